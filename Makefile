@@ -1,0 +1,54 @@
+# Everything runs in .venv, made on first use with nothing but python3 (3.11 or newer) and make.
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/.ready
+
+.PHONY: demo test lint format bench reproduce torch lock clean
+.DEFAULT_GOAL := demo
+
+$(READY): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lumigraph needs Python 3.11 or newer, this is " + sys.version.split()[0])'
+	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	@echo "Installing lumigraph into .venv (once; a minute or two) ..."
+	@if command -v uv >/dev/null 2>&1; then \
+		uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock && \
+		uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e . ; \
+	else \
+		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock && \
+		$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e . ; \
+	fi
+	@touch $(READY)
+
+.venv: $(READY)
+
+demo: $(READY)  ## design, simulate, calibrate, decode, refocus: demo/report.html
+	$(BIN)/lumigraph demo
+
+test: $(READY)  ## the whole test suite and the doctests
+	$(BIN)/python -m pytest -n auto -m "not long"
+
+lint: $(READY)  ## format, rules, types, import floors
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+format: $(READY)
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: $(READY)  ## speed against plain SciPy, ratios within one run
+	$(BIN)/python -m benchmarks
+
+reproduce: $(READY)  ## the long experiments
+	$(BIN)/python -m pytest -m long tests
+
+torch: $(READY)  ## optional: PyTorch, so that the array tests run on it too
+	@$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/python -m pip install --quiet --disable-pip-version-check "torch==2.13.0"
+
+lock: $(READY)  ## compile requirements.lock again (needs uv)
+	uv pip compile --universal --python-version 3.11 --generate-hashes --extra dev --no-emit-index-url --no-emit-find-links \
+		--custom-compile-command "make lock" -o requirements.lock pyproject.toml
+
+clean:
+	rm -rf .venv demo build dist

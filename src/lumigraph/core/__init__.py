@@ -1,0 +1,11 @@
+"""The nouns that everything else shares; verbs are functions on higher floors.
+
+- `grid`: `Grid`, where samples stand
+- `lattice`: `Lattice`, where lenslets stand, in a simulation [m] or on a white image [px]
+- `field`: `Field`, a complex scalar wave on a grid
+- `raw`: `RawImage`, what a sensor read out
+- `calibration`: `Calibration`, the micro-images found on a white image
+- `lightfield`: `LightField`, decoded radiance (v, u, t, s)
+- `arrays`: the only file that knows array libraries
+- `checks`: one-line refusals of bad numbers
+"""

@@ -1,0 +1,119 @@
+"""Array libraries: the only file that knows more than NumPy.
+
+Array type in = array type out: NumPy, PyTorch (CPU or CUDA), CuPy and anything else that follows the
+array API standard, through array-api-compat. Geometry (coordinates, frequencies, phases) is always
+computed by NumPy in float64 and cast last, by `like`.
+"""
+
+import os
+from typing import Any
+
+import numpy as np
+import scipy.fft
+from array_api_compat import array_namespace, device, is_numpy_array, is_torch_array
+
+Array = Any
+"""An array of any library that follows the array API standard."""
+
+WORKERS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+"""Threads that one FFT may use: the processors this process may run on."""
+
+_SINGLE = ("float32", "complex64", "float16")
+
+
+def namespace(*arrays: Array) -> Any:
+    """Array API namespace that the arrays share."""
+    return array_namespace(*arrays)
+
+
+def to_numpy(array: Array) -> np.ndarray:
+    """The array on the CPU as NumPy; shares memory where it can."""
+    if is_numpy_array(array):
+        return array
+    if is_torch_array(array):
+        return array.detach().cpu().resolve_conj().resolve_neg().numpy()
+    if hasattr(array, "get"):  # CuPy
+        return array.get()
+    return np.asarray(array)
+
+
+def is_numpy(array: Array) -> bool:
+    """Whether the array is a NumPy array."""
+    return is_numpy_array(array)
+
+
+def is_single(array: Array) -> bool:
+    """Whether the array holds single precision: float32 or complex64."""
+    return str(array.dtype).rsplit(".", 1)[-1] in _SINGLE
+
+
+def is_complex(array: Array) -> bool:
+    """Whether the array holds complex numbers."""
+    return bool(namespace(array).isdtype(array.dtype, "complex floating"))
+
+
+def placement(array: Array) -> tuple[str, str, str]:
+    """Hashable (library, dtype, device) of an array: the part of a cache key that depends on it."""
+    return namespace(array).__name__, str(array.dtype), str(device(array))
+
+
+def like(values: np.ndarray, array: Array) -> Array:
+    """`values`, computed by NumPy in double precision, as `array`'s library, device and precision.
+
+    Real values become float32 or float64, complex ones complex64 or complex128, after the precision
+    of `array`; whether `array` itself is real or complex does not matter.
+    """
+    single = is_single(array)
+    if np.iscomplexobj(values):
+        values = values.astype(np.complex64 if single else np.complex128, copy=False)
+    else:
+        values = values.astype(np.float32 if single else np.float64, copy=False)
+    if is_numpy_array(array):
+        return values
+    return namespace(array).asarray(np.ascontiguousarray(values), device=device(array))
+
+
+def as_complex(array: Array) -> Array:
+    """The array as complex numbers of its own precision; a complex array is returned as it is."""
+    if is_complex(array):
+        return array
+    xp = namespace(array)
+    return xp.astype(array, xp.complex64 if is_single(array) else xp.complex128)
+
+
+def intensity(array: Array) -> Array:
+    """Squared modulus, real, of the array's own precision."""
+    if is_numpy_array(array):
+        result = np.square(array.real)
+        result += np.square(array.imag)
+        return result
+    xp = namespace(array)
+    return xp.real(array) ** 2 + xp.imag(array) ** 2
+
+
+def fft(array: Array, n: int | None = None, axis: int = -1, *, overwrite: bool = False) -> Array:
+    """1-D DFT along one axis, zero-padded or cropped to `n`; `overwrite` allows reuse of the input's memory."""
+    if is_numpy_array(array):
+        return scipy.fft.fft(array, n, axis=axis, overwrite_x=overwrite, workers=WORKERS)
+    return namespace(array).fft.fft(array, n=n, axis=axis)
+
+
+def ifft(array: Array, n: int | None = None, axis: int = -1, *, overwrite: bool = False) -> Array:
+    """1-D inverse DFT along one axis; see `fft`."""
+    if is_numpy_array(array):
+        return scipy.fft.ifft(array, n, axis=axis, overwrite_x=overwrite, workers=WORKERS)
+    return namespace(array).fft.ifft(array, n=n, axis=axis)
+
+
+def fft2(array: Array, *, overwrite: bool = False) -> Array:
+    """2-D DFT of the last two axes."""
+    if is_numpy_array(array):
+        return scipy.fft.fft2(array, overwrite_x=overwrite, workers=WORKERS)
+    return namespace(array).fft.fftn(array, axes=(-2, -1))
+
+
+def ifft2(array: Array, *, overwrite: bool = False) -> Array:
+    """2-D inverse DFT of the last two axes."""
+    if is_numpy_array(array):
+        return scipy.fft.ifft2(array, overwrite_x=overwrite, workers=WORKERS)
+    return namespace(array).fft.ifftn(array, axes=(-2, -1))

@@ -1,0 +1,63 @@
+"""A complex scalar wave on a plane."""
+
+from dataclasses import dataclass, replace
+
+from lumigraph.core import checks
+from lumigraph.core.arrays import Array, as_complex, intensity, namespace
+from lumigraph.core.grid import Grid
+from lumigraph.errors import GeometryError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Field:
+    """Complex amplitude on a grid, with the time factor exp(-i2πνt): a forward wave is exp(+ikz).
+
+    Parameters
+    ----------
+    data
+        Amplitude (..., y, x); leading axes are a batch. Real input becomes complex of its precision.
+    grid
+        Where the samples stand.
+    wavelength
+        In vacuum [m].
+
+    Raises
+    ------
+    GeometryError
+        The data's last two axes differ from the grid's shape, or the wavelength is not above zero.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> wave = Field(np.ones((4, 6), np.complex64), Grid((4, 6), 2.0), 633e-9)
+    >>> float((wave * 0.5).power)
+    24.0
+    """
+
+    data: Array
+    grid: Grid
+    wavelength: float
+
+    def __post_init__(self) -> None:
+        checks.positive("wavelength", self.wavelength)
+        if tuple(self.data.shape[-2:]) != self.grid.shape:
+            raise GeometryError(
+                f"data has shape {tuple(self.data.shape)} but the grid has {self.grid.shape}: "
+                "the last two axes must be (y, x) of the grid."
+            )
+        object.__setattr__(self, "data", as_complex(self.data))
+
+    @property
+    def intensity(self) -> Array:
+        """Squared modulus (..., y, x)."""
+        return intensity(self.data)
+
+    @property
+    def power(self) -> Array:
+        """Intensity integrated over the window (...), [amplitude² m²]."""
+        dy, dx = self.grid.pitch
+        return namespace(self.data).sum(self.intensity, axis=(-2, -1)) * (dy * dx)
+
+    def __mul__(self, transmission: Array) -> "Field":
+        """Multiply the field by a transmission: a number or an array that broadcasts against (y, x)."""
+        return replace(self, data=self.data * transmission)

@@ -1,0 +1,74 @@
+"""Decoded radiance: one picture for each place on the main lens."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from lumigraph.core import checks
+from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.grid import Grid
+from lumigraph.errors import GeometryError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LightField:
+    """Radiance L(v, u, t, s): (v, u) on the main-lens aperture, (t, s) on the lenslets.
+
+    Both pairs are coordinates of one frame, so that an object whose image lies at F' = F / α' obeys
+    x = α'x' + u(1 - α'): its slope dx/du is 1 - α'.
+
+    Parameters
+    ----------
+    data
+        Radiance (v, u, t, s) or (v, u, t, s, c).
+    aperture
+        Where the views stand on the main lens [m].
+    lenslets
+        Where the lenslets stand [m].
+    separation
+        Main lens to lenslets, F [m].
+
+    Raises
+    ------
+    GeometryError
+        The data's shape differs from the two grids', or the separation is not above zero.
+    """
+
+    data: Array
+    aperture: Grid
+    lenslets: Grid
+    separation: float
+
+    def __post_init__(self) -> None:
+        checks.positive("separation", self.separation)
+        shape = tuple(self.data.shape)
+        if len(shape) not in (4, 5) or shape[:4] != self.aperture.shape + self.lenslets.shape:
+            raise GeometryError(
+                f"data has shape {shape} but must be (v, u, t, s[, c]) with (v, u) = {self.aperture.shape} "
+                f"of the aperture and (t, s) = {self.lenslets.shape} of the lenslets."
+            )
+
+    def view(self, v: int, u: int) -> Array:
+        """Picture (t, s[, c]) seen from one place on the main lens; indices as in NumPy."""
+        return self.data[v, u]
+
+    def micro_image(self, t: int, s: int) -> Array:
+        """Directions (v, u[, c]) that meet in one lenslet."""
+        return self.data[:, :, t, s]
+
+    def epi(self, v: int, t: int) -> Array:
+        """Epipolar-plane image (u, s[, c]): one row of lenslets seen from one row of the aperture."""
+        return self.data[v, :, t]
+
+    def to_xarray(self) -> Any:
+        """The radiance as an `xarray.DataArray` with named axes and coordinates in metres."""
+        import xarray
+
+        names = ("v", "u", "t", "s", "c")[: self.data.ndim]
+        coordinates = {"v": self.aperture.y, "u": self.aperture.x, "t": self.lenslets.y, "s": self.lenslets.x}
+        array = xarray.DataArray(
+            to_numpy(self.data), dims=names, coords=coordinates, name="radiance",
+            attrs={"separation": self.separation},
+        )  # fmt: skip
+        for name in coordinates:
+            array[name].attrs["units"] = "m"
+        return array

@@ -1,0 +1,57 @@
+"""What a sensor read out."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from lumigraph.core import checks
+from lumigraph.core.arrays import Array
+from lumigraph.errors import FormatError, GeometryError
+
+BAYER_PATTERNS = ("RGGB", "GRBG", "GBRG", "BGGR")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RawImage:
+    """A sensor's picture, in which position and direction are still interleaved.
+
+    A simulated raw image is turned by 180° as every camera's is, so that pictures stand upright.
+
+    Parameters
+    ----------
+    data
+        Pixel values (y, x) or (y, x, c).
+    pixel_pitch
+        Distance between pixels [m]; None where the file does not say.
+    bit_depth
+        Significant bits of integer data; None for floats.
+    bayer
+        Colours of the first 2 × 2 pixels: "RGGB", "GRBG", "GBRG" or "BGGR"; None for grey or full colour.
+    metadata
+        Whatever else is known, by name.
+
+    Raises
+    ------
+    GeometryError
+        The data is not (y, x) or (y, x, c), or is empty.
+    """
+
+    data: Array
+    pixel_pitch: float | None = None
+    bit_depth: int | None = None
+    bayer: str | None = None
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        shape = tuple(self.data.shape)
+        if len(shape) not in (2, 3) or min(shape) < 1:
+            raise GeometryError(f"a raw image has shape (y, x) or (y, x, c), not {shape}.")
+        if self.pixel_pitch is not None:
+            checks.positive("pixel_pitch", self.pixel_pitch)
+        if self.bayer is not None and self.bayer not in BAYER_PATTERNS:
+            raise FormatError(f"bayer is {self.bayer!r} but must be one of {', '.join(BAYER_PATTERNS)}.")
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns (ny, nx)."""
+        return int(self.data.shape[0]), int(self.data.shape[1])
