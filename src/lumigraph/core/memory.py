@@ -1,0 +1,30 @@
+"""Refusing work that cannot fit in memory, before it is allocated."""
+
+import os
+
+from lumigraph.errors import LumigraphError
+
+
+def available() -> int | None:
+    """Memory that can be allocated now [bytes]; None where the system does not say."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as lines:  # noqa: PTH123 - not a file of the user's
+            for line in lines:
+                if line.startswith("MemAvailable:"):
+                    return int(line.split()[1]) * 1024
+        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, AttributeError, IndexError):
+        return None
+
+
+def require(needed: float, what: str, remedy: str, error: type[LumigraphError] = LumigraphError) -> None:
+    """Refuse `what` when it needs more memory [bytes] than there is.
+
+    Raises
+    ------
+    LumigraphError
+        Or the given child: what needs how much, how much there is, and the remedy.
+    """
+    free = available()
+    if free is not None and needed > free:
+        raise error(f"{what} needs {needed / 2**30:.3g} GiB but {free / 2**30:.3g} GiB are free. {remedy}")

@@ -1,0 +1,280 @@
+"""A raw image from a camera and a scene: fields through the camera's train, intensities onto pixels."""
+
+import math
+from builtins import map as serial_map
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from lumigraph.core import arrays, memory
+from lumigraph.core.field import Field
+from lumigraph.core.grid import Grid
+from lumigraph.core.lattice import Lattice
+from lumigraph.core.raw import RawImage
+from lumigraph.elements import CircularAperture, Train
+from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.propagation import propagate
+from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
+from lumigraph.sensor import Sensor, integrate
+from lumigraph.simulation.coherence import Coherence, Incoherent, Snapshots
+
+Progress = Callable[[int, int], None]
+
+
+class Camera(Protocol):
+    """What `simulate` asks of an instrument."""
+
+    wavelength: float
+    """In vacuum [m]."""
+    object_distance: float
+    """Focused plane to main lens, z1 [m]."""
+
+    @property
+    def separation(self) -> float:
+        """Main lens to lenslets, or to the sensor where there are none [m]."""
+        ...
+
+    @property
+    def pupil_diameter(self) -> float:
+        """Of the main lens [m]."""
+        ...
+
+    @property
+    def lattice(self) -> Lattice | None:
+        """Where the lenslets stand [m]."""
+        ...
+
+    @property
+    def object_grid(self) -> Grid:
+        """Samples of the focused plane."""
+        ...
+
+    @property
+    def pupil_grid(self) -> Grid:
+        """Samples of the main lens."""
+        ...
+
+    @property
+    def lenslet_grid(self) -> Grid | None:
+        """Samples of the lenslet plane."""
+        ...
+
+    @property
+    def image_grid(self) -> Grid:
+        """Samples of the sensor plane."""
+        ...
+
+    @property
+    def sensor(self) -> Sensor:
+        """Pixels."""
+        ...
+
+    def image_train(self) -> Train:
+        """From the field just before the main lens to the sensor."""
+        ...
+
+    def relay_train(self) -> Train | None:
+        """From the field just before the lenslets to the sensor."""
+        ...
+
+
+class Interrupted(KeyboardInterrupt):
+    """`simulate` was interrupted; `partial` is the raw image of the shots that were finished."""
+
+    def __init__(self, partial: RawImage) -> None:
+        super().__init__(f"interrupted after {partial.metadata['shots']} shots")
+        self.partial = partial
+
+
+@dataclass(frozen=True, slots=True)
+class _Shot:
+    """One field on its way: where it enters the camera, and the weight of its intensity."""
+
+    field: Field
+    train: Train
+    weight: float
+
+    def intensity(self) -> np.ndarray:
+        return self.weight * self.train(self.field).intensity
+
+
+def simulate(
+    camera: Camera,
+    scene: Scene,
+    coherence: Coherence | Incoherent | None = None,
+    *,
+    progress: Progress | None = None,
+    map: Callable[..., Iterable[Any]] = serial_map,  # noqa: A002 - what it is
+) -> RawImage:
+    """Raw image (ny, nx) of a scene, float32, turned by 180° so that pictures stand upright.
+
+    Light goes from each plane of the scene to the main lens, through the camera's train to the sensor,
+    where its intensity is integrated over the pixels. Depths add up: planes do not hide one another. An
+    evenly lit, wide scene of intensity 1 gives a mean of about 1; a point of intensity 1 counts as one
+    sample of ``camera.object_grid``.
+
+    Parameters
+    ----------
+    camera
+        Any instrument.
+    scene
+        Slices, points and diffusers; see `lumigraph.targets`.
+    coherence
+        `Incoherent` (default), `Coherent`, `Snapshots` or `TiltedWaves`.
+    progress
+        Called as ``progress(done, total)`` after each propagation.
+    map
+        Runs the propagations, such as a pool's ``imap``; results are added in order, so that every map
+        gives the same raw image.
+
+    Raises
+    ------
+    GeometryError
+        An empty scene, or one that reaches behind the main lens.
+    SamplingError
+        The propagation does not fit in memory.
+    Interrupted
+        A KeyboardInterrupt; it carries the raw image of what was finished.
+    """
+    if coherence is None:
+        coherence = Incoherent()
+    if isinstance(coherence, Incoherent):
+        coherence = Snapshots(coherence.snapshots, rng=coherence.rng)
+    _check(camera, scene)
+    shots, total = _shots(camera, scene, coherence)
+    intensity = np.zeros(camera.image_grid.shape)
+    done = 0
+    try:
+        for image in map(_Shot.intensity, shots):
+            intensity += image
+            done += 1
+            if progress is not None:
+                progress(done, total)
+    except KeyboardInterrupt:
+        if not done:
+            raise
+        raise Interrupted(_read_out(camera, intensity, coherence, done)) from None
+    return _read_out(camera, intensity, coherence, total)
+
+
+def _read_out(camera: Camera, intensity: np.ndarray, coherence: Coherence, shots: int) -> RawImage:
+    pixels = integrate(intensity, camera.image_grid, camera.sensor)
+    # A hard edge rings below zero when it is interpolated to pixels; a sensor counts no negative light.
+    data = np.maximum(pixels, 0).astype(np.float32)
+    known = {"simulated": repr(coherence), "shots": shots, "wavelength": camera.wavelength}
+    return RawImage(data, pixel_pitch=camera.sensor.pixel_pitch, metadata=known)
+
+
+def _check(camera: Camera, scene: Scene) -> None:
+    """Refuse scenes that are empty or behind the lens, and propagations that do not fit in memory."""
+    if not scene.parts:
+        raise GeometryError("the scene is empty. Add targets, points or a diffuser.")
+    for part in scene.parts:
+        if isinstance(part, Slice) and part.intensity.ndim != 2:
+            raise GeometryError(
+                f"a slice has shape {part.intensity.shape} but one wavelength needs grey (y, x). "
+                "Simulate one channel at a time."
+            )
+        depths = part.positions[:, 2] if isinstance(part, Points) else np.array([getattr(part, "dz", 0.0)])
+        if (nearest := camera.object_distance + float(depths.min())) <= 0:
+            raise GeometryError(
+                f"the scene reaches {nearest * 1e3:.4g} mm in front of the main lens: depth "
+                f"{depths.min() * 1e3:.4g} mm at an object distance of {camera.object_distance * 1e3:.4g} mm. "
+                "Use depths that stay in front of the camera."
+            )
+    samples = max(math.prod(grid.shape) for grid in (camera.image_grid, camera.object_grid))
+    pixels = math.prod(camera.sensor.shape)
+    memory.require(
+        8 * (12 * samples + 2 * pixels), "the simulation", "Use fewer lenslets or larger pixels.", SamplingError
+    )
+
+
+def _shots(camera: Camera, scene: Scene, coherence: Coherence) -> tuple[Iterator[_Shot], int]:
+    """Every field to send through the camera, made when it is its turn, and their number."""
+    points = [part for part in scene.parts if isinstance(part, Points)]
+    slices = [part.trimmed() for part in scene.parts if isinstance(part, Slice)]
+    diffusers = [part for part in scene.parts if isinstance(part, Diffuser)]
+    directions = _pupil_points(camera) if diffusers else np.empty((0, 3))
+    brightness = sum(part.intensity for part in diffusers)
+    planes = min(len(slices), 1) if coherence.planes_independent else len(slices)
+    total = sum(len(part.positions) for part in points) + len(directions) + planes * coherence.shots
+
+    def one_after_the_other() -> Iterator[_Shot]:
+        yield from _diffuser_shots(camera, directions, brightness)
+        for part in points:
+            yield from _point_shots(camera, part)
+        if slices:
+            yield from _slice_shots(camera, slices, coherence)
+
+    return one_after_the_other(), total
+
+
+def _pupil_area(camera: Camera) -> float:
+    return math.pi * camera.pupil_diameter**2 / 4
+
+
+def _point_shots(camera: Camera, points: Points) -> Iterator[_Shot]:
+    """Spherical waves at the main lens. Points never interfere with each other."""
+    train, grid = camera.image_train(), camera.pupil_grid
+    sample_area = math.prod(camera.object_grid.pitch)
+    weight = sample_area * camera.separation**2 / _pupil_area(camera)
+    for (y, x, dz), intensity in zip(points.positions, points.intensities, strict=True):
+        wave = sources.point_source(grid, camera.wavelength, camera.object_distance + dz, position=(y, x))
+        yield _Shot(_single(wave), train, weight * float(intensity))
+
+
+def _slice_shots(camera: Camera, slices: list[Slice], coherence: Coherence) -> Iterator[_Shot]:
+    """What independent planes send goes together in one propagation: its interference averages out."""
+    train, grid = camera.image_train(), camera.pupil_grid
+    grids = [part.grid for part in slices]
+    distances = [camera.object_distance + part.dz for part in slices]
+    amplitudes = [np.sqrt(arrays.to_numpy(part.intensity)).astype(np.float32) for part in slices]
+    # Each slice's own scale goes into its amplitude: its samples may differ in area.
+    for i, part in enumerate(slices):
+        area = math.prod(part.grid.pitch)
+        scale = coherence.scale(area, camera.wavelength, _pupil_area(camera), distances[i])
+        amplitudes[i] = amplitudes[i] * np.float32(math.sqrt(scale) * camera.separation / distances[i])
+    for planes in coherence.illuminations(grids, camera.wavelength, distances):
+        arriving = []
+        for amplitude, light, plane, distance in zip(amplitudes, planes, grids, distances, strict=True):
+            field = Field(amplitude * light, plane, camera.wavelength)
+            arriving.append(propagate(field, distance, "fresnel", grid=grid))
+        if coherence.planes_independent:
+            yield _Shot(Field(sum(field.data for field in arriving), grid, camera.wavelength), train, 1.0)
+        else:
+            yield from (_Shot(field, train, 1.0) for field in arriving)
+
+
+def _diffuser_shots(camera: Camera, directions: np.ndarray, brightness: float) -> Iterator[_Shot]:
+    """Spherical waves from points of the main lens, exact without speckle: see `_pupil_points`."""
+    train, grid = camera.relay_train(), camera.lenslet_grid
+    if train is None or grid is None:
+        train, grid = Train(()), camera.image_grid
+    for y, x, weight in directions:
+        wave = sources.point_source(grid, camera.wavelength, camera.separation, position=(y, x))
+        yield _Shot(_single(wave * camera.separation), train, weight * brightness)
+
+
+def _pupil_points(camera: Camera) -> np.ndarray:
+    """Rows (y, x, weight): points of the main lens that stand for an evenly lit diffuser before it.
+
+    Behind a diffuser the light in the pupil is incoherent, and a lenslet of pitch p resolves λL/p of the
+    pupil: points at half that distance, weighted by the pupil's area around each, are its exact image.
+    """
+    if camera.lattice is None:
+        return np.array([[0.0, 0.0, 1.0]])
+    finest = camera.wavelength * camera.separation / (2.2 * max(camera.lattice.pitches))
+    n = 2 * math.ceil(camera.pupil_diameter / 2 / finest) + 3
+    grid = Grid.square(n, camera.pupil_diameter / (n - 2))
+    area = CircularAperture(camera.pupil_diameter)
+    weights = area(Field(np.ones(grid.shape, np.complex128), grid, camera.wavelength)).data.real
+    rows, columns = np.nonzero(weights)
+    picked = weights[rows, columns]
+    return np.stack([grid.y[rows], grid.x[columns], picked / picked.sum()], axis=1)
+
+
+def _single(field: Field) -> Field:
+    """Single precision: the phases were computed in double."""
+    return Field(field.data.astype(np.complex64), field.grid, field.wavelength)
