@@ -8,4 +8,6 @@
 - `lightfield`: `LightField`, decoded radiance (v, u, t, s)
 - `arrays`: the only file that knows array libraries
 - `checks`: one-line refusals of bad numbers
+- `cache`: arrays kept within a bound of memory
+- `coverage`: fractions of samples that shapes cover
 """
