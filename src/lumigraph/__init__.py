@@ -1,3 +1,179 @@
-"""Light-field cameras and microscopes: design them, simulate their raw images, process raw images."""
+"""Light-field cameras and microscopes: design them, simulate their raw images, process raw images.
+
+The everyday names, listed one by one; each is imported when it is first used, so that ``import lumigraph``
+stays quick. Nothing inside the package imports this module.
+
+>>> import lumigraph as lg
+>>> camera = lg.FocusedPlenopticCamera.from_catalogue("thesis-plenoptic-2-m050")
+>>> round(camera.lenslet_distance * 1e3, 3)
+7.8
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from lumigraph import design, plots, units
+    from lumigraph.calibration import calibrate, devignette
+    from lumigraph.core.calibration import Calibration
+    from lumigraph.core.field import Field
+    from lumigraph.core.grid import Grid
+    from lumigraph.core.lattice import Lattice
+    from lumigraph.core.lightfield import LightField
+    from lumigraph.core.raw import RawImage
+    from lumigraph.elements import (
+        CircularAperture,
+        LensletArray,
+        RectangularAperture,
+        ThinLens,
+        Train,
+        ZernikePlate,
+    )
+    from lumigraph.errors import (
+        CalibrationError,
+        FormatError,
+        GeometryError,
+        LumigraphError,
+        SamplingError,
+        SamplingWarning,
+    )
+    from lumigraph.instruments import (
+        FocusedPlenopticCamera,
+        PlenopticCamera,
+        SingleLensCamera,
+        catalogue,
+        load_camera,
+    )
+    from lumigraph.io import open, save  # noqa: A004
+    from lumigraph.propagation import METHODS, Propagate, choose_method, propagate
+    from lumigraph.rendering import (
+        decode,
+        encode,
+        reduce_aperture,
+        refocus,
+        refocus_fourier,
+        refocus_stack,
+        render,
+        view,
+    )
+    from lumigraph.scene import Scene, targets
+    from lumigraph.sensor import Sensor
+    from lumigraph.simulation import Coherent, Incoherent, Snapshots, TiltedWaves, simulate
+
+_HOMES = {
+    "lumigraph": ("design", "plots", "units"),
+    "lumigraph.calibration": ("calibrate", "devignette"),
+    "lumigraph.core.calibration": ("Calibration",),
+    "lumigraph.core.field": ("Field",),
+    "lumigraph.core.grid": ("Grid",),
+    "lumigraph.core.lattice": ("Lattice",),
+    "lumigraph.core.lightfield": ("LightField",),
+    "lumigraph.core.raw": ("RawImage",),
+    "lumigraph.elements": (
+        "CircularAperture",
+        "LensletArray",
+        "RectangularAperture",
+        "ThinLens",
+        "Train",
+        "ZernikePlate",
+    ),
+    "lumigraph.errors": (
+        "CalibrationError",
+        "FormatError",
+        "GeometryError",
+        "LumigraphError",
+        "SamplingError",
+        "SamplingWarning",
+    ),
+    "lumigraph.instruments": (
+        "FocusedPlenopticCamera",
+        "PlenopticCamera",
+        "SingleLensCamera",
+        "catalogue",
+        "load_camera",
+    ),
+    "lumigraph.io": ("open", "save"),
+    "lumigraph.propagation": ("METHODS", "Propagate", "choose_method", "propagate"),
+    "lumigraph.rendering": (
+        "decode",
+        "encode",
+        "reduce_aperture",
+        "refocus",
+        "refocus_fourier",
+        "refocus_stack",
+        "render",
+        "view",
+    ),
+    "lumigraph.scene": ("Scene", "targets"),
+    "lumigraph.sensor": ("Sensor",),
+    "lumigraph.simulation": ("Coherent", "Incoherent", "Snapshots", "TiltedWaves", "simulate"),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "METHODS",
+    "Calibration",
+    "CalibrationError",
+    "CircularAperture",
+    "Coherent",
+    "Field",
+    "FocusedPlenopticCamera",
+    "FormatError",
+    "GeometryError",
+    "Grid",
+    "Incoherent",
+    "Lattice",
+    "LensletArray",
+    "LightField",
+    "LumigraphError",
+    "PlenopticCamera",
+    "Propagate",
+    "RawImage",
+    "RectangularAperture",
+    "SamplingError",
+    "SamplingWarning",
+    "Scene",
+    "Sensor",
+    "SingleLensCamera",
+    "Snapshots",
+    "ThinLens",
+    "TiltedWaves",
+    "Train",
+    "ZernikePlate",
+    "calibrate",
+    "catalogue",
+    "choose_method",
+    "decode",
+    "design",
+    "devignette",
+    "encode",
+    "load_camera",
+    "open",
+    "plots",
+    "propagate",
+    "reduce_aperture",
+    "refocus",
+    "refocus_fourier",
+    "refocus_stack",
+    "render",
+    "save",
+    "simulate",
+    "targets",
+    "units",
+    "view",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'lumigraph' has no attribute {name!r}")
+    home = _HOME[name]
+    value = import_module(f"{home}.{name}") if home == "lumigraph" else getattr(import_module(home), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]
