@@ -1,0 +1,12 @@
+"""From a white image to the places of its micro-images.
+
+- `lattice_fit`: `calibrate`, the whole path: period, spots, robust fit, `Calibration`
+- `period`: the lattice vectors, by autocorrelation, before any spot is known
+- `centres`: sub-pixel centre of every micro-image
+- `devignette`: divide a raw image by its white image; grey versions of colour images
+"""
+
+from lumigraph.calibration.devignette import devignette
+from lumigraph.calibration.lattice_fit import calibrate
+
+__all__ = ["calibrate", "devignette"]
