@@ -34,6 +34,7 @@ def half_plane(distance: np.ndarray, normal: tuple[float, float], pitch: tuple[f
         return np.clip(distance / long + 0.5, 0.0, 1.0)
     # The sample's shadow on the normal is two boxes convolved; this is the integral of that trapezoid.
     outer, inner = (long + short) / 2, (long - short) / 2
+    distance = np.clip(distance, -outer, outer)
     ramps = [np.square(np.maximum(distance + step, 0.0)) for step in (outer, inner, -inner, -outer)]
     return np.clip((ramps[0] - ramps[1] - ramps[2] + ramps[3]) / (2 * long * short), 0.0, 1.0)
 

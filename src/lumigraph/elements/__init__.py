@@ -1,0 +1,31 @@
+"""What light passes between planes: every element is a function from `Field` to `Field`.
+
+- `train`: `Element`, the protocol, and `Train`, elements one after the other
+- `transmission`: what thin elements share: a cached factor for each sample
+- `apertures`: `CircularAperture`, `RectangularAperture`
+- `lens`: `ThinLens`
+- `lenslets`: `LensletArray`, square or hexagonal, of one or three focal lengths
+- `zernike`: Zernike polynomials in Noll's order and `ZernikePlate`
+- `masks`: white random phases and the thesis' random phase mask
+"""
+
+from lumigraph.elements.apertures import CircularAperture, RectangularAperture
+from lumigraph.elements.lens import ThinLens
+from lumigraph.elements.lenslets import LensletArray
+from lumigraph.elements.masks import random_phase_mask, white_phase
+from lumigraph.elements.train import Element, Train
+from lumigraph.elements.zernike import ZernikePlate, noll_to_nm, zernike
+
+__all__ = [
+    "CircularAperture",
+    "Element",
+    "LensletArray",
+    "RectangularAperture",
+    "ThinLens",
+    "Train",
+    "ZernikePlate",
+    "noll_to_nm",
+    "random_phase_mask",
+    "white_phase",
+    "zernike",
+]

@@ -1,0 +1,227 @@
+"""Lenslet arrays on any lattice."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from lumigraph.core import checks, coverage
+from lumigraph.core.field import Field
+from lumigraph.core.grid import Grid
+from lumigraph.core.lattice import Lattice, Vector
+from lumigraph.elements.lens import lens_phase
+from lumigraph.elements.transmission import Edge, check_edge, transmit, warn_if_coarse
+from lumigraph.errors import GeometryError
+
+Shape = Literal["square", "hex", "round"]
+
+_BLOCK = 2**20
+"""Samples worked on at a time: what lies between a lattice and its transmission is ten times larger."""
+
+
+@dataclass(frozen=True, slots=True)
+class LensletArray:
+    r"""Thin lenslets at the points of a lattice, opaque between them.
+
+    Each sample belongs to the nearest lattice point, at distance ρ, whose lenslet gives it the phase
+
+    .. math:: t = \exp(-i \pi \rho^2 / (\lambda f_\mu))
+
+    It is sampled well where dx ≤ λ f / size, otherwise a `SamplingWarning` gives the numbers.
+
+    Parameters
+    ----------
+    lattice
+        Where the lenslets stand [m].
+    focal_length
+        [m], one number, or three for a lattice of three kinds.
+    shape
+        "square" or "hex": the lattice's own cell, so that lenslets abut; "round". None takes the cell.
+    fill_factor
+        Size of a lenslet over the pitch, along a line: 1 leaves no gap (between round lenslets, the corners).
+    extent
+        (height, width) [m], turned with the lattice about the axis: lenslets whose centres lie outside it are
+        missing, and opaque. None for an array as large as the field.
+    edge
+        "grey" (area fractions; exact along straight edges and circles) or "hard".
+
+    Raises
+    ------
+    GeometryError
+        A focal length of zero or of the wrong count, a cell of the other layout, a fill factor outside
+        0 to 1, or an extent that is not above zero.
+
+    Examples
+    --------
+    >>> array = LensletArray(Lattice.square(150e-6), 5.2e-3, fill_factor=0.5)
+    >>> grid = Grid.square(150, 5e-6)
+    >>> round(float(np.mean(np.abs(array.transmission(grid, 633e-9)))), 6)
+    0.25
+    """
+
+    lattice: Lattice
+    focal_length: float | tuple[float, ...]
+    shape: Shape | None = field(default=None, kw_only=True)
+    fill_factor: float = field(default=1.0, kw_only=True)
+    extent: tuple[float, float] | None = field(default=None, kw_only=True)
+    edge: Edge = field(default="grey", kw_only=True)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "focal_length", _focal_lengths(self.focal_length, self.lattice.kinds))
+        shape = self.lattice.layout if self.shape is None else self.shape
+        if shape not in (self.lattice.layout, "round"):
+            raise GeometryError(
+                f"shape is {shape!r} but lenslets on a {self.lattice.layout!r} lattice are "
+                f"{self.lattice.layout!r} (its cell) or 'round'."
+            )
+        object.__setattr__(self, "shape", shape)
+        if checks.positive("fill_factor", self.fill_factor, "1") > 1:
+            raise GeometryError(f"fill_factor is {self.fill_factor:g} but lenslets overlap above 1.")
+        if self.extent is not None:
+            extent = checks.pair("extent", self.extent)
+            for name, value in zip(("height", "width"), extent, strict=True):
+                checks.positive(f"extent ({name})", value)
+            object.__setattr__(self, "extent", extent)
+        check_edge(self.edge)
+
+    def __call__(self, field: Field) -> Field:
+        """The field just behind the lenslets."""
+        focal_length, size = min(map(abs, self._focal)), self.fill_factor * self.lattice.pitch
+        warn_if_coarse("a lenslet", field.grid, field.wavelength, focal_length, (size / 2, size / 2))
+        return transmit(self, field)
+
+    def transmission(self, grid: Grid, wavelength: float) -> np.ndarray:
+        """Complex factor (ny, nx) of each sample."""
+        if self._along_axes:
+            return np.outer(*(self._along(grid, wavelength, axis) for axis in (0, 1)))
+        result = np.empty(grid.shape, np.complex128)
+        rows = max(1, _BLOCK // grid.shape[1])
+        for first in range(0, grid.shape[0], rows):
+            y = grid.y[first : first + rows, None]
+            i, j = self.lattice.index(y, grid.x)
+            center_y, center_x = self._position(i, j)
+            dy, dx = y - center_y, grid.x - center_x
+            focal_length = np.asarray(self._focal)[self.lattice.kind(i, j) % len(self._focal)]
+            block = np.exp(-1j * np.pi * (dy**2 + dx**2) / (wavelength * focal_length))
+            result[first : first + rows] = block * self._opening(i, j, dy, dx, grid.pitch)
+        return result
+
+    @property
+    def _focal(self) -> tuple[float, ...]:
+        return self.focal_length if isinstance(self.focal_length, tuple) else (self.focal_length,)
+
+    @property
+    def _along_axes(self) -> bool:
+        """Whether the transmission is a product of one factor along y and one along x."""
+        straight = self.lattice.basis[0][0] == 0 == self.lattice.basis[1][1]
+        return straight and self.shape == "square" and len(self._focal) == 1
+
+    @property
+    def _open_everywhere(self) -> bool:
+        return self.extent is None and self._abutting
+
+    @property
+    def _abutting(self) -> bool:
+        return self.fill_factor == 1 and self.shape != "round"
+
+    def _along(self, grid: Grid, wavelength: float, axis: int) -> np.ndarray:
+        """Factor along one axis of a square lattice that is not turned."""
+        coordinates, origin = (grid.y, grid.x)[axis], self.lattice.origin[axis]
+        step = abs(self.lattice.basis[1 - axis][axis])
+        index = np.floor((coordinates - origin) / step + 0.5)
+        offset = coordinates - origin - index * step
+        phase = lens_phase(offset, self._focal[0], wavelength)
+        if self._open_everywhere:
+            return phase
+        half, opening = self.fill_factor * step / 2, np.zeros(len(coordinates))
+        for k in (-1, 0, 1):
+            inside = offset - k * step
+            if self.edge == "grey":
+                part = coverage.interval(inside, grid.pitch[axis], -half, half)
+            else:
+                part = np.where((np.abs(inside) <= half * (1 + 1e-12)) & (k == 0), 1.0, 0.0)
+            if self.extent is not None:
+                part = part * (np.abs(origin + (index + k) * step) <= self.extent[axis] / 2 * (1 + 1e-9))
+            opening += part
+        return phase * np.minimum(opening, 1.0)
+
+    def _position(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        (y0, x0), (y1, x1) = self.lattice.basis
+        return self.lattice.origin[0] + i * y1 + j * y0, self.lattice.origin[1] + i * x1 + j * x0
+
+    def _exists(self, i: np.ndarray, j: np.ndarray) -> np.ndarray | float:
+        if self.extent is None:
+            return 1.0
+        y, x = self._position(i, j)
+        sin, cos = coverage.sides(self.lattice.rotation)
+        height, width = self.extent[0] / 2 * (1 + 1e-9), self.extent[1] / 2 * (1 + 1e-9)
+        return ((np.abs(y * cos - x * sin) <= height) & (np.abs(y * sin + x * cos) <= width)) * 1.0
+
+    def _opening(
+        self, i: np.ndarray, j: np.ndarray, dy: np.ndarray, dx: np.ndarray, pitch: Vector
+    ) -> np.ndarray | float:
+        """Open fraction of each sample: its own lenslet's part, and on an edge its neighbours' too."""
+        if self._open_everywhere:
+            return 1.0
+        own = self._covered(dy, dx, pitch)
+        opening = own * self._exists(i, j)
+        if self.edge == "hard":
+            return opening
+        edge = own < 1
+        i, j, dy, dx = i[edge], j[edge], dy[edge], dx[edge]
+        total, passed = own[edge], opening[edge]
+        (y0, x0), (y1, x1) = self.lattice.basis
+        for di, dj in ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)):
+            part = self._covered(dy - di * y1 - dj * y0, dx - di * x1 - dj * x0, pitch)
+            total, passed = total + part, passed + part * self._exists(i + di, j + dj)
+        # Where cells abut, every sample is covered once: this corrects the approximation at their corners.
+        opening[edge] = passed / total if self._abutting else np.minimum(passed, 1.0)
+        return opening
+
+    def _covered(self, dy: np.ndarray, dx: np.ndarray, pitch: Vector) -> np.ndarray:
+        """Fraction of a sample at (dy, dx) from a lenslet's centre that this lenslet covers."""
+        if self.shape == "round":
+            radius = self.fill_factor * self.lattice.pitch / 2
+            if self.edge == "grey":
+                return coverage.disc(dy, dx, radius, pitch)
+            return (dy**2 + dx**2 <= radius**2 * (1 + 1e-12)) * 1.0
+        inside, touched = np.ones(np.shape(dy), bool), np.ones(np.shape(dy), bool)
+        for (ny, nx), half in self._sides():
+            distance = np.abs(dy * ny + dx * nx)
+            margin = (abs(ny) * pitch[0] + abs(nx) * pitch[1]) / 2 if self.edge == "grey" else -1e-12 * half
+            inside &= distance <= half - margin
+            touched &= distance < half + margin
+        covered = inside * 1.0
+        if self.edge == "grey":
+            rim = touched & ~inside
+            covered[rim] = 1.0
+            for (ny, nx), half in self._sides():
+                covered[rim] *= coverage.strip(dy[rim] * ny + dx[rim] * nx, half, (ny, nx), pitch)
+        return covered
+
+    def _sides(self) -> list[tuple[Vector, float]]:
+        """Normal and distance from the centre of each pair of opposite sides of a lenslet."""
+        (y0, x0), (y1, x1) = self.lattice.basis
+        neighbours = [(y0, x0), (y1, x1)]
+        if self.lattice.layout == "hex":
+            neighbours.append(min((y1 - y0, x1 - x0), (y1 + y0, x1 + x0), key=lambda v: math.hypot(*v)))
+        lengths = [math.hypot(*v) for v in neighbours]
+        return [
+            ((vy / length, vx / length), self.fill_factor * length / 2)
+            for (vy, vx), length in zip(neighbours, lengths, strict=True)
+        ]
+
+
+def _focal_lengths(value: float | Sequence[float], kinds: int) -> float | tuple[float, ...]:
+    values = (value,) if isinstance(value, int | float) else tuple(value)
+    if len(values) not in (1, kinds):
+        raise GeometryError(
+            f"{len(values)} focal lengths were given for a lattice of {kinds} kind{'s'[: kinds - 1]}. "
+            "Give one, or one for each kind."
+        )
+    for number in values:
+        if checks.finite("focal_length", number) == 0:
+            raise GeometryError("focal_length is 0 m. Give a length, negative for a diverging lenslet.")
+    return float(values[0]) if len(values) == 1 else values

@@ -1,0 +1,133 @@
+"""Zernike polynomials in Noll's order, and a phase plate made of them."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import eval_jacobi
+
+from lumigraph.core import checks
+from lumigraph.core.field import Field
+from lumigraph.core.grid import Grid
+from lumigraph.elements.apertures import CircularAperture
+from lumigraph.elements.transmission import Edge, check_edge, transmit
+from lumigraph.errors import GeometryError
+
+
+def noll_to_nm(j: int) -> tuple[int, int]:
+    """Radial order n and azimuthal order m of Noll's index j = 1, 2, ...; m < 0 is the sine.
+
+    Raises
+    ------
+    GeometryError
+        j is not a whole number of at least 1.
+
+    Examples
+    --------
+    >>> [noll_to_nm(j) for j in (1, 2, 3, 4, 5, 6, 11)]
+    [(0, 0), (1, 1), (1, -1), (2, 0), (2, -2), (2, 2), (4, 0)]
+    """
+    if isinstance(j, bool) or not isinstance(j, int | np.integer) or j < 1:
+        raise GeometryError(f"Noll's index is {j!r} but must be a whole number of at least 1 (1 is piston).")
+    n = (math.isqrt(8 * int(j) - 7) - 1) // 2
+    place = int(j) - n * (n + 1) // 2 - 1
+    order = n % 2 + 2 * ((place + (n + 1) % 2) // 2)
+    return n, order if j % 2 == 0 else -order
+
+
+def zernike(j: int, rho: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    r"""Zernike polynomial of Noll's index j, with rms 1 over the unit disc.
+
+    .. math:: Z_j = \sqrt{n + 1} \, R_n^m(\rho) \times
+              \{1,\ \sqrt{2} \cos m\theta \ (j\ \text{even}),\ \sqrt{2} \sin m\theta \ (j\ \text{odd})\}
+
+    Parameters
+    ----------
+    j
+        Noll's index: 1 piston, 2 tilt along x, 3 tilt along y, 4 defocus, 5 and 6 astigmatism, 7 and 8 coma,
+        11 spherical aberration.
+    rho, theta
+        Radius over the disc's, and angle [rad] from +x towards +y; they broadcast.
+
+    Raises
+    ------
+    GeometryError
+        j is not a whole number of at least 1.
+
+    References
+    ----------
+    Noll, J. Opt. Soc. Am. 66, 207 (1976), equations 1 and 2.
+
+    Examples
+    --------
+    >>> float(zernike(4, np.array(1.0), np.array(0.0)))  # sqrt(3) (2ρ² - 1)
+    1.7320508075688772
+    """
+    n, m = noll_to_nm(j)
+    order = abs(m)
+    k = (n - order) // 2
+    radial = (-1) ** k * rho**order * eval_jacobi(k, order, 0, 1 - 2 * np.square(rho))
+    if m == 0:
+        return math.sqrt(n + 1) * radial * np.ones_like(theta)
+    return math.sqrt(2 * (n + 1)) * radial * (np.cos(m * theta) if m > 0 else np.sin(order * theta))
+
+
+@dataclass(frozen=True, slots=True)
+class ZernikePlate:
+    r"""Phase plate in a round stop: aberrations.
+
+    .. math:: t = \exp(i \sum_j c_j Z_j(2r/D, \theta)), \quad r < D/2
+
+    Parameters
+    ----------
+    coefficients
+        Phase c_j [rad rms] by Noll's index j; one wave rms is 2π. The phase is the same for every wavelength.
+    diameter
+        Of the unit disc [m]; opaque outside.
+    center
+        (y, x) [m].
+    edge
+        Of the stop: "grey" or "hard".
+
+    Raises
+    ------
+    GeometryError
+        A coefficient that is not finite, an index below 1, or a diameter that is not above zero.
+
+    Examples
+    --------
+    >>> ZernikePlate({11: 0.5, 4: 0.1}, 5e-3).coefficients
+    ((4, 0.1), (11, 0.5))
+    """
+
+    coefficients: Mapping[int, float] | tuple[tuple[int, float], ...]
+    diameter: float
+    center: tuple[float, float] = (0.0, 0.0)
+    edge: Edge = "grey"
+
+    def __post_init__(self) -> None:
+        pairs = sorted(dict(self.coefficients).items())
+        for j, value in pairs:
+            noll_to_nm(j)
+            checks.finite(f"coefficient {j}", value, "rad rms")
+        object.__setattr__(self, "coefficients", tuple((int(j), float(value)) for j, value in pairs))
+        checks.positive("diameter", self.diameter)
+        object.__setattr__(self, "center", checks.pair("center", self.center))
+        check_edge(self.edge)
+
+    def transmission(self, grid: Grid, wavelength: float) -> np.ndarray:
+        """Complex factor (ny, nx) of each sample."""
+        y, x = (grid.y - self.center[0])[:, None], grid.x - self.center[1]
+        rho, theta = np.hypot(y, x) / (self.diameter / 2), np.arctan2(y, x)
+        rho = np.minimum(rho, 1.5)  # high orders overflow far outside the stop
+        phase = np.zeros(grid.shape)
+        for j, coefficient in dict(self.coefficients).items():
+            phase += coefficient * zernike(j, rho, theta)
+        return np.exp(1j * phase) * CircularAperture(self.diameter, self.center, self.edge).transmission(
+            grid, wavelength
+        )
+
+    def __call__(self, field: Field) -> Field:
+        """The field just behind the plate."""
+        return transmit(self, field)
