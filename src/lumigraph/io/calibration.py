@@ -1,0 +1,146 @@
+"""A `Calibration` as TOML: the lattice in pixels, the geometry, and every measured centre."""
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.lattice import Lattice
+from lumigraph.errors import FormatError, LumigraphError
+from lumigraph.io import source, target
+from lumigraph.units import parse
+
+KIND = "calibration"
+_LARGEST = 64 << 20  # bytes of a file; about a million lenslets
+_LENGTHS = ("pixel_pitch", "separation", "lenslet_distance")
+
+
+def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> None:
+    """Write a calibration as TOML; every number survives exactly."""
+    lattice = calibration.lattice
+    lengths = [
+        f'{name} = "{float(value)!r} m"'
+        for name in _LENGTHS
+        if (value := getattr(calibration, name)) is not None
+    ]
+    lines = [
+        "# Micro-images found on a white image, lengths on it in pixels; pixel (0, 0) is a pixel's centre.",
+        f'kind = "{KIND}"',
+        f"shape = {list(calibration.shape)}  # rows, columns",
+        f"residual_px = {float(calibration.residual_px)!r}",
+        *lengths,
+        "",
+        "[lattice]  # points origin + i * basis[1] + j * basis[0]; pairs are (y, x)",
+        f'layout = "{lattice.layout}"',
+        f"kinds = {lattice.kinds}",
+        f"origin = {_row(lattice.origin)}",
+        f"basis = [{_row(lattice.basis[0])}, {_row(lattice.basis[1])}]",
+        "",
+        "[lenslets]  # one row each: the index (i, j) and the measured centre (y, x)",
+        f"indices = [{_rows(to_numpy(calibration.indices))}]",
+        f"centers = [{_rows(to_numpy(calibration.centers))}]",
+    ]
+    target.write_bytes(path, ("\n".join(lines) + "\n").encode())
+
+
+def load_calibration(path: str | os.PathLike[str]) -> Calibration:
+    """The calibration in a TOML file.
+
+    Raises
+    ------
+    FormatError
+        No such file, no TOML, another kind of file, or a field that is missing or wrong.
+    """
+    path = source.regular_file(path)
+    if path.stat().st_size > _LARGEST:
+        raise FormatError(
+            f"{path} has {path.stat().st_size} bytes, too many for a calibration. Check the path."
+        )
+    try:
+        found = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise FormatError(f"{path} is not TOML: {error}.") from error
+    _check_kind(path, found)
+    try:
+        return _calibration(found)
+    except LumigraphError as error:
+        raise FormatError(f"{path}: {error}") from error
+
+
+def _check_kind(path: Path, found: dict[str, Any]) -> None:
+    kind = found.get("kind")
+    if kind == KIND:
+        return
+    if isinstance(kind, str):
+        raise FormatError(
+            f"{path} describes a {kind!r}, not a calibration. If it is a camera, give it where a camera file "
+            "is asked for; from Python, lumigraph.instruments.load_camera(path)."
+        )
+    raise FormatError(
+        f'{path} is not a calibration: it has no kind = "{KIND}". Make one by `lumigraph calibrate`.'
+    )
+
+
+def _calibration(found: dict[str, Any]) -> Calibration:
+    lattice, lenslets = _table(found, "lattice"), _table(found, "lenslets")
+    basis = _numbers(lattice, "lattice.basis", (2, 2))
+    centers = _numbers(lenslets, "lenslets.centers", (-1, 2))
+    indices = _numbers(lenslets, "lenslets.indices", (-1, 2))
+    shape = _numbers(found, "shape", (2,))
+    if np.any(indices != np.rint(indices)) or np.any(shape != np.rint(shape)):
+        raise FormatError("lenslets.indices and shape must be whole numbers.")
+    return Calibration(
+        lattice=Lattice(
+            (tuple(basis[0].tolist()), tuple(basis[1].tolist())),
+            tuple(_numbers(lattice, "lattice.origin", (2,)).tolist()),
+            lattice.get("layout", "square"),
+            lattice.get("kinds", 1),
+        ),
+        shape=(int(shape[0]), int(shape[1])),
+        indices=indices.astype(np.int64),
+        centers=centers,
+        residual_px=float(_numbers(found, "residual_px", ())),
+        **{name: _length(name, found[name]) for name in _LENGTHS if name in found},
+    )
+
+
+def _table(found: dict[str, Any], name: str) -> dict[str, Any]:
+    if not isinstance(table := found.get(name), dict):
+        raise FormatError(f"the table [{name}] is missing. Make the calibration again.")
+    return table
+
+
+def _length(name: str, value: Any) -> float:
+    try:
+        return parse(value)
+    except FormatError as error:
+        raise FormatError(f"{name}: {error}") from error
+
+
+def _numbers(found: dict[str, Any], name: str, shape: tuple[int, ...]) -> np.ndarray:
+    """The finite numbers under the last part of `name`; -1 stands for any count."""
+    key = name.rpartition(".")[2]
+    if key not in found:
+        raise FormatError(f"{name} is missing. Make the calibration again.")
+    try:
+        values = np.asarray(found[key], dtype=np.float64)
+    except (TypeError, ValueError):
+        values = np.array(np.nan)
+    values = values.reshape(0, 2) if values.shape == (0,) and len(shape) == 2 else values
+    fits = values.ndim == len(shape) and all(w in (-1, n) for w, n in zip(shape, values.shape, strict=True))
+    if not fits or not np.isfinite(values).all():
+        wanted = " x ".join("k" if n < 0 else str(n) for n in shape)
+        raise FormatError(f"{name} must be {wanted + ' finite numbers' if wanted else 'a finite number'}.")
+    return values
+
+
+def _row(values: Any) -> str:
+    return f"[{', '.join(repr(value) for value in np.asarray(values).tolist())}]"
+
+
+def _rows(values: np.ndarray) -> str:
+    return "".join(f"\n  {_row(row)}," for row in values) + ("\n" if len(values) else "")

@@ -1,0 +1,114 @@
+"""PNG: 8 and 16 bits grey, 8 bits colour; fields of the raw image in a text chunk."""
+
+import io
+import struct
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+from PIL.PngImagePlugin import PngImageFile, PngInfo
+
+from lumigraph.core import checks
+from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.raw import RawImage
+from lumigraph.errors import FormatError
+from lumigraph.io import header, source, target
+
+_KEY = "lumigraph"
+_COLOUR_TYPES = (2, 6)  # RGB, RGBA
+_DEPTHS = (1, 2, 4, 8, 16)
+
+
+def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> RawImage:
+    """The picture in a PNG file (y, x) or (y, x, 3); transparency is left out, a palette becomes colour.
+
+    Raises
+    ------
+    FormatError
+        Not a PNG, damaged, too large, or 16 bits of colour.
+    """
+    path = source.regular_file(path)
+    shape, depth, colour = _read_header(path)
+    source.check_size(path, shape, max_pixels)
+    if depth == 16 and colour in _COLOUR_TYPES:
+        raise FormatError(f"{path} holds 16-bit colour, of which 8 bits would be lost. Convert it to TIFF.")
+    # The class is called itself, not Image.open, which has a size limit of its own for the whole process.
+    with source.decoding(path, "a PNG"), PngImageFile(path) as image:
+        mode = {"I;16": "I;16", "I": "I;16", "L": "L", "1": "L", "LA": "L"}.get(image.mode, "RGB")
+        text = image.text.get(_KEY)  # before load(): chunks ahead of the pixels
+        data = np.array(image if image.mode == mode else image.convert(mode))
+    return header.restore(data, header.loads(text), bit_depth=data.dtype.itemsize * 8)
+
+
+def save(raw: RawImage, path: Path, *, white: float | None = None) -> None:
+    """Write a raw image; floats are scaled, see `to_integers`."""
+    data = to_integers(raw.data, white=white, bits=16 if raw.data.ndim == 2 else 8)
+    depth = raw.bit_depth if raw.data.dtype.kind in "iu" else data.dtype.itemsize * 8
+    fields = RawImage(data, raw.pixel_pitch, depth, raw.bayer, raw.metadata)
+    target.write_bytes(path, _encoded(data, fields))
+
+
+def encode(image: Array, *, white: float | None = None, bits: int = 8) -> bytes:
+    """A picture (y, x) or (y, x, 3) as the bytes of a PNG file; floats are scaled, see `to_integers`."""
+    return _encoded(to_integers(image, white=white, bits=bits), None)
+
+
+def to_integers(image: Array, *, white: float | None = None, bits: int = 16) -> np.ndarray:
+    """Pixels as uint8 or uint16: these stay as they are, floats 0 ... `white` fill the range of `bits`.
+
+    Parameters
+    ----------
+    image
+        (y, x) or (y, x, 3).
+    white
+        Becomes the largest whole number; the image's maximum if left out. Values outside 0 ... `white`
+        are clipped.
+    bits
+        8 or 16; for floats and truth values.
+
+    Raises
+    ------
+    FormatError
+        Another shape or type of number, or values that are not finite.
+    """
+    data = to_numpy(image)
+    if data.ndim not in (2, 3) or (data.ndim == 3 and data.shape[2] != 3) or data.size == 0:
+        raise FormatError(
+            f"a PNG holds (y, x) or (y, x, 3) but the picture has shape {data.shape}. Use TIFF."
+        )
+    if data.dtype == np.uint8 or (data.dtype == np.uint16 and data.ndim == 2):
+        return data
+    if data.dtype.kind not in "fb":
+        raise FormatError(
+            f"a PNG holds uint8, or uint16 if grey, but the picture is {data.dtype}. "
+            "Use TIFF, or give it as floats, which are scaled."
+        )
+    checks.finite_array("the picture", data, FormatError)
+    white = float(data.max()) or 1.0 if white is None else checks.positive("white", white, "1", FormatError)
+    top = 2**bits - 1
+    scaled = np.clip(np.asarray(data, np.float64) / white if white > 0 else data * 0.0, 0, 1) * top
+    return np.rint(scaled).astype(np.uint8 if bits == 8 else np.uint16)
+
+
+def _encoded(data: np.ndarray, fields: RawImage | None) -> bytes:
+    info, resolution = PngInfo(), {}
+    if fields is not None:
+        info.add_text(_KEY, header.dumps(fields))
+        if fields.pixel_pitch and fields.pixel_pitch > 1e-9:
+            resolution = {"dpi": (0.0254 / fields.pixel_pitch,) * 2}
+    buffer = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(data)).save(buffer, "PNG", pnginfo=info, **resolution)
+    return buffer.getvalue()
+
+
+def _read_header(path: Path) -> tuple[tuple[int, int], int, int]:
+    """Size (rows, columns), bits and colour type from the first 26 bytes."""
+    with path.open("rb") as file:
+        start = file.read(26)
+    source.check_signature(path, start, "PNG")
+    if len(start) < 26 or start[12:16] != b"IHDR":
+        raise FormatError(f"{path} is a damaged PNG: its header is missing. Copy or save it again.")
+    columns, rows, depth, colour = struct.unpack(">IIBB", start[16:26])
+    if depth not in _DEPTHS:
+        raise FormatError(f"{path} is a damaged PNG: it declares {depth} bits. Copy or save it again.")
+    return (rows, columns), depth, colour

@@ -1,0 +1,117 @@
+"""What is checked before a file is decoded: that it exists, what it is, and how large it says it is."""
+
+import difflib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import ceil, prod
+from pathlib import Path
+
+from lumigraph.errors import FormatError, LumigraphError
+
+MAX_PIXELS = 178_956_970
+"""Largest picture that is opened unless the caller allows more: the figure Pillow refuses at."""
+
+_SIGNATURES = (
+    (b"\x89PNG\r\n\x1a\n", "PNG", ".png"),
+    (b"II*\0", "TIFF", ".tiff"),
+    (b"MM\0*", "TIFF", ".tiff"),
+    (b"II+\0", "TIFF", ".tiff"),
+    (b"MM\0+", "TIFF", ".tiff"),
+    (b"PK\x03\x04", "ZIP", ".zarr.zip"),
+    (b"\xff\xd8\xff", "JPEG", ".jpg"),
+    (b"GIF8", "GIF", ".gif"),
+    (b"%PDF", "PDF", ".pdf"),
+)
+
+
+def existing(path: str | os.PathLike[str]) -> Path:
+    """The path, refused where nothing lies there; near names are suggested.
+
+    Raises
+    ------
+    FormatError
+        No such file, or a folder on the way that does not exist.
+    """
+    path = Path(path)
+    if path.exists():
+        return path
+    if not path.parent.is_dir():
+        raise FormatError(f"{path} does not exist: there is no folder {path.parent}. Check the path.")
+    near = difflib.get_close_matches(path.name, [p.name for p in path.parent.iterdir()], n=3, cutoff=0.6)
+    hint = f"Did you mean {' or '.join(near)}?" if near else f"Check the name; the folder is {path.parent}."
+    raise FormatError(f"{path} does not exist. {hint}")
+
+
+def regular_file(path: str | os.PathLike[str]) -> Path:
+    """The path, refused unless it is a file that holds something.
+
+    Raises
+    ------
+    FormatError
+        Nothing there, a folder, something that is not a plain file, or an empty file.
+    """
+    path = existing(path)
+    if path.is_dir():
+        raise FormatError(f"{path} is a folder, not a file. Give the file inside it.")
+    if not path.is_file():
+        raise FormatError(f"{path} is not a plain file (a device or a pipe). Copy it to a file first.")
+    if path.stat().st_size == 0:
+        raise FormatError(f"{path} is empty (0 bytes). Copy or save it again.")
+    return path
+
+
+def check_signature(path: Path, start: bytes, kind: str) -> None:
+    """Refuse a file whose first bytes are not those of `kind` ("PNG", "TIFF", "ZIP").
+
+    Raises
+    ------
+    FormatError
+        It is another known kind of file, or none; the message shows how it begins.
+    """
+    found = next(((name, ending) for magic, name, ending in _SIGNATURES if start.startswith(magic)), None)
+    if found is None:
+        raise FormatError(f"{path} is not a {kind} file: it begins with {start[:8]!r}. Check its name.")
+    if found[0] != kind:
+        raise FormatError(f"{path} is a {found[0]} file, not {kind}. Rename it to end in {found[1]}.")
+
+
+def check_size(path: Path, shape: tuple[int, ...], max_pixels: int) -> None:
+    """Refuse data (rows, columns[, channels]) larger than allowed, as the file's header declares it.
+
+    Four channels count as one pixel.
+
+    Raises
+    ------
+    FormatError
+        No pixels, or more than `max_pixels`.
+    """
+    if min(shape, default=0) < 1:
+        raise FormatError(f"{path} has no pixels: its header says {_times(shape)}. The file is damaged.")
+    pixels = prod(shape[:2]) * ceil(prod(shape[2:]) / 4) if len(shape) < 4 else ceil(prod(shape) / 4)
+    if pixels > max_pixels:
+        raise FormatError(
+            f"{path} declares {_times(shape)} = {pixels:.3g} pixels but at most {max_pixels:.3g} are read. "
+            f"If that is right, call lumigraph.io.open(path, max_pixels={pixels})."
+        )
+
+
+@contextmanager
+def decoding(path: Path, kind: str) -> Iterator[None]:
+    """Context in which every failure of a decoder becomes one `FormatError` naming the file."""
+    try:
+        yield
+    except FormatError as error:
+        message = str(error)
+        raise (error if str(path) in message else FormatError(f"{path}: {message}")) from error.__cause__
+    except LumigraphError as error:
+        raise FormatError(f"{path} is damaged: {error}") from error
+    except MemoryError as error:
+        raise FormatError(f"{path} does not fit into memory. Crop it, or use a larger machine.") from error
+    except Exception as error:
+        reason = " ".join(str(error).split())[:160] or type(error).__name__
+        raise FormatError(f"{path} is damaged or is not {kind} that can be read: {reason}.") from error
+
+
+def _times(shape: tuple[int, ...]) -> str:
+    return " x ".join(map(str, shape))
