@@ -1,0 +1,15 @@
+"""Free-space propagation of a `Field` over a distance.
+
+- `propagate`: `propagate()`, the element `Propagate`, `METHODS`, and `choose_method()`, which says why
+- `angular_spectrum`: plain, band-limited, and the thesis' circular and corrected variants
+- `fresnel`: one step onto its own or a given grid, and many steps that keep the pitch
+- `zoom`: angular spectrum onto any grid, by matrix DFT or chirp-z
+- `sampling`: validity ranges and sampling rules, in closed form
+- `window`: the window of a calculation: size, quick FFT sizes, memory
+- `pruned`: convolution without the transforms that see only zeros
+- `cache`: transfer functions that were built before
+"""
+
+from lumigraph.propagation.propagate import METHODS, Choice, Propagate, choose_method, propagate
+
+__all__ = ["METHODS", "Choice", "Propagate", "choose_method", "propagate"]

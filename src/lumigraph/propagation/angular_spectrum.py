@@ -1,0 +1,157 @@
+"""Angular spectrum of plane waves: plain, band-limited, and the thesis' circular and corrected variants.
+
+The transfer function exp(ikz sqrt(1 - (λfx)² - (λfy)²)) is exact; on a sampled window it aliases above
+`sampling.band_limits`. The four methods differ only in what they do about that.
+
+J. W. Goodman, *Introduction to Fourier Optics*, section 3.10; K. Matsushima and T. Shimobaba,
+Opt. Express 17, 19662 (2009); the thesis' sections 2.4 to 2.4.3 with two corrections: the circle
+multiplies the transfer function, not its phase, and rect(f/f_max) of 2.65 is rect(f/(2 f_max)).
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from lumigraph.core import arrays
+from lumigraph.core.field import Field
+from lumigraph.core.grid import Grid
+from lumigraph.propagation import sampling
+from lumigraph.propagation.cache import CACHE
+from lumigraph.propagation.pruned import Band, Transfer, convolve
+from lumigraph.propagation.window import check_memory, reach, window_shape
+
+Pair = tuple[float, float]
+CIRCULAR = ("band_limited_circular", "corrected_band_limited")
+
+
+def angular_spectrum(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
+    """Plain: every frequency of the window, aliased or not."""
+    return _propagate(field, distance, "angular_spectrum", pad, grid or field.grid)
+
+
+def band_limited(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
+    """Zero outside the rectangle of `sampling.band_limits` (Matsushima and Shimobaba 2009)."""
+    return _propagate(field, distance, "band_limited", pad, grid or field.grid)
+
+
+def band_limited_circular(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
+    """Zero outside the circle of radius f_max (the thesis' 2.4.2); an ellipse on unequal windows."""
+    return _propagate(field, distance, "band_limited_circular", pad, grid or field.grid)
+
+
+def corrected_band_limited(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
+    """Zero outside the circle of radius max(f_max, W/(λz)) (the thesis' 2.4.3); W is the input's width."""
+    return _propagate(field, distance, "corrected_band_limited", pad, grid or field.grid)
+
+
+def transfer_function(fy: np.ndarray, fx: np.ndarray, distance: float, wavelength: float) -> np.ndarray:
+    r"""Angular-spectrum transfer function (fy, fx), complex128.
+
+    .. math:: H = \exp(i 2\pi z/\lambda \sqrt{1 - s}), \quad s = (\lambda f_x)^2 + (\lambda f_y)^2
+
+    The phase is computed as the carrier 2πz/λ, reduced to one turn, plus 2πz/λ · (sqrt(1-s) - 1) by way of
+    -s/(1 + sqrt(1-s)), which keeps its digits. Evanescent waves, s > 1, decay for z > 0; for z < 0 they
+    are dropped, because they would grow without bound.
+
+    Parameters
+    ----------
+    fy, fx
+        Frequencies of the rows (ny,) and the columns (nx,) [1/m].
+    distance
+        z [m].
+    wavelength
+        In vacuum [m].
+
+    References
+    ----------
+    Goodman, *Introduction to Fourier Optics*, equation 3-74 (3rd edition); the thesis' 2.53.
+    """
+    waves = distance / wavelength
+    s = ((wavelength * fy) ** 2)[:, None] + (wavelength * fx) ** 2
+    evanescent = s > 1
+    turns = math.fmod(waves, 1.0) - waves * (s / (1 + np.sqrt(np.maximum(1 - s, 0))))
+    H = np.exp(2j * math.pi * turns)
+    if evanescent.any():
+        H[evanescent] = np.exp(-2 * math.pi * waves * np.sqrt(s[evanescent] - 1)) if waves > 0 else 0.0
+    return H
+
+
+def kept_frequencies(method: str, grid: Grid, window: Grid, distance: float, wavelength: float) -> Pair:
+    """Highest frequencies (y, x) that a method keeps [1/m]; infinite for the plain one."""
+    if method == "angular_spectrum":
+        return math.inf, math.inf
+    free = sampling.band_limits(window, distance, wavelength)
+    if method != "corrected_band_limited":
+        return free
+    cutoff = sampling.corrected_cutoff(grid, distance, wavelength)
+    return max(free[0], cutoff[0]), max(free[1], cutoff[1])
+
+
+def _propagate(field: Field, distance: float, method: str, pad: float, output: Grid) -> Field:
+    first = output.samples_to(field.grid)
+    window = Grid(window_shape(field.grid, output, pad, first), field.grid.pitch)
+    limits = kept_frequencies(method, field.grid, window, distance, field.wavelength)
+    rows, columns = Band.below(window.fy, limits[0]), Band.below(window.fx, limits[1])
+    _check_memory(field, rows, columns, output)
+    farthest = tuple(map(reach, field.grid.shape, first, output.shape))
+    _check_sampling(method, field, window, limits, (distance, (farthest[0], farthest[1])))
+    circle = limits if method in CIRCULAR else None
+    key = ("spectral", window, first, distance, field.wavelength, rows, columns, circle)
+    values = CACHE.get(
+        (*key, arrays.placement(field.data)),
+        lambda: arrays.like(
+            _on_band(window, (rows, columns), first, (distance, field.wavelength), circle), field.data
+        ),
+    )
+    return replace(field, data=convolve(field.data, Transfer(values, rows, columns), output.shape), grid=output)
+
+
+def _on_band(
+    window: Grid, bands: tuple[Band, Band], first: tuple[int, int], wave: Pair, circle: Pair | None
+) -> np.ndarray:
+    """Transfer function (columns, rows) on its band, with the shift that puts the output's first sample at 0.
+
+    It is even in both frequencies, so only one quadrant is computed.
+    """
+    rows, columns = bands
+    fy, fx = np.abs(window.fy[: rows.n // 2 + 1]), np.abs(window.fx[: columns.n // 2 + 1])
+    fy, fx = fy[: max(rows.positive, rows.negative + 1)], fx[: max(columns.positive, columns.negative + 1)]
+    quadrant = transfer_function(fx, fy, *wave)  # transposed: x first
+    if circle is not None:
+        quadrant[((fx / circle[1]) ** 2)[:, None] + (fy / circle[0]) ** 2 > 1] = 0
+    values = quadrant[_mirrored(columns)][:, _mirrored(rows)]
+    if any(first):
+        turns_y, turns_x = (n * np.arange(band.n) for n, band in zip(first, bands, strict=True))
+        shift_y = rows.take(np.exp(2j * math.pi * (turns_y % rows.n) / rows.n))
+        shift_x = columns.take(np.exp(2j * math.pi * (turns_x % columns.n) / columns.n))
+        values *= shift_y
+        values *= shift_x[:, None]
+    return np.ascontiguousarray(values)
+
+
+def _mirrored(band: Band) -> np.ndarray:
+    """Index of |f| for each frequency of the band, in FFT order."""
+    return np.concatenate([np.arange(band.positive), np.arange(band.negative, 0, -1)])
+
+
+def _check_memory(field: Field, rows: Band, columns: Band, output: Grid) -> None:
+    planes = math.prod(field.data.shape[:-2])
+    item = 8 if arrays.is_single(field.data) else 16
+    result = output.shape[0] * output.shape[1]
+    spectrum = columns.count * (field.grid.shape[0] + output.shape[0])
+    transfer = columns.count * rows.count
+    nbytes = item * (planes * result + spectrum + transfer) + 40 * transfer
+    check_memory(nbytes, f"propagation on a window of {rows.n} x {columns.n} samples")
+
+
+def _check_sampling(
+    method: str, field: Field, window: Grid, limits: Pair, target: tuple[float, tuple[int, int]]
+) -> None:
+    distance, wavelength = target[0], field.wavelength
+    message = None
+    if method == "angular_spectrum":
+        message = sampling.unlimited_aliases(method, window, distance, wavelength)
+    elif method == "corrected_band_limited":
+        message = sampling.kept_alias(method, limits, window, distance, wavelength)
+    sampling.warn(message or sampling.light_wraps(window, limits, target[1], distance, wavelength))

@@ -1,0 +1,248 @@
+"""One verb for free space: `propagate`, its methods, and the choice among them."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+from lumigraph.core import arrays, checks
+from lumigraph.core.arrays import Array
+from lumigraph.core.field import Field
+from lumigraph.core.grid import Grid
+from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.propagation import sampling
+from lumigraph.propagation.angular_spectrum import (
+    angular_spectrum,
+    band_limited,
+    band_limited_circular,
+    corrected_band_limited,
+)
+from lumigraph.propagation.fresnel import fresnel, multi_step_fresnel
+from lumigraph.propagation.zoom import zoom
+
+Method = Callable[[Field, float, float, Grid | None], Field]
+
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "fresnel": fresnel,
+        "multi_step_fresnel": multi_step_fresnel,
+        "angular_spectrum": angular_spectrum,
+        "band_limited": band_limited,
+        "band_limited_circular": band_limited_circular,
+        "corrected_band_limited": corrected_band_limited,
+        "zoom": zoom,
+    }
+)
+"""Every method by name; `"auto"` stands for the one that `choose_method` picks."""
+
+FEWEST_FREQUENCIES = 100
+"""Below this many samples in the band, a band-limited FFT is the coarser choice: 51 dB at 158, 45 dB at 63."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A method, its padding, and why."""
+
+    method: str
+    pad: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Propagate:
+    """Free space as an element of a train: see `propagate`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> wave = Field(np.ones((64, 64), np.complex64), Grid.square(64, 10e-6), 633e-9)
+    >>> Propagate(1e-3)(wave).grid == wave.grid
+    True
+    """
+
+    distance: float
+    method: str = "band_limited"
+    pad: float = 1.0
+    grid: Grid | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "distance", checks.finite("distance", self.distance))
+        _check_method(self.method)
+        _check_pad(self.pad)
+
+    def __call__(self, field: Field) -> Field:
+        """The field after the distance."""
+        return propagate(field, self.distance, self.method, self.pad, grid=self.grid)
+
+
+def propagate(
+    field: Field,
+    distance: float,
+    method: str = "band_limited",
+    pad: float = 1.0,
+    *,
+    grid: Grid | None = None,
+) -> Field:
+    r"""The field after `distance` of free space, a new `Field`.
+
+    .. math:: U(x, y; z) = \mathcal{F}^{-1}\{\mathcal{F}\{U(x, y; 0)\}\, H(f_x, f_y; z)\}
+
+    Parameters
+    ----------
+    field
+        Amplitude (..., y, x); leading axes are a batch. NumPy, PyTorch or another array API library.
+    distance
+        z [m]; negative goes back. Zero returns the field on `grid`.
+    method
+        One of `METHODS`, or "auto". "fresnel" has its own output pitch λ|z|/(N p) unless `grid` is
+        given, "zoom" needs `grid`, the others keep the pitch.
+    pad
+        Zeros added to the window, as a fraction of the input window: 1 doubles it and keeps wrapped
+        light off the output; 0 is the unpadded window of the thesis. "fresnel" and "zoom" have no use
+        for it, "auto" chooses it.
+    grid
+        Output grid; the input's own if left out. Methods that keep the pitch take any window whose
+        samples fall on the input's, smaller, larger or shifted, and compute only that window.
+
+    Returns
+    -------
+    Field
+        On `grid`, in the library and precision of `field.data`.
+
+    Raises
+    ------
+    SamplingError
+        An unknown method, "zoom" without a grid, "fresnel" over zero distance, a window that needs
+        more memory than there is, or an output too far off.
+    GeometryError
+        A distance or pad that is not a finite number, or an output grid that a method cannot reach.
+
+    Warns
+    -----
+    SamplingWarning
+        The result is defined but aliases, or light wraps round; the message gives the numbers.
+
+    References
+    ----------
+    Goodman, *Introduction to Fourier Optics*, sections 3.10 and 4.2; Matsushima and Shimobaba,
+    Opt. Express 17, 19662 (2009).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from lumigraph.units import um, mm, nm
+    >>> grid = Grid.square(200, 10*um)
+    >>> beam = Field(np.exp(-(grid.y[:, None]**2 + grid.x**2) / (0.2*mm)**2), grid, 633*nm)
+    >>> round(float(propagate(beam, 100*mm).power / beam.power), 6)
+    1.0
+    """
+    distance = checks.finite("distance", distance)
+    _check_method(method)
+    _check_pad(pad)
+    if method == "auto":
+        choice = choose_method(field.grid, distance, field.wavelength, grid)
+        method, pad = choice.method, choice.pad
+    if distance == 0 and method not in ("fresnel", "zoom"):
+        return _on_window(field, grid or field.grid)
+    return METHODS[method](field, distance, pad, grid)
+
+
+def choose_method(grid: Grid, distance: float, wavelength: float, output: Grid | None = None) -> Choice:
+    """Method and padding for a propagation, with the reason in one sentence.
+
+    Parameters
+    ----------
+    grid
+        Where the input stands.
+    distance
+        z [m].
+    wavelength
+        In vacuum [m].
+    output
+        Where the output is wanted; None for the input's grid.
+
+    Examples
+    --------
+    >>> print(choose_method(Grid.square(1000, 5e-6), 0.316, 633e-9).reason)
+    light spreads 20.1 mm, the window of 5 mm is doubled and 500 of 2000 frequencies per axis pass unaliased
+    """
+    distance = checks.finite("distance", distance)
+    target = output or grid
+    if not _aligned(grid, target):
+        return Choice("zoom", 0.0, _grids_differ(grid, target))
+    if distance == 0:
+        return Choice("band_limited", 0.0, "the distance is 0 m: the field is only cropped or padded")
+    spread = abs(distance) * math.tan(math.asin(min(wavelength * 0.5 / min(grid.pitch), 0.999)))
+    widths = [f"{1e3 * value:.3g} mm" for value in (spread, min(grid.size))]
+    pad = min(1.0, 2 * spread / min(grid.size))
+    padded = Grid((grid.shape[0] * 2, grid.shape[1] * 2), grid.pitch)
+    if pad < 1:
+        reason = f"light spreads {widths[0]}, less than half of the window of {widths[1]}: padded by {pad:.2g}"
+        return Choice("band_limited", pad, reason)
+    limits = sampling.band_limits(padded, distance, wavelength)
+    passing = [
+        min(n, round(2 * limit * size)) for n, limit, size in zip(padded.shape, limits, padded.size, strict=True)
+    ]
+    if min(passing) < FEWEST_FREQUENCIES:
+        reason = (
+            f"only {min(passing)} frequencies of a doubled window of {2 * min(grid.size) * 1e3:.3g} mm pass unaliased "
+            f"over {abs(distance):.4g} m, fewer than {FEWEST_FREQUENCIES}: a matrix DFT takes them as close as needed"
+        )
+        return Choice("zoom", 0.0, reason)
+    reason = (
+        f"light spreads {widths[0]}, the window of {widths[1]} is doubled and {min(passing)} of "
+        f"{min(padded.shape)} frequencies per axis pass unaliased"
+    )
+    return Choice("band_limited", 1.0, reason)
+
+
+def _aligned(grid: Grid, output: Grid) -> bool:
+    try:
+        output.samples_to(grid)
+    except GeometryError:
+        return False
+    return True
+
+
+def _grids_differ(grid: Grid, output: Grid) -> str:
+    pitches = [" x ".join(f"{1e6 * p:.6g}" for p in g.pitch) for g in (grid, output)]
+    if pitches[0] != pitches[1]:
+        return f"the output's pitch of {pitches[1]} µm differs from the input's {pitches[0]} µm"
+    return f"the output's samples fall between the input's, whose pitch is {pitches[0]} µm"
+
+
+def _on_window(field: Field, grid: Grid) -> Field:
+    """The field on another window of its own samples, zero where it has none."""
+    if grid == field.grid:
+        return field
+    data = field.data
+    for axis, first in zip((-2, -1), grid.samples_to(field.grid), strict=True):
+        data = _window_along(data, axis, first, grid.shape[axis])
+    return replace(field, data=data, grid=grid)
+
+
+def _window_along(data: Array, axis: int, first: int, count: int) -> Array:
+    n = data.shape[axis]
+    start, stop = min(max(first, 0), n), min(max(first + count, 0), n)
+    kept = data[..., start:stop, :] if axis == -2 else data[..., start:stop]
+    one = data[..., :1, :] if axis == -2 else data[..., :1]
+    before = min(max(-first, 0), count)
+    parts = [kept]
+    for where, missing in ((0, before), (2, count - before - (stop - start))):
+        if missing:
+            shape = list(data.shape)
+            shape[axis] = missing
+            xp = arrays.namespace(data)
+            zeros = xp.broadcast_to(xp.zeros_like(one), tuple(shape))
+            parts = [zeros, *parts] if where == 0 else [*parts, zeros]
+    return arrays.namespace(data).concat(parts, axis=axis) if len(parts) > 1 else kept
+
+
+def _check_method(method: str) -> None:
+    if method != "auto" and method not in METHODS:
+        raise SamplingError(f"method is {method!r} but must be 'auto' or one of {', '.join(METHODS)}.")
+
+
+def _check_pad(pad: float) -> None:
+    if checks.finite("pad", pad, "windows") < 0:
+        raise GeometryError(f"pad is {pad:g} but must be 0 or more: 1 doubles the window.")
