@@ -1,0 +1,47 @@
+"""Colour filters on pixels."""
+
+from lumigraph.core.arrays import Array, namespace
+from lumigraph.core.raw import BAYER_PATTERNS
+from lumigraph.errors import FormatError, GeometryError
+
+
+def mosaic(image: Array, pattern: str = "RGGB") -> Array:
+    """What pixels behind a Bayer filter see of a colour image.
+
+    Parameters
+    ----------
+    image
+        (y, x, 3): red, green, blue.
+    pattern
+        Colours of the first 2 × 2 pixels, row by row: "RGGB", "GRBG", "GBRG" or "BGGR".
+
+    Returns
+    -------
+    Array
+        (y, x), for ``RawImage(..., bayer=pattern)``.
+
+    Raises
+    ------
+    GeometryError
+        An image that is not (y, x, 3).
+    FormatError
+        An unknown pattern.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> mosaic(np.broadcast_to([10, 20, 30], (2, 4, 3)), "GRBG").tolist()
+    [[20, 10, 20, 10], [30, 20, 30, 20]]
+    """
+    if image.ndim != 3 or image.shape[2] != 3:
+        raise GeometryError(f"a colour image has shape (y, x, 3), not {tuple(image.shape)}.")
+    if pattern not in BAYER_PATTERNS:
+        raise FormatError(f"pattern is {pattern!r} but must be one of {', '.join(BAYER_PATTERNS)}.")
+    xp = namespace(image)
+    rows, columns = xp.arange(image.shape[0]) % 2, xp.arange(image.shape[1]) % 2
+    cell = 2 * rows[:, None] + columns[None, :]
+    result = image[:, :, 1]
+    for place, colour in enumerate(pattern):
+        if colour != "G":
+            result = xp.where(cell == place, image[:, :, "RGB".index(colour)], result)
+    return result
