@@ -1,0 +1,14 @@
+"""Drawings: every function returns a matplotlib Figure and opens no window.
+
+- `pictures`: `show` an image, a raw image, a field or a light field
+- `trains`: `planes` of a train of elements
+- `lattices`: `lattice`, a calibration over its white image
+- `layout`: rays through a camera
+- `axes`: axes with lengths in readable units, colour bars
+"""
+
+from lumigraph.plots.lattices import lattice
+from lumigraph.plots.pictures import show
+from lumigraph.plots.trains import planes
+
+__all__ = ["lattice", "planes", "show"]
