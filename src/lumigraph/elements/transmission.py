@@ -48,8 +48,8 @@ def warn_if_coarse(what: str, grid: Grid, wavelength: float, focal_length: float
     for name, pitch, radius in zip("yx", grid.pitch, radii, strict=True):
         if radius > 0 and pitch > (limit := wavelength * abs(focal_length) / (2 * radius)) * (1 + 1e-9):
             warnings.warn(
-                f"{what} has samples {pitch * 1e6:.4g} um apart along {name} but needs {limit * 1e6:.4g} um "
-                f"for f = {focal_length * 1e3:.4g} mm and radius {radius * 1e3:.4g} mm at {wavelength * 1e9:.4g} nm. "
+                f"{what} of f = {focal_length * 1e3:.4g} mm and radius {radius * 1e3:.4g} mm has samples "
+                f"{pitch * 1e6:.4g} um apart along {name} but needs {limit * 1e6:.4g} um. "
                 "Use a finer grid or a smaller diameter.",
                 SamplingWarning,
                 stacklevel=4,

@@ -41,7 +41,7 @@ def plane_wave(grid: Grid, wavelength: float, tilt: Pair = (0.0, 0.0), dtype: An
     sines = np.sin(checks.pair("tilt", tilt, "rad"))
     if np.sum(sines**2) > 1:
         raise GeometryError(
-            f"tilt is ({tilt[0]:.4g}, {tilt[1]:.4g}) rad: its squared sines add up to {np.sum(sines**2):.4g}, "
+            f"tilt is ({tilt[0]:.4g}, {tilt[1]:.4g}) rad: its squared sines add to {np.sum(sines**2):.4g}, "
             "above 1. Use smaller angles."
         )
     _warn_if_coarse("a tilted plane wave", grid, wavelength, (abs(sines[0]), abs(sines[1])))
