@@ -9,13 +9,15 @@ from lumigraph.core.lattice import Lattice
 
 _CHUNK = 1 << 24  # pixels gathered at a time
 _ITERATIONS = 4
+_SOFT = 0.2  # of the cell: over how much its window fades, so that pixels do not jump in and out
 
 
 class Spots(NamedTuple):
-    """Measured micro-images: `indices` (k, 2) as (i, j), `centers` (k, 2) as (y, x) [px]."""
+    """Measured micro-images: `indices` (k, 2) as (i, j), `centers` (k, 2) as (y, x) [px], `light` (k,)."""
 
     indices: np.ndarray
     centers: np.ndarray
+    light: np.ndarray
 
 
 def measure(picture: np.ndarray, lattice: Lattice, *, part: float = 1.0) -> Spots:
@@ -28,7 +30,7 @@ def measure(picture: np.ndarray, lattice: Lattice, *, part: float = 1.0) -> Spot
     Parameters
     ----------
     picture
-        Grey white image (y, x).
+        Flattened white image (y, x), zero in the dark.
     lattice
         Where the micro-images are, to a third of a pitch [px].
     part
@@ -44,14 +46,13 @@ def measure(picture: np.ndarray, lattice: Lattice, *, part: float = 1.0) -> Spot
         for n, size in zip((ny, nx), cell, strict=True)
     ]
     indices = lattice.indices(ranges[0], ranges[1])
-    picture = picture - np.float32(np.percentile(picture[:: max(1, ny // 512), :: max(1, nx // 512)], 2))
     guess = lattice.position(indices)
     step = max(1, int(_CHUNK / np.prod([size + 6 for size in cell])))
     parts = [_centre(picture, guess[k : k + step], cell) for k in range(0, len(guess), step)]
     centers = np.concatenate([p[0] for p in parts]) if parts else guess
     light = np.concatenate([p[1] for p in parts]) if parts else np.zeros((0, 3))
     keep = _lit(light) & (np.abs(centers - guess) < 0.35 * np.array(cell)).all(-1)
-    return Spots(indices[keep], centers[keep])
+    return Spots(indices[keep], centers[keep], light[keep, 0])
 
 
 def _cell(lattice: Lattice) -> tuple[float, float]:
@@ -63,10 +64,12 @@ def _cell(lattice: Lattice) -> tuple[float, float]:
     return (rows, second) if abs(lattice.rotation) < math.pi / 12 else (lattice.pitch, rows)
 
 
-def _centre(picture: np.ndarray, guess: np.ndarray, cell: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+def _centre(
+    picture: np.ndarray, guess: np.ndarray, cell: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
     """Centres (k, 2) and light (k, 3): mean of the cell, first harmonic along y and along x."""
     first = np.rint(guess).astype(np.int64)
-    reach = [math.ceil(size / 2) + 2 for size in cell]
+    reach = [math.ceil(size * (0.5 + _SOFT / 2)) + 2 for size in cell]
     offsets = [np.arange(-r, r + 1) for r in reach]
     rows = np.clip(first[:, :1] + offsets[0], 0, picture.shape[0] - 1)
     columns = np.clip(first[:, 1:] + offsets[1], 0, picture.shape[1] - 1)
@@ -77,7 +80,8 @@ def _centre(picture: np.ndarray, guess: np.ndarray, cell: tuple[float, float]) -
     for _ in range(_ITERATIONS):
         distance = [offsets[a] - shift[:, a, None] for a in (0, 1)]
         window = [
-            np.clip(size / 2 + 0.5 - np.abs(d), 0, 1) for d, size in zip(distance, cell, strict=True)
+            np.clip((size / 2 - np.abs(d)) / max(_SOFT * size, 1) + 0.5, 0, 1)
+            for d, size in zip(distance, cell, strict=True)
         ]
         profile_y = np.matmul(patches, window[1].astype(np.float32)[:, :, None])[..., 0]
         profile_x = np.matmul(window[0].astype(np.float32)[:, None, :], patches)[:, 0]

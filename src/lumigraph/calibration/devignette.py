@@ -9,7 +9,11 @@ from lumigraph.errors import CalibrationError
 
 
 def devignette(
-    raw: RawImage | Array, white: RawImage | Array, *, dark: RawImage | Array | None = None, floor: float = 0.1
+    raw: RawImage | Array,
+    white: RawImage | Array,
+    *,
+    dark: RawImage | Array | None = None,
+    floor: float = 0.1,
 ) -> RawImage:
     """Raw image divided by the white image, so that a uniform scene gives uniform pixels.
 

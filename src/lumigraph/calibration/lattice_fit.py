@@ -1,11 +1,10 @@
 """From a white image to its lattice: period, spots, robust least squares."""
 
-
 import numpy as np
 
 from lumigraph.calibration.centres import Spots, measure
 from lumigraph.calibration.devignette import as_raw, grey
-from lumigraph.calibration.period import SMALLEST_PITCH, Vectors, lattice_vectors
+from lumigraph.calibration.period import SMALLEST_PITCH, Surface, Vectors, flattened, lattice_vectors
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
@@ -69,7 +68,7 @@ def calibrate(
     white = as_raw(white)
     _check_request(layout, pitch)
     checks.finite_array("the white image", white.data, CalibrationError)
-    picture = _picture(white)
+    picture = flattened(_picture(white))
     vectors = lattice_vectors(picture, layout, pitch)
     lattice = _starting_lattice(picture, vectors)
     _check_count(lattice, picture.shape)
@@ -148,10 +147,19 @@ def _fit_outwards(picture: np.ndarray, lattice: Lattice) -> tuple[Spots, Lattice
         if part < 1 and len(spots.indices) < 50:
             continue
         spots, lattice = _robust_fit(spots, lattice)
-    spots, lattice = _robust_fit(measure(picture, lattice), lattice)
+    spots, lattice = _robust_fit(measure(_evenly_lit(picture, spots), lattice), lattice)
     centred = _centred(lattice, picture.shape)
     moved = np.stack(lattice.index(*centred.origin), -1)
-    return Spots(spots.indices - moved, spots.centers), centred
+    return Spots(spots.indices - moved, spots.centers, spots.light), centred
+
+
+def _evenly_lit(picture: np.ndarray, spots: Spots) -> np.ndarray:
+    """Picture without the vignetting that its micro-images' brightness shows, which would move their centres."""
+    ny, nx = picture.shape
+    y, x = (2 * spots.centers[:, axis] / (n - 1) - 1 for axis, n in enumerate((ny, nx)))
+    surface = Surface(4 if len(y) > 100 else 2).fit(y, x, spots.light / spots.light.mean())
+    rows, columns = np.linspace(-1, 1, ny, dtype=np.float32), np.linspace(-1, 1, nx, dtype=np.float32)
+    return picture / surface(rows[:, None], columns[None, :])
 
 
 def _robust_fit(spots: Spots, lattice: Lattice) -> tuple[Spots, Lattice]:
@@ -167,7 +175,7 @@ def _robust_fit(spots: Spots, lattice: Lattice) -> tuple[Spots, Lattice]:
         if np.array_equal(closer, keep) or np.linalg.matrix_rank(design[closer]) < 3:
             break
         keep = closer
-    kept = Spots(spots.indices[keep], spots.centers[keep])
+    kept = Spots(*(column[keep] for column in spots))
     rms = float(np.sqrt((distance[keep] ** 2).mean()))
     if keep.mean() < 0.5 or rms > 0.1 * lattice.pitch:
         raise CalibrationError(
@@ -187,5 +195,3 @@ def _check_spots(spots: Spots, lattice: Lattice, what: str) -> None:
             f"in {count[0]} rows and {count[1]} columns, but a lattice needs at least 3 x 3. "
             "Use the whole sensor's picture, evenly lit."
         )
-
-

@@ -18,6 +18,7 @@ from lumigraph.errors import CalibrationError
 SMALLEST_PITCH = 4.0
 """Shortest lattice vector looked for [px]: two pixels for the spot, two for the gap."""
 
+_LONGEST = 1024  # lags looked at [px]
 _STRONG = 0.75  # of the strongest peak; the ridges of nearly touching square micro-images reach 0.5
 _DIP = 0.15  # how far the autocorrelation must fall between two lattice points
 
@@ -31,7 +32,7 @@ class Vectors(NamedTuple):
 
 
 def lattice_vectors(picture: np.ndarray, layout: Layout | None, pitch: float | None) -> Vectors:
-    """Lattice vectors of a grey picture (y, x), to about 0.01 px.
+    """Lattice vectors of a flattened picture (y, x), to about 0.01 px.
 
     Raises
     ------
@@ -50,10 +51,12 @@ def lattice_vectors(picture: np.ndarray, layout: Layout | None, pitch: float | N
 
 
 def _autocorrelation(picture: np.ndarray) -> np.ndarray:
-    """Normalised autocorrelation for lags 0..ny/2 and -nx/2..nx/2; element [0, nx_lag] is lag 0."""
-    wave = _flattened(picture)
+    """Normalised autocorrelation for lags up to half the picture each way; element [0, nx_lag] is lag 0."""
+    wave = picture - picture.mean()
+    for axis in (0, 1):  # takes out the highest frequency: what grey() left of a Bayer pattern
+        wave = ndimage.correlate1d(wave, np.array([0.25, 0.5, 0.25], np.float32), axis=axis)
     ny, nx = wave.shape
-    lags = ny // 2 + 2, nx // 2 + 2
+    lags = min(ny // 2, _LONGEST) + 2, min(nx // 2, _LONGEST) + 2
     size = tuple(scipy.fft.next_fast_len(n + lag, real=True) for n, lag in zip((ny, nx), lags, strict=True))
     windows = [np.hanning(n + 2)[1:-1].astype(np.float32) for n in (ny, nx)]
     spectrum = scipy.fft.rfft2(wave * windows[0][:, None] * windows[1], size, workers=WORKERS)
@@ -68,19 +71,40 @@ def _autocorrelation(picture: np.ndarray) -> np.ndarray:
     return result / result[0, lags[1]]
 
 
-def _flattened(picture: np.ndarray) -> np.ndarray:
-    """Picture minus a smooth quadratic surface, without the highest frequency (Bayer remains, readout)."""
+def flattened(picture: np.ndarray) -> np.ndarray:
+    """Picture above its dark level, divided by a smooth quadratic surface: about 1 on average everywhere."""
     ny, nx = picture.shape
-    step = max(1, min(ny, nx) // 256)
-    y, x = np.linspace(-1, 1, ny)[:, None], np.linspace(-1, 1, nx)[None, :]
-    terms = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
-    coarse = [np.broadcast_to(y**a * x**b, (ny, nx))[::step, ::step].ravel() for a, b in terms]
-    weights = np.linalg.lstsq(np.stack(coarse, -1), picture[::step, ::step].ravel(), rcond=None)[0]
-    smooth = sum(w * y**a * x**b for w, (a, b) in zip(weights, terms, strict=True))
-    flat = (picture - smooth).astype(np.float32)
-    for axis in (0, 1):
-        flat = ndimage.correlate1d(flat, np.array([0.25, 0.5, 0.25], np.float32), axis=axis)
-    return flat
+    step = max(1, min(ny, nx) // 512)
+    sparse = picture[::step, ::step]
+    dark = np.float32(np.percentile(sparse, 2))
+    y, x = np.linspace(-1, 1, ny, dtype=np.float32), np.linspace(-1, 1, nx, dtype=np.float32)
+    surface = Surface(2).fit(y[::step, None], x[None, ::step], sparse - dark)
+    return (picture - dark) / surface(y[:, None], x[None, :])
+
+
+class Surface:
+    """Polynomial surface of brightness, kept above a tenth of its top."""
+
+    def __init__(self, degree: int) -> None:
+        self.powers = [(a, b) for a in range(degree + 1) for b in range(degree + 1 - a)]
+        self.weights: list[np.float32] = []
+        self.floor = np.float32(0)
+
+    def fit(self, y: np.ndarray, x: np.ndarray, values: np.ndarray) -> "Surface":
+        """Least squares through values at y and x, which broadcast."""
+        terms = [np.broadcast_to(y**a * x**b, values.shape).ravel() for a, b in self.powers]
+        self.weights = list(np.linalg.lstsq(np.stack(terms, -1), values.ravel(), rcond=None)[0])
+        self.weights = [np.float32(w) for w in self.weights]
+        self.floor = np.float32(-np.inf)
+        self.floor = np.float32(max(0.1 * float(self(y, x).max()), 1e-30))
+        return self
+
+    def __call__(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """The surface at y and x, which broadcast."""
+        total = np.zeros(np.broadcast_shapes(y.shape, x.shape), np.float32)
+        for weight, (a, b) in zip(self.weights, self.powers, strict=True):
+            total += weight * y**a * x**b
+        return np.maximum(total, self.floor)
 
 
 class _Peaks:
@@ -89,8 +113,13 @@ class _Peaks:
     def __init__(self, correlation: np.ndarray) -> None:
         self.correlation = correlation
         zero = correlation.shape[1] // 2
-        local = correlation == ndimage.maximum_filter(correlation, 3)
-        rows, columns = np.nonzero(local & (correlation > 0))
+        # The row above lag 0 is the mirror image of the row below it; the other edges are no peaks.
+        around = np.concatenate([correlation[1:2, ::-1], correlation])
+        local = (around == ndimage.maximum_filter(around, 3)) & (around > 0)
+        local[0] = local[-1] = local[:, 0] = local[:, -1] = False
+        rows, columns = np.nonzero(local)
+        tops = _tops(around, rows, columns)
+        rows = rows - 1
         lags = np.stack([rows, columns - zero], -1)
         length = np.hypot(*lags.T)
         limits = np.array(correlation.shape) - 2, zero - 1
@@ -98,7 +127,7 @@ class _Peaks:
         keep &= (lags[:, 0] > 0) | (lags[:, 1] > 0)  # a half plane: the rest is its mirror image
         order = np.argsort(length[keep], kind="stable")
         self.lags, self.lengths = lags[keep][order], length[keep][order]
-        self.heights = correlation[rows, columns][keep][order]
+        self.heights = tops[keep][order]
 
     def dips(self, index: int) -> bool:
         """Whether the autocorrelation falls and rises again between lag 0 and this peak."""
@@ -124,6 +153,17 @@ class _Peaks:
             if self.dips(index):
                 return float(self.heights[index])
         return 0.0
+
+
+def _tops(around: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Heights of peaks between the samples, by parabolas: for pitches of few pixels the samples miss them."""
+    here = around[rows, columns]
+    result = here.copy()
+    for dy, dx in ((1, 0), (0, 1)):
+        before, after = around[rows - dy, columns - dx], around[rows + dy, columns + dx]
+        bend = np.maximum(2 * here - before - after, 1e-12)
+        result += (after - before) ** 2 / (8 * bend)
+    return result
 
 
 def _shortest(peaks: _Peaks, pitch: float | None, layout: Layout | None) -> tuple[np.ndarray, np.ndarray]:
