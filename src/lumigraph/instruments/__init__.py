@@ -1,0 +1,36 @@
+"""Cameras: what is given is checked, what is left out computed, and simulations get their grids and trains.
+
+- `single_lens`: `SingleLensCamera`
+- `plenoptic1`: `PlenopticCamera`, lenslets at the main-lens image
+- `plenoptic2`: `FocusedPlenopticCamera`, lenslets that relay the main-lens image
+- `parts`: `MainLens`, `Lenslets`, `Pixels`: the tables of a camera file
+- `loading`: `load_camera` for every kind, `catalogue`
+- `camera`, `lenslet_camera`: what the kinds share
+- `grids`: how finely and widely planes are sampled
+- `describe`: the table of everything that follows from a description
+- `quantities`, `problems`, `files`: numbers with units, errors in one line, TOML
+"""
+
+from lumigraph.instruments.camera import Camera
+from lumigraph.instruments.describe import Description, Row
+from lumigraph.instruments.lenslet_camera import LensletCamera
+from lumigraph.instruments.loading import catalogue, load_camera
+from lumigraph.instruments.parts import Lenslets, MainLens, Pixels
+from lumigraph.instruments.plenoptic1 import PlenopticCamera
+from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
+from lumigraph.instruments.single_lens import SingleLensCamera
+
+__all__ = [
+    "Camera",
+    "Description",
+    "FocusedPlenopticCamera",
+    "LensletCamera",
+    "Lenslets",
+    "MainLens",
+    "Pixels",
+    "PlenopticCamera",
+    "Row",
+    "SingleLensCamera",
+    "catalogue",
+    "load_camera",
+]

@@ -1,0 +1,215 @@
+"""What all cameras have in common: reading, checking, changing and writing their description."""
+
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from os import PathLike
+from typing import Any, ClassVar, Self
+
+from pydantic import Field, ValidationError
+
+from lumigraph.core.grid import Grid
+from lumigraph.core.lattice import Lattice
+from lumigraph.design import plenoptic1, resolution, thin_lens
+from lumigraph.elements import ThinLens, Train, ZernikePlate
+from lumigraph.errors import FormatError, GeometryError
+from lumigraph.instruments import files
+from lumigraph.instruments.grids import Sampling
+from lumigraph.instruments.parts import MainLens, Part, Pixels, check_pixels
+from lumigraph.instruments.problems import readable
+from lumigraph.instruments.quantities import FROM_FILE, Length, Wavelength
+from lumigraph.propagation import Propagate
+from lumigraph.sensor import Sensor
+
+
+class Camera(Part):
+    """A camera focused at `object_distance`; see its children."""
+
+    KIND: ClassVar[str]
+
+    wavelength: Wavelength
+    object_distance: Length
+    main_lens: MainLens
+    pixels: Pixels = Field(alias="sensor")
+
+    @classmethod
+    def from_toml(cls, path: str | PathLike[str]) -> Self:
+        """The camera that a TOML file describes.
+
+        Raises
+        ------
+        FormatError
+            No such file, damaged TOML, another kind of camera, an unknown or missing key, or a wrong unit.
+        GeometryError
+            Values that no camera can have.
+        """
+        return cls.from_table(files.read(path), str(path))
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any], origin: str = "the camera file") -> Self:
+        """The camera of a parsed TOML file, whose lengths carry a unit; `origin` is named in errors."""
+        kind = files.kind(table, origin)
+        if kind != cls.KIND:
+            raise FormatError(
+                f"{origin} describes a {kind!r} camera, not a {cls.KIND!r}. Use lumigraph.load_camera, which "
+                "takes every kind."
+            )
+        values = {key: value for key, value in table.items() if key != "kind"}
+        try:
+            return cls.model_validate(values, context=FROM_FILE)
+        except ValidationError as error:
+            problem = readable(error, cls)
+            raise type(problem)(f"{origin}: {problem}") from None
+
+    def to_toml(self) -> str:
+        """The description as the text of a camera file; what is computed is left out."""
+        return files.write({"kind": self.KIND, **self.model_dump(by_alias=True, exclude_defaults=True)})
+
+    def replace(self, **changes: Any) -> Self:
+        """The camera with other values; a mapping changes only the keys it has.
+
+        Examples
+        --------
+        ``camera.replace(object_distance="130 mm", lenslets={"magnification": 0.3})``
+        """
+        values = self.model_dump(by_alias=True)
+        for key, change in changes.items():
+            table = values.get(key)
+            merge = isinstance(change, Mapping) and isinstance(table, dict)
+            values[key] = {**table, **change} if merge else change  # type: ignore[dict-item]
+        return type(self)(**values)
+
+    @property
+    def image_distance(self) -> float:
+        """Main lens to its image, z2 [m]."""
+        return thin_lens.image_distance(self.main_lens.focal_length, self.object_distance)
+
+    @property
+    def magnification(self) -> float:
+        """Size of the main-lens image over the object's, z2 / z1; above 0, though the image is inverted."""
+        return thin_lens.magnification(self.object_distance, self.image_distance)
+
+    @property
+    def separation(self) -> float:
+        """Main lens to lenslets, L, or to the sensor where there are none [m]."""
+        return self.image_distance
+
+    @property
+    def lenslet_distance(self) -> float | None:
+        """Lenslets to sensor, b [m]; None without lenslets."""
+        return None
+
+    @property
+    def lattice(self) -> Lattice | None:
+        """Where the lenslets stand [m], in physical coordinates; None without lenslets."""
+        return None
+
+    @property
+    def pupil_diameter(self) -> float:
+        """Of the main lens' stop, D [m]."""
+        raise NotImplementedError
+
+    @property
+    def f_number(self) -> float:
+        """Of the main lens at its image, z2 / D."""
+        return resolution.f_number(self.image_distance, self.pupil_diameter)
+
+    @cached_property
+    def sampling(self) -> Sampling:
+        """How finely the planes must be sampled, and are."""
+        raise NotImplementedError
+
+    @cached_property
+    def sensor(self) -> Sensor:
+        """The pixels; without a shape given, as many as all micro-images need."""
+        shape = self.pixels.shape or self._covering_shape()
+        check_pixels(shape)
+        given = self.pixels
+        return Sensor(shape, given.pixel_pitch, given.full_well, given.read_noise, given.bits)
+
+    def _covering_shape(self) -> tuple[int, int]:
+        raise NotImplementedError
+
+    @property
+    def object_grid(self) -> Grid:
+        """Samples of the focused plane that the sensor sees."""
+        return self.sampling.object_grid
+
+    @property
+    def pupil_grid(self) -> Grid:
+        """Samples of the main lens."""
+        return self.sampling.pupil_grid
+
+    @property
+    def lenslet_grid(self) -> Grid | None:
+        """Samples of the lenslet plane; None without lenslets."""
+        return self.sampling.lenslet_grid
+
+    @property
+    def image_grid(self) -> Grid:
+        """Samples of the sensor plane."""
+        return self.sampling.image_grid
+
+    def train(self, object_distance: float | None = None) -> Train:
+        """Elements from a field at the object to the sensor.
+
+        Parameters
+        ----------
+        object_distance
+            Where the field stands, from the main lens [m]; None for the focused plane.
+        """
+        distance = self.object_distance if object_distance is None else object_distance
+        return Train((Propagate(distance, method="fresnel", grid=self.pupil_grid), self.image_train()))
+
+    def image_train(self) -> Train:
+        """Elements from the field just before the main lens to the sensor."""
+        raise NotImplementedError
+
+    def relay_train(self) -> Train | None:
+        """Elements from the field just before the lenslets to the sensor; None without lenslets."""
+        return None
+
+    def lens_train(self) -> Train:
+        """The main lens: its phase, its stop and its aberrations."""
+        focal_length, diameter = self.main_lens.focal_length, self.pupil_diameter
+        if not self.main_lens.aberrations:
+            return Train((ThinLens(focal_length, diameter),))
+        waves = self.main_lens.aberrations
+        # The plate is also the stop: two grey edges would be darker than one.
+        plate = ZernikePlate({j: 2 * math.pi * rms for j, rms in waves.items()}, diameter)
+        return Train((plate, ThinLens(focal_length)))
+
+    def defocused(self, dz: float) -> float:
+        """Object distance of a depth `dz` from the focused plane [m]; positive is farther.
+
+        Raises
+        ------
+        GeometryError
+            The object would be inside the focal length.
+        """
+        distance, focal_length = self.object_distance + dz, self.main_lens.focal_length
+        if not math.isfinite(distance) or distance <= focal_length:
+            raise GeometryError(
+                f"an object at depth {dz * 1e3:.6g} mm is {distance * 1e3:.6g} mm from the main lens, inside "
+                f"its focal length of {focal_length * 1e3:.6g} mm. Use a depth above "
+                f"{(focal_length - self.object_distance) * 1e3:.6g} mm."
+            )
+        return distance
+
+    def alpha(self, dz: float) -> float:
+        """Refocus factor α' = F/F' that brings an object at depth `dz` into focus."""
+        self.defocused(dz)
+        return plenoptic1.refocus_factor(self.main_lens.focal_length, self.object_distance, dz)
+
+    def _check_beyond_focus(self) -> None:
+        if self.object_distance <= self.main_lens.focal_length:
+            raise GeometryError(
+                f"object_distance {self.object_distance * 1e3:.6g} mm is inside the main lens' focal length "
+                f"of {self.main_lens.focal_length * 1e3:.6g} mm: there is no real image. "
+                "Move the object farther away or use a shorter focal length."
+            )
+        if self.image_distance > 1e3 * self.main_lens.focal_length:
+            raise GeometryError(
+                f"object_distance {self.object_distance * 1e3:.9g} mm is so close to the focal plane that "
+                f"the image lies {self.image_distance:.4g} m away. Move the object farther away."
+            )

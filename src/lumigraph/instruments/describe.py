@@ -1,0 +1,307 @@
+"""A table of everything that follows from a camera's description, each value with its equation."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from lumigraph.design import plenoptic1 as design1
+from lumigraph.design import plenoptic2 as design2
+from lumigraph.design import resolution
+from lumigraph.errors import SamplingError
+
+if TYPE_CHECKING:
+    from lumigraph.instruments.camera import Camera
+    from lumigraph.instruments.lenslet_camera import LensletCamera
+    from lumigraph.instruments.plenoptic1 import PlenopticCamera
+    from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
+    from lumigraph.instruments.single_lens import SingleLensCamera
+
+_PREFIXES = {
+    "m": ((1.0, "m"), (1e-3, "mm"), (1e-6, "um"), (1e-9, "nm")),
+    "1/m": ((1e3, "/mm"), (1.0, "/m")),
+    "rad": ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "urad")),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line: a name, a value in SI, its SI unit ("" for a number), and where it comes from."""
+
+    name: str
+    value: Any
+    unit: str = ""
+    source: str = ""
+
+    @property
+    def text(self) -> str:
+        """The value in a unit that suits its size."""
+        if isinstance(self.value, tuple):
+            return " x ".join(Row("", each, self.unit).text for each in self.value)
+        if isinstance(self.value, str | int):
+            return str(self.value)
+        prefixes = _PREFIXES.get(self.unit, ((1.0, self.unit),))
+        size, unit = next((p for p in prefixes if abs(self.value) >= p[0] * 0.99999), prefixes[-1])
+        return f"{self.value / size:.5g} {unit}".strip()
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A camera's table: rows by section, and warnings; `str` gives it as text."""
+
+    title: str
+    sections: tuple[tuple[str, tuple[Row, ...]], ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """All rows, section after section."""
+        return tuple(row for _, rows in self.sections for row in rows)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Values in SI by name, for programs; "warnings" holds the warnings."""
+        return {**{row.name: row.value for row in self.rows}, "warnings": list(self.warnings)}
+
+    def __str__(self) -> str:
+        name, value = (max(len(getattr(row, part)) for row in self.rows) for part in ("name", "text"))
+        lines = [self.title]
+        for section, rows in self.sections:
+            lines += ["", section]
+            lines += [f"  {row.name:<{name}}  {row.text:>{value}}   {row.source}".rstrip() for row in rows]
+        if self.warnings:
+            lines += ["", "Warnings", *(f"  {warning}" for warning in self.warnings)]
+        return "\n".join(lines)
+
+
+def single_lens(camera: "SingleLensCamera") -> Description:
+    """The table of a camera without lenslets."""
+    sections = (
+        ("Geometry", tuple(_geometry(camera))),
+        ("Main lens", tuple(_main_lens(camera))),
+        ("Sensor", tuple(_sensor(camera))),
+        ("Simulation", tuple(_sampling(camera))),
+    )
+    return Description(_title(camera), sections, tuple(_warnings(camera)))
+
+
+def plenoptic1(camera: "PlenopticCamera") -> Description:
+    """The table of a plenoptic camera 1.0."""
+    wavelength, pitch, f = camera.wavelength, camera.lenslets.pitch, camera.lenslet_distance
+    width = pitch * camera.lenslets.fill_factor
+    pixels = camera.micro_image_pitch / camera.pixels.pixel_pitch
+    directions = (
+        Row("views per axis", pixels, "", "pixels per micro-image, p (1 + b/F) / pixel"),
+        Row(
+            "resolvable directions",
+            design1.resolvable_directions(wavelength, width, f),
+            "",
+            "d² / (1.22 λ f_µ)",
+        ),
+        Row("angular resolution", design1.angular_resolution(camera.f_number, pixels), "rad", "1 / (F# N)"),
+        Row("diffraction angle", design1.diffraction_angle(wavelength, width), "rad", "λ / d"),
+        Row(
+            "smallest lenslet",
+            design1.smallest_lenslet(wavelength, f),
+            "m",
+            "sqrt(2.44 λ f_µ), against cross-talk",
+        ),
+        Row(
+            "picture cut-off",
+            1 / (2 * pitch),
+            "1/m",
+            "1 / (2 p): one sample per lenslet, on the main-lens image",
+        ),
+    )
+    return _with_lenslets(camera, ("Directions", directions))
+
+
+def plenoptic2(camera: "FocusedPlenopticCamera") -> Description:
+    """The table of a focused plenoptic camera 2.0."""
+    wavelength, pitch, m, b = (
+        camera.wavelength, camera.lenslets.pitch, camera.lenslet_magnification, camera.lenslet_distance
+    )  # fmt: skip
+    cutoff = design2.rendered_cutoff(wavelength, pitch, m, b)
+    rendered = (
+        Row("lenslet magnification", m, "", "m = b/a; " + ("Keplerian" if m > 0 else "Galilean")),
+        Row("views per axis", design2.views_per_axis(m), "", "1/|m|"),
+        Row("patch", camera.patch, "px", "m p z2 / L / pixel; " + ("turned" if m > 0 else "not turned")),
+        Row("rendered cut-off", cutoff, "1/m", "|m| p / (λ b), on the main-lens image"),
+        Row("rendered cut-off at the object", cutoff * camera.magnification, "1/m", "times z2/z1"),
+        Row(
+            "rendered lobe",
+            design2.rendered_lobe(wavelength, pitch, camera.relay_distance),
+            "m",
+            "2.44 λ |a| / p",
+        ),
+    )
+    return _with_lenslets(camera, ("Rendered picture", rendered))
+
+
+def _with_lenslets(camera: "LensletCamera", own: tuple[str, tuple[Row, ...]]) -> Description:
+    sections = (
+        ("Geometry", tuple(_geometry(camera))),
+        ("Main lens", tuple(_main_lens(camera))),
+        ("Lenslets", tuple(_lenslets(camera))),
+        own,
+        ("Sensor", tuple(_sensor(camera))),
+        ("Simulation", tuple(_sampling(camera))),
+    )
+    return Description(_title(camera), sections, (*_warnings(camera), *_lenslet_warnings(camera)))
+
+
+def _title(camera: "Camera") -> str:
+    return f"{camera.KIND} camera at {Row('', camera.wavelength, 'm').text}"
+
+
+def _geometry(camera: "Camera") -> Iterator[Row]:
+    z1, z2, length = camera.object_distance, camera.image_distance, camera.separation
+    yield Row("wavelength", camera.wavelength, "m", "given")
+    yield Row("object distance", z1, "m", "z1, given")
+    yield Row("image distance", z2, "m", "z2 = f z1 / (z1 - f)")
+    yield Row("magnification", camera.magnification, "", "z2 / z1")
+    if camera.lenslet_distance is not None:
+        if length != z2:
+            yield Row("relay distance", length - z2, "m", "a = b/m, main-lens image to lenslets")
+        yield Row(
+            "separation", length, "m", "L = z2 + a, main lens to lenslets" if length != z2 else "F = z2"
+        )
+        source = "b = f_µ (1 + m)" if length != z2 else "b = f_µ"
+        yield Row("lenslet distance", camera.lenslet_distance, "m", f"{source}, lenslets to sensor")
+
+
+def _main_lens(camera: "Camera") -> Iterator[Row]:
+    wavelength, f_number = camera.wavelength, camera.f_number
+    at_object = camera.object_distance / camera.pupil_diameter
+    yield Row("focal length", camera.main_lens.focal_length, "m", "f, given")
+    yield Row("diameter", camera.pupil_diameter, "m", _diameter_source(camera))
+    yield Row("f-number", f_number, "", "F# = z2/D")
+    yield Row("numerical aperture", resolution.numerical_aperture(f_number), "", "1 / (2 F#)")
+    yield Row("object-side numerical aperture", resolution.numerical_aperture(at_object), "", "D / (2 z1)")
+    yield Row("cut-off", resolution.incoherent_cutoff(wavelength, f_number), "1/m", "1 / (λ F#), incoherent")
+    yield Row("coherent cut-off", resolution.coherent_cutoff(wavelength, f_number), "1/m", "1 / (2 λ F#)")
+    yield Row(
+        "cut-off at the object", resolution.incoherent_cutoff(wavelength, at_object), "1/m", "D / (λ z1)"
+    )
+    yield Row("Airy radius", resolution.airy_first_zero(wavelength, f_number), "m", "1.22 λ F#, first zero")
+    yield Row("depth of field", resolution.depth_of_field(wavelength, at_object), "m", "4 λ (z1/D)²")
+    for index, waves in camera.main_lens.aberrations.items():
+        yield Row(f"Noll {index}", float(waves), "waves rms", "given")
+
+
+def _diameter_source(camera: "Camera") -> str:
+    matching = getattr(camera, "matching", None)
+    if camera.main_lens.diameter is not None or matching is None:
+        return "D, given"
+    return "D = p L / b, full micro-images" if matching == "full" else "D = z2 p / b, f-numbers matched"
+
+
+def _lenslets(camera: "LensletCamera") -> Iterator[Row]:
+    parts, f_number = camera.lenslets, camera.lenslet_distance / camera.lenslets.pitch
+    pixel = camera.pixels.pixel_pitch
+    yield Row("lenslets", parts.count, "", f"{parts.layout}, {len(parts.indices())} in all")
+    yield Row("lenslet pitch", parts.pitch, "m", "p, given")
+    for number, focal_length in enumerate(parts.focal_length):
+        kind = "" if len(parts.focal_length) == 1 else f" {number + 1}"
+        yield Row(f"lenslet focal length{kind}", focal_length, "m", "f_µ, given")
+    yield Row("lenslet f-number", f_number, "", "b/p")
+    yield Row(
+        "lenslet cut-off",
+        resolution.incoherent_cutoff(camera.wavelength, f_number),
+        "1/m",
+        "p / (λ b), on the sensor",
+    )
+    yield Row(
+        "lenslet Airy radius",
+        resolution.airy_first_zero(camera.wavelength, f_number),
+        "m",
+        "1.22 λ b/p, on the sensor",
+    )
+    yield Row("micro-image pitch", camera.micro_image_pitch, "m", "p (1 + b/L)")
+    yield Row("micro-image pitch in pixels", camera.micro_image_pitch / pixel, "px", "")
+    yield Row("micro-image width", camera.micro_image_width, "m", "D b / L, without diffraction")
+
+
+def _sensor(camera: "Camera") -> Iterator[Row]:
+    sensor = camera.sensor
+    given = "given" if camera.pixels.shape else "all micro-images fit"
+    yield Row("pixels", tuple(sensor.shape), "", given)
+    yield Row("pixel pitch", sensor.pixel_pitch, "m", "given")
+    yield Row("sensor size", tuple(n * sensor.pixel_pitch for n in sensor.shape), "m", "height x width")
+    yield Row(
+        "field of view", tuple(2 * half for half in camera.sampling.object_half), "m", "in the focused plane"
+    )
+
+
+def _sampling(camera: "Camera") -> Iterator[Row]:
+    sampling = camera.sampling
+    for rule in sampling.rules:
+        yield Row(f"largest pitch, {rule.name}", rule.pitch, "m", f"{rule.source}, margin included")
+    yield Row("pitch", sampling.pitch, "m", "chosen, of pupil, lenslets and sensor")
+    for rule in sampling.object_rules:
+        yield Row(f"largest pitch, {rule.name}", rule.pitch, "m", f"{rule.source}, margin included")
+    yield Row("object pitch", sampling.object_pitch, "m", "chosen")
+    for name in ("object", "pupil", "lenslet", "image"):
+        try:
+            grid = getattr(sampling, f"{name}_grid")
+        except SamplingError:
+            continue
+        if grid is not None:
+            yield Row(f"{name} samples", grid.shape)
+
+
+def _warnings(camera: "Camera") -> Iterator[str]:
+    for name in ("object", "pupil", "lenslet", "image"):
+        try:
+            getattr(camera.sampling, f"{name}_grid")
+        except SamplingError as error:
+            yield f"cannot be simulated: {error}"
+    if camera.f_number < 4:
+        yield f"the main lens works at f/{camera.f_number:.3g}: below f/4 paraxial, scalar forms are rough."
+    pixel, airy = camera.pixels.pixel_pitch, resolution.airy_first_zero(camera.wavelength, camera.f_number)
+    if camera.lenslet_distance is None and pixel > camera.wavelength * camera.f_number / 2:
+        yield (
+            f"pixels of {pixel * 1e6:.3g} um sample the Airy radius of {airy * 1e6:.3g} um too coarsely: "
+            f"{camera.wavelength * camera.f_number / 2 * 1e6:.3g} um would keep all detail."
+        )
+
+
+def _lenslet_warnings(camera: "LensletCamera") -> Iterator[str]:
+    diameter, matched = camera.pupil_diameter, camera.matched_diameter
+    if not math.isclose(diameter, matched, rel_tol=0.01):
+        yield (
+            f"the main lens is {diameter * 1e3:.4g} mm wide where {matched * 1e3:.4g} mm match the lenslets: "
+            f"micro-images are {'larger' if diameter > matched else 'smaller'} than intended."
+        )
+    if camera.micro_image_width > camera.micro_image_pitch * (1 + 1e-9):
+        yield (
+            f"micro-images overlap: {camera.micro_image_width * 1e6:.4g} um wide, "
+            f"{camera.micro_image_pitch * 1e6:.4g} um apart. Reduce the main lens' diameter below "
+            f"{camera.micro_image_pitch * camera.separation / camera.lenslet_distance * 1e3:.4g} mm."
+        )
+    width, smallest = camera.lenslets.pitch * camera.lenslets.fill_factor, _smallest(camera)
+    if width < smallest:
+        yield (
+            f"cross-talk by diffraction: lenslets of {width * 1e6:.4g} um are narrower than "
+            f"sqrt(2.44 λ b) = {smallest * 1e6:.4g} um. Use wider lenslets or a shorter focal length."
+        )
+    pixel, nyquist = camera.pixels.pixel_pitch, camera.wavelength * camera.lenslet_distance / (2 * width)
+    if pixel > camera.micro_image_pitch / 2:
+        yield f"pixels of {pixel * 1e6:.3g} um leave less than two per micro-image."
+    elif pixel > nyquist * (1 + 1e-9):
+        yield (
+            f"pixels of {pixel * 1e6:.3g} um are coarser than the lenslets' detail, "
+            f"λ b / (2 p) = {nyquist * 1e6:.3g} um."
+        )
+    yield from _cropped(camera)
+
+
+def _smallest(camera: "LensletCamera") -> float:
+    return design1.smallest_lenslet(camera.wavelength, camera.lenslet_distance)
+
+
+def _cropped(camera: "LensletCamera") -> Iterator[str]:
+    seen, present = len(camera.calibration.indices), len(camera.lenslets.indices())
+    if seen < present:
+        yield f"the sensor shows {seen} micro-image centres of {present}. Leave its shape out to see all."
+    if camera.lenslet_distance and max(camera.lenslets.reach) > camera.separation / 4:
+        yield "the array is wide for its distance: rays beyond 14 degrees are not paraxial."

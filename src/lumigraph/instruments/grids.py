@@ -1,0 +1,127 @@
+"""Which grids a camera's simulation needs: the rules, each with its source, and the windows."""
+
+import math
+from dataclasses import dataclass
+
+from scipy.fft import next_fast_len
+
+from lumigraph.core.grid import Grid
+from lumigraph.errors import SamplingError
+
+MARGIN = 2.0
+"""By this factor grids are finer than the rules for lens phases and intensities ask."""
+
+ANGLE_MARGIN = 1.1
+"""By this factor grids are finer than the steepest ray asks: depths differ a little in angle."""
+
+BORDER = 4
+"""Samples left free around the stop, the lenslets and the sensor."""
+
+MOST_SAMPLES = 2**28
+"""Largest plane: 2 GiB in complex64, of which a propagation needs several."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """The largest pitch that something allows [m], margin included, and why."""
+
+    name: str
+    pitch: float
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sampling:
+    """Pitches and half widths of a camera's planes; grids are made, and refused if too large, when asked for.
+
+    Parameters
+    ----------
+    rules
+        What the pitch of pupil, lenslets and sensor must obey.
+    pitch
+        Of pupil, lenslets and sensor [m].
+    object_rules, object_pitch
+        The same in the focused plane.
+    object_half, pupil_half, lenslet_half, image_half
+        Half widths to cover (y, x) [m]; lenslet_half is None without lenslets.
+    """
+
+    rules: tuple[Rule, ...]
+    pitch: float
+    object_rules: tuple[Rule, ...]
+    object_pitch: float
+    object_half: tuple[float, float]
+    pupil_half: tuple[float, float]
+    lenslet_half: tuple[float, float] | None
+    image_half: tuple[float, float]
+
+    @property
+    def object_grid(self) -> Grid:
+        """The focused plane, as wide as the field of view."""
+        shape = [math.ceil(2 * half / self.object_pitch - 1e-6) for half in self.object_half]
+        return _grid("the object", shape, self.object_pitch)
+
+    @property
+    def pupil_grid(self) -> Grid:
+        """The main lens, a little wider than its stop."""
+        return self._window("the main lens", self.pupil_half)
+
+    @property
+    def lenslet_grid(self) -> Grid | None:
+        """The lenslets, a little wider than the array."""
+        return None if self.lenslet_half is None else self._window("the lenslet array", self.lenslet_half)
+
+    @property
+    def image_grid(self) -> Grid:
+        """The sensor, a little wider than its pixels."""
+        return self._window("the sensor", self.image_half)
+
+    def _window(self, name: str, half: tuple[float, float]) -> Grid:
+        shape = [2 * (math.ceil(width / self.pitch) + BORDER) + 1 for width in half]
+        if max(shape) < 2**31:
+            shape = [int(next_fast_len(n) or n) for n in shape]
+        return _grid(name, shape, self.pitch)
+
+
+def _grid(name: str, shape: list[int], pitch: float) -> Grid:
+    if math.prod(shape) > MOST_SAMPLES:
+        raise SamplingError(
+            f"{name} needs {shape[0]} x {shape[1]} samples of {pitch * 1e6:.3g} um, more than the "
+            f"{MOST_SAMPLES:.3g} that can be simulated. Use fewer lenslets, a smaller sensor or a larger "
+            "f-number."
+        )
+    return Grid((shape[0], shape[1]), (pitch, pitch))
+
+
+def plane_rules(
+    wavelength: float, focal_length: float, diameter: float, f_number: float, steepest: float
+) -> tuple[Rule, ...]:
+    """Rules for the planes behind the object.
+
+    Parameters
+    ----------
+    wavelength, focal_length, diameter
+        Of the light; of the main lens [m].
+    f_number
+        Of the light on the sensor.
+    steepest
+        Largest slope of a ray behind the lenses.
+    """
+    return (
+        Rule("main lens", wavelength * focal_length / (diameter * MARGIN), "λ f / D / 2"),
+        Rule("intensity", wavelength * f_number / (2 * MARGIN), "λ F# / 4"),
+        Rule("steepest ray", wavelength / (2 * steepest * ANGLE_MARGIN), "λ / (2.2 θ)"),
+    )
+
+
+def object_rules(wavelength: float, distance: float, diameter: float, half_field: float) -> tuple[Rule, ...]:
+    """Rules for the object: it is low-passed at D / (λ z1), and seen from all of the pupil."""
+    return (
+        Rule("object detail", wavelength * distance / (2 * diameter) / 1.2, "λ z1 / (2 D) / 1.2"),
+        Rule("object field", wavelength * distance / (half_field + diameter / 2), "λ z1 / (X + D/2)"),
+    )
+
+
+def smallest(rules: tuple[Rule, ...]) -> float:
+    """The pitch that obeys all rules [m]."""
+    return min(rule.pitch for rule in rules)

@@ -1,0 +1,139 @@
+"""What plenoptic cameras 1.0 and 2.0 have in common."""
+
+import math
+from functools import cached_property
+from typing import Literal
+
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.lattice import Lattice
+from lumigraph.design import plenoptic1, plenoptic2, resolution
+from lumigraph.elements import LensletArray, Train
+from lumigraph.errors import GeometryError
+from lumigraph.instruments import grids
+from lumigraph.instruments.camera import Camera
+from lumigraph.instruments.parts import Lenslets
+from lumigraph.propagation import Propagate
+
+
+class LensletCamera(Camera):
+    """A main lens, lenslets and a sensor."""
+
+    lenslets: Lenslets
+    matching: Literal["views", "full"] = "views"
+
+    @property
+    def lenslet_distance(self) -> float:
+        """Lenslets to sensor, b [m]."""
+        raise NotImplementedError
+
+    @property
+    def matched_diameter(self) -> float:
+        """Main-lens diameter that `matching` asks for [m]."""
+        if self.matching == "full":
+            return plenoptic2.full_diameter(self.lenslets.pitch, self.separation, self.lenslet_distance)
+        return plenoptic2.views_diameter(self.lenslets.pitch, self.image_distance, self.lenslet_distance)
+
+    @property
+    def pupil_diameter(self) -> float:
+        """Of the main lens' stop, D [m]: as given, or matched to the lenslets."""
+        return self.main_lens.diameter or self.matched_diameter
+
+    @property
+    def micro_image_pitch(self) -> float:
+        """Distance between neighbouring micro-images on the sensor, p (1 + b/L) [m]."""
+        return plenoptic1.micro_image_pitch(self.lenslets.pitch, self.separation, self.lenslet_distance)
+
+    @property
+    def micro_image_width(self) -> float:
+        """Width of a micro-image by ray optics: the main lens seen through a lenslet, D b / L [m]."""
+        return self.pupil_diameter * self.lenslet_distance / self.separation
+
+    @property
+    def lattice(self) -> Lattice:
+        """Where the lenslets stand [m], in physical coordinates."""
+        return self.lenslets.lattice()
+
+    @cached_property
+    def calibration(self) -> Calibration:
+        """Where the micro-images stand on the raw image [px], by geometry; only those inside the sensor.
+
+        The raw image is turned by 180°: lenslet (i, j) of the calibration is lenslet (-i, -j) of `lattice`,
+        so that the second and third kind of a multi-focus array trade places.
+        """
+        sensor, pitch = self.sensor, self.sensor.pixel_pitch
+        scale = -(1 + self.lenslet_distance / self.separation) / pitch
+        lattice = self.lattice.scaled(scale).moved(sensor.shape[0] // 2, sensor.shape[1] // 2)
+        indices = -self.lenslets.indices()[::-1]
+        centers = lattice.position(indices)
+        inside = ((centers >= -0.5) & (centers <= [n - 0.5 for n in sensor.shape])).all(axis=1)
+        return Calibration(
+            lattice, sensor.shape, indices[inside], centers[inside], 0.0,
+            pixel_pitch=pitch, separation=self.separation, lenslet_distance=self.lenslet_distance,
+        )  # fmt: skip
+
+    def _covering_shape(self) -> tuple[int, int]:
+        spread = 1 + self.lenslet_distance / self.separation
+        # Micro-images can be wider than their pitch, where the main lens is too large.
+        excess = max(0.0, self.micro_image_width - self.micro_image_pitch) / 2
+        half = [(reach * spread + excess) / self.pixels.pixel_pitch for reach in self.lenslets.reach]
+        return 2 * math.ceil(half[0] - 0.5) + 1, 2 * math.ceil(half[1] - 0.5) + 1
+
+    @cached_property
+    def sampling(self) -> grids.Sampling:
+        """How finely the planes must be sampled, and are."""
+        wavelength, diameter, pitch = self.wavelength, self.pupil_diameter, self.lenslets.pitch
+        scale, reach = self.object_distance / self.separation, self.lenslets.reach
+        object_half = (reach[0] * scale, reach[1] * scale)
+        rules = self._plane_rules()
+        # An odd number of samples per lenslet: the border between lenslets is one between samples.
+        samples = math.ceil(pitch / grids.smallest(rules)) // 2 * 2 + 1
+        object_rules = grids.object_rules(wavelength, self.object_distance, diameter, max(object_half))
+        object_samples = math.ceil(pitch * scale / grids.smallest(object_rules))
+        image_half = tuple(n * self.sensor.pixel_pitch / 2 for n in self.sensor.shape)
+        return grids.Sampling(
+            rules=rules,
+            pitch=pitch / samples,
+            object_rules=object_rules,
+            object_pitch=pitch * scale / object_samples,
+            object_half=object_half,
+            pupil_half=(diameter / 2, diameter / 2),
+            lenslet_half=reach,
+            image_half=(image_half[0], image_half[1]),
+        )
+
+    def _plane_rules(self) -> tuple[grids.Rule, ...]:
+        wavelength, diameter, pitch = self.wavelength, self.pupil_diameter, self.lenslets.pitch
+        f_number = resolution.f_number(self.lenslet_distance, pitch)
+        shortest = min(self.lenslets.focal_length)
+        steepest = (max(self.lenslets.reach) + diameter / 2) / self.separation + pitch / (2 * shortest)
+        lenslet = grids.Rule("lenslet", wavelength * shortest / (pitch * grids.MARGIN), "λ f_µ / p / 2")
+        return (
+            *grids.plane_rules(wavelength, self.main_lens.focal_length, diameter, f_number, steepest),
+            lenslet,
+        )
+
+    def image_train(self) -> Train:
+        """Elements from the field just before the main lens to the sensor."""
+        to_lenslets = Propagate(self.separation, "band_limited", grid=self.lenslet_grid)
+        return Train((self.lens_train(), to_lenslets, self.relay_train()))
+
+    def relay_train(self) -> Train:
+        """Elements from the field just before the lenslets to the sensor."""
+        parts = self.lenslets
+        array = LensletArray(
+            self.lattice,
+            parts.focal_length,
+            shape=parts.shape,
+            fill_factor=parts.fill_factor,
+            extent=parts.extent,
+        )
+        return Train((array, Propagate(self.lenslet_distance, "band_limited", grid=self.image_grid)))
+
+    def _check_lenslets_behind_lens(self) -> None:
+        if self.separation <= 0:
+            raise GeometryError(
+                f"the lenslets would stand {-self.separation * 1e3:.6g} mm before the main lens: "
+                f"its image is at z2 = {self.image_distance * 1e3:.6g} mm and a = "
+                f"{(self.separation - self.image_distance) * 1e3:.6g} mm. "
+                "Use a shorter lenslet focal length or a magnification nearer to -1."
+            )

@@ -1,0 +1,230 @@
+"""Parts of a camera, as the tables of a camera file: frozen, strict, no unknown keys.
+
+Values are SI floats or text with a unit in Python; in a file, lengths carry their unit.
+"""
+
+import math
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from lumigraph.core.lattice import Lattice
+from lumigraph.errors import GeometryError
+from lumigraph.instruments.problems import readable
+from lumigraph.instruments.quantities import (
+    Aberrations,
+    Angle,
+    Bits,
+    Counts,
+    Fraction,
+    Length,
+    NotNegative,
+    Number,
+    Offset,
+    OneOrThree,
+    Positive,
+)
+
+MOST_PIXELS = 2**28
+"""Largest sensor: 268 million pixels, 1 GiB in single precision."""
+MOST_LENSLETS = 2**22
+
+
+class Part(BaseModel):
+    """A table of a camera file. Whatever is wrong with it is one line that names the field."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, populate_by_name=True)
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            self.__pydantic_validator__.validate_python(values, self_instance=self)
+        except ValidationError as error:
+            raise readable(error, type(self)) from None
+
+    # Parts inside a camera are validated by the camera, which knows their place and whether a file is read.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+
+class MainLens(Part):
+    """The lens that forms the image: a thin lens with a round stop.
+
+    Parameters
+    ----------
+    focal_length
+        [m] or text such as "60 mm".
+    diameter
+        Of the stop; left out, it is matched to the lenslets.
+    aberrations
+        Zernike terms: Noll index to waves rms.
+
+    Examples
+    --------
+    >>> MainLens(focal_length="60 mm").focal_length
+    0.06
+    """
+
+    focal_length: Length
+    diameter: Length | None = None
+    aberrations: Aberrations = Field(default_factory=dict)
+
+
+class Lenslets(Part):
+    """The lenslet array.
+
+    Parameters
+    ----------
+    pitch
+        Between neighbouring lenslets.
+    focal_length
+        One, or three for a multi-focus array in a "hex" layout; kept as a tuple.
+    count
+        Rows and columns (ny, nx). An odd number has a lenslet on the axis, an even one straddles it. The
+        rows of a "hex" array hold nx and nx - 1 in turn, or nx each if ny is even.
+    layout
+        "square" or "hex".
+    magnification
+        Of a focused plenoptic camera, m = b/a of the first focal length: above 0 Keplerian, between -1
+        and 0 Galilean.
+    shape
+        Of a lenslet: "square" or "hex", the lattice's cell, or "round"; left out, the cell.
+    fill_factor
+        Width of a lenslet over the pitch; the rest is opaque.
+    rotation
+        From +x towards +y [rad], or text such as "2 mrad".
+    offset
+        Of the lenslets from the axis (y, x), less than half a pitch.
+    """
+
+    pitch: Length
+    focal_length: OneOrThree
+    count: Counts
+    layout: Literal["square", "hex"] = "square"
+    magnification: Number | None = None
+    shape: Literal["square", "hex", "round"] | None = None
+    fill_factor: Fraction = 1.0
+    rotation: Angle = 0.0
+    offset: Offset = (0.0, 0.0)
+
+    @field_validator("count")
+    @classmethod
+    def _few_enough(cls, count: tuple[int, int]) -> tuple[int, int]:
+        if math.prod(count) > MOST_LENSLETS:
+            raise GeometryError(
+                f"{count[0]} x {count[1]} lenslets are more than {MOST_LENSLETS}, the most that can be "
+                "simulated. Use fewer."
+            )
+        return count
+
+    @model_validator(mode="after")
+    def _fits_its_layout(self) -> "Lenslets":
+        if len(self.focal_length) == 3 and self.layout != "hex":
+            raise GeometryError(
+                "three focal lengths need layout 'hex', in which neighbours never have the same, not "
+                f"{self.layout!r}. Give one focal length or change the layout."
+            )
+        if self.shape not in (None, "round", self.layout):
+            raise GeometryError(
+                f"shape {self.shape!r} does not tile layout {self.layout!r}. "
+                f"Use {self.layout!r} or 'round', or leave it out."
+            )
+        for name, shift, slack in zip("yx", self._turned(*self.offset), self._slack, strict=True):
+            if abs(shift) >= slack:
+                raise GeometryError(
+                    f"offset along {name} is {shift * 1e6:.6g} um but must stay below {slack * 1e6:.6g} um. "
+                    "Give what is left after whole lenslets, or change count."
+                )
+        return self
+
+    @property
+    def row_pitch(self) -> float:
+        """Distance between rows [m]."""
+        return self.pitch * (math.sqrt(3) / 2 if self.layout == "hex" else 1.0)
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Height and width of the rectangle, turned with the array, that holds its lenslets' centres [m]."""
+        ny, nx = self.count
+        # Every second hexagonal row is shifted by half a pitch: the border lies between the rows' ends.
+        inset = 0.5 if self.layout == "hex" and ny % 2 else 0.0
+        return ny * self.row_pitch, (nx - inset) * self.pitch
+
+    @property
+    def _slack(self) -> tuple[float, float]:
+        """Shift (y, x) that brings no lenslet over the border of `extent` [m]."""
+        return self.row_pitch / 2, self.pitch / (4 if self.layout == "hex" else 2)
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Farthest the outermost lenslets extend from the axis (y, x) [m], turned and moved as they are."""
+        sin, cos = abs(math.sin(self.rotation)), abs(math.cos(self.rotation))
+        height, width = self.extent
+        if self.layout == "hex":  # its cells are pointed along y, and the border lies inside the last cells
+            height, width = height + 0.3 * self.pitch, width + 0.5 * self.pitch
+        return (
+            (height * cos + width * sin) / 2 + abs(self.offset[0]),
+            (width * cos + height * sin) / 2 + abs(self.offset[1]),
+        )
+
+    def lattice(self) -> Lattice:
+        """Where the lenslets stand [m]."""
+        if self.layout == "hex":
+            lattice = Lattice.hex(self.pitch, self.rotation, kinds=len(self.focal_length))
+        else:
+            lattice = Lattice.square(self.pitch, self.rotation)
+        half_steps = [0.0 if n % 2 else 0.5 for n in self.count]
+        dy, dx = lattice.position(np.asarray(half_steps))
+        return lattice.moved(float(dy) + self.offset[0], float(dx) + self.offset[1])
+
+    def indices(self) -> np.ndarray:
+        """Index pairs (k, 2) as (i, j) of the lenslets that exist, row by row."""
+        lattice, (reach_y, reach_x) = self.lattice(), self.reach
+        pairs = lattice.indices((-reach_y, reach_y), (-reach_x, reach_x))
+        across, along = self._turned(*lattice.position(pairs).T)
+        height, width = self.extent
+        return pairs[(np.abs(across) <= height / 2) & (np.abs(along) <= width / 2)]
+
+    def _turned(self, y: Any, x: Any) -> tuple[Any, Any]:
+        """Coordinates (y, x) in the frame that turns with the array."""
+        sin, cos = math.sin(self.rotation), math.cos(self.rotation)
+        return y * cos - x * sin, y * sin + x * cos
+
+
+class Pixels(Part):
+    """The sensor's pixels, table ``[sensor]``.
+
+    Parameters
+    ----------
+    pixel_pitch
+        [m] or text such as "5 um".
+    shape
+        Rows and columns; left out, all micro-images fit.
+    full_well
+        Electrons of a full pixel.
+    read_noise
+        Electrons rms.
+    bits
+        Of the readout.
+    """
+
+    pixel_pitch: Length
+    shape: Counts | None = None
+    full_well: Positive = 10000.0
+    read_noise: NotNegative = 5.0
+    bits: Bits = 12
+
+    @field_validator("shape")
+    @classmethod
+    def _few_enough(cls, shape: tuple[int, int] | None) -> tuple[int, int] | None:
+        if shape is not None:
+            check_pixels(shape)
+        return shape
+
+
+def check_pixels(shape: tuple[int, int]) -> None:
+    """Refuse a sensor that no computer would simulate."""
+    if math.prod(shape) > MOST_PIXELS:
+        raise GeometryError(
+            f"{shape[0]} x {shape[1]} = {math.prod(shape):.3g} pixels are more than the {MOST_PIXELS:.3g} "
+            "that can be simulated. Use fewer or larger pixels."
+        )

@@ -1,0 +1,73 @@
+"""The plenoptic camera 1.0."""
+
+from typing import ClassVar
+
+from pydantic import model_validator
+
+from lumigraph.errors import GeometryError
+from lumigraph.instruments import describe
+from lumigraph.instruments.lenslet_camera import LensletCamera
+
+
+class PlenopticCamera(LensletCamera):
+    """Plenoptic camera 1.0: lenslets at the main-lens image, F = z2, and the sensor at b = f_µ behind them.
+
+    Each lenslet is one place, each pixel under it one direction.
+
+    Parameters
+    ----------
+    wavelength, object_distance
+        [m] or text with a unit.
+    main_lens
+        `MainLens`; without a diameter it is matched, D = p F / b.
+    lenslets
+        `Lenslets`, of one focal length and without magnification.
+    sensor
+        `Pixels`; without a shape all micro-images fit.
+    matching
+        "views" or "full", which are the same here.
+
+    Raises
+    ------
+    FormatError
+        A wrong or missing key, a wrong unit.
+    GeometryError
+        The object is inside the focal length, a magnification or three focal lengths are given, or values
+        that no camera can have.
+
+    Examples
+    --------
+    >>> camera = PlenopticCamera(
+    ...     wavelength="633 nm", object_distance="240 mm", main_lens={"focal_length": "120 mm"},
+    ...     lenslets={"pitch": "150 um", "focal_length": "10 mm", "count": (101, 101)},
+    ...     sensor={"pixel_pitch": "5 um"},
+    ... )
+    >>> round(camera.pupil_diameter * 1e3, 6), round(camera.micro_image_pitch * 1e6, 6)
+    (3.6, 156.25)
+    """
+
+    KIND: ClassVar[str] = "plenoptic"
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> "PlenopticCamera":
+        self._check_beyond_focus()
+        if self.lenslets.magnification is not None:
+            raise GeometryError(
+                f"lenslets.magnification is {self.lenslets.magnification:g}, but the lenslets of a plenoptic "
+                "camera 1.0 image infinity. Leave it out, or use kind 'focused-plenoptic'."
+            )
+        if len(self.lenslets.focal_length) != 1:
+            raise GeometryError(
+                "lenslets.focal_length has 3 lengths, but the sensor of a plenoptic camera 1.0 stands in one "
+                "focal plane. Give one, or use kind 'focused-plenoptic'."
+            )
+        return self
+
+    @property
+    def lenslet_distance(self) -> float:
+        """Lenslets to sensor, b = f_µ [m]."""
+        return self.lenslets.focal_length[0]
+
+    def describe(self) -> describe.Description:
+        """Distances, f-numbers, cut-offs, directions and sampling, each with its equation."""
+        return describe.plenoptic1(self)

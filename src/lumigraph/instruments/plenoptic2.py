@@ -1,0 +1,123 @@
+"""The focused plenoptic camera 2.0."""
+
+from typing import ClassVar
+
+from pydantic import model_validator
+
+from lumigraph.design import plenoptic2 as closed_forms
+from lumigraph.design import thin_lens
+from lumigraph.errors import FormatError, GeometryError
+from lumigraph.instruments import describe
+from lumigraph.instruments.lenslet_camera import LensletCamera
+
+
+class FocusedPlenopticCamera(LensletCamera):
+    """Focused plenoptic camera 2.0: lenslets relay the main-lens image onto the sensor, magnified m = b/a.
+
+    Keplerian for m > 0 (the image lies a before the lenslets), Galilean for m < 0 (it would lie -a behind).
+
+    Parameters
+    ----------
+    wavelength, object_distance
+        [m] or text with a unit.
+    main_lens
+        `MainLens`; without a diameter it is matched to the lenslets.
+    lenslets
+        `Lenslets` with their magnification; of three focal lengths it is that of the first.
+    sensor
+        `Pixels`; without a shape all micro-images fit.
+    matching
+        "views": D = z2 p / b, with which 1/m lenslets per axis see a point; "full": D = p L / b, with which
+        micro-images are as wide as the lenslets.
+
+    Raises
+    ------
+    FormatError
+        A wrong or missing key, a wrong unit.
+    GeometryError
+        The object is inside the focal length, a magnification of 0 or at most -1, lenslets before the main
+        lens, or values that no camera can have.
+
+    Examples
+    --------
+    >>> camera = FocusedPlenopticCamera(
+    ...     wavelength="633 nm", object_distance="120 mm", main_lens={"focal_length": "60 mm"},
+    ...     lenslets={"pitch": "150 um", "focal_length": "5.2 mm", "count": (39, 39), "magnification": 0.5},
+    ...     sensor={"pixel_pitch": "1.6667 um"},
+    ... )
+    >>> round(camera.relay_distance * 1e3, 6), round(camera.lenslet_distance * 1e3, 6)
+    (15.6, 7.8)
+    >>> round(camera.patch, 2)
+    39.82
+    """
+
+    KIND: ClassVar[str] = "focused-plenoptic"
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> "FocusedPlenopticCamera":
+        self._check_beyond_focus()
+        m = self.lenslets.magnification
+        if m is None:
+            raise FormatError(
+                "lenslets.magnification is missing. Give m = b/a, such as 0.5 or -0.25 (Galilean)."
+            )
+        if m == 0 or m <= -1:
+            raise GeometryError(
+                f"lenslets.magnification is {m:g} but must be above 0 (Keplerian) or between -1 and 0 "
+                "(Galilean)."
+            )
+        if abs(m) < 1e-3 or m > 1e3:
+            raise GeometryError(
+                f"lenslets.magnification is {m:g}, outside 0.001 to 1000 in size. Use a value near 0.1 to 1; "
+                "lenslets that image infinity are kind 'plenoptic'."
+            )
+        self._check_lenslets_behind_lens()
+        return self
+
+    @property
+    def lenslet_magnification(self) -> float:
+        """Size of the sensor's image over the main lens', m = b/a; negative for a Galilean camera."""
+        assert self.lenslets.magnification is not None  # checked above
+        return self.lenslets.magnification
+
+    @property
+    def lenslet_distance(self) -> float:
+        """Lenslets to sensor, b = f_µ (1 + m) [m]."""
+        return closed_forms.lenslet_distance(self.lenslets.focal_length[0], self.lenslet_magnification)
+
+    @property
+    def relay_distance(self) -> float:
+        """Main-lens image to lenslets, a = b/m [m]; negative for a Galilean camera."""
+        return closed_forms.relay_distance(self.lenslets.focal_length[0], self.lenslet_magnification)
+
+    @property
+    def separation(self) -> float:
+        """Main lens to lenslets, L = z2 + a [m]."""
+        return self.image_distance + self.relay_distance
+
+    @property
+    def patch(self) -> float:
+        """Piece of a micro-image that tiles the picture of the focused plane [px]; negative if Galilean."""
+        return self.patch_at(0.0)
+
+    def magnification_at(self, dz: float) -> float:
+        """Lenslet magnification m' = b/a' of an object at depth `dz` [m] from the focused plane.
+
+        Raises
+        ------
+        GeometryError
+            The object is inside the focal length, or its image falls on the lenslets.
+        """
+        return closed_forms.magnification_at(
+            self.main_lens.focal_length, self.defocused(dz), self.separation, self.lenslet_distance
+        )
+
+    def patch_at(self, dz: float) -> float:
+        """Piece of a micro-image that tiles the picture of an object at depth `dz` [px]; signed."""
+        image = thin_lens.image_distance(self.main_lens.focal_length, self.defocused(dz))
+        width = closed_forms.patch(self.lenslets.pitch, self.magnification_at(dz), image, self.separation)
+        return width / self.pixels.pixel_pitch
+
+    def describe(self) -> describe.Description:
+        """Distances, f-numbers, cut-offs, views and sampling, each with its equation."""
+        return describe.plenoptic2(self)

@@ -1,0 +1,101 @@
+"""A camera without lenslets."""
+
+from functools import cached_property
+from typing import ClassVar
+
+from pydantic import model_validator
+
+from lumigraph.design import resolution
+from lumigraph.elements import Train
+from lumigraph.errors import FormatError
+from lumigraph.instruments import describe, grids
+from lumigraph.instruments.camera import Camera
+from lumigraph.propagation import Propagate
+
+
+class SingleLensCamera(Camera):
+    """A main lens and a sensor at its image.
+
+    Parameters
+    ----------
+    wavelength, object_distance
+        [m] or text with a unit.
+    main_lens
+        `MainLens`, with its diameter.
+    sensor
+        `Pixels`, with its shape.
+
+    Raises
+    ------
+    FormatError
+        The diameter or the shape is missing; a wrong key or unit.
+    GeometryError
+        The object is inside the focal length; values that no camera can have.
+
+    Examples
+    --------
+    >>> camera = SingleLensCamera(
+    ...     wavelength="633 nm", object_distance="316 mm",
+    ...     main_lens={"focal_length": "158 mm", "diameter": "5 mm"},
+    ...     sensor={"pixel_pitch": "5 um", "shape": [2000, 2000]},
+    ... )
+    >>> round(camera.f_number, 1)
+    63.2
+    """
+
+    KIND: ClassVar[str] = "single-lens"
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> "SingleLensCamera":
+        if self.main_lens.diameter is None:
+            raise FormatError(
+                "main_lens.diameter is missing. A camera without lenslets needs it: nothing else sets it."
+            )
+        if self.pixels.shape is None:
+            raise FormatError("sensor.shape is missing. A camera without lenslets needs it: write [ny, nx].")
+        self._check_beyond_focus()
+        return self
+
+    @property
+    def pupil_diameter(self) -> float:
+        """Of the main lens' stop, D [m]."""
+        assert self.main_lens.diameter is not None  # checked above
+        return self.main_lens.diameter
+
+    @cached_property
+    def sampling(self) -> grids.Sampling:
+        """How finely the planes must be sampled, and are."""
+        wavelength, z1, z2, diameter = (
+            self.wavelength,
+            self.object_distance,
+            self.image_distance,
+            self.pupil_diameter,
+        )
+        sensor = self.sensor
+        image_half = tuple(n * sensor.pixel_pitch / 2 for n in sensor.shape)
+        object_half = tuple(half / self.magnification for half in image_half)
+        steepest = (max(image_half) + diameter / 2) / z2
+        rules = grids.plane_rules(
+            wavelength, self.main_lens.focal_length, diameter, resolution.f_number(z2, diameter), steepest
+        )
+        object_rules = grids.object_rules(wavelength, z1, diameter, max(object_half))
+        return grids.Sampling(
+            rules=rules,
+            pitch=grids.smallest(rules),
+            object_rules=object_rules,
+            object_pitch=grids.smallest(object_rules),
+            object_half=(object_half[0], object_half[1]),
+            pupil_half=(diameter / 2, diameter / 2),
+            lenslet_half=None,
+            image_half=(image_half[0], image_half[1]),
+        )
+
+    def image_train(self) -> Train:
+        """Elements from the field just before the main lens to the sensor."""
+        return Train(
+            (self.lens_train(), Propagate(self.image_distance, "band_limited", grid=self.image_grid))
+        )
+
+    def describe(self) -> describe.Description:
+        """Distances, f-numbers, cut-offs and sampling, each with its equation."""
+        return describe.single_lens(self)
