@@ -104,7 +104,9 @@ def _propagate(field: Field, distance: float, method: str, pad: float, output: G
             _on_band(window, (rows, columns), first, (distance, field.wavelength), circle), field.data
         ),
     )
-    return replace(field, data=convolve(field.data, Transfer(values, rows, columns), output.shape), grid=output)
+    return replace(
+        field, data=convolve(field.data, Transfer(values, rows, columns), output.shape), grid=output
+    )
 
 
 def _on_band(

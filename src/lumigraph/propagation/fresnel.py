@@ -47,7 +47,7 @@ def one_step_grid(grid: Grid, distance: float, wavelength: float) -> Grid:
 
 
 def multi_step_fresnel(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
-    r"""Steps of dz = W²/(Nλ), each of which keeps the pitch (the thesis' 2.3.1), and the rest by its spectrum.
+    r"""Steps of dz = W²/(Nλ), each of which keeps the pitch (the thesis' 2.3.1), the rest by its spectrum.
 
     Each step is one FFT between two chirps exp(iπj²/N). The distance need not be a multiple of dz: what
     is left, less than one step, is multiplied by exp(-iπλzf²), which such a short way samples without
@@ -61,9 +61,7 @@ def multi_step_fresnel(field: Field, distance: float, pad: float, grid: Grid | N
     _check_steps(field, window, distance, (first, output))
     steps = sampling.fresnel_step(window, field.wavelength)
     data = _conjugate_if(distance < 0, field.data)
-    for axis, n, step, offset, n_out in zip(
-        (-2, -1), window.shape, steps, first, output.shape, strict=True
-    ):
+    for axis, n, step, offset, n_out in zip((-2, -1), window.shape, steps, first, output.shape, strict=True):
         data = _steps_along(data, axis, n, abs(distance) / step)
         data = arrays.namespace(data).roll(data, -offset, axis=axis)
         data = data[..., :n_out, :] if axis == -2 else data[..., :n_out]
@@ -71,9 +69,7 @@ def multi_step_fresnel(field: Field, distance: float, pad: float, grid: Grid | N
     return replace(field, data=_conjugate_if(distance < 0, data), grid=output)
 
 
-def _check_steps(
-    field: Field, window: Grid, distance: float, target: tuple[tuple[int, int], Grid]
-) -> None:
+def _check_steps(field: Field, window: Grid, distance: float, target: tuple[tuple[int, int], Grid]) -> None:
     shortest = min(sampling.fresnel_step(window, field.wavelength))
     if abs(distance) > MOST_STEPS * shortest:
         raise SamplingError(
@@ -159,14 +155,16 @@ def _matrix(field: Field, axes: tuple[np.ndarray, np.ndarray], pitch: float, are
 
     def build() -> Array:
         squares = (axes[0][:, None] - axes[1]) ** 2
-        return arrays.like(np.exp(1j * math.pi * (squares / area % 2)) * pitch / np.sqrt(1j * area), field.data)
+        return arrays.like(
+            np.exp(1j * math.pi * (squares / area % 2)) * pitch / np.sqrt(1j * area), field.data
+        )
 
     spans = tuple((len(axis), float(axis[0]), float(axis[-1])) for axis in axes)
     return CACHE.get(("points", spans, pitch, area, arrays.placement(field.data)), build)
 
 
 def _product(rows: Array, data: Array, columns: Array) -> Array:
-    """rows · data · columnsᵀ in the cheaper order."""
+    """The product rows · data · columnsᵀ, in the cheaper order."""
     xp = arrays.namespace(data)
     (my, ny), (mx, nx) = rows.shape, columns.shape
     turned = xp.matrix_transpose(columns)
@@ -205,5 +203,3 @@ def _vector(values: np.ndarray, data: Array, axis: int) -> Array:
 
 def _conjugate_if(condition: bool, data: Array) -> Array:
     return arrays.namespace(data).conj(data) if condition else data
-
-

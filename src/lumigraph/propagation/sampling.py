@@ -171,8 +171,8 @@ def one_step_aliases(grid: Grid, distance: float, wavelength: float) -> str | No
     if abs(distance) >= shortest * (1 - 1e-9):
         return None
     return (
-        f"fresnel over {abs(distance):.4g} m aliases: on this grid one step is valid from {shortest:.4g} m on. "
-        "Use method='band_limited', or a finer pitch."
+        f"fresnel over {abs(distance):.4g} m aliases: on this grid one step is valid from {shortest:.4g} m "
+        "on. Use method='band_limited', or a finer pitch."
     )
 
 
@@ -182,8 +182,8 @@ def points_alias(pitch: float, farthest: float, distance: float, wavelength: flo
     if farthest <= widest * (1 + 1e-9):
         return None
     return (
-        f"fresnel onto this grid aliases: input and output points are up to {farthest:.4g} m apart, but a pitch "
-        f"of {pitch:.4g} m serves {widest:.4g} m over {abs(distance):.4g} m. "
+        f"fresnel onto this grid aliases: input and output points are up to {farthest:.4g} m apart, but a "
+        f"pitch of {pitch:.4g} m serves {widest:.4g} m over {abs(distance):.4g} m. "
         f"Use a pitch of {pitch * widest / farthest:.4g} m, or a smaller output grid."
     )
 
@@ -205,8 +205,8 @@ def kept_alias(method: str, limits: Pair, window: Grid, distance: float, wavelen
     for limit, clean, pitch in zip(limits, free, window.pitch, strict=True):
         if min(limit, 0.5 / pitch) > 1.01 * clean:
             return (
-                f"{method} over {abs(distance):.4g} m keeps frequencies up to {limit:.4g} /m, but on this window "
-                f"they alias above {clean:.4g} /m. Use method='band_limited', or pad=1."
+                f"{method} over {abs(distance):.4g} m keeps frequencies up to {limit:.4g} /m, but on this "
+                f"window they alias above {clean:.4g} /m. Use method='band_limited', or pad=1."
             )
     return None
 

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import scipy.fft
 
@@ -31,7 +32,8 @@ def smooth_size(n: int, *, even: bool = False) -> int:
 
 
 def _next_fast(n: int, even: bool) -> int:
-    return 2 * int(scipy.fft.next_fast_len((n + 1) // 2)) if even else int(scipy.fft.next_fast_len(n))
+    size: Any = scipy.fft.next_fast_len((n + 1) // 2 if even else n)
+    return 2 * size if even else size
 
 
 def reach(n_in: int, first: int, n_out: int) -> int:

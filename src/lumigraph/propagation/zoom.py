@@ -2,8 +2,8 @@
 
 The frequencies are chosen for the two grids at hand instead of by an FFT: spaced closely enough that
 nothing wraps round into the output, and only those whose rays join the two grids, up to the input's
-Nyquist frequency. Far away few frequencies are left, and the sum is both quicker and more exact than
-an FFT on a padded window.
+Nyquist frequency, with a smooth edge beyond. Far away few frequencies are left, and the sum is both
+quicker and more exact than an FFT on a padded window.
 
 R. Soummer et al., Opt. Express 15, 15935 (2007) (matrix DFT); L. Rabiner, R. Schafer and C. Rader,
 IEEE Trans. Audio Electroacoust. 17, 86 (1969) (chirp-z).
@@ -24,8 +24,8 @@ from lumigraph.propagation.cache import CACHE
 from lumigraph.propagation.window import check_memory, smooth_size
 
 MARGIN = 1.0
-"""Rays are followed this fraction of the grids' joint width beyond it, so that the band's edge stays outside."""
-GAIN = 8.0
+"""Rays are followed this fraction of the grids' joint half-width beyond it; their weight fades to zero there."""
+GAIN = 12.0
 """One multiplication in a matrix product is this much quicker than one in an FFT (measured, two cores)."""
 
 
@@ -64,7 +64,8 @@ def zoom(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
     """
     if grid is None:
         raise SamplingError("zoom needs the output's grid: pass grid=Grid(shape, pitch, center).")
-    fy, fx = (frequencies(field, grid, axis, distance) for axis in (0, 1))
+    bands = [passband(field, grid, axis, distance) for axis in (0, 1)]
+    fy, fx = bands[0].samples, bands[1].samples
     _check_memory(field, grid, fy, fx)
     data = _transform(field.data, Samples.axis(field.grid, 1), fx, -1)
     data = _swap(_transform(_swap(data), Samples.axis(field.grid, 0), fy, -1))
@@ -73,47 +74,77 @@ def zoom(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
 
     def build() -> Array:
         H = transfer_function(fy.values, fx.values, distance, field.wavelength)
-        return arrays.like(H * scale, field.data)
+        H *= bands[0].weights[:, None] * (bands[1].weights * scale)
+        return arrays.like(H, field.data)
 
-    key = ("zoom", fy, fx, distance, field.wavelength, scale, arrays.placement(field.data))
+    key = ("zoom", *bands, distance, field.wavelength, scale, arrays.placement(field.data))
     data = data * CACHE.get(key, build)
     data = _swap(_transform(_swap(data), fy, Samples.axis(grid, 0), +1))
     return replace(field, data=_transform(data, fx, Samples.axis(grid, 1), +1), grid=grid)
 
 
-def frequencies(field: Field, grid: Grid, axis: int, distance: float) -> Samples:
+@dataclass(frozen=True, slots=True)
+class Passband:
+    """Frequencies of one axis [1/m]: full weight from `low` to `high`, which fades over `low_fade`, `high_fade`."""
+
+    samples: Samples
+    low: float
+    high: float
+    low_fade: float
+    high_fade: float
+
+    @property
+    def weights(self) -> np.ndarray:
+        """One inside, a squared cosine towards the ends: a hard edge would ring right through the output."""
+        f = self.samples.values
+        beyond = np.maximum((self.low - f) / self.low_fade, (f - self.high) / self.high_fade)
+        return np.cos(math.pi / 2 * np.clip(beyond, 0, 1)) ** 2
+
+
+def passband(field: Field, grid: Grid, axis: int, distance: float) -> Passband:
     """Frequencies of one axis that carry light from the field's grid to `grid` [1/m].
 
-    A ray that moves by x over z has the frequency x/(λ sqrt(x² + z²)); the movements between the two
-    grids, widened by `MARGIN` on both sides, give the range, and their width the spacing.
+    A ray that moves by x over z has the frequency x/(λ sqrt(x² + z²)). The movements between the two
+    grids give the frequencies of full weight; widened by `MARGIN` they give the range, and their width
+    the spacing. Above the input's Nyquist frequency there is nothing to carry.
     """
-    (low, high), (low_y, high_y) = (_movements(field.grid, grid, k) for k in (axis, 1 - axis))
+    (low, high), across = _movements(field.grid, grid, axis), _movements(field.grid, grid, 1 - axis)
     margin = MARGIN * (high - low) / 2 + math.sqrt(field.wavelength * abs(distance))
-    low, high = low - margin, high + margin
-    across = max(abs(low_y), abs(high_y))
+    aside, wave = max(map(abs, across)), (distance, field.wavelength)
+    inner = _frequency_range((low, high), aside, wave)
+    outer = _frequency_range((low - margin, high + margin), aside, wave)
     nyquist = 0.5 / field.grid.pitch[axis]
-    ends = [_frequency(x, r, distance, field.wavelength) for x in (low, high) for r in (0.0, across)]
-    start, stop = max(min(ends), -nyquist), min(max(ends), nyquist)
+    start, stop = max(outer[0], -nyquist), min(outer[1], nyquist)
     if stop <= start:
         raise SamplingError(
-            f"the output lies {max(abs(low), abs(high)):.4g} m off the input along {'yx'[axis]}, where a pitch of "
-            f"{field.grid.pitch[axis]:.4g} m sends no light over {abs(distance):.4g} m. "
+            f"the output lies {min(abs(low), abs(high)):.4g} m off the input along {'yx'[axis]}, where a "
+            f"pitch of {field.grid.pitch[axis]:.4g} m sends no light over {abs(distance):.4g} m. "
             "Use a finer input pitch, or move grid nearer."
         )
-    count = max(2, math.ceil((stop - start) * (high - low)))
+    count = max(2, math.ceil((stop - start) * (high - low + 2 * margin)))
     step = (stop - start) / count
-    return Samples(count, start + step / 2, step)
+    fades = max(inner[0] - outer[0], step), max(outer[1] - inner[1], step)
+    return Passband(Samples(count, start + step / 2, step), *inner, *fades)
+
+
+def _frequency_range(
+    movements: tuple[float, float], aside: float, wave: tuple[float, float]
+) -> tuple[float, float]:
+    """Lowest and highest frequency of rays that move so along one axis, by up to `aside` along the other."""
+    distance, wavelength = wave
+    sign = 1.0 if distance >= 0 else -1.0
+    ends = [
+        sign * x / (wavelength * math.hypot(x, y, distance)) if x else 0.0
+        for x in movements
+        for y in (0.0, aside)
+    ]
+    return min(ends), max(ends)
 
 
 def _movements(grid: Grid, output: Grid, axis: int) -> tuple[float, float]:
     """Smallest and largest way from an input to an output sample along one axis [m]."""
     a, b = Samples.axis(grid, axis), Samples.axis(output, axis)
     return b.first - a.last, b.last - a.first
-
-
-def _frequency(x: float, across: float, distance: float, wavelength: float) -> float:
-    sign = 1.0 if distance >= 0 else -1.0
-    return sign * x / (wavelength * math.hypot(x, across, distance))
 
 
 def _transform(data: Array, source: Samples, target: Samples, sign: int) -> Array:

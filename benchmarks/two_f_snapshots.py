@@ -1,0 +1,144 @@
+"""Incoherent 2f image by 20 random-phase snapshots: pruned propagation against full transforms.
+
+f = 158 mm, D = 5 mm, 633 nm, 2000² samples over 1 cm, complex64, band-limited, one window of 2000² for
+all. lumigraph goes from the object's box to the pupil's box to the whole image, or only to the box
+that holds the image; the fields are compared where both have them. The plain version is fft2 · H ·
+ifft2 by scipy.fft on complex64, in place, with workers and a cached transfer function. They run in
+turns, snapshot by snapshot, on the same random phases, which are drawn outside the measured time.
+
+    python -m benchmarks.two_f_snapshots
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from statistics import median
+from typing import Any
+
+import numpy as np
+import scipy.fft
+
+from lumigraph.core.arrays import WORKERS, intensity
+from lumigraph.core.field import Field
+from lumigraph.core.grid import Grid
+from lumigraph.propagation import propagate
+from lumigraph.propagation.angular_spectrum import transfer_function
+from lumigraph.propagation.sampling import band_limits
+
+FOCAL_LENGTH, DIAMETER, WAVELENGTH = 158e-3, 5e-3, 633e-9
+DISTANCE = 2 * FOCAL_LENGTH
+GRID = Grid.square(2000, 5e-6)
+OBJECT = GRID.resized(800)
+PUPIL = GRID.resized(1002)
+IMAGE = GRID.resized(900)
+FULL = "full transforms (scipy.fft)"
+
+Step = Callable[[np.ndarray], np.ndarray]
+
+
+def bars(grid: Grid) -> np.ndarray:
+    """Groups of three horizontal and three vertical bars, as on a USAF-1951 target, (y, x)."""
+    image = np.zeros(grid.shape, np.float32)
+    row = 10
+    for width in (40, 30, 20, 14, 10, 6):
+        for k in range(3):
+            start = 2 * k * width
+            image[row : row + 5 * width, 20 + start : 20 + start + width] = 1
+            image[row + start : row + start + width, 420 : 420 + 5 * width] = 1
+        row += 5 * width + 20
+    return image
+
+
+def lens(grid: Grid) -> np.ndarray:
+    """Thin lens behind a round stop, complex64 (y, x)."""
+    r2 = grid.y[:, None] ** 2 + grid.x**2
+    phase = np.exp(-1j * np.pi * r2 / (WAVELENGTH * FOCAL_LENGTH))
+    return np.where(r2 <= (DIAMETER / 2) ** 2, phase, 0).astype(np.complex64)
+
+
+def pruned(image: Grid) -> Step:
+    """One snapshot by lumigraph: object's box to pupil's box to `image`."""
+    pupil = lens(PUPIL)
+    pads = [GRID.shape[0] / grid.shape[0] - 1 for grid in (OBJECT, PUPIL)]  # a window of 2000² for both legs
+
+    def snapshot(waves: np.ndarray) -> np.ndarray:
+        field = propagate(Field(waves, OBJECT, WAVELENGTH), DISTANCE, pad=pads[0], grid=PUPIL)
+        return propagate(field * pupil, DISTANCE, pad=pads[1] if image != GRID else 0, grid=image).data
+
+    return snapshot
+
+
+def plain() -> Step:
+    """One snapshot by full transforms of the whole window."""
+    pupil = lens(GRID)
+    limit_y, limit_x = band_limits(GRID, DISTANCE, WAVELENGTH)
+    H = transfer_function(GRID.fy, GRID.fx, DISTANCE, WAVELENGTH)
+    H *= (np.abs(GRID.fy) <= limit_y)[:, None] & (np.abs(GRID.fx) <= limit_x)
+    H = H.astype(np.complex64)
+    box = slice(600, 1400)
+
+    def leg(data: np.ndarray) -> np.ndarray:
+        data = scipy.fft.fft2(data, overwrite_x=True, workers=WORKERS)
+        data *= H
+        return scipy.fft.ifft2(data, overwrite_x=True, workers=WORKERS)
+
+    def snapshot(waves: np.ndarray) -> np.ndarray:
+        data = np.zeros(GRID.shape, np.complex64)
+        data[box, box] = waves
+        data = leg(data)
+        data *= pupil
+        return leg(data)
+
+    return snapshot
+
+
+def run(snapshots: int = 20) -> list[dict[str, Any]]:
+    """Rows of the table: seconds for all snapshots, median milliseconds of one, ratio, and difference."""
+    rng = np.random.default_rng(1)
+    methods = {FULL: plain(), "pruned, whole image": pruned(GRID), "pruned, image's box": pruned(IMAGE)}
+    boxes = {
+        FULL: slice(0, 2000),
+        "pruned, whole image": slice(0, 2000),
+        "pruned, image's box": slice(550, 1450),
+    }
+    target, times = bars(OBJECT), {name: [] for name in methods}
+    sums: dict[str, Any] = dict.fromkeys(methods, 0)
+    differences = dict.fromkeys(methods, 0.0)
+    for index in range(-1, snapshots):  # the first one warms the caches and does not count
+        phase = rng.random(OBJECT.shape, np.float32) * np.float32(2 * np.pi)
+        waves = (target * np.exp(1j * phase)).astype(np.complex64)
+        fields = {}
+        for name in sorted(methods, reverse=bool(index % 2)):
+            start = time.perf_counter()
+            fields[name] = methods[name](waves)
+            sums[name] = sums[name] + intensity(fields[name])
+            if index >= 0:
+                times[name].append(time.perf_counter() - start)
+        for name, field in fields.items():
+            full = fields[FULL][boxes[name], boxes[name]]
+            difference = float(np.linalg.norm(full - field) / np.linalg.norm(full))
+            differences[name] = max(differences[name], difference)
+    return [
+        {
+            "method": name,
+            "total s": round(sum(values), 3),
+            "median ms": round(1e3 * median(values), 1),
+            "times faster": round(median(times[FULL]) / median(values), 2),
+            "relative difference": f"{differences[name]:.1e}",
+        }
+        for name, values in times.items()
+    ]
+
+
+def show(rows: Sequence[dict[str, Any]]) -> None:
+    """Print rows as a table."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(*rows[0])
+    for row in rows:
+        table.add_row(*(str(value) for value in row.values()))
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    show(run())
