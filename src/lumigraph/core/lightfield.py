@@ -49,15 +49,15 @@ class LightField:
 
     def view(self, v: int, u: int) -> Array:
         """Picture (t, s[, c]) seen from one place on the main lens; indices as in NumPy."""
-        return self.data[v, u]
+        return self.data[v, u, ...]
 
     def micro_image(self, t: int, s: int) -> Array:
         """Directions (v, u[, c]) that meet in one lenslet."""
-        return self.data[:, :, t, s]
+        return self.data[:, :, t, s, ...]
 
     def epi(self, v: int, t: int) -> Array:
         """Epipolar-plane image (u, s[, c]): one row of lenslets seen from one row of the aperture."""
-        return self.data[v, :, t]
+        return self.data[v, :, t, ...]
 
     def to_xarray(self) -> Any:
         """The radiance as an `xarray.DataArray` with named axes and coordinates in metres."""
