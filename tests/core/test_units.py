@@ -1,0 +1,35 @@
+import math
+
+import pytest
+
+from lumigraph.errors import FormatError
+from lumigraph.units import deg, mm, nm, parse, um
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("150 um", 150 * um), ("150µm", 150 * um), ("60mm", 60 * mm), ("-2.5e1 nm", -25 * nm), ("0", 0.0)],
+)
+def test_lengths_become_metres(text, value):
+    assert parse(text) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(("text", "value"), [("2 deg", 2 * deg), ("90°", math.pi / 2), ("5 mrad", 5e-3)])
+def test_angles_become_radians(text, value):
+    assert parse(text, "angle") == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("five mm", "'five mm' is not a quantity"),
+        ("9**9**9 m", "is not a quantity"),
+        ("1e999 m", "is not finite"),
+        ("60", "'60' has no unit. Write a number and a unit, such as '150 um'"),
+        ("60 deg", "'60 deg' is not a length"),
+        ("60 parrots", "unknown unit 'parrots'"),
+    ],
+)
+def test_what_is_not_a_length_is_refused(text, message):
+    with pytest.raises(FormatError, match=message.replace("*", r"\*")):
+        parse(text)
