@@ -14,6 +14,9 @@ MARGIN = 2.0
 ANGLE_MARGIN = 1.1
 """By this factor grids are finer than the steepest ray asks: depths differ a little in angle."""
 
+DEPTH_MARGIN = 1.25
+"""By this factor the object is finer than the focused plane asks: nearer depths see it at larger angles."""
+
 BORDER = 4
 """Samples left free around the stop, the lenslets and the sensor."""
 
@@ -77,10 +80,13 @@ class Sampling:
         return self._window("the sensor", self.image_half)
 
     def _window(self, name: str, half: tuple[float, float]) -> Grid:
-        shape = [2 * (math.ceil(width / self.pitch) + BORDER) + 1 for width in half]
-        if max(shape) < 2**31:
-            shape = [int(next_fast_len(n) or n) for n in shape]
-        return _grid(name, shape, self.pitch)
+        return _grid(name, [_samples(width, self.pitch) for width in half], self.pitch)
+
+
+def _samples(half: float, pitch: float) -> int:
+    """Samples of a window that covers `half` on either side, of a quick FFT size."""
+    n = 2 * (math.ceil(half / pitch) + BORDER) + 1
+    return int(next_fast_len(n) or n) if n < 2**31 else n
 
 
 def _grid(name: str, shape: list[int], pitch: float) -> Grid:
@@ -114,11 +120,25 @@ def plane_rules(
     )
 
 
-def object_rules(wavelength: float, distance: float, diameter: float, half_field: float) -> tuple[Rule, ...]:
-    """Rules for the object: it is low-passed at D / (λ z1), and seen from all of the pupil."""
+def object_rules(
+    wavelength: float, distance: float, diameter: float, half_field: float, pitch: float
+) -> tuple[Rule, ...]:
+    """Rules for the object: it is low-passed at D / (λ z1), and seen from all of the pupil's window.
+
+    Parameters
+    ----------
+    wavelength, distance, diameter
+        Of the light; object to main lens, z1; of the stop, D [m].
+    half_field
+        Half width of the object, X [m].
+    pitch
+        Of the pupil's samples [m].
+    """
+    half_window = _samples(diameter / 2, pitch) * pitch / 2
+    seen = wavelength * distance / (2 * (half_field + half_window))
     return (
         Rule("object detail", wavelength * distance / (2 * diameter) / 1.2, "λ z1 / (2 D) / 1.2"),
-        Rule("object field", wavelength * distance / (half_field + diameter / 2), "λ z1 / (X + D/2)"),
+        Rule("object field", seen / DEPTH_MARGIN, "λ z1 / (2 (X + pupil)) / 1.25"),
     )
 
 

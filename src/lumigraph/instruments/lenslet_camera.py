@@ -87,7 +87,9 @@ class LensletCamera(Camera):
         rules = self._plane_rules()
         # An odd number of samples per lenslet: the border between lenslets is one between samples.
         samples = math.ceil(pitch / grids.smallest(rules)) // 2 * 2 + 1
-        object_rules = grids.object_rules(wavelength, self.object_distance, diameter, max(object_half))
+        object_rules = grids.object_rules(
+            wavelength, self.object_distance, diameter, max(object_half), pitch / samples
+        )
         object_samples = math.ceil(pitch * scale / grids.smallest(object_rules))
         image_half = tuple(n * self.sensor.pixel_pitch / 2 for n in self.sensor.shape)
         return grids.Sampling(

@@ -78,7 +78,7 @@ class SingleLensCamera(Camera):
         rules = grids.plane_rules(
             wavelength, self.main_lens.focal_length, diameter, resolution.f_number(z2, diameter), steepest
         )
-        object_rules = grids.object_rules(wavelength, z1, diameter, max(object_half))
+        object_rules = grids.object_rules(wavelength, z1, diameter, max(object_half), grids.smallest(rules))
         return grids.Sampling(
             rules=rules,
             pitch=grids.smallest(rules),

@@ -1,0 +1,290 @@
+"""A camera drawn as a ray diagram."""
+
+import math
+from collections.abc import Iterable
+from typing import Any, Protocol
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse, Rectangle
+
+from lumigraph.core.lattice import Lattice
+from lumigraph.errors import GeometryError
+
+MM = 1e3
+AXIS_COLOUR, GLASS, DARK = "#8a8a8a", "#9ec9e2", "#333333"
+BUNDLES = ("#c1272d", "#0071bc")
+FAN = ("#7a4fa3", "#c1272d", "#e08a00", "#2e8b57", "#0071bc")
+
+
+class Camera(Protocol):
+    """What `layout` asks of an instrument."""
+
+    object_distance: float
+    main_lens: Any
+
+    @property
+    def image_distance(self) -> float:
+        """Main lens to its image [m]."""
+        ...
+
+    @property
+    def separation(self) -> float:
+        """Main lens to lenslets, or to the sensor [m]."""
+        ...
+
+    @property
+    def lenslet_distance(self) -> float | None:
+        """Lenslets to sensor [m]."""
+        ...
+
+    @property
+    def pupil_diameter(self) -> float:
+        """Of the main lens' stop [m]."""
+        ...
+
+    @property
+    def lattice(self) -> Lattice | None:
+        """Where the lenslets stand [m]."""
+        ...
+
+    @property
+    def sensor(self) -> Any:
+        """Pixels."""
+        ...
+
+
+def layout(camera: Camera) -> Figure:
+    """Ray diagram of a camera: object, main lens with its stop, lenslets and sensor, distances labelled.
+
+    The upper panel shows the whole camera, the lower one the lenslets and the sensor. Distances along the
+    axis are to scale within a panel, heights are enlarged.
+
+    Parameters
+    ----------
+    camera
+        Any camera of `lumigraph.instruments`.
+
+    Raises
+    ------
+    GeometryError
+        The object is inside the focal length, so that there are no rays to draw.
+
+    Examples
+    --------
+    ``lumigraph.plots.layout(camera).savefig("layout.png")``
+    """
+    if camera.object_distance <= camera.main_lens.focal_length:
+        raise GeometryError(
+            f"the object at {camera.object_distance * MM:.6g} mm is inside the focal length of "
+            f"{camera.main_lens.focal_length * MM:.6g} mm: there is no image to draw. Move it farther away."
+        )
+    if camera.lattice is None:
+        figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+        _whole(figure.subplots(), camera)
+        return figure
+    figure = Figure(figsize=(9.0, 7.4), layout="constrained")
+    upper, lower = figure.subplots(2, 1, height_ratios=(1.0, 1.15))
+    _whole(upper, camera)
+    _enlarged(lower, camera)
+    return figure
+
+
+def _whole(axes: Axes, camera: Camera) -> None:
+    """Object to sensor: one bundle from the axis, one from the field, chief rays dashed."""
+    z1, length, radius = camera.object_distance, camera.separation, camera.pupil_diameter / 2
+    end = length + (camera.lenslet_distance or 0.0)
+    half_sensor = camera.sensor.shape[1] * camera.sensor.pixel_pitch / 2
+    field = half_sensor * z1 / end
+    top = max(field, 1.6 * radius, half_sensor)
+    axes.plot([-z1 * MM, end * MM], [0, 0], color=AXIS_COLOUR, lw=0.8, ls="-.")
+    for height, colour in zip((0.0, 0.75 * field), BUNDLES, strict=True):
+        for u in (-radius, 0.0, radius):
+            after = u + (-height * camera.image_distance / z1 - u) / camera.image_distance * length
+            axes.plot(
+                np.array([-z1, 0, length]) * MM, np.array([height, u, after]) * MM,
+                color=colour, lw=1.0, ls="--" if u == 0 else "-",
+            )  # fmt: skip
+    width = 0.02 * (z1 + end)
+    axes.add_patch(Ellipse((0, 0), width * MM, 2 * radius * MM, color=GLASS, zorder=3, alpha=0.8))
+    for sign in (-1, 1):
+        axes.plot(
+            [0, 0], [sign * radius * MM, sign * 1.15 * top * MM], color=DARK, lw=3, solid_capstyle="butt"
+        )
+    _plane(axes, -z1, field, DARK)
+    _plane(axes, end, half_sensor, DARK, lw=3.5)
+    if camera.lattice is not None:
+        _plane(axes, length, half_sensor, "#3b83ad", ls=(0, (1.2, 0.6)), lw=3)
+    _name(axes, -z1, 1.25 * top, "object", "left")
+    _name(axes, 0, 1.25 * top, f"main lens\nf = {_mm(camera.main_lens.focal_length)}", "center")
+    close = end < 0.4 * z1  # the name would run into the main lens'
+    behind = "sensor" if camera.lattice is None else "lenslets, sensor"
+    _name(axes, end, (1.75 if close else 1.25) * top, behind, "right")
+    _dimension(axes, (-z1, 0.0), -1.35 * top, f"z1 = {_mm(z1)}")
+    symbol = "z2" if camera.lattice is None else _separation_name(camera)
+    _dimension(axes, (0.0, length), -1.35 * top, f"{symbol} = {_mm(length)}")
+    axes.annotate(
+        f"D = {_mm(2 * radius)}", (0, -radius * MM), (-0.25 * z1 * MM, -0.85 * top * MM), fontsize=9,
+        ha="center", va="center", arrowprops={"arrowstyle": "-", "color": DARK, "lw": 0.7},
+    )  # fmt: skip
+    _frame(axes, (-1.04 * z1, end + 0.04 * z1), (-1.75 * top, 2.0 * top))
+
+
+def _separation_name(camera: Camera) -> str:
+    return "F = z2" if math.isclose(camera.separation, camera.image_distance) else "L"
+
+
+def _enlarged(axes: Axes, camera: Camera) -> None:
+    """Five lenslets, the main-lens image and the sensor: rays of one or three image points."""
+    assert camera.lattice is not None
+    assert camera.lenslet_distance is not None
+    pitch, b, length = camera.lattice.pitches[1], camera.lenslet_distance, camera.separation
+    relay = length - camera.image_distance
+    shown = _lenslets_shown(camera)
+    first, last = _range(relay, b)
+    top = (shown / 2 + 0.25) * pitch * (1 + b / length)
+    _rays(axes, camera, first, shown)
+    for k in _numbers(shown):
+        height, width = 0.97 * pitch * MM, 0.035 * (last - first) * MM
+        center = _center(camera, k) * MM
+        axes.add_patch(Ellipse((0, center), width, height, color=GLASS, zorder=3, alpha=0.85))
+    _plane(axes, b, top, DARK, lw=3.5)
+    _micro_images(axes, camera, shown, last - first)
+    if abs(relay) > 1e-9 * length:
+        axes.plot([-relay * MM] * 2, [-top * MM, top * MM], color=DARK, lw=1.2, ls=":")
+    name = "main-lens image" if relay >= 0 else "virtual main-lens image"
+    _names(axes, relay, b, top, name)
+    if abs(relay) > 1e-9 * length:
+        level = -1.25 if relay > 0 else -1.55
+        _dimension(axes, tuple(sorted((-relay, 0.0))), level * top, f"a = {_mm(relay)}")
+    _dimension(axes, (0.0, b), -1.25 * top, f"b = {_mm(b)}")
+    told = "lenslet" if abs(relay) > 1e-9 * length else "place on the main lens"
+    caption = f"lenslets and sensor, enlarged; one colour for each {told}"
+    axes.text(0.01, 0.0, caption, transform=axes.transAxes, fontsize=9, color=DARK, va="bottom")
+    _frame(axes, (first, last), (-2.0 * top, 1.5 * top))
+
+
+def _lenslets_shown(camera: Camera) -> int:
+    """Enough lenslets for the light of one image point, odd like a count with one on the axis."""
+    assert camera.lattice is not None
+    relay = abs(camera.separation - camera.image_distance)
+    lit = camera.pupil_diameter * relay / camera.image_distance / camera.lattice.pitches[1]
+    return int(min(max(5, 2 * math.ceil(lit / 2) + 3), 11))
+
+
+def _range(relay: float, b: float) -> tuple[float, float]:
+    """First and last distance from the lenslets to draw [m]."""
+    if relay > 0:
+        return -1.12 * relay, b + 0.12 * relay
+    before = 1.2 * b if relay == 0 else 0.7 * max(b, abs(relay))
+    return -before, max(1.35 * b, 1.08 * abs(relay))
+
+
+def _numbers(shown: int) -> Iterable[int]:
+    return range(-(shown // 2), shown // 2 + 1)
+
+
+def _center(camera: Camera, k: int) -> float:
+    assert camera.lattice is not None
+    return camera.lattice.origin[1] + k * camera.lattice.pitches[1]
+
+
+def _rays(axes: Axes, camera: Camera, first: float, shown: int) -> None:
+    """Rays of image points, coloured by lenslet (2.0) or by the place on the main lens (1.0)."""
+    z2, radius = camera.image_distance, camera.pupil_diameter / 2
+    focused_on_lenslets = math.isclose(camera.separation, z2)
+    middle, pitch = _center(camera, 0), _center(camera, 1) - _center(camera, 0)
+    if focused_on_lenslets:
+        # Light of the whole lenslet, from three places on the main lens: one pixel each.
+        for k in (-1, 0, 1):
+            for u, colour in zip((-0.92 * radius, 0.0, 0.92 * radius), FAN[1:], strict=False):
+                for part in (-0.35, 0.0, 0.35):
+                    _ray(axes, camera, first, (_center(camera, k) + part * pitch, u), colour)
+        return
+    for u in np.linspace(-0.97 * radius, 0.97 * radius, 4 * shown - 1):
+        _ray(axes, camera, first, (middle * z2 / camera.separation, float(u)), None)
+
+
+def _ray(axes: Axes, camera: Camera, first: float, ends: tuple[float, float], colour: str | None) -> None:
+    """From height u on the main lens towards the image point Y, through the nearest lenslet to the sensor."""
+    assert camera.lattice is not None
+    assert camera.lenslet_distance is not None
+    image, u = ends
+    slope = (image - u) / camera.image_distance
+    at_lenslets = u + slope * camera.separation
+    k = round((at_lenslets - camera.lattice.origin[1]) / camera.lattice.pitches[1])
+    center, b = _center(camera, k), camera.lenslet_distance
+    after = slope - (at_lenslets - center) / _focal_length(camera, k)
+    colour = FAN[(k + 2) % len(FAN)] if colour is None else colour
+    heights = np.array([at_lenslets + slope * first, at_lenslets, at_lenslets + after * b])
+    axes.plot(np.array([first, 0, b]) * MM, heights * MM, color=colour, lw=0.9)
+    relay = camera.separation - camera.image_distance
+    if relay < 0:  # where the light would have gone
+        axes.plot(
+            np.array([0, -relay]) * MM, np.array([at_lenslets, image]) * MM, color=colour, lw=0.5, ls=":"
+        )
+
+
+def _focal_length(camera: Any, k: int) -> float:
+    values = camera.lenslets.focal_length
+    return values[k % len(values)]
+
+
+def _micro_images(axes: Axes, camera: Camera, shown: int, width: float) -> None:
+    """Brackets behind the sensor: where each micro-image lies."""
+    assert camera.lenslet_distance is not None
+    b, length = camera.lenslet_distance, camera.separation
+    half = camera.pupil_diameter * b / length / 2
+    by_lenslet = not math.isclose(length, camera.image_distance)
+    for k in _numbers(shown):
+        center = _center(camera, k) * (1 + b / length)
+        corner = ((b + 0.012 * width) * MM, (center - half) * MM)
+        face = FAN[(k + 2) % len(FAN)] if by_lenslet else AXIS_COLOUR
+        axes.add_patch(Rectangle(corner, 0.012 * width * MM, 2 * half * MM, color=face, alpha=0.55, lw=0))
+
+
+def _names(axes: Axes, relay: float, b: float, top: float, image: str) -> None:
+    """Names above the planes; the nearest two never on one level."""
+    if relay > 0:
+        _name(axes, -relay, 1.12 * top, image, "center")
+        _name(axes, 0, 1.12 * top, "lenslets", "center")
+        _name(axes, b, 1.12 * top, "sensor, micro-images", "center")
+    elif relay == 0:
+        _name(axes, 0, 1.12 * top, "lenslets at the main-lens image", "center")
+        _name(axes, b, 1.12 * top, "sensor, micro-images", "center")
+    else:
+        _name(axes, 0, 1.12 * top, "lenslets", "right")
+        _name(axes, b, 1.3 * top, "sensor, micro-images", "center")
+        _name(axes, -relay, 1.12 * top, image, "right")
+
+
+def _plane(axes: Axes, z: float, half: float, colour: str, **style: Any) -> None:
+    axes.plot([z * MM] * 2, [-half * MM, half * MM], color=colour, **{"lw": 1.5, "zorder": 4, **style})
+
+
+def _name(axes: Axes, z: float, height: float, text: str, align: str) -> None:
+    axes.text(z * MM, height * MM, text, ha=align, va="bottom", fontsize=10, color=DARK)  # type: ignore[arg-type]
+
+
+def _dimension(axes: Axes, ends: tuple[float, ...], height: float, text: str) -> None:
+    """A double arrow with its text below."""
+    left, right = ends[0] * MM, ends[-1] * MM
+    axes.annotate(
+        "", (left, height * MM), (right, height * MM),
+        arrowprops={"arrowstyle": "<->", "color": DARK, "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
+    )  # fmt: skip
+    axes.annotate(
+        text, ((left + right) / 2, height * MM), (0, -3), textcoords="offset points",
+        ha="center", va="top", fontsize=9, color=DARK,
+    )  # fmt: skip
+
+
+def _frame(axes: Axes, z: tuple[float, float], y: tuple[float, float]) -> None:
+    axes.set_xlim(z[0] * MM, z[1] * MM)
+    axes.set_ylim(y[0] * MM, y[1] * MM)
+    axes.set_axis_off()
+
+
+def _mm(length: float) -> str:
+    return f"{length * MM:.4g} mm"
