@@ -1,0 +1,94 @@
+"""Values between samples, as gathered neighbours times weights: linear in the data, for every array library."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+import numpy as np
+
+from lumigraph.core.arrays import Array, like, namespace
+from lumigraph.errors import LumigraphError
+
+Interpolation = Literal["cubic", "linear"]
+
+Tap = tuple[int, np.ndarray]
+"""Steps from the sample below a position, and the weight of the sample there."""
+
+
+def taps(fraction: np.ndarray, interpolation: Interpolation) -> list[Tap]:
+    """Weights of the neighbours of positions `fraction` (0 to 1) beyond a sample; they add up to 1.
+
+    "cubic" is the convolution kernel with a = -1/2 (Catmull-Rom), exact for quadratic pictures.
+
+    References
+    ----------
+    Keys, "Cubic convolution interpolation for digital image processing", IEEE Trans. ASSP 29, 1153 (1981).
+    """
+    f = np.asarray(fraction, float)
+    if interpolation == "linear":
+        return [(0, 1 - f), (1, f)]
+    if interpolation != "cubic":
+        raise LumigraphError(f"interpolation is {interpolation!r} but must be 'cubic' or 'linear'.")
+    return [
+        (-1, ((2 - f) * f - 1) * f / 2),
+        (0, (3 * f - 5) * f * f / 2 + 1),
+        (1, ((4 - 3 * f) * f + 1) * f / 2),
+        (2, (f - 1) * f * f / 2),
+    ]
+
+
+def neighbours(
+    position: np.ndarray, count: int, interpolation: Interpolation
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(index, weight) of every neighbour of positions along an axis of `count` samples, edges repeated.
+
+    Neighbours whose weight is zero everywhere are left out, so that positions on samples cost one gather.
+    """
+    nearest = np.rint(position)
+    position = np.where(np.abs(position - nearest) < 1e-9, nearest, position)
+    below = np.floor(position)
+    return [
+        (np.clip(below.astype(np.int64) + step, 0, count - 1), weight)
+        for step, weight in taps(position - below, interpolation)
+        if np.any(weight)
+    ]
+
+
+def as_float(data: Array) -> Array:
+    """The data as floats: whole numbers become float32, floats stay as they are."""
+    xp = namespace(data)
+    return data if xp.isdtype(data.dtype, ("real floating", "complex floating")) else xp.astype(data, xp.float32)
+
+
+def take(data: Array, index: np.ndarray, axis: int) -> Array:
+    """Slices of the data along one axis at NumPy indices (k,)."""
+    xp = namespace(data)
+    return xp.take(data, xp.asarray(index, device=data.device), axis=axis)
+
+
+def weighted(values: Array, weight: np.ndarray, trailing: int) -> Array:
+    """Values times NumPy weights that broadcast from the left, with `trailing` axes of values after them."""
+    return values * like(weight.reshape(weight.shape + (1,) * trailing), values)
+
+
+def _combined(
+    image_shape: tuple[int, ...], y: np.ndarray, x: np.ndarray, interpolation: Interpolation
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    columns = neighbours(x, image_shape[1], interpolation)
+    for row, row_weight in neighbours(y, image_shape[0], interpolation):
+        for column, column_weight in columns:
+            yield (row * image_shape[1] + column).ravel(), (row_weight * column_weight).ravel()
+
+
+def sample(image: Array, y: np.ndarray, x: np.ndarray, interpolation: Interpolation = "cubic") -> Array:
+    """Image (ny, nx[, c]) at positions y and x [px] of one shape: values of that shape[, c].
+
+    Positions beyond the edge take the edge's value.
+    """
+    y, x = np.broadcast_arrays(y, x)
+    xp, tail = namespace(image), tuple(image.shape[2:])
+    flat = xp.reshape(image, (image.shape[0] * image.shape[1], *tail))
+    total = None
+    for index, weight in _combined(tuple(image.shape), y, x, interpolation):
+        term = weighted(take(flat, index, 0), weight, len(tail))
+        total = term if total is None else total + term
+    return xp.reshape(total, (*y.shape, *tail))

@@ -1,0 +1,129 @@
+"""Pictures out of a light field, and its two-dimensional layouts."""
+
+import math
+from typing import Literal
+
+import numpy as np
+
+from lumigraph.core import checks
+from lumigraph.core.arrays import Array, like, namespace
+from lumigraph.core.grid import Grid
+from lumigraph.core.lightfield import LightField
+from lumigraph.errors import GeometryError
+from lumigraph.rendering.interpolate import as_float, neighbours
+
+
+def view(views: LightField, v: int, u: int) -> Array:
+    """Picture (t, s[, c]) seen from view (v, u) of the aperture; negative indices count from the end.
+
+    Raises
+    ------
+    GeometryError
+        There is no such view.
+    """
+    nv, nu = views.aperture.shape
+    if not (-nv <= v < nv and -nu <= u < nu):
+        raise GeometryError(f"there is no view ({v}, {u}): the aperture has {nv} x {nu}, counted from 0.")
+    return views.view(v, u)
+
+
+def point_of_view(views: LightField, y: float, x: float) -> Array:
+    """Picture (t, s[, c]) seen from a place on the main lens (y, x) [m], between the views linearly.
+
+    Raises
+    ------
+    GeometryError
+        The place lies outside the aperture; the message gives its limits.
+    """
+    grid, places = views.aperture, []
+    for name, value, positions in zip("yx", (y, x), (grid.y, grid.x), strict=True):
+        checks.finite(name, value)
+        if not positions[0] - 1e-9 * abs(positions[0]) <= value <= positions[-1] + 1e-9 * abs(positions[-1]):
+            raise GeometryError(
+                f"{name} is {value:.4g} m but the views lie between {positions[0]:.4g} and {positions[-1]:.4g} m. "
+                "Choose a place inside the aperture."
+            )
+    for axis, value in enumerate((y, x)):
+        first = (grid.y, grid.x)[axis][0]
+        places.append(neighbours(np.array((value - first) / grid.pitch[axis]), grid.shape[axis], "linear"))
+    data, total = as_float(views.data), None
+    for v, wv in places[0]:
+        for u, wu in places[1]:
+            term = data[int(v), int(u)] * float(wv * wu)
+            total = term if total is None else total + term
+    return total
+
+
+def reduce_aperture(
+    views: LightField, fraction: float, *, shape: Literal["square", "round"] = "square"
+) -> LightField:
+    """Light field of a smaller aperture: the outer views are left out, the middle one stays the middle.
+
+    Parameters
+    ----------
+    views
+        Of the full aperture.
+    fraction
+        Width kept, above 0 and up to 1; at least one view stays.
+    shape
+        "round" also sets the views in the corners to 0, outside the circle (an ellipse, where the numbers
+        of views differ) that touches the kept views' outer edges.
+
+    Raises
+    ------
+    GeometryError
+        A fraction outside 0 to 1, or another shape.
+    """
+    if not 0 < checks.finite("fraction", fraction, "1") <= 1:
+        raise GeometryError(f"fraction is {fraction:g} but must be above 0 and at most 1.")
+    if shape not in ("square", "round"):
+        raise GeometryError(f"shape is {shape!r} but must be 'square' or 'round'.")
+    full = views.aperture.shape
+    kept = tuple(max(1, round(n * fraction)) for n in full)
+    first = [n // 2 - k // 2 for n, k in zip(full, kept, strict=True)]
+    data = views.data[first[0] : first[0] + kept[0], first[1] : first[1] + kept[1]]
+    aperture = views.aperture.resized((kept[0], kept[1]))
+    if shape == "round":
+        v, u = ((np.arange(k) - (k - 1) / 2) / (k / 2) for k in kept)
+        disc = (v[:, None] ** 2 + u**2 <= 1).astype(float)
+        data = as_float(data)
+        data = data * like(disc.reshape(disc.shape + (1,) * (len(data.shape) - 2)), data)
+    return LightField(data, aperture, views.lenslets, views.separation)
+
+
+def views_mosaic(views: LightField) -> Array:
+    """All views side by side (v t, u s[, c]), as an array of cameras would take them."""
+    return _mosaic(views.data, (0, 2, 1, 3))
+
+
+def lenslet_mosaic(views: LightField) -> Array:
+    """All micro-images side by side (t v, s u[, c]), each with v and u ascending."""
+    return _mosaic(views.data, (2, 0, 3, 1))
+
+
+def views_from_mosaic(mosaic: Array, aperture: Grid, lenslets: Grid, separation: float) -> LightField:
+    """Light field of all views side by side (v t, u s[, c]): the inverse of `views_mosaic`.
+
+    Raises
+    ------
+    GeometryError
+        The mosaic's size is not that of the grids.
+    """
+    (nv, nu), (nt, ns), tail = aperture.shape, lenslets.shape, tuple(mosaic.shape[2:])
+    if tuple(mosaic.shape[:2]) != (nv * nt, nu * ns):
+        raise GeometryError(
+            f"the mosaic has {mosaic.shape[0]} x {mosaic.shape[1]} pixels but {nv} x {nu} views of {nt} x {ns} "
+            f"make {nv * nt} x {nu * ns}. Give the grids that it was made from."
+        )
+    xp = namespace(mosaic)
+    data = xp.permute_dims(
+        xp.reshape(mosaic, (nv, nt, nu, ns, *tail)), (0, 2, 1, 3, *range(4, 4 + len(tail)))
+    )
+    return LightField(data, aperture, lenslets, separation)
+
+
+def _mosaic(data: Array, order: tuple[int, int, int, int]) -> Array:
+    xp, shape = namespace(data), tuple(data.shape)
+    turned = xp.permute_dims(data, (*order, *range(4, len(shape))))
+    sizes = [shape[k] for k in order]
+    return xp.reshape(turned, (math.prod(sizes[:2]), math.prod(sizes[2:]), *shape[4:]))
