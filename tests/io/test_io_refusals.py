@@ -278,7 +278,7 @@ LIGHT = LightField(np.ones((2, 2, 2, 2)), Grid.square(2, 1.0), Grid.square(2, 1.
 @pytest.mark.parametrize(
     ("thing", "name", "message"),
     [
-        (LIGHT, "a.png", "no extension for this result. Use one of .zarr, .zarr.zip"),
+        (LIGHT, "a.png", "the wrong extension for this result. Use one of .zarr, .zarr.zip"),
         (np.ones((2, 2)), "a.toml", "Use one of .tif, .tiff, .png, .zarr, .zarr.zip"),
         ([np.ones((2, 2))], "a.png", "Use one of .tif, .tiff"),
         ([], "a.tiff", "no pictures"),

@@ -32,7 +32,7 @@ def check_target(path: str | os.PathLike[str], endings: Sequence[str] = ()) -> P
     path = Path(path)
     name = path.name.lower()
     if endings and not name.endswith(tuple(endings)):
-        raise FormatError(f"{path} has no extension for this result. Use one of {', '.join(endings)}.")
+        raise FormatError(f"{path} has the wrong extension for this result. Use one of {', '.join(endings)}.")
     if not path.parent.is_dir():
         raise FormatError(f"the folder {path.parent} for {path.name} does not exist. Make it first.")
     if not os.access(path.parent, os.W_OK):

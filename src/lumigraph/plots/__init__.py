@@ -8,7 +8,8 @@
 """
 
 from lumigraph.plots.lattices import lattice
+from lumigraph.plots.layout import layout
 from lumigraph.plots.pictures import show
 from lumigraph.plots.trains import planes
 
-__all__ = ["lattice", "planes", "show"]
+__all__ = ["lattice", "layout", "planes", "show"]

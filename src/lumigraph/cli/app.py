@@ -1,0 +1,101 @@
+"""The verbs, and `main`, which turns every error into one line and an exit code."""
+
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Sequence
+
+from cyclopts import App, Parameter
+from cyclopts.exceptions import CycloptsError
+
+from lumigraph import __version__
+from lumigraph.cli.calibrate import calibrate
+from lumigraph.cli.decode import decode
+from lumigraph.cli.demo import demo
+from lumigraph.cli.design import design
+from lumigraph.cli.refocus import refocus
+from lumigraph.cli.render import render
+from lumigraph.cli.simulate import simulate
+from lumigraph.errors import LumigraphError
+
+FAILED, USAGE, INTERRUPTED = 1, 2, 130
+"""Exit codes: something went wrong, the command was written wrongly, Ctrl-C."""
+
+VERBS = (demo, design, simulate, calibrate, decode, render, refocus)
+"""In the order of their use."""
+
+
+def _telling(default: object) -> str | None:
+    """The default as the help shows it, if it is worth showing."""
+    return None if default is False or default is None else str(default)
+
+
+app = App(
+    name="lumigraph",
+    help="Design, simulate and process light-field (plenoptic) cameras.\n\n"
+    "Lengths carry their unit, such as '150 um'. Every verb takes --json and --debug.",
+    version=__version__,
+    help_format="markdown",
+    suppress_keyboard_interrupt=False,
+    result_action="return_value",
+    default_parameter=Parameter(negative=(), show_default=_telling),
+)
+for _number, _verb in enumerate(VERBS):
+    app.command(_verb, sort_key=_number)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code; 0 only on success.
+
+    Parameters
+    ----------
+    arguments
+        Without the program's name; those the program was started with if left out.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in words
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        try:
+            app(words, exit_on_error=False, print_error=False)
+            sys.stdout.flush()
+            return 0
+        except BrokenPipeError:  # the reader, such as `head`, has seen enough
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
+        except (Exception, KeyboardInterrupt) as error:
+            if debug:
+                traceback.print_exc()
+            code, text = _explained(error)
+            print(f"lumigraph: {' '.join(text.split())}", file=sys.stderr)
+            return code
+
+
+def _explained(error: BaseException) -> tuple[int, str]:
+    """Exit code and one line for an error."""
+    match error:
+        case KeyboardInterrupt():
+            return INTERRUPTED, "interrupted; no output was written."
+        case CycloptsError():
+            return USAGE, f"error: {_usage(error)}"
+        case LumigraphError():
+            return FAILED, f"error: {error}"
+        case MemoryError():
+            return FAILED, "error: not enough memory. Use a smaller image, grid or number of samples."
+        case OSError():
+            where = f"{error.filename}: " if error.filename else ""
+            return FAILED, f"error: {where}{error.strerror or error}."
+    what = f"{type(error).__name__}: {error}"
+    return FAILED, f"error: unexpected {what[:300]}. Run it again with --debug and report the traceback."
+
+
+def _usage(error: CycloptsError) -> str:
+    """What was written wrongly, and where help is."""
+    verb = " ".join(error.command_chain or ())
+    hint = f"lumigraph {verb} --help".replace("  ", " ")
+    return f"{str(error).rstrip('.')}. Try '{hint}'."
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    print(f"lumigraph: warning: {' '.join(str(message).split())}", file=sys.stderr)

@@ -1,0 +1,33 @@
+"""`lumigraph demo`."""
+
+from pathlib import Path
+
+from lumigraph.cli.console import report, stages
+from lumigraph.cli.options import COMMON, Common, Output
+
+
+def demo(*, output: Output = Path("demo"), common: Common = COMMON) -> None:
+    """Run the whole path on two small cameras and write a report.
+
+    Simulates raw and white images, calibrates, decodes or renders, refocuses, and writes
+    report.html beside the pictures. Takes about a minute.
+
+    Example: `lumigraph demo -o demo`
+
+    Parameters
+    ----------
+    output
+        Folder for the results; made if it does not exist.
+    """
+    from lumigraph import demo
+    from lumigraph.errors import FormatError
+
+    if output.exists() and not output.is_dir():
+        raise FormatError(f"--output {output} is a file. Give a folder.")
+    if not output.parent.is_dir():
+        raise FormatError(
+            f"the folder {output.parent} for --output {output.name} does not exist. Make it first."
+        )
+    with stages("demo") as shown:
+        page = demo.run(output, shown)
+    report(common, f"Open {page}", {"output": str(output), "report": str(page)})

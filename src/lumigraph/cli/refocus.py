@@ -1,0 +1,155 @@
+"""`lumigraph refocus`."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from lumigraph.cli import files
+from lumigraph.cli.console import progress, report
+from lumigraph.cli.options import COMMON, Common, Output
+from lumigraph.errors import FormatError
+
+_MOST = 1000
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Focus:
+    """Where to focus: α' = F/F', below 1 nearer than the focused plane was, 1 as it was, above 1 farther.
+
+    Parameters
+    ----------
+    alpha
+        One or more numbers.
+    alphas
+        A range 'first:last:count', such as 0.9:1.1:9.
+    """
+
+    alpha: Annotated[list[float] | None, Parameter(consume_multiple=True)] = None
+    alphas: str | None = None
+
+    def chosen(self) -> list[float]:
+        """All factors, as given."""
+        found = [*(self.alpha or []), *(_range(self.alphas) if self.alphas else [])]
+        if not found:
+            raise FormatError("where to focus is not known. Give --alpha 0.95 or --alphas 0.9:1.1:9.")
+        for alpha in found:
+            if not math.isfinite(alpha) or alpha <= 0:
+                raise FormatError(f"--alpha is {alpha:g} but must be a finite number above 0.")
+        return found
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Origin:
+    """What a raw image needs to become views.
+
+    Parameters
+    ----------
+    calibration
+        File made by 'lumigraph calibrate', for a raw image.
+    white
+        White image, for a raw image: it is divided by it, and calibrated from it without --calibration.
+    """
+
+    calibration: Path | None = None
+    white: Path | None = None
+
+
+def refocus(
+    views: Path,
+    /,
+    *,
+    output: Output,
+    focus: Focus = Focus(),
+    origin: Origin = Origin(),
+    method: Literal["shear", "fourier"] = "shear",
+    common: Common = COMMON,
+) -> None:
+    """Focus afresh on one or more depths.
+
+    Example: `lumigraph refocus views.zarr --alpha 0.95 -o near.png`
+
+    Example: `lumigraph refocus raw.png --white white.png --alphas 0.9:1.1:9 -o stack.tiff`
+
+    Parameters
+    ----------
+    views
+        Views (.zarr) made by 'lumigraph decode', or a raw image.
+    output
+        One focus: a picture (.png, .tiff, .zarr). Several: a stack (.tiff) or a folder for PNG files.
+    method
+        shear: sums sheared views; fourier: slices their spectrum.
+    """
+    alphas = focus.chosen()
+    _check_output(output, alphas)
+    with progress("refocus") as shown:
+        light_field = _light_field(views, origin)
+        images = []
+        for alpha in alphas:
+            images.append(_refocused(light_field, alpha, method))
+            shown(len(images), len(alphas))
+    written = _write(images, alphas, output)
+    shape = images[0].shape[:2]
+    lines = [f"alpha {alpha:g}: {shape[0]} x {shape[1]} px" for alpha in alphas]
+    text = "\n".join([*lines, *(f"written {path}" for path in written)])
+    report(common, text, {"alphas": alphas, "shape": shape, "output": [str(path) for path in written]})
+
+
+def _light_field(path: Path, origin: Origin) -> Any:
+    from lumigraph import rendering
+    from lumigraph.core.lightfield import LightField
+
+    found = files.read_views(path)
+    if isinstance(found, LightField):
+        if origin.calibration is not None or origin.white is not None:
+            raise FormatError(f"{path} holds views, which need no --calibration or --white. Leave them out.")
+        return found
+    return rendering.decode(*files.calibration_for(found, origin.calibration, origin.white))
+
+
+def _refocused(views: Any, alpha: float, method: str) -> Any:
+    from lumigraph import rendering
+
+    return (rendering.refocus if method == "shear" else rendering.refocus_fourier)(views, alpha)
+
+
+def _check_output(output: Path, alphas: list[float]) -> None:
+    if output.suffix or len(alphas) == 1:
+        files.check_output(output, files.PICTURES if len(alphas) == 1 else (".tif", ".tiff"))
+    elif output.exists() and not output.is_dir():
+        raise FormatError(f"{output} is a file. Give a folder, or a stack that ends in .tiff.")
+    elif not output.parent.is_dir():
+        raise FormatError(f"the folder {output.parent} for {output.name} does not exist. Make it first.")
+
+
+def _write(images: list[Any], alphas: list[float], output: Path) -> list[Path]:
+    from lumigraph import io
+
+    if len(images) == 1:
+        io.save(images[0], output)
+        return [output]
+    if output.suffix:
+        io.save(images, output)
+        return [output]
+    output.mkdir(exist_ok=True)
+    # One white for all, so that the pictures of a folder can be compared.
+    white = max(float(image.max()) for image in images) or None
+    paths = [output / f"refocused-{k:03}-alpha-{alpha:.4f}.png" for k, alpha in enumerate(alphas)]
+    for image, path in zip(images, paths, strict=True):
+        io.save(image, path, white=white)
+    return paths
+
+
+def _range(text: str) -> list[float]:
+    try:
+        words = text.split(":")
+        first, last, count = float(words[0]), float(words[1]), int(":".join(words[2:]))
+    except (IndexError, ValueError):
+        raise FormatError(f"--alphas is {text!r} but must be first:last:count, such as 0.9:1.1:9.") from None
+    if not 2 <= count <= _MOST or not math.isfinite(first) or not math.isfinite(last):
+        raise FormatError(f"--alphas is {text!r} but needs finite numbers and a count from 2 to {_MOST}.")
+    return [first + (last - first) * k / (count - 1) for k in range(count)]

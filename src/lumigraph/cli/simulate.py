@@ -1,0 +1,205 @@
+"""`lumigraph simulate`."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from lumigraph.cli import files
+from lumigraph.cli.console import progress, report
+from lumigraph.cli.options import COMMON, Common, Output, length
+from lumigraph.errors import FormatError, GeometryError
+
+if TYPE_CHECKING:
+    from lumigraph.core.grid import Grid
+    from lumigraph.scene import Scene
+
+SCENES = ("white", "usaf1951", "siemens_star", "gratings", "slanted_edge", "edge", "pinhole", "photo")
+_FINEST_GROUP = 9
+_COUNTS = {"incoherent": 100, "snapshots": 100, "tilted": 64}
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Light:
+    """How the light of the scene interferes.
+
+    Parameters
+    ----------
+    coherence
+        incoherent: like every lit scene; coherent: one plane wave; snapshots: random phases, many
+        times; tilted: plane waves from many directions.
+    count
+        Snapshots or tilted waves to add up.
+    na
+        Numerical aperture of the tilted waves; all directions if left out.
+    """
+
+    coherence: Literal["incoherent", "coherent", "snapshots", "tilted"] = "incoherent"
+    count: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
+    na: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
+
+    def chosen(self, seed: int) -> Any:
+        """The coherence that `lumigraph.simulate` takes."""
+        from lumigraph import simulation
+
+        if self.coherence == "coherent":
+            if self.count is not None:
+                raise FormatError("--count has no meaning with --coherence coherent. Leave it out.")
+            return simulation.Coherent()
+        if self.na is not None and self.coherence != "tilted":
+            raise FormatError(
+                f"--na has no meaning with --coherence {self.coherence}. Use --coherence tilted."
+            )
+        count = _COUNTS[self.coherence] if self.count is None else self.count
+        if count < 1:
+            raise FormatError(f"--count is {count} but must be at least 1.")
+        if self.coherence == "tilted":
+            return simulation.TiltedWaves(count, self.na)
+        if self.coherence == "snapshots":
+            return simulation.Snapshots(count, rng=seed)
+        return simulation.Incoherent(count, seed)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Stage:
+    """What stands in front of the camera.
+
+    Parameters
+    ----------
+    scene
+        white, usaf1951, siemens_star, gratings, slanted_edge, edge, pinhole, photo, or a picture file;
+        may be given several times.
+    depth
+        Of each scene from the focused plane, such as '10 mm' (farther) or '-10 mm' (nearer).
+    point
+        A point of light at 'y, x' or 'y, x, depth' in object space, such as '0 mm, 1 mm, 5 mm'; may be
+        given several times.
+    """
+
+    scene: list[str] | None = None
+    depth: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True)] = None
+    point: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True)] = None
+
+    def check(self) -> None:
+        """Refuse what can be seen to be wrong before the camera is known."""
+        if not self.scene and not self.point:
+            raise FormatError(
+                f"nothing is in front of the camera. Give --scene ({', '.join(SCENES)}) or --point."
+            )
+        if self.depth and len(self.depth) not in (1, len(self.scene or [])):
+            raise FormatError(
+                f"there are {len(self.depth)} --depth for {len(self.scene or [])} --scene. Give one for each."
+            )
+
+    def built(self, grid: "Grid") -> "Scene":
+        """Everything together."""
+        from lumigraph.scene import Scene, targets
+
+        names = self.scene or []
+        texts = (self.depth or ["0 mm"]) * (len(names) if len(self.depth or [""]) == 1 else 1)
+        depths = [length("--depth", text) or 0.0 for text in texts]
+        parts = [_scene(name, grid).at(dz) for name, dz in zip(names, depths, strict=True)]
+        if self.point:
+            parts.append(targets.points([_point(text) for text in self.point]))
+        return sum(parts, Scene())
+
+
+def simulate(
+    camera: str,
+    /,
+    *,
+    output: Output,
+    stage: Stage = Stage(),
+    light: Light = Light(),
+    seed: int = 0,
+    noise: Annotated[bool, Parameter(negative="")] = False,
+    common: Common = COMMON,
+) -> None:
+    """Simulate the raw image of a scene by wave optics.
+
+    Writes intensities (TIFF and Zarr: floats, 1 for an even scene; PNG: scaled), or with --noise what the
+    sensor reads out, in whole numbers.
+
+    Example: `lumigraph simulate camera.toml --scene usaf1951 --depth "10 mm" -o raw.tiff`
+
+    Parameters
+    ----------
+    camera
+        Camera file (TOML), or the name of a bundled one such as thesis-plenoptic-1.
+    output
+        Raw image (.tiff, .png, .zarr, .zarr.zip).
+    seed
+        Of the random numbers: the same seed gives the same raw image.
+    noise
+        Expose the sensor: photon noise, read noise, whole numbers of its bits.
+    """
+    from lumigraph import io
+    from lumigraph.instruments import load_camera
+    from lumigraph.simulation import simulate
+
+    files.check_output(output, files.PICTURES)
+    stage.check()
+    if seed < 0:
+        raise FormatError(f"--seed is {seed} but must be at least 0.")
+    described, coherence = load_camera(camera), light.chosen(seed)
+    scene = stage.built(described.object_grid)
+    with progress("simulate") as shown:
+        raw = simulate(described, scene, coherence, progress=shown)
+    if noise:
+        import numpy as np
+
+        exposed = described.sensor.expose(raw.data, rng=np.random.default_rng(seed))
+        raw = type(raw)(
+            exposed.data,
+            exposed.pixel_pitch,
+            exposed.bit_depth,
+            raw.bayer,
+            {**raw.metadata, **exposed.metadata},
+        )
+    io.save(raw, output)
+    rows, columns = raw.shape
+    text = (
+        f"{rows} x {columns} px, mean {raw.data.mean():.4g}, largest {raw.data.max():.4g}\nwritten {output}"
+    )
+    values = {
+        "shape": raw.shape,
+        "mean": raw.data.mean(),
+        "largest": raw.data.max(),
+        "pixel_pitch": raw.pixel_pitch,
+    }
+    report(common, text, {**values, "coherence": light.coherence, "output": str(output)})
+
+
+def _scene(name: str, grid: "Grid") -> "Scene":
+    from lumigraph.scene import targets
+
+    if name == "white":
+        return targets.white()
+    if name == "usaf1951":
+        return _largest_chart(grid)
+    if name in SCENES:
+        return getattr(targets, name)(grid)
+    if "." not in name and "/" not in name:
+        raise FormatError(f"--scene {name!r} is unknown. Use {', '.join(SCENES)}, or a picture file.")
+    return targets.photo(grid, files.read_raw(Path(name)).data)
+
+
+def _largest_chart(grid: "Grid") -> "Scene":
+    """Three groups of the USAF-1951 chart, the coarsest that fit."""
+    from lumigraph.scene import targets
+
+    for group in range(-2, _FINEST_GROUP):
+        with suppress(GeometryError):
+            return targets.usaf1951(grid, (group, group + 2))
+    return targets.usaf1951(grid, (_FINEST_GROUP, _FINEST_GROUP))
+
+
+def _point(text: str) -> tuple[float, ...]:
+    words = text.split(",")
+    if len(words) not in (2, 3):
+        raise FormatError(f"--point {text!r} must be 'y, x' or 'y, x, depth', such as '0 mm, 1 mm, 5 mm'.")
+    return tuple(length("--point", word) or 0.0 for word in words)
