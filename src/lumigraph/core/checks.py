@@ -16,7 +16,8 @@ Pair = tuple[float, float]
 def finite(name: str, value: float, unit: str = "m", error: type[LumigraphError] = GeometryError) -> float:
     """`value` as a float, refused unless it is one finite real number."""
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        raise error(f"{name} is {value!r} but must be a finite number [{unit}].")
+        told = "" if unit == "1" else f" [{unit}]"
+        raise error(f"{name} is {value!r} but must be a finite number{told}.")
     return float(value)
 
 
