@@ -1,6 +1,8 @@
 """Colour filters on pixels."""
 
-from lumigraph.core.arrays import Array, namespace
+import numpy as np
+
+from lumigraph.core.arrays import Array, like, namespace
 from lumigraph.core.raw import BAYER_PATTERNS
 from lumigraph.errors import FormatError, GeometryError
 
@@ -29,7 +31,6 @@ def mosaic(image: Array, pattern: str = "RGGB") -> Array:
 
     Examples
     --------
-    >>> import numpy as np
     >>> mosaic(np.broadcast_to([10, 20, 30], (2, 4, 3)), "GRBG").tolist()
     [[20, 10, 20, 10], [30, 20, 30, 20]]
     """
@@ -37,11 +38,10 @@ def mosaic(image: Array, pattern: str = "RGGB") -> Array:
         raise GeometryError(f"a colour image has shape (y, x, 3), not {tuple(image.shape)}.")
     if pattern not in BAYER_PATTERNS:
         raise FormatError(f"pattern is {pattern!r} but must be one of {', '.join(BAYER_PATTERNS)}.")
-    xp = namespace(image)
-    rows, columns = xp.arange(image.shape[0]) % 2, xp.arange(image.shape[1]) % 2
-    cell = 2 * rows[:, None] + columns[None, :]
+    xp, (rows, columns) = namespace(image), np.indices(tuple(image.shape[:2])) % 2
     result = image[:, :, 1]
     for place, colour in enumerate(pattern):
         if colour != "G":
-            result = xp.where(cell == place, image[:, :, "RGB".index(colour)], result)
+            here = like(2 * rows + columns == place, image) > 0
+            result = xp.where(here, image[:, :, "RGB".index(colour)], result)
     return result
