@@ -25,7 +25,8 @@ def positive(name: str, value: float, unit: str = "m", error: type[LumigraphErro
     """`value` as a float, refused unless it is finite and above zero."""
     number = finite(name, value, unit, error)
     if number <= 0:
-        raise error(f"{name} is {value:g} {unit} but must be above 0 {unit}.")
+        told = "" if unit == "1" else f" {unit}"
+        raise error(f"{name} is {value:g}{told} but must be above 0{told}.")
     return number
 
 
