@@ -1,6 +1,7 @@
 """A raw image from a camera and a scene: fields through the camera's train, intensities onto pixels."""
 
 import math
+import warnings
 from builtins import map as serial_map
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -14,11 +15,14 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.raw import RawImage
 from lumigraph.elements import CircularAperture, Train
-from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
 from lumigraph.propagation import propagate
 from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
 from lumigraph.sensor import Sensor, integrate
 from lumigraph.simulation.coherence import Coherence, Incoherent, Snapshots
+
+PUPIL_OVERSAMPLING = 1.1
+"""How much denser than half of λL/p the points of the pupil stand that make a white image."""
 
 Progress = Callable[[int, int], None]
 
@@ -187,7 +191,10 @@ def _check(camera: Camera, scene: Scene) -> None:
     samples = max(math.prod(grid.shape) for grid in (camera.image_grid, camera.object_grid))
     pixels = math.prod(camera.sensor.shape)
     memory.require(
-        8 * (12 * samples + 2 * pixels), "the simulation", "Use fewer lenslets or larger pixels.", SamplingError
+        8 * (12 * samples + 2 * pixels),
+        "the simulation",
+        "Use fewer lenslets or larger pixels.",
+        SamplingError,
     )
 
 
@@ -239,8 +246,11 @@ def _slice_shots(camera: Camera, slices: list[Slice], coherence: Coherence) -> I
     for planes in coherence.illuminations(grids, camera.wavelength, distances):
         arriving = []
         for amplitude, light, plane, distance in zip(amplitudes, planes, grids, distances, strict=True):
-            field = Field(amplitude * light, plane, camera.wavelength)
-            arriving.append(propagate(field, distance, "fresnel", grid=grid))
+            with warnings.catch_warnings():
+                if coherence.planes_independent:  # samples of random phase are points: no pitch is too coarse
+                    warnings.simplefilter("ignore", SamplingWarning)
+                field = Field(amplitude * light, plane, camera.wavelength)
+                arriving.append(propagate(field, distance, "fresnel", grid=grid))
         if coherence.planes_independent:
             yield _Shot(Field(sum(field.data for field in arriving), grid, camera.wavelength), train, 1.0)
         else:
@@ -248,7 +258,7 @@ def _slice_shots(camera: Camera, slices: list[Slice], coherence: Coherence) -> I
 
 
 def _diffuser_shots(camera: Camera, directions: np.ndarray, brightness: float) -> Iterator[_Shot]:
-    """Spherical waves from points of the main lens, exact without speckle: see `_pupil_points`."""
+    """Spherical waves from points of the main lens, without speckle: see `_pupil_points`."""
     train, grid = camera.relay_train(), camera.lenslet_grid
     if train is None or grid is None:
         train, grid = Train(()), camera.image_grid
@@ -261,11 +271,12 @@ def _pupil_points(camera: Camera) -> np.ndarray:
     """Rows (y, x, weight): points of the main lens that stand for an evenly lit diffuser before it.
 
     Behind a diffuser the light in the pupil is incoherent, and a lenslet of pitch p resolves λL/p of the
-    pupil: points at half that distance, weighted by the pupil's area around each, are its exact image.
+    pupil: points at half that distance, weighted by the pupil's area around each, give its image without
+    speckle, to 1 or 2 % rms: what neighbouring lenslets share interferes more finely.
     """
     if camera.lattice is None:
         return np.array([[0.0, 0.0, 1.0]])
-    finest = camera.wavelength * camera.separation / (2.2 * max(camera.lattice.pitches))
+    finest = camera.wavelength * camera.separation / (2 * PUPIL_OVERSAMPLING * max(camera.lattice.pitches))
     n = 2 * math.ceil(camera.pupil_diameter / 2 / finest) + 3
     grid = Grid.square(n, camera.pupil_diameter / (n - 2))
     area = CircularAperture(camera.pupil_diameter)
