@@ -183,7 +183,7 @@ def _check_points(field: Field, distance: float, output: Grid) -> None:
         if n == 1:
             continue  # a single point has no neighbour to interfere with
         farthest = abs(output.center[axis] - field.grid.center[axis])
-        farthest += (output.size[axis] + field.grid.size[axis]) / 2
+        farthest += sum(grid.size[axis] - grid.pitch[axis] for grid in (output, field.grid)) / 2
         message = sampling.points_alias(field.grid.pitch[axis], farthest, distance, field.wavelength)
         if message:
             sampling.warn(message)

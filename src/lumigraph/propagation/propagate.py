@@ -36,7 +36,12 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 """Every method by name; `"auto"` stands for the one that `choose_method` picks."""
 
 FEWEST_FREQUENCIES = 100
-"""With fewer samples in the band "auto" prefers zoom: band-limited has 51 dB with 158 of them, 45 dB with 63."""
+"""With fewer in the band, "auto" takes zoom: band-limited has 51 dB with 158 of them, 45 dB with 63."""
+
+LARGEST_PHASE_ERROR = 1e-3
+"""Phase [rad] that "auto" lets the Fresnel approximation leave out."""
+MOST_POINTS = 1000
+"""Samples per axis up to which one pair of matrix products is quicker than `zoom`'s two."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +146,7 @@ def propagate(
     _check_pad(pad)
     if method == "auto":
         choice = choose_method(field.grid, distance, field.wavelength, grid)
-        method, pad = choice.method, choice.pad
+        method, pad, grid = choice.method, choice.pad, grid or field.grid
     if distance == 0 and method not in ("fresnel", "zoom"):
         return _on_window(field, grid or field.grid)
     return METHODS[method](field, distance, pad, grid)
@@ -164,12 +169,12 @@ def choose_method(grid: Grid, distance: float, wavelength: float, output: Grid |
     Examples
     --------
     >>> print(choose_method(Grid.square(1000, 5e-6), 0.316, 633e-9).reason)
-    light spreads 20.1 mm, the window of 5 mm is doubled and 500 of 2000 frequencies per axis pass unaliased
+    light spreads 20 mm, the window of 5 mm is doubled and 500 of 2000 frequencies per axis pass unaliased
     """
     distance = checks.finite("distance", distance)
     target = output or grid
     if not _aligned(grid, target):
-        return Choice("zoom", 0.0, _grids_differ(grid, target))
+        return _onto_other(grid, target, distance, wavelength)
     if distance == 0:
         return Choice("band_limited", 0.0, "the distance is 0 m: the field is only cropped or padded")
     spread = abs(distance) * math.tan(math.asin(min(wavelength * 0.5 / min(grid.pitch), 0.999)))
@@ -206,6 +211,23 @@ def _aligned(grid: Grid, output: Grid) -> bool:
     except GeometryError:
         return False
     return True
+
+
+def _onto_other(grid: Grid, output: Grid, distance: float, wavelength: float) -> Choice:
+    """Points to points where that is small, paraxial and unaliased; otherwise the angular spectrum."""
+    differ = _grids_differ(grid, output)
+    ways = [
+        abs(b - a) + (m + n) / 2
+        for a, b, m, n in zip(grid.center, output.center, grid.size, output.size, strict=True)
+    ]
+    error = sampling.fresnel_phase_error(distance, math.hypot(*ways), wavelength) if distance else math.inf
+    fine = all(
+        way <= wavelength * abs(distance) / (2 * pitch) for way, pitch in zip(ways, grid.pitch, strict=True)
+    )
+    if error < LARGEST_PHASE_ERROR and fine and max(*grid.shape, *output.shape) <= MOST_POINTS:
+        reason = f"{differ}, and the Fresnel approximation is only {error:.1g} rad off: points to points"
+        return Choice("fresnel", 0.0, reason)
+    return Choice("zoom", 0.0, differ)
 
 
 def _grids_differ(grid: Grid, output: Grid) -> str:

@@ -247,4 +247,4 @@ def warn(message: str | None) -> None:
         level, frame = 2, sys._getframe(1)
         while frame.f_back and str(frame.f_globals.get("__name__")).startswith("lumigraph.propagation"):
             level, frame = level + 1, frame.f_back
-        warnings.warn(message, SamplingWarning, stacklevel=level - 1)
+        warnings.warn(message, SamplingWarning, stacklevel=level)

@@ -10,7 +10,9 @@ from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError
 
 FARTHEST = 16
-"""An aligned output may lie this many times (input + output window) off before it is refused."""
+"""An aligned output may lie this many times (input + output window) off before it is refused, and
+as far as a window of `LARGEST_EMPTY` samples reaches in any case."""
+LARGEST_EMPTY = 20_000
 
 
 def smooth_size(n: int, *, even: bool = False) -> int:
@@ -71,7 +73,7 @@ def window_shape(
     shape = []
     for n_in, n_out, offset in zip(grid.shape, output.shape, first, strict=True):
         farthest = reach(n_in, offset, n_out)
-        if farthest > FARTHEST * (n_in + n_out):
+        if 2 * farthest + 1 > max(2 * FARTHEST * (n_in + n_out), LARGEST_EMPTY):
             raise SamplingError(
                 f"the output reaches {farthest} samples from the input, which has only {n_in}: "
                 f"the window would need {2 * farthest + 1} samples. Use method='zoom', or move grid nearer."

@@ -24,7 +24,7 @@ from lumigraph.propagation.cache import CACHE
 from lumigraph.propagation.window import check_memory, smooth_size
 
 MARGIN = 1.0
-"""Rays are followed this fraction of the grids' joint half-width beyond it; their weight fades to zero there."""
+"""Rays that pass the output by up to this fraction of the grids' joint half-width count, ever less."""
 GAIN = 12.0
 """One multiplication in a matrix product is this much quicker than one in an FFT (measured, two cores)."""
 
@@ -85,7 +85,7 @@ def zoom(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
 
 @dataclass(frozen=True, slots=True)
 class Passband:
-    """Frequencies of one axis [1/m]: full weight from `low` to `high`, which fades over `low_fade`, `high_fade`."""
+    """Frequencies of one axis [1/m]: full weight from `low` to `high`, fading over the two others."""
 
     samples: Samples
     low: float
