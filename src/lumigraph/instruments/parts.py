@@ -28,7 +28,8 @@ from lumigraph.instruments.quantities import (
 
 MOST_PIXELS = 2**28
 """Largest sensor: 268 million pixels, 1 GiB in single precision."""
-MOST_LENSLETS = 2**22
+MOST_LENSLETS = 2**20
+"""Largest array: 1024 x 1024."""
 
 
 class Part(BaseModel):

@@ -35,7 +35,7 @@ def readable(error: ValidationError, model: type[BaseModel]) -> LumigraphError:
 def unknown_key(name: str, known: list[str]) -> str:
     """One line about a key that nothing reads, with the nearest known one."""
     *table, key = name.split(".")
-    near = get_close_matches(key.replace("-", "_").lower(), known, 1, 0.6)
+    near = get_close_matches(key.replace("-", "_").lower(), known, 1, 0.5)
     if near:
         return f"{name} is not a known key. Did you mean {'.'.join([*table, near[0]])!r}?"
     return f"{name} is not a known key. Known here: {', '.join(known)}."
