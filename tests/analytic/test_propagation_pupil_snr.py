@@ -38,7 +38,7 @@ def exact_profile(distance):
         way = distance * np.sqrt(1 + more)
         phase = k * distance * more / (1 + np.sqrt(1 + more))
         kernel = np.exp(1j * phase) * distance / way**2 * (1 - 1 / (1j * k * way))
-        field[i] = (weights @ kernel).sum() * 2 * np.pi / len(angles) / (1j * WAVELENGTH)
+        field[i] = (weights[:, None] * kernel).sum() * 2 * np.pi / len(angles) / (1j * WAVELENGTH)
     return CubicSpline(r, np.abs(field) ** 2)
 
 
@@ -53,12 +53,16 @@ def hard_pupil(grid=WINDOW):
     return Field((np.hypot(grid.y[:, None], grid.x) <= RADIUS).astype(np.complex64), grid, WAVELENGTH)
 
 
+@cache
 def grey_pupil():
     """Edge pixels hold the share of their area inside the circle: 8 × 8 points each."""
     grid = WINDOW.resized(1504)
+    share = (np.hypot(grid.y[:, None], grid.x) <= RADIUS).astype(np.complex64)
+    iy, ix = np.nonzero(np.abs(np.hypot(grid.y[:, None], grid.x) - RADIUS) < grid.pitch[0])
     offsets = (np.arange(8) - 3.5) / 8 * grid.pitch[0]
-    inside = sum(np.hypot(grid.y[:, None] + dy, grid.x + dx) <= RADIUS for dy in offsets for dx in offsets)
-    return Field((inside / 64).astype(np.complex64), grid, WAVELENGTH)
+    y, x = grid.y[iy][:, None, None] + offsets[:, None], grid.x[ix][:, None, None] + offsets
+    share[iy, ix] = (np.hypot(y, x) <= RADIUS).mean((1, 2))
+    return Field(share, grid, WAVELENGTH)
 
 
 def unpadded(distance, method):

@@ -189,8 +189,12 @@ def points_alias(pitch: float, farthest: float, distance: float, wavelength: flo
 
 
 def unlimited_aliases(method: str, window: Grid, distance: float, wavelength: float) -> str | None:
-    """What is wrong where a transfer function without band limit aliases on its window."""
-    longest = longest_distance(window, wavelength)
+    """What is wrong where a transfer function without band limit aliases on its window.
+
+    An axis of one sample holds only the frequency 0, which never aliases.
+    """
+    steps = zip(window.shape, fresnel_step(window, wavelength), strict=True)
+    longest = min((step for n, step in steps if n > 1), default=math.inf)
     if abs(distance) <= longest * (1 + 1e-9):
         return None
     return (
