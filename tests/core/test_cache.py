@@ -18,8 +18,10 @@ def test_a_cache_builds_once_and_forgets_the_least_recently_used_first():
 
 def test_what_is_larger_than_the_limit_is_returned_but_not_kept():
     cache = ByteCache(limit=100)
+    small = cache.get("small", lambda: np.zeros(5))
     assert cache.get("big", lambda: np.zeros(100)).shape == (100,)
-    assert cache.used == 0
+    assert cache.used == 40
+    assert cache.get("small", lambda: np.ones(5)) is small
 
 
 def test_clear_forgets_everything(xp):

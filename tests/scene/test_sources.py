@@ -51,6 +51,12 @@ def test_a_negative_distance_converges():
     np.testing.assert_allclose(back, out.conj())
 
 
+def test_a_gaussian_beam_has_its_waist():
+    grid = Grid((9, 12), 1e-5)
+    expected = np.exp(-(grid.y[:, None] ** 2 + grid.x**2) / (40e-6) ** 2)
+    np.testing.assert_allclose(gaussian_beam(grid, WAVELENGTH, 40e-6).data, expected, atol=1e-12)
+
+
 def test_a_gaussian_beam_propagates_into_itself():
     grid = Grid.square(128, 5e-6)
     moved = propagate(gaussian_beam(grid, WAVELENGTH, 60e-6), 15e-3, "band_limited", pad=1.0)

@@ -59,13 +59,17 @@ def test_usaf_bars_have_the_standards_widths_gaps_and_lengths(dark):
         for element in range(1, 7):
             width = 0.5e-3 / 2 ** (group + (element - 1) / 6)
             # Neighbouring elements differ by 26 % in area; coverage is exact.
+            places = []
             for kind, axis in ((upright, 1), (~upright, 0)):
                 mine = kind & (abs(areas / (5 * width**2) - 1) < 1e-6)
                 assert mine.sum() == 3
+                places.append(middles[mine].mean(axis=0))
                 steps = np.diff(np.sort(middles[mine, axis]))
                 # Centroids of grey samples are right to a few hundredths of a sample; elements differ by 12 %.
                 np.testing.assert_allclose(steps, 2 * width, atol=0.15 * UM)
                 np.testing.assert_allclose(middles[mine, 1 - axis], middles[mine, 1 - axis].mean(), atol=1e-9)
+            # Lying bars stand beside the upright ones, two widths apart.
+            np.testing.assert_allclose(places[1] - places[0], [0, 7 * width], atol=0.15 * UM)
 
 
 def test_usaf_line_pairs_measured_by_run_lengths():
