@@ -90,6 +90,12 @@ def test_a_file_wins_over_a_name_of_the_catalogue(write, monkeypatch):
     assert isinstance(load_camera("thesis-plenoptic-1"), SingleLensCamera)
 
 
+def test_a_class_finds_its_kind_in_the_catalogue():
+    assert PlenopticCamera.from_catalogue("thesis-plenoptic-1") == load_camera("thesis-plenoptic-1")
+    with pytest.raises(FormatError, match="thesis-2f describes a 'single-lens' camera, not a 'plenoptic'"):
+        PlenopticCamera.from_catalogue("thesis-2f")
+
+
 def test_an_unknown_name_tells_the_nearest():
     with pytest.raises(
         FormatError, match=r"'thesis-plenoptic' is neither .* Did you mean 'thesis-plenoptic-1'\?"

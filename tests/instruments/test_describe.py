@@ -72,7 +72,7 @@ def test_the_cameras_of_the_catalogue_have_no_warnings_that_matter():
         ("thesis-plenoptic-1", {"lenslets": {"focal_length": "0.4 mm"}}, "works at f/2.67: below f/4"),
         (
             "thesis-plenoptic-1",
-            {"lenslets": {"count": [801, 801]}, "sensor": {"pixel_pitch": "25 um"}},
+            {"lenslets": {"count": [301, 301], "focal_length": "2 mm"}},
             "cannot be simulated: ",
         ),
         (

@@ -4,17 +4,18 @@
 - `plenoptic1`: `PlenopticCamera`, lenslets at the main-lens image
 - `plenoptic2`: `FocusedPlenopticCamera`, lenslets that relay the main-lens image
 - `parts`: `MainLens`, `Lenslets`, `Pixels`: the tables of a camera file
-- `loading`: `load_camera` for every kind, `catalogue`
+- `loading`: `load_camera` for every kind
 - `camera`, `lenslet_camera`: what the kinds share
 - `grids`: how finely and widely planes are sampled
 - `describe`: the table of everything that follows from a description
-- `quantities`, `problems`, `files`: numbers with units, errors in one line, TOML
+- `quantities`, `problems`, `files`: numbers with units, errors in one line, TOML and the `catalogue`
 """
 
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.describe import Description, Row
+from lumigraph.instruments.files import catalogue
 from lumigraph.instruments.lenslet_camera import LensletCamera
-from lumigraph.instruments.loading import catalogue, load_camera
+from lumigraph.instruments.loading import load_camera
 from lumigraph.instruments.parts import Lenslets, MainLens, Pixels
 from lumigraph.instruments.plenoptic1 import PlenopticCamera
 from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera

@@ -46,6 +46,17 @@ class Camera(Part):
         return cls.from_table(files.read(path), str(path))
 
     @classmethod
+    def from_catalogue(cls, name: str) -> Self:
+        """A camera that comes with lumigraph; `lumigraph.catalogue` lists them.
+
+        Raises
+        ------
+        FormatError
+            No such name, or another kind of camera.
+        """
+        return cls.from_table(files.read_catalogue(name), name)
+
+    @classmethod
     def from_table(cls, table: Mapping[str, Any], origin: str = "the camera file") -> Self:
         """The camera of a parsed TOML file, whose lengths carry a unit; `origin` is named in errors."""
         kind = files.kind(table, origin)

@@ -2,6 +2,8 @@
 
 import tomllib
 from collections.abc import Mapping
+from difflib import get_close_matches
+from importlib import resources
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -44,6 +46,37 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         reason = str(error) or "nested too deeply"
         raise FormatError(f"{str(path)!r} is damaged TOML: {reason}. Correct that line.") from None
+
+
+_CATALOGUE = resources.files("lumigraph.instruments") / "catalogue"
+
+
+def catalogue() -> list[str]:
+    """Names of the cameras that come with lumigraph, for `load_camera`.
+
+    Examples
+    --------
+    >>> "thesis-plenoptic-1" in catalogue()
+    True
+    """
+    names = [entry.name for entry in _CATALOGUE.iterdir()]
+    return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
+
+
+def read_catalogue(name: str) -> dict[str, Any]:
+    """The table of a camera that comes with lumigraph.
+
+    Raises
+    ------
+    FormatError
+        No such name; the message gives the nearest, or all.
+    """
+    names = catalogue()
+    if name not in names:
+        near = get_close_matches(name, names, 1, 0.6)
+        hint = f"Did you mean {near[0]!r}?" if near else f"The catalogue has {', '.join(names)}."
+        raise FormatError(f"{name!r} is neither a camera file nor in the catalogue. {hint}")
+    return tomllib.loads((_CATALOGUE / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def kind(table: Mapping[str, Any], origin: str) -> str:
