@@ -37,13 +37,19 @@ class Bench:
     camera: str | None = None
 
     def lengths(self) -> dict[str, float | None]:
-        """The three lengths [m]."""
-        names = ("pixel_pitch", "separation", "lenslet_distance")
-        options = {name: f"--{name.replace('_', '-')}" for name in names}
-        return {
-            name: above_zero(option, length(option, getattr(self, name)), "m")
-            for name, option in options.items()
-        }
+        """The three lengths [m]; those given by themselves go before those of the camera."""
+        known: dict[str, float | None] = dict.fromkeys(("pixel_pitch", "separation", "lenslet_distance"))
+        if self.camera is not None:
+            from lumigraph.instruments import load_camera
+
+            described = load_camera(self.camera)
+            known = {name: getattr(described, name) for name in ("separation", "lenslet_distance")}
+            known["pixel_pitch"] = described.sensor.pixel_pitch
+        for name in known:
+            option = f"--{name.replace('_', '-')}"
+            given = above_zero(option, length(option, getattr(self, name)), "m")
+            known[name] = known[name] if given is None else given
+        return known
 
 
 def calibrate(

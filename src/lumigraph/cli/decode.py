@@ -1,6 +1,9 @@
 """`lumigraph decode`."""
 
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress, report
@@ -14,7 +17,7 @@ def decode(
     output: Output,
     calibration: Path | None = None,
     white: Path | None = None,
-    devignette: bool | None = None,
+    devignette: Annotated[bool | None, Parameter(negative="--no-devignette")] = None,
     common: Common = COMMON,
 ) -> None:
     """Decode a raw image of a plenoptic camera 1.0 into views.

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from lumigraph.cli.console import report, stages
 from lumigraph.cli.options import COMMON, Common, Output
+from lumigraph.errors import FormatError
 
 
 def demo(*, output: Output = Path("demo"), common: Common = COMMON) -> None:
@@ -19,15 +20,14 @@ def demo(*, output: Output = Path("demo"), common: Common = COMMON) -> None:
     output
         Folder for the results; made if it does not exist.
     """
-    from lumigraph import demo
-    from lumigraph.errors import FormatError
-
     if output.exists() and not output.is_dir():
         raise FormatError(f"--output {output} is a file. Give a folder.")
     if not output.parent.is_dir():
         raise FormatError(
             f"the folder {output.parent} for --output {output.name} does not exist. Make it first."
         )
+    from lumigraph import demo
+
     with stages("demo") as shown:
         page = demo.run(output, shown)
     report(common, f"Open {page}", {"output": str(output), "report": str(page)})

@@ -67,6 +67,7 @@ def refocus(
     focus: Focus = Focus(),
     origin: Origin = Origin(),
     method: Literal["shear", "fourier"] = "shear",
+    aperture: float = 1.0,
     common: Common = COMMON,
 ) -> None:
     """Focus afresh on one or more depths.
@@ -83,11 +84,17 @@ def refocus(
         One focus: a picture (.png, .tiff, .zarr). Several: a stack (.tiff) or a folder for PNG files.
     method
         shear: sums sheared views; fourier: slices their spectrum.
+    aperture
+        Part of the aperture's width that is used: smaller is sharper in depth, and noisier.
     """
+    from lumigraph import rendering
+
     alphas = focus.chosen()
+    if not 0 < aperture <= 1:
+        raise FormatError(f"--aperture is {aperture:g} but must be above 0 and at most 1.")
     _check_output(output, alphas)
     with progress("refocus") as shown:
-        light_field = _light_field(views, origin)
+        light_field = rendering.reduce_aperture(_light_field(views, origin), aperture)
         images = []
         for alpha in alphas:
             images.append(_refocused(light_field, alpha, method))

@@ -189,12 +189,13 @@ def _scene(name: str, grid: "Grid") -> "Scene":
 
 
 def _largest_chart(grid: "Grid") -> "Scene":
-    """Three groups of the USAF-1951 chart, the coarsest that fit."""
+    """Up to three groups of the USAF-1951 chart: the coarsest that fit, as far as samples resolve them."""
     from lumigraph.scene import targets
 
     for group in range(-2, _FINEST_GROUP):
+        resolved = [g for g in (group + 1, group + 2) if targets.bar_width(g, 6) >= max(grid.pitch)]
         with suppress(GeometryError):
-            return targets.usaf1951(grid, (group, group + 2))
+            return targets.usaf1951(grid, (group, max(resolved, default=group)))
     return targets.usaf1951(grid, (_FINEST_GROUP, _FINEST_GROUP))
 
 

@@ -1,0 +1,303 @@
+"""Every verb does what its help says, for people and for machines."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lumigraph.io as io
+from lumigraph.cli import app as cli_app
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.lightfield import LightField
+from lumigraph.errors import SamplingWarning
+
+VERBS = ("demo", "design", "simulate", "calibrate", "decode", "render", "refocus")
+PROGRAM = [sys.executable, "-c", "import sys; from lumigraph.cli import main; sys.exit(main())"]
+
+
+def test_help_lists_every_verb_and_says_what_it_does(lumigraph):
+    result = lumigraph("--help")
+    assert (result.code, result.err) == (0, "")
+    for verb in VERBS:
+        assert f"│ {verb} " in result.out
+    assert lumigraph().out == result.out
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_has_help_with_an_example(lumigraph, verb):
+    result = lumigraph(verb, "--help")
+    assert (result.code, result.err) == (0, "")
+    assert f"Example: lumigraph {verb}" in result.out
+    assert "--json" in result.out
+    assert "--debug" in result.out
+
+
+def test_help_is_quick_because_nothing_slow_is_imported():
+    slow = "numpy|scipy|matplotlib|PIL|zarr|pydantic|pint|tifffile|jinja2"
+    code = (
+        "import sys; from lumigraph.cli import main; main(['--help']); main(['simulate', '--help']);"
+        f"print([m for m in '{slow}'.split('|') if m in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+
+
+def test_the_version_is_printed(lumigraph):
+    assert lumigraph("--version").out.strip() == "0.1.0"
+
+
+def test_design_prints_a_table_and_json(lumigraph, bench):
+    result = lumigraph("design", "camera.toml")
+    assert (result.code, result.err) == (0, "")
+    assert "plenoptic camera at 550 nm" in result.out
+    values = json.loads(lumigraph("design", "camera.toml", "--json").out)
+    assert values["separation"] == pytest.approx(0.2)
+    assert lumigraph("design", "thesis-plenoptic-1").code == 0
+
+
+def test_design_draws_the_rays(lumigraph, bench):
+    assert lumigraph("design", "camera.toml", "--plot", "rays.png").code == 0
+    assert io.open("rays.png").data.ndim == 3
+    assert lumigraph("design", "camera.toml", "--plot", "rays.svg").code == 0
+    assert "<svg" in Path("rays.svg").read_text()
+
+
+def test_simulate_writes_a_raw_image(lumigraph, bench):
+    words = ("--scene", "pinhole", "--coherence", "coherent")
+    result = lumigraph("simulate", "camera.toml", *words, "-o", "raw.zarr", "--json")
+    assert (result.code, result.err) == (0, "")
+    values = json.loads(result.out)
+    raw = io.open("raw.zarr")
+    assert (list(raw.shape), raw.pixel_pitch, raw.data.dtype) == (values["shape"], 8e-6, np.dtype("float32"))
+    assert values["largest"] == raw.data.max()
+
+
+def test_simulate_adds_noise_that_the_seed_repeats(lumigraph, bench):
+    common = ("simulate", "camera.toml", "--scene", "siemens_star", "--coherence", "coherent", "--noise")
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+        assert lumigraph(*common, "--depth", "-1 mm", "--seed", seed, "-o", f"{name}.tiff").code == 0
+    a, b, c = (io.open(f"{name}.tiff") for name in "abc")
+    assert (a.bit_depth, a.data.dtype) == (12, np.dtype("uint16"))
+    np.testing.assert_array_equal(a.data, b.data)
+    assert np.any(a.data != c.data)
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--coherence", "coherent"), "Coherent()"),
+        (("--count", "3"), "Incoherent(snapshots=3, rng=7)"),
+        (("--coherence", "snapshots"), "Snapshots(count=100, coherence_index=None, rng=7)"),
+        (("--coherence", "tilted", "--na", "0.01", "--count", "5"), "TiltedWaves(count=5, na=0.01)"),
+    ],
+)
+def test_simulate_passes_the_light_and_the_scene_on(lumigraph, bench, monkeypatch, words, expected):
+    seen = {}
+
+    def simulate(camera, scene, coherence, progress):
+        seen.update(scene=scene, coherence=coherence)
+        return io.open(bench / "raw.tiff")
+
+    monkeypatch.setattr("lumigraph.simulation.simulate", simulate)
+    scenes = ("--scene", "raw.tiff", "--depth", "-3 mm", "--scene", "white", "--depth", "1 mm")
+    point = ("--point", "-1 mm, 0 mm, 5 mm")
+    result = lumigraph("simulate", "camera.toml", *scenes, *point, *words, "--seed", 7, "-o", "out.tiff")
+    assert (result.code, result.err) == (0, "")
+    assert repr(seen["coherence"]) == expected
+    photo, _, points = seen["scene"].parts
+    assert photo.dz == pytest.approx(-3e-3)
+    np.testing.assert_allclose(points.positions, [[-1e-3, 0, 5e-3]])
+
+
+@pytest.mark.parametrize(
+    "scene", ["white", "usaf1951", "siemens_star", "gratings", "slanted_edge", "edge", "pinhole", "photo"]
+)
+def test_every_named_scene_fits_the_camera(lumigraph, bench, monkeypatch, scene):
+    monkeypatch.setattr("lumigraph.simulation.simulate", lambda *_, **__: io.open(bench / "raw.tiff"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SamplingWarning)  # three lenslets see little
+        result = lumigraph("simulate", "camera.toml", "--scene", scene, "-o", "out.tiff")
+    assert result.code == 0, result.err
+
+
+def test_calibrate_writes_the_lattice_and_an_overlay(lumigraph, bench):
+    known = ("--pixel-pitch", "6.45 um", "--separation", "400 mm", "--lenslet-distance", "18.6 mm")
+    result = lumigraph("calibrate", "white.tiff", "-o", "c.toml", *known, "--overlay", "lattice.png")
+    assert (result.code, result.err) == (0, "")
+    assert "pitch       11.500 px" in result.out
+    found = io.open("c.toml")
+    assert isinstance(found, Calibration)
+    assert found.lattice.pitch == pytest.approx(11.5, abs=0.01)
+    assert (found.pixel_pitch, found.separation, found.lenslet_distance) == pytest.approx(
+        (6.45e-6, 0.4, 18.6e-3)
+    )
+    assert io.open("lattice.png").data.ndim == 3
+
+
+def test_calibrate_takes_the_geometry_of_a_camera(lumigraph, bench):
+    words = ("--layout", "square", "--pitch", "11.4", "--camera", "camera.toml", "--separation", "201 mm")
+    values = json.loads(lumigraph("calibrate", "white.tiff", "-o", "c.toml", *words, "--json").out)
+    assert values["pitch_px"] == pytest.approx(11.5, abs=0.01)
+    lengths = [values[name] for name in ("pixel_pitch", "separation", "lenslet_distance")]
+    assert lengths == pytest.approx([8e-6, 0.201, 2e-3])
+
+
+def test_decode_and_refocus(lumigraph, bench):
+    assert lumigraph("calibrate", "white.tiff", "-o", "c.toml").code == 0
+    result = lumigraph("decode", "raw.tiff", "--calibration", "c.toml", "-o", "plain.zarr", "--json")
+    assert json.loads(result.out)["shape"][:2] == [11, 11]
+    assert lumigraph("decode", "raw.tiff", "--white", "white.tiff", "-o", "views.zarr").code == 0
+    plain, views = io.open("plain.zarr"), io.open("views.zarr")
+    assert isinstance(views, LightField)
+    outer, central = ([v.data[a, a].mean() for v in (plain, views)] for a in (1, 5))
+    assert outer[0] < 0.5 * central[0]  # the lenslets' vignetting
+    assert outer[1] > 0.7 * central[1]  # divided by the white image
+    words = ("--calibration", "c.toml", "--white", "white.tiff", "--no-devignette")
+    assert lumigraph("decode", "raw.tiff", *words, "-o", "other.zarr").code == 0
+    np.testing.assert_array_equal(io.open("other.zarr").data, plain.data)
+
+    assert lumigraph("refocus", "views.zarr", "--alpha", "1", "-o", "one.tiff").code == 0
+    picture = io.open("one.tiff").data
+    assert picture.shape == views.data.shape[2:]
+    words = ("--white", "white.tiff", "--alpha", "1", "-o", "raw-one.tiff")
+    assert lumigraph("refocus", "raw.tiff", *words).code == 0
+    np.testing.assert_array_equal(io.open("raw-one.tiff").data, picture)
+
+
+def test_refocus_writes_stacks_and_folders(lumigraph, bench):
+    lumigraph("decode", "raw.tiff", "--white", "white.tiff", "-o", "views.zarr")
+    result = lumigraph("refocus", "views.zarr", "--alphas", "0.9:1.1:3", "-o", "stack.tiff", "--json")
+    assert json.loads(result.out)["alphas"] == pytest.approx([0.9, 1.0, 1.1])
+    pages = [io.open("stack.tiff", page=k).data for k in range(3)]
+    assert lumigraph("refocus", "views.zarr", "--alpha", "0.9", "--alpha", "1.1", "-o", "folder").code == 0
+    files = sorted(path.name for path in Path("folder").iterdir())
+    assert files == ["refocused-000-alpha-0.9000.png", "refocused-001-alpha-1.1000.png"]
+    top = max(pages[0].max(), pages[2].max())
+    first = io.open(Path("folder") / files[0]).data / 65535 * top
+    np.testing.assert_allclose(first, np.clip(pages[0], 0, None), atol=top * 1e-5)  # one white for all
+    fourier = ("--method", "fourier", "--aperture", "0.5")
+    assert lumigraph("refocus", "views.zarr", "--alpha", "0.95", *fourier, "-o", "f.png").code == 0
+
+
+def test_render_takes_the_patch_from_a_camera_or_by_itself(lumigraph, bench):
+    result = lumigraph(
+        "render", "raw.tiff", "--white", "white.tiff", "--patch", "5.2", "-o", "p.tiff", "--json"
+    )
+    assert (result.code, result.err) == (0, "")
+    values = json.loads(result.out)
+    assert values["patch_px"] == 5.2
+    assert list(io.open("p.tiff").shape) == values["shape"]
+    words = ("simulate", "focused.toml", "--coherence", "coherent", "--scene", "pinhole", "-o", "raw2.tiff")
+    assert lumigraph(*words).code == 0
+    result = lumigraph("render", "raw2.tiff", "--camera", "focused.toml", "-o", "q.png", "--json")
+    assert json.loads(result.out)["patch_px"] == pytest.approx(9.653, abs=1e-3)
+
+
+def test_demo_is_run_in_the_folder(lumigraph, monkeypatch):
+    def run(output, progress):
+        progress("white image", 0.5)
+        return Path(output) / "report.html"
+
+    monkeypatch.setattr("lumigraph.demo.run", run)
+    assert lumigraph("demo", "-o", "here").out == f"Open {Path('here') / 'report.html'}\n"
+    assert json.loads(lumigraph("demo", "--json").out)["report"] == str(Path("demo") / "report.html")
+
+
+def test_an_output_is_overwritten_by_a_success_only(lumigraph, bench):
+    assert lumigraph("calibrate", "white.tiff", "-o", "c.toml").code == 0
+    before = (bench / "c.toml").read_bytes()
+    assert lumigraph("calibrate", "raw.tiff", "-o", "c.toml", "--pitch", "40").code == 1
+    assert (bench / "c.toml").read_bytes() == before
+    assert lumigraph("calibrate", "white.tiff", "-o", "c.toml", "--pixel-pitch", "5 um").code == 0
+    assert (bench / "c.toml").read_bytes() != before
+
+
+def test_debug_shows_the_traceback_and_the_line(lumigraph, bench):
+    result = lumigraph("calibrate", "none.tiff", "-o", "c.toml", "--debug")
+    assert result.code == 1
+    assert "Traceback" in result.err
+    assert result.err.splitlines()[-1].startswith("lumigraph: error: none.tiff does not exist")
+
+
+@pytest.mark.parametrize(
+    ("failure", "code", "line"),
+    [
+        (KeyboardInterrupt(), 130, "lumigraph: interrupted; no output was written."),
+        (MemoryError(), 1, "lumigraph: error: not enough memory."),
+        (RuntimeError("two\nlines"), 1, "lumigraph: error: unexpected RuntimeError: two lines. Run it again"),
+        (
+            OSError(28, "No space left on device", "a.png"),
+            1,
+            "lumigraph: error: a.png: No space left on device.",
+        ),
+    ],
+)
+def test_whatever_goes_wrong_is_one_line(lumigraph, bench, monkeypatch, failure, code, line):
+    def fail(*_, **__):
+        raise failure
+
+    monkeypatch.setattr("lumigraph.calibration.calibrate", fail)
+    result = lumigraph("calibrate", "white.tiff", "-o", "c.toml")
+    assert result.code == code
+    assert result.err.startswith(line)
+    assert result.err.count("\n") == 1
+    assert not (bench / "c.toml").exists()
+
+
+def test_warnings_are_one_line_each(lumigraph, bench, monkeypatch):
+    def suspicious(*_, **__):
+        warnings.warn("two\n  lines", SamplingWarning, stacklevel=2)
+        return io.open(bench / "raw.tiff")
+
+    monkeypatch.setattr("lumigraph.simulation.simulate", suspicious)
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        result = lumigraph("simulate", "camera.toml", "--scene", "white", "-o", "a.tiff")
+    assert (result.code, result.err) == (0, "lumigraph: warning: two lines\n")
+
+
+def test_ctrl_c_ends_with_130_and_one_line(bench):
+    words = ["simulate", "thesis-plenoptic-1", "--scene", "photo", "--count", "100000", "-o", "raw.tiff"]
+    process = subprocess.Popen([*PROGRAM, *words], stderr=subprocess.PIPE, text=True, cwd=bench)
+    time.sleep(1.5)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert (process.returncode, err) == (130, "lumigraph: interrupted; no output was written.\n")
+    assert not any(path.name.startswith(".raw") for path in bench.iterdir())
+
+
+def test_a_reader_that_leaves_early_is_no_error(bench):
+    command = f"{' '.join(PROGRAM[:2])} '{PROGRAM[2]}' design camera.toml | true; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, cwd=bench)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_the_progress_bar_is_for_terminals(monkeypatch):
+    import pty
+
+    primary, secondary = pty.openpty()
+    code = (
+        "from lumigraph.cli.console import progress, stages\n"
+        "with progress('simulate') as p: p(1, 2)\n"
+        "with stages('demo') as s: s('white image', 0.5)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], stderr=secondary, stdout=subprocess.PIPE, check=True,
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "80"},
+    )  # fmt: skip
+    os.close(secondary)
+    shown = os.read(primary, 100_000).decode()
+    assert done.stdout == b""
+    assert "simulate" in shown
+    assert "demo: white image" in shown
+
+
+def test_verbs_are_listed_as_they_are_registered():
+    assert tuple(verb.__name__ for verb in cli_app.VERBS) == VERBS
