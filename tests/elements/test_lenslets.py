@@ -152,7 +152,7 @@ def test_a_coarse_grid_warns_with_numbers():
         ),
         (
             lambda: LensletArray(Lattice.square(PITCH), 1.0, fill_factor=0.0),
-            "fill_factor is 0 1 but must be above",
+            "fill_factor is 0 but must be above",
         ),
         (lambda: LensletArray(Lattice.square(PITCH), 1.0, extent=(1.0, 0.0)), r"extent \(width\) is 0 m"),
         (lambda: LensletArray(Lattice.square(PITCH), 1.0, edge="soft"), "edge is 'soft'"),

@@ -65,7 +65,7 @@ def test_usaf_bars_have_the_standards_widths_gaps_and_lengths(dark):
                 assert mine.sum() == 3
                 places.append(middles[mine].mean(axis=0))
                 steps = np.diff(np.sort(middles[mine, axis]))
-                # Centroids of grey samples are right to a few hundredths of a sample; elements differ by 12 %.
+                # Centroids of grey samples are right to hundredths of a sample; elements differ by 12 %.
                 np.testing.assert_allclose(steps, 2 * width, atol=0.15 * UM)
                 np.testing.assert_allclose(middles[mine, 1 - axis], middles[mine, 1 - axis].mean(), atol=1e-9)
             # Lying bars stand beside the upright ones, two widths apart.

@@ -93,9 +93,9 @@ def test_impossible_sensors_are_refused(changes, message):
 
 
 def test_exposures_need_a_reference_and_a_fill_above_zero():
-    with pytest.raises(GeometryError, match="reference is 0 1 but must be above 0"):
+    with pytest.raises(GeometryError, match="reference is 0 but must be above 0"):
         SENSOR.expose(np.ones(SENSOR.shape), reference=0.0)
-    with pytest.raises(GeometryError, match="fill is -1 1 but must be above 0"):
+    with pytest.raises(GeometryError, match="fill is -1 but must be above 0"):
         SENSOR.expose(np.ones(SENSOR.shape), fill=-1.0)
 
 
