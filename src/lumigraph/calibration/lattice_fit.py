@@ -68,11 +68,12 @@ def calibrate(
     white = as_raw(white)
     _check_request(layout, pitch)
     checks.finite_array("the white image", white.data, CalibrationError)
-    picture = flattened(_picture(white))
+    original = _picture(white)
+    picture = flattened(original)
     vectors = lattice_vectors(picture, layout, pitch)
     lattice = _starting_lattice(picture, vectors)
     _check_count(lattice, picture.shape)
-    spots, lattice = _fit_outwards(picture, lattice)
+    spots, lattice = _fit_outwards(picture, original - np.float32(original.min()), lattice)
     residuals = spots.centers - lattice.position(spots.indices)
     return Calibration(
         lattice, picture.shape, spots.indices, spots.centers, float(np.sqrt((residuals**2).sum(-1).mean())),
@@ -140,24 +141,24 @@ def _check_count(lattice: Lattice, shape: tuple[int, ...]) -> None:
         )
 
 
-def _fit_outwards(picture: np.ndarray, lattice: Lattice) -> tuple[Spots, Lattice]:
+def _fit_outwards(picture: np.ndarray, original: np.ndarray, lattice: Lattice) -> tuple[Spots, Lattice]:
     """Fit the middle first, so that the error of the first guess does not grow over many lenslets."""
-    for part in (0.3, 0.6, 1.0):
-        spots = measure(picture, lattice, part=part)
+    for part, source in ((0.3, picture), (0.6, picture), (1.0, original)):
+        spots = measure(source, lattice, part=part)
         if part < 1 and len(spots.indices) < 50:
             continue
         spots, lattice = _robust_fit(spots, lattice)
-    spots, lattice = _robust_fit(measure(_evenly_lit(picture, spots), lattice), lattice)
+    spots, lattice = _robust_fit(measure(_evenly_lit(original, spots), lattice), lattice)
     centred = _centred(lattice, picture.shape)
     moved = np.stack(lattice.index(*centred.origin), -1)
     return Spots(spots.indices - moved, spots.centers, spots.light), centred
 
 
 def _evenly_lit(picture: np.ndarray, spots: Spots) -> np.ndarray:
-    """Picture without the vignetting that its micro-images' brightness shows, which would move their centres."""
+    """Picture without the vignetting of its micro-images' brightness, which would move their centres."""
     ny, nx = picture.shape
     y, x = (2 * spots.centers[:, axis] / (n - 1) - 1 for axis, n in enumerate((ny, nx)))
-    surface = Surface(4 if len(y) > 100 else 2).fit(y, x, spots.light / spots.light.mean())
+    surface = Surface(4 if len(y) > 100 else 2 if len(y) > 20 else 1).fit(y, x, spots.light / spots.light.mean())
     rows, columns = np.linspace(-1, 1, ny, dtype=np.float32), np.linspace(-1, 1, nx, dtype=np.float32)
     return picture / surface(rows[:, None], columns[None, :])
 
@@ -179,8 +180,8 @@ def _robust_fit(spots: Spots, lattice: Lattice) -> tuple[Spots, Lattice]:
     rms = float(np.sqrt((distance[keep] ** 2).mean()))
     if keep.mean() < 0.5 or rms > 0.1 * lattice.pitch:
         raise CalibrationError(
-            f"only {keep.sum()} of {len(keep)} micro-images stand on one lattice of pitch {lattice.pitch:.1f} px, "
-            f"{rms:.2f} px rms away from it. Check the white image, or pass pitch= and layout=."
+            f"only {keep.sum()} of {len(keep)} micro-images stand on one lattice of pitch "
+            f"{lattice.pitch:.1f} px, {rms:.2f} px rms away from it. Check the white image, or pass pitch= and layout=."
         )
     _check_spots(kept, lattice, "micro-images on one lattice")
     origin, column, row = (tuple(map(float, w)) for w in weights)

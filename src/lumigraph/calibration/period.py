@@ -19,6 +19,8 @@ SMALLEST_PITCH = 4.0
 """Shortest lattice vector looked for [px]: two pixels for the spot, two for the gap."""
 
 _LONGEST = 1024  # lags looked at [px]
+_PART = 0.42  # of the picture: farther lags have little overlap and much noise; 3 lenslets need 0.34
+_LEAST = 0.2  # of the autocorrelation's top; noise alone reaches 0.15 on pictures of 100 px
 _STRONG = 0.75  # of the strongest peak; the ridges of nearly touching square micro-images reach 0.5
 _DIP = 0.15  # how far the autocorrelation must fall between two lattice points
 
@@ -56,7 +58,7 @@ def _autocorrelation(picture: np.ndarray) -> np.ndarray:
     for axis in (0, 1):  # takes out the highest frequency: what grey() left of a Bayer pattern
         wave = ndimage.correlate1d(wave, np.array([0.25, 0.5, 0.25], np.float32), axis=axis)
     ny, nx = wave.shape
-    lags = min(ny // 2, _LONGEST) + 2, min(nx // 2, _LONGEST) + 2
+    lags = tuple(min(int(_PART * n), _LONGEST) + 2 for n in (ny, nx))
     size = tuple(scipy.fft.next_fast_len(n + lag, real=True) for n, lag in zip((ny, nx), lags, strict=True))
     windows = [np.hanning(n + 2)[1:-1].astype(np.float32) for n in (ny, nx)]
     spectrum = scipy.fft.rfft2(wave * windows[0][:, None] * windows[1], size, workers=WORKERS)
@@ -169,10 +171,10 @@ def _tops(around: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarr
 def _shortest(peaks: _Peaks, pitch: float | None, layout: Layout | None) -> tuple[np.ndarray, np.ndarray]:
     """The two shortest strong lattice vectors that are not parallel."""
     top = peaks.top()
-    if top < 0.1:
+    if top < _LEAST:
         raise CalibrationError(
             f"the white image shows no lattice: its autocorrelation returns to {top:.2f} of its top at most, "
-            "where a lattice gives over 0.1. Use an evenly lit, focused white image with dark gaps between "
+            "where a lattice gives over {_LEAST:g}. Use an evenly lit, focused white image with dark gaps between "
             "at least 3 x 3 micro-images."
         )
     strong = peaks.strong(_STRONG * top)
