@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.propagation import propagate, sampling
-from lumigraph.propagation.cache import CACHE, ByteCache
+from lumigraph.propagation.cache import CACHE
 from lumigraph.propagation.pruned import Band, Transfer, convolve, nonzero_rows
 from lumigraph.propagation.window import smooth_size, window_shape
 from lumigraph.propagation.zoom import Samples, _chirp_z, _fourier_matrix
@@ -89,21 +89,20 @@ def test_chirp_z_is_the_matrix_product(n, m, seed, sign):
     assert np.abs(data @ _fourier_matrix(data, source, target, sign) - expected).max() < 1e-10
 
 
-def test_the_cache_forgets_the_oldest_and_keeps_its_limit():
-    cache, built = ByteCache(limit=250), []
-
-    def build(name, n=10):
-        return cache.get(name, lambda: built.append(name) or np.zeros(n))
-
-    for name in ("a", "b", "c", "a", "d", "b"):  # "a" is used again before "d" pushes the oldest, "b", out
-        build(name)
-    assert built == ["a", "b", "c", "d", "b"]
-    assert cache.size == 240
-    assert build("too large", 1000).shape == (1000,)
-    assert cache.size == 240
-    cache.clear()
-    assert (len(cache), cache.size) == (0, 0)
-    assert CACHE.limit == 1 << 30
+def test_a_transfer_function_is_built_once_and_only_its_band_is_kept():
+    field = Field(np.ones((50, 60), np.complex64), Grid((50, 60), 5e-6), 633e-9)
+    CACHE.clear()
+    propagate(field, 5e-3)
+    once = CACHE.used
+    limits = sampling.band_limits(Grid((100, 120), 5e-6), 5e-3, 633e-9)
+    kept = [2 * int(limit * n * 5e-6) + 1 for limit, n in zip(limits, (100, 120), strict=True)]
+    assert once == 8 * kept[0] * kept[1] < 8 * 100 * 120
+    propagate(field, 5e-3)
+    assert CACHE.used == once
+    for change in ({"distance": 6e-3}, {"pad": 2.0}, {"grid": Grid((50, 60), 5e-6, (5e-6, 0))}):
+        propagate(field, **{"distance": 5e-3, **change})
+        assert CACHE.used > once
+        once = CACHE.used
 
 
 def test_sampling_rules_in_numbers():

@@ -1,11 +1,11 @@
 """The window a calculation runs on: large enough, a quick size to transform, and within memory."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import scipy.fft
 
+from lumigraph.core import memory
 from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError
 
@@ -93,20 +93,4 @@ def check_memory(nbytes: float, what: str) -> None:
     SamplingError
         The estimate is above the free memory; the message gives both.
     """
-    free = available_memory()
-    if nbytes > free:
-        raise SamplingError(
-            f"{what} needs about {nbytes / 2**30:.3g} GiB of memory but {free / 2**30:.3g} GiB are free. "
-            "Use fewer samples, a smaller pad, or complex64 data."
-        )
-
-
-def available_memory() -> float:
-    """Free memory of this machine [bytes]; infinite where the system does not say."""
-    try:
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                return float(line.split()[1]) * 1024
-    except OSError:
-        pass
-    return math.inf
+    memory.require(nbytes, what, "Use fewer samples, a smaller pad, or complex64 data.", SamplingError)
