@@ -189,6 +189,8 @@ CAMERAS = {
     "galilean": lambda: focused(-0.25, matching="full"),
     "even": lambda: focused(0.3, (6, 5)),
     "single": single,
+    "wide": lambda: load_camera("thesis-plenoptic-1"),
+    "hex": lambda: load_camera("multi-focus-hex"),
 }
 
 
@@ -218,7 +220,8 @@ def test_grids_obey_their_rules_and_cover_their_planes(name):
     assert (np.array(camera.lenslet_grid.size) > 2 * np.array(camera.lenslets.reach)).all()
     samples = pitch * z1 / camera.separation / object_pitch
     assert round(samples) == pytest.approx(samples, rel=1e-9)
-    assert camera.object_grid.shape == tuple(n * round(samples) for n in camera.lenslets.count)
+    if camera.lenslets.layout == "square":
+        assert camera.object_grid.shape == tuple(n * round(samples) for n in camera.lenslets.count)
 
 
 def _image_of_a_point(camera, row, column):
@@ -289,7 +292,8 @@ def test_aberrations_spread_the_point_and_keep_the_stop():
     # exp(-(2π 0.25)²) = 0.085 is Maréchal's estimate; astigmatism of that size leaves a little more or less.
     assert 0.02 < strehl < 0.3
     through = [camera.lens_train()(_even(camera)).power for camera in (perfect, aberrated)]
-    assert through[0] == pytest.approx(through[1], rel=2e-3)
+    # A second grey edge would take 1e-3 of the light.
+    assert through[0] == pytest.approx(through[1], rel=1e-4)
 
 
 def _even(camera):
