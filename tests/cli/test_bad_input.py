@@ -238,6 +238,10 @@ OPTIONS = {
     "endless range": ((*REFOCUS, "--alphas", "1:2:1000000000"), ["1000"]),
     "several pictures in one PNG": ((*REFOCUS, "--alpha", "0.9", "1.1"), ["out.png", ".tiff"]),
     "aperture above 1": ((*REFOCUS, "--alpha", "1", "--aperture", "2"), ["--aperture is 2"]),
+    "no oversampling": ((*REFOCUS, "--alpha", "1", "--oversample", "0"), ["--oversample is 0"]),
+    "oversampled spectrum": (
+        (*REFOCUS, "--alpha", "1", "--oversample", "2", "--method", "fourier"), ["--oversample", "fourier"],
+    ),
     "views with a calibration": (
         ("refocus", "views.zarr", "--alpha", "1", "--white", "white.tiff", "-o", "o.png"), ["holds views"],
     ),

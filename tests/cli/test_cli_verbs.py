@@ -182,6 +182,10 @@ def test_refocus_writes_stacks_and_folders(lumigraph, bench):
     top = max(pages[0].max(), pages[2].max())
     first = io.open(Path("folder") / files[0]).data / 65535 * top
     np.testing.assert_allclose(first, np.clip(pages[0], 0, None), atol=top * 1e-5)  # one white for all
+    assert (
+        lumigraph("refocus", "views.zarr", "--alpha", "0.9", "--oversample", "3", "-o", "three.png").code == 0
+    )
+    assert io.open("three.png").shape == (3 * pages[0].shape[0], 3 * pages[0].shape[1])
     fourier = ("--method", "fourier", "--aperture", "0.5")
     assert lumigraph("refocus", "views.zarr", "--alpha", "0.95", *fourier, "-o", "f.png").code == 0
 

@@ -5,11 +5,11 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
+from importlib.metadata import version
 
 from cyclopts import App, Parameter
 from cyclopts.exceptions import CycloptsError
 
-from lumigraph import __version__
 from lumigraph.cli.calibrate import calibrate
 from lumigraph.cli.decode import decode
 from lumigraph.cli.demo import demo
@@ -35,7 +35,7 @@ app = App(
     name="lumigraph",
     help="Design, simulate and process light-field (plenoptic) cameras.\n\n"
     "Lengths carry their unit, such as '150 um'. Every verb takes --json and --debug.",
-    version=__version__,
+    version=lambda: version("lumigraph"),
     help_format="markdown",
     suppress_keyboard_interrupt=False,
     result_action="return_value",

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -12,7 +12,12 @@ from lumigraph.cli.console import progress, report
 from lumigraph.cli.options import COMMON, Common, Output
 from lumigraph.errors import FormatError
 
+if TYPE_CHECKING:
+    from lumigraph.core.arrays import Array
+    from lumigraph.core.lightfield import LightField
+
 _MOST = 1000
+_MOST_SAMPLES = 64
 
 
 @Parameter(name="*")
@@ -59,6 +64,43 @@ class Origin:
     white: Path | None = None
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Quality:
+    """How pictures are made.
+
+    Parameters
+    ----------
+    method
+        shear: sums sheared views; fourier: slices their spectrum.
+    aperture
+        Part of the aperture's width that is used: smaller is sharper in depth, and noisier.
+    oversample
+        Pixels per lenslet: out of the lenslets' plane, views fill in between; for shear.
+    """
+
+    method: Literal["shear", "fourier"] = "shear"
+    aperture: float = 1.0
+    oversample: Annotated[int, Parameter(allow_leading_hyphen=True)] = 1
+
+    def check(self) -> None:
+        """Refuse what no picture can be made with."""
+        if not 0 < self.aperture <= 1:
+            raise FormatError(f"--aperture is {self.aperture:g} but must be above 0 and at most 1.")
+        if not 1 <= self.oversample <= _MOST_SAMPLES:
+            raise FormatError(f"--oversample is {self.oversample} but must be from 1 to {_MOST_SAMPLES}.")
+        if self.method == "fourier" and self.oversample != 1:
+            raise FormatError("--oversample has no meaning with --method fourier. Use --method shear.")
+
+    def picture(self, views: "LightField", alpha: float) -> "Array":
+        """The picture focused by `alpha`."""
+        from lumigraph import rendering
+
+        if self.method == "fourier":
+            return rendering.refocus_fourier(views, alpha)
+        return rendering.refocus(views, alpha, oversample=self.oversample)
+
+
 def refocus(
     views: Path,
     /,
@@ -66,8 +108,7 @@ def refocus(
     output: Output,
     focus: Focus = Focus(),
     origin: Origin = Origin(),
-    method: Literal["shear", "fourier"] = "shear",
-    aperture: float = 1.0,
+    quality: Quality = Quality(),
     common: Common = COMMON,
 ) -> None:
     """Focus afresh on one or more depths.
@@ -82,22 +123,17 @@ def refocus(
         Views (.zarr) made by 'lumigraph decode', or a raw image.
     output
         One focus: a picture (.png, .tiff, .zarr). Several: a stack (.tiff) or a folder for PNG files.
-    method
-        shear: sums sheared views; fourier: slices their spectrum.
-    aperture
-        Part of the aperture's width that is used: smaller is sharper in depth, and noisier.
     """
     from lumigraph import rendering
 
     alphas = focus.chosen()
-    if not 0 < aperture <= 1:
-        raise FormatError(f"--aperture is {aperture:g} but must be above 0 and at most 1.")
+    quality.check()
     _check_output(output, alphas)
     with progress("refocus") as shown:
-        light_field = rendering.reduce_aperture(_light_field(views, origin), aperture)
+        light_field = rendering.reduce_aperture(_light_field(views, origin), quality.aperture)
         images = []
         for alpha in alphas:
-            images.append(_refocused(light_field, alpha, method))
+            images.append(quality.picture(light_field, alpha))
             shown(len(images), len(alphas))
     written = _write(images, alphas, output)
     shape = images[0].shape[:2]
@@ -106,7 +142,7 @@ def refocus(
     report(common, text, {"alphas": alphas, "shape": shape, "output": [str(path) for path in written]})
 
 
-def _light_field(path: Path, origin: Origin) -> Any:
+def _light_field(path: Path, origin: Origin) -> "LightField":
     from lumigraph import rendering
     from lumigraph.core.lightfield import LightField
 
@@ -116,12 +152,6 @@ def _light_field(path: Path, origin: Origin) -> Any:
             raise FormatError(f"{path} holds views, which need no --calibration or --white. Leave them out.")
         return found
     return rendering.decode(*files.calibration_for(found, origin.calibration, origin.white))
-
-
-def _refocused(views: Any, alpha: float, method: str) -> Any:
-    from lumigraph import rendering
-
-    return (rendering.refocus if method == "shear" else rendering.refocus_fourier)(views, alpha)
 
 
 def _check_output(output: Path, alphas: list[float]) -> None:

@@ -4,11 +4,11 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from importlib.metadata import version
 from importlib.resources import files
 from itertools import groupby
 from typing import Any
 
-import lumigraph
 from lumigraph.errors import FormatError
 from lumigraph.io.target import write_bytes
 from lumigraph.report.pictures import Picture, picture
@@ -105,7 +105,7 @@ class Page:
 
     def html(self) -> str:
         """The page as one HTML document."""
-        return _template().render(page=self, version=lumigraph.__version__)
+        return _template().render(page=self, version=version("lumigraph"))
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the page atomically.
