@@ -9,12 +9,13 @@ from lumigraph.core import checks
 from lumigraph.core.arrays import Array, is_single, namespace
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
+from lumigraph.core.lattice import Lattice
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.rendering import memory
 from lumigraph.rendering.geometry import Frame, lenslet_rectangle, transposed
-from lumigraph.rendering.interpolate import Interpolation, as_float, neighbours, sample, take, weighted
+from lumigraph.rendering.interpolate import Interpolation, as_float, sample, take, weighted
 
 
 def decode(
@@ -29,7 +30,8 @@ def decode(
     Every micro-image is sampled about its own centre, c (1 + b/F) for a lenslet at c, along the lattice's
     own axes. Light from the main lens at u lands at -u b/F from that centre, so the order of the pixels
     turns round. A hexagonal lattice is resampled onto rows √3/2 pitch apart, every other row interpolated
-    half a pitch along itself.
+    half a pitch along itself; the views outside its hexagonal cell, whose pixels belong to other lenslets,
+    are 0 and do not count in `refocus`.
 
     Parameters
     ----------
@@ -75,7 +77,7 @@ def decode(
     before, after = plan.reach(frame)
     indices = lenslet_rectangle(calibration, before, after)
     _check_memory(raw, plan, indices)
-    data = _gather(as_float(raw.data), calibration.lattice.position(indices), (frame, plan), interpolation)
+    data = _gather(as_float(raw.data), calibration.lattice.position(indices), (frame, plan, calibration.lattice), interpolation)
     if calibration.lattice.layout == "hex":
         data = _straightened(data, indices[:, 0, 0] % 2 == 1, interpolation)
     pitch = plan.step[0] * frame.aperture_per_px, plan.step[1] * frame.aperture_per_px
@@ -121,17 +123,18 @@ class _Directions:
     def reach(self, frame: Frame) -> tuple[tuple[float, float], tuple[float, float]]:
         """What a micro-image needs before and after its centre (y, x) [px], turned lattices included."""
         across, along = self.offsets(0), self.offsets(1)
-        ends = [v * frame.column + u * frame.row for v in (across.min(), across.max()) for u in (along.min(), along.max())]
+        corners = [(v, u) for v in (across.min(), across.max()) for u in (along.min(), along.max())]
+        ends = [v * frame.column + u * frame.row for v, u in corners]
         low, high = np.min(ends, 0), np.max(ends, 0)
         return (-low[0], -low[1]), (high[0], high[1])
 
 
 def _gather(
-    image: Array, centers: np.ndarray, how: tuple[Frame, _Directions], interpolation: Interpolation
+    image: Array, centers: np.ndarray, how: tuple[Frame, _Directions, Lattice], interpolation: Interpolation
 ) -> Array:
     """Samples (v, u, t, s[, c]) about micro-image centres (t, s, 2), one row of views at a time."""
-    frame, plan = how
-    xp = namespace(image)
+    frame, plan, lattice = how
+    xp, tail = namespace(image), image.ndim - 2
     along = plan.offsets(1)[:, :, None, None, None] * frame.row
     rows = []
     for offsets in plan.offsets(0):
@@ -141,16 +144,30 @@ def _gather(
                 places = centers + across * frame.column + along[:, part]
                 term = sample(image, places[..., 0], places[..., 1], interpolation)
                 total = term if total is None else total + term
+        if lattice.layout == "hex":
+            vectors = offsets.mean() * frame.column + along.mean(1)[:, 0, 0]
+            total = weighted(total, _own(vectors, lattice)[:, None, None], tail)
         rows.append(total / (len(offsets) * along.shape[1]))
     return xp.stack(rows)
 
 
+def _own(vectors: np.ndarray, lattice: Lattice) -> np.ndarray:
+    """1 where a pixel at `vectors` (k, 2) from a micro-image's centre belongs to it, else 0."""
+    i, j = lattice.index(*(vectors + lattice.origin).T)
+    return ((i == 0) & (j == 0)).astype(float)
+
+
 def _straightened(data: Array, odd: np.ndarray, interpolation: Interpolation) -> Array:
-    """Rows `odd` (t,) of a hexagonal light field moved by half a pitch along s, onto the other rows' columns."""
+    """Rows `odd` (t,) of a hexagonal light field moved by half a pitch along s, onto the other rows' columns.
+
+    Half way between samples, six points of Lagrange's polynomial are far better than four.
+    """
     xp, columns = namespace(data), data.shape[3]
+    weights = (0.5, 0.5) if interpolation == "linear" else tuple(w / 256 for w in (3, -25, 150, 150, -25, 3))
     moved = None
-    for index, weight in neighbours(np.arange(columns) - 0.5, columns, interpolation):
-        term = weighted(take(data, index, 3), weight, data.ndim - 4)
+    for step, weight in enumerate(weights, start=-len(weights) // 2):
+        index = np.clip(np.arange(columns) + step, 0, columns - 1)
+        term = take(data, index, 3) * weight
         moved = term if moved is None else moved + term
     mask = xp.asarray(odd.reshape((-1,) + (1,) * (data.ndim - 3)), device=data.device)
     return xp.where(mask, moved, data)
@@ -168,7 +185,10 @@ def _lenslet_grid(calibration: Calibration, frame: Frame, indices: np.ndarray) -
 
 
 def _turned(
-    raw: RawImage, calibration: Calibration, directions: int | tuple[int, int] | None, interpolation: Interpolation
+    raw: RawImage,
+    calibration: Calibration,
+    directions: int | tuple[int, int] | None,
+    interpolation: Interpolation,
 ) -> LightField:
     """Decode with y and x exchanged, and exchange them back: a hexagonal lattice with dense columns."""
     xp, extra = namespace(raw.data), tuple(range(2, len(raw.data.shape)))
@@ -186,5 +206,6 @@ def _check_memory(raw: RawImage, plan: _Directions, indices: np.ndarray) -> None
     values = math.prod(plan.count) * indices.shape[0] * indices.shape[1] * math.prod(raw.data.shape[2:])
     size = 2.5 * values * (4 if is_single(raw.data) else 8)
     memory.require(
-        f"a light field of {plan.count[0]} x {plan.count[1]} views", size, "Ask for {factor:.1f}x fewer directions."
+        f"a light field of {plan.count[0]} x {plan.count[1]} views", size,
+        "Ask for {factor:.1f}x fewer directions.",
     )

@@ -6,10 +6,11 @@ import numpy as np
 
 from lumigraph.core.arrays import Array, like, namespace
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.rendering import memory
-from lumigraph.rendering.geometry import Frame, transposed
+from lumigraph.rendering.geometry import Frame, lit, transposed
 from lumigraph.rendering.interpolate import Interpolation, as_float, neighbours, take, weighted
 
 _BAND = 1 << 20  # pixels handled at a time
@@ -58,7 +59,7 @@ def encode(views: LightField, calibration: Calibration, *, interpolation: Interp
 class _Axes:
     """First sample, pitch and count of a grid along (y, x), exchanged where the lattice is."""
 
-    def __init__(self, grid, axes: np.ndarray) -> None:
+    def __init__(self, grid: Grid, axes: np.ndarray) -> None:
         order = (0, 1) if axes[0, 0] == 1 else (1, 0)
         self.count = tuple(grid.shape[k] for k in order)
         self.first = tuple((grid.y, grid.x)[k][0] for k in order)
@@ -103,12 +104,16 @@ def _rows(
     near = [neighbours(place, count, interpolation) for place, count in zip(places, counts, strict=True)]
     xp, tail = namespace(data), tuple(data.shape[4:])
     flat = xp.reshape(data, (math.prod(counts), *tail))
-    total = like(np.zeros((reached.size, *tail)), data)
+    total, seen = like(np.zeros((reached.size, *tail)), data), np.zeros(reached.size)
+    open_views = lit(data)
     for v, wv in near[0]:
         for u, wu in near[1]:
             for t, wt in near[2]:
                 for s, ws in near[3]:
                     index = ((v * counts[1] + u) * counts[2] + t) * counts[3] + s
-                    weight = (wv * wu * wt * ws * reached).ravel()
+                    weight = (wv * wu * wt * ws * reached * open_views[v, u]).ravel()
+                    seen += weight
                     total = total + weighted(take(flat, index.ravel(), 0), weight, len(tail))
+    # Weights lost to dark views outside the aperture are made up by the others, where these are most of it.
+    total = weighted(total, np.where(seen > 0.5, 1 / np.maximum(seen, 0.5), 0), len(tail))
     return xp.reshape(total, (*reached.shape, *tail))

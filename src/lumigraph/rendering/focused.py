@@ -20,8 +20,6 @@ from lumigraph.rendering.interpolate import Interpolation, as_float, sample, wei
 
 _BAND = 1 << 20  # picture samples handled at a time
 
-Patch = float | np.ndarray
-
 
 def render(
     raw: RawImage | Array,
@@ -98,7 +96,7 @@ def render(
     for k in range(0, len(layout.y), band):
         y, x = np.meshgrid(layout.y[k : k + band], layout.x, indexing="ij")
         total = None
-        for places, weight in source(y, x, calibration.lattice, sizes):
+        for places, weight in source(y, x, calibration, sizes):
             term = sample(data, places[0], places[1], interpolation)
             term = term if weight is None else weighted(term, weight, len(data.shape) - 2)
             total = term if total is None else total + term
@@ -171,7 +169,8 @@ class _Patches:
             return float(self.values)
         column = j + i // 2 if self.hexagonal else j
         rows, columns = self.values.shape
-        return self.values[np.clip(i - self.first[0], 0, rows - 1), np.clip(column - self.first[1], 0, columns - 1)]
+        row, column = i - self.first[0], column - self.first[1]
+        return self.values[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
 
 
 def _patches(patch: float | Array, calibration: Calibration) -> _Patches:
@@ -182,8 +181,8 @@ def _patches(patch: float | Array, calibration: Calibration) -> _Patches:
     if smallest == 0 or largest > pitch * (1 + 1e-6):
         shown = 0.0 if smallest == 0 else largest
         raise GeometryError(
-            f"patch is {shown:g} px but must be above 0 and at most the micro-images' pitch, {pitch:.4g} px (below 0 "
-            "for a Galilean camera). Its size is m p z2 / L in pixels."
+            f"patch is {shown:g} px but must be above 0 and at most the micro-images' pitch, {pitch:.4g} px "
+            "(below 0 for a Galilean camera). Its size is m p z2 / L in pixels."
         )
     if values.ndim == 0:
         return _Patches(values)
@@ -241,10 +240,10 @@ class _Layout:
 _Source = Iterator[tuple[tuple[np.ndarray, np.ndarray], np.ndarray | None]]
 
 
-def _nearest(y: np.ndarray, x: np.ndarray, lattice: Lattice, sizes: _Patches) -> _Source:
+def _nearest(y: np.ndarray, x: np.ndarray, calibration: Calibration, sizes: _Patches) -> _Source:
     """Where on the sensor (y, x) each sample is seen by the lenslet whose cell holds it."""
-    i, j = lattice.index(y, x)
-    yield _seen(y, x, lattice, sizes, i, j), None
+    i, j = calibration.lattice.index(y, x)
+    yield _seen(y, x, calibration.lattice, sizes, i, j), None
 
 
 def _seen(
@@ -255,14 +254,17 @@ def _seen(
     return center[0] - ratio * (y - center[0]), center[1] - ratio * (x - center[1])
 
 
-def _blended(y: np.ndarray, x: np.ndarray, lattice: Lattice, sizes: _Patches) -> _Source:
+def _blended(y: np.ndarray, x: np.ndarray, calibration: Calibration, sizes: _Patches) -> _Source:
     """The same for every lenslet that sees a sample inside its micro-image, with weights that add up to 1."""
+    lattice = calibration.lattice
     i, j = lattice.index(y, x)
-    reach = min(0.5 * lattice.pitch**2 / sizes.largest, 2 * lattice.pitch)
+    # Two pixels from the edge of the micro-image, so that no tap falls into the next one.
+    inside = max(0.5 * lattice.pitch - 2, 0.25 * lattice.pitch)
+    reach = min(inside * lattice.pitch / sizes.largest, 2 * lattice.pitch)
     steps = math.ceil(reach / lattice.pitch * 1.2) + 1
     around = [(di, dj) for di in range(-steps, steps + 1) for dj in range(-steps, steps + 1)]
     near = [d for d in around if np.hypot(*(lattice.matrix @ d)) < reach + 0.75 * lattice.pitch]
-    weights = [_window(y, x, lattice, (i + di, j + dj), reach) for di, dj in near]
+    weights = [_window(y, x, calibration, (i + di, j + dj), reach) for di, dj in near]
     weights[near.index((0, 0))] += 1e-6  # corners that no window reaches take the nearest lenslet
     total = np.sum(weights, axis=0)
     for (di, dj), weight in zip(near, weights, strict=True):
@@ -271,8 +273,12 @@ def _blended(y: np.ndarray, x: np.ndarray, lattice: Lattice, sizes: _Patches) ->
 
 
 def _window(
-    y: np.ndarray, x: np.ndarray, lattice: Lattice, index: tuple[np.ndarray, np.ndarray], reach: float
+    y: np.ndarray, x: np.ndarray, calibration: Calibration, index: tuple[np.ndarray, np.ndarray], reach: float
 ) -> np.ndarray:
-    center = np.moveaxis(lattice.position(np.stack(index, -1)), -1, 0)
-    distance = np.minimum(np.hypot(y - center[0], x - center[1]) / reach, 1)
-    return np.cos(math.pi / 2 * distance) ** 2 * (distance < 1)
+    """Weight of a lenslet for samples around it; 0 where its micro-image is cut by the sensor's edge."""
+    lattice, (ny, nx) = calibration.lattice, calibration.shape
+    cy, cx = np.moveaxis(lattice.position(np.stack(index, -1)), -1, 0)
+    distance = np.minimum(np.hypot(y - cy, x - cx) / reach, 1)
+    half = lattice.pitch / 2
+    whole = (cy >= half - 1) & (cy + half <= ny) & (cx >= half - 1) & (cx + half <= nx)
+    return np.cos(math.pi / 2 * distance) ** 2 * (distance < 1) * whole

@@ -8,6 +8,7 @@ from lumigraph.core import arrays, checks
 from lumigraph.core.arrays import Array, like, namespace
 from lumigraph.core.lightfield import LightField
 from lumigraph.rendering import memory
+from lumigraph.rendering.geometry import lit
 from lumigraph.rendering.interpolate import as_float, take, weighted
 
 _WIDTH = 6  # samples of the spectrum that the kernel spans
@@ -60,7 +61,7 @@ def refocus_fourier(views: LightField, alpha: float) -> Array:
         spectrum = _sliced(spectrum, axis, -k * (1 - alpha) * pitch, first)
     xp = namespace(data)
     picture = xp.real(arrays.ifft(arrays.ifft(spectrum, axis=0), axis=1))
-    picture = picture / math.prod(views.aperture.shape)
+    picture = picture / max(1, int(lit(data).sum()))
     return xp.astype(picture, xp.float32) if single else picture
 
 

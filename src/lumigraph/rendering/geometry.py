@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lumigraph.core.arrays import Array, namespace, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import CalibrationError
@@ -72,6 +73,12 @@ def transposed(calibration: Calibration) -> Calibration | None:
         indices=np.zeros((0, 2), int),
         centers=np.zeros((0, 2)),
     )
+
+
+def lit(data: Array) -> np.ndarray:
+    """Which views (v, u) of a light field are not dark everywhere: those inside a round or hexagonal aperture."""
+    xp = namespace(data)
+    return to_numpy(xp.any(data != 0, axis=tuple(range(2, data.ndim))))
 
 
 def lenslet_rectangle(

@@ -2,16 +2,17 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, like, namespace
-from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.errors import GeometryError
 from lumigraph.rendering import memory
-from lumigraph.rendering.interpolate import Interpolation, as_float, taps
+from lumigraph.rendering.geometry import lit
+from lumigraph.rendering.interpolate import Interpolation, as_float, taps, weighted
 
 _PAD = 2  # samples repeated at every edge, so that the taps of a position on the edge exist
 
@@ -25,7 +26,8 @@ def refocus(
 
     which is L(α'x' + u(1 - α'), u) for x = α'x': sample n of the picture lies at x' = x_n / α' on the plane,
     so that all pictures of a stack have the same size and an object keeps its place while it goes out of
-    focus. The mean runs over the views that see a place: pictures have no dark frame. alpha = 1 keeps the
+    focus. The mean runs over the views that see a place, without those that are dark everywhere (outside a
+    round aperture): pictures have no dark frame. alpha = 1 keeps the
     plane of the lenslets; alpha below 1 is farther from the main lens, an object nearer to the camera.
 
     Parameters
@@ -69,9 +71,19 @@ def refocus_stack(
         raise GeometryError("alphas is empty but a stack needs at least one. Give a list of numbers such as 1.0.")
     checks.shape("oversample", (oversample, oversample))
     _check_memory(views, len(alphas), oversample)
-    data = _padded(as_float(views.data))
-    xp = namespace(data)
-    return xp.stack([_refocused(data, views, alpha, (interpolation, oversample)) for alpha in alphas])
+    data, xp = as_float(views.data), namespace(views.data)
+    light = _Light(_padded(data), lit(data), views, interpolation)
+    return xp.stack([_refocused(light, alpha, oversample) for alpha in alphas])
+
+
+@dataclass(frozen=True, slots=True)
+class _Light:
+    """What all pictures of a stack share: the padded light field, and which views count."""
+
+    data: Array
+    lit: np.ndarray
+    views: LightField
+    interpolation: Interpolation
 
 
 def shifts(views: LightField, alpha: float) -> tuple[np.ndarray, np.ndarray]:
@@ -93,46 +105,36 @@ def _padded(data: Array) -> Array:
     return data
 
 
-def _refocused(data: Array, views: LightField, alpha: float, how: tuple[Interpolation, int]) -> Array:
-    """One picture, by phases: sample m of `oversample` per lenslet is a picture moved by m / oversample."""
-    (down, right), (interpolation, times) = shifts(views, alpha), how
+def _refocused(light: _Light, alpha: float, times: int) -> Array:
+    """One picture, by phases: sample m of `times` per lenslet is a picture moved by m / times."""
+    down, right = shifts(light.views, alpha)
     if times == 1:
-        return _mean(data, views.lenslets, (down, right), interpolation)
-    xp, (nt, ns) = namespace(data), views.lenslets.shape
-    phases = [
-        xp.stack(
-            [
-                _mean(data, views.lenslets, (down + y / times, right + x / times), interpolation)
-                for x in range(times)
-            ],
-            axis=2,
-        )
-        for y in range(times)
-    ]
-    fine = xp.reshape(xp.stack(phases, axis=1), (nt * times, ns * times, *data.shape[4:]))
+        return _mean(light, down, right)
+    xp, (nt, ns) = namespace(light.data), light.views.lenslets.shape
+    steps = np.arange(times) / times
+    phases = [xp.stack([_mean(light, down + y, right + x) for x in steps], axis=2) for y in steps]
+    fine = xp.reshape(xp.stack(phases, axis=1), (nt * times, ns * times, *light.data.shape[4:]))
     return fine[: (nt - 1) * times + 1, : (ns - 1) * times + 1, ...]
 
 
-def _mean(
-    data: Array, lenslets: Grid, moves: tuple[np.ndarray, np.ndarray], interpolation: Interpolation
-) -> Array:
+def _mean(light: _Light, down: np.ndarray, right: np.ndarray) -> Array:
     """Mean over the views (v, u) of a padded light field, moved along t and s."""
-    nt, ns = lenslets.shape
-    tail = tuple(data.shape[4:])
+    data, (nt, ns), tail = light.data, light.views.lenslets.shape, tuple(light.data.shape[4:])
     rows = like(np.zeros((data.shape[0], nt + 2 * _PAD, ns, *tail)), data)
-    seen_s, seen_t = np.zeros(ns), np.zeros(nt)
-    for u, move in enumerate(moves[1]):
-        for (low, high), first, weight in _pieces(float(move), ns, interpolation):
-            rows[:, :, low:high, ...] += weight * data[:, u, :, first : first + high - low, ...]
-        seen_s[_span(float(move), ns)] += 1
+    seen_t, seen_s = np.zeros((nt, len(down))), np.zeros((len(right), ns))
+    for u, move in enumerate(right):
+        span, pieces = _pieces(float(move), ns, light.interpolation)
+        for first, weight in pieces:
+            rows[:, :, span, ...] += weight * data[:, u, :, first : first + span.stop - span.start, ...]
+        seen_s[u, span] = 1
     picture = like(np.zeros((nt, ns, *tail)), data)
-    for v, move in enumerate(moves[0]):
-        for (low, high), first, weight in _pieces(float(move), nt, interpolation):
-            picture[low:high, ...] += weight * rows[v, first : first + high - low, ...]
-        seen_t[_span(float(move), nt)] += 1
-    seen = seen_t[:, None] * seen_s
-    inverse = np.where(seen > 0, 1 / np.maximum(seen, 1), 0)
-    return picture * like(inverse.reshape(inverse.shape + (1,) * len(tail)), picture)
+    for v, move in enumerate(down):
+        span, pieces = _pieces(float(move), nt, light.interpolation)
+        for first, weight in pieces:
+            picture[span, ...] += weight * rows[v, first : first + span.stop - span.start, ...]
+        seen_t[span, v] = 1
+    seen = seen_t @ light.lit @ seen_s
+    return weighted(picture, np.where(seen > 0, 1 / np.maximum(seen, 1), 0), len(tail))
 
 
 def _span(move: float, count: int) -> slice:
@@ -142,22 +144,16 @@ def _span(move: float, count: int) -> slice:
     return slice(min(max(low, 0), count), max(min(high, count), 0))
 
 
-def _pieces(
-    move: float, count: int, interpolation: Interpolation
-) -> list[tuple[tuple[int, int], int, float]]:
-    """(samples covered, first padded sample, weight) of each tap of a view moved by `move`."""
+def _pieces(move: float, count: int, interpolation: Interpolation) -> tuple[slice, list[tuple[int, float]]]:
+    """Samples that a view moved by `move` covers; of each tap, its first padded sample and its weight."""
     span = _span(move, count)
     if span.start >= span.stop:
-        return []
+        return slice(0, 0), []
     nearest = round(move)
     move = nearest if abs(move - nearest) < 1e-9 else move
     below = math.floor(move)
-    pieces = []
-    for step, weight in taps(np.array(move - below), interpolation):
-        if weight != 0:
-            first = span.start + below + step + _PAD
-            pieces.append(((span.start, span.stop), first, float(weight)))
-    return pieces
+    weights = [(step, float(weight)) for step, weight in taps(np.array(move - below), interpolation)]
+    return span, [(span.start + below + step + _PAD, weight) for step, weight in weights if weight != 0]
 
 
 def _check_memory(views: LightField, count: int, oversample: int) -> None:
@@ -165,5 +161,6 @@ def _check_memory(views: LightField, count: int, oversample: int) -> None:
     picture = math.prod(views.data.shape[2:]) * oversample**2 * itemsize
     size = 2.5 * math.prod(views.data.shape) * itemsize + (count + 3) * picture
     memory.require(
-        f"a stack of {count} pictures, {oversample} samples per lenslet", size, "Refocus {factor:.1f}x fewer at a time."
+        f"a stack of {count} pictures, {oversample} samples per lenslet", size,
+        "Refocus {factor:.1f}x fewer at a time.",
     )

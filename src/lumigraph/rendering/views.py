@@ -24,7 +24,7 @@ def view(views: LightField, v: int, u: int) -> Array:
     nv, nu = views.aperture.shape
     if not (-nv <= v < nv and -nu <= u < nu):
         raise GeometryError(f"there is no view ({v}, {u}): the aperture has {nv} x {nu}, counted from 0.")
-    return views.view(v, u)
+    return views.data[v, u, ...]
 
 
 def point_of_view(views: LightField, y: float, x: float) -> Array:
@@ -49,7 +49,7 @@ def point_of_view(views: LightField, y: float, x: float) -> Array:
     data, total = as_float(views.data), None
     for v, wv in places[0]:
         for u, wu in places[1]:
-            term = data[int(v), int(u)] * float(wv * wu)
+            term = data[int(v), int(u), ...] * float(wv * wu)
             total = term if total is None else total + term
     return total
 
@@ -67,7 +67,7 @@ def reduce_aperture(
         Width kept, above 0 and up to 1; at least one view stays.
     shape
         "round" also sets the views in the corners to 0, outside the circle (an ellipse, where the numbers
-        of views differ) that touches the kept views' outer edges.
+        of views differ) that touches the kept views' outer edges; they do not count in `refocus`.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def reduce_aperture(
     full = views.aperture.shape
     kept = tuple(max(1, round(n * fraction)) for n in full)
     first = [n // 2 - k // 2 for n, k in zip(full, kept, strict=True)]
-    data = views.data[first[0] : first[0] + kept[0], first[1] : first[1] + kept[1]]
+    data = views.data[first[0] : first[0] + kept[0], first[1] : first[1] + kept[1], ...]
     aperture = views.aperture.resized((kept[0], kept[1]))
     if shape == "round":
         v, u = ((np.arange(k) - (k - 1) / 2) / (k / 2) for k in kept)
