@@ -14,9 +14,6 @@ MARGIN = 2.0
 ANGLE_MARGIN = 1.1
 """By this factor grids are finer than the steepest ray asks: depths differ a little in angle."""
 
-DEPTH_MARGIN = 1.25
-"""By this factor the object is finer than the focused plane asks: nearer depths see it at larger angles."""
-
 BORDER = 4
 """Samples left free around the stop, the lenslets and the sensor."""
 
@@ -135,10 +132,11 @@ def object_rules(
         Of the pupil's samples [m].
     """
     half_window = _samples(diameter / 2, pitch) * pitch / 2
-    seen = wavelength * distance / (2 * (half_field + half_window))
     return (
         Rule("object detail", wavelength * distance / (2 * diameter) / 1.2, "λ z1 / (2 D) / 1.2"),
-        Rule("object field", seen / DEPTH_MARGIN, "λ z1 / (2 (X + pupil)) / 1.25"),
+        Rule(
+            "object field", wavelength * distance / (2 * (half_field + half_window)), "λ z1 / (2 (X + pupil))"
+        ),
     )
 
 

@@ -129,7 +129,8 @@ class LensletCamera(Camera):
             fill_factor=parts.fill_factor,
             extent=parts.extent,
         )
-        return Train((array, Propagate(self.lenslet_distance, "band_limited", grid=self.image_grid)))
+        # "auto" pads by no more than light spreads over the short way b: a fraction of the window.
+        return Train((array, Propagate(self.lenslet_distance, "auto", grid=self.image_grid)))
 
     def _check_lenslets_behind_lens(self) -> None:
         if self.separation <= 0:
