@@ -168,6 +168,40 @@ def test_zoom_agrees_with_band_limited_on_a_common_grid(distance):
     )
 
 
+@pytest.mark.parametrize("distance", [40e-3, -40e-3])
+def test_zoom_follows_a_tilted_beam_off_the_axis(distance):
+    # Ray optics: the centre moves by z tan θ, here 1.27 mm, three windows away.
+    grid, tilt = Grid.square(80, 5e-6), 5e4
+    wave = np.exp(-(grid.y[:, None] ** 2 + grid.x**2) / (60e-6) ** 2 + 2j * np.pi * tilt * grid.x)
+    sine = WAVELENGTH * tilt
+    centre = distance * sine / np.sqrt(1 - sine**2)
+    output = Grid((101, 101), 5e-6, (0.0, centre))
+    image = propagate(Field(wave, grid, WAVELENGTH), distance, "zoom", grid=output)
+    assert float(image.power / Field(wave, grid, WAVELENGTH).power) > 0.99
+    assert np.average(output.x, weights=image.intensity.sum(0)) == pytest.approx(centre, abs=1e-6)
+
+
+@pytest.mark.parametrize("method", SPECTRAL)
+def test_each_method_keeps_the_frequencies_it_says(method):
+    # A point's spectrum is flat, so that the spectrum of its image is the transfer function itself.
+    grid, distance = Grid((80, 100), 5e-6), 40e-3
+    point = np.zeros(grid.shape, complex)
+    point[0, 0] = 1
+    found = np.fft.fft2(quiet(Field(point, grid, WAVELENGTH), distance, method, pad=0).data)
+    free = [1 / (WAVELENGTH * np.hypot(2 * distance / size, 1)) for size in grid.size]
+    wide = [size / (WAVELENGTH * distance) for size in grid.size]
+    y, x = np.abs(grid.fy)[:, None], np.abs(grid.fx)
+    kept = {
+        "angular_spectrum": (y >= 0) & (x >= 0),
+        "band_limited": (y <= free[0]) & (x <= free[1]),
+        "band_limited_circular": (y / free[0]) ** 2 + (x / free[1]) ** 2 <= 1,
+        "corrected_band_limited": (y / wide[0]) ** 2 + (x / wide[1]) ** 2 <= 1,
+    }[method]
+    assert np.array_equal(np.abs(found) > 0.5, kept)
+    phase = 2j * np.pi * distance / WAVELENGTH * np.sqrt(1 - (WAVELENGTH * y) ** 2 - (WAVELENGTH * x) ** 2)
+    assert np.abs(found - np.where(kept, np.exp(phase), 0)).max() < 1e-8
+
+
 def test_zoom_computes_a_finer_shifted_window_of_a_gaussian_beam():
     grid, waist, distance = Grid.square(120, 10e-6), 0.15e-3, 38e-3
     field = Field(np.exp(-(grid.y[:, None] ** 2 + grid.x**2) / waist**2) + 0j, grid, WAVELENGTH)
@@ -237,13 +271,13 @@ def test_pytorch_differentiates_through_every_method(method, rng):
 def test_zero_distance_only_crops_and_pads(method, rng):
     field = Field(noise(rng, (6, 8)), Grid((6, 8), 1e-5), WAVELENGTH)
     assert propagate(field, 0, method) is field
-    other = Grid((9, 4), 1e-5, (1e-5, -2e-5))
+    other = Grid((9, 6), 1e-5, (-1e-5, 2e-5))  # two rows before, one after, one column after
     found = propagate(field, 0.0, method, grid=other)
     assert found.grid == other
-    expected = np.zeros((9, 4), complex)
+    expected = np.zeros((9, 6), complex)
     top, left = other.samples_to(field.grid)
     for i in range(9):
-        for j in range(4):
+        for j in range(6):
             if 0 <= i + top < 6 and 0 <= j + left < 8:
                 expected[i, j] = field.data[i + top, j + left]
     assert np.array_equal(found.data, expected)
