@@ -92,13 +92,14 @@ def point_source(
     sines = tuple(float(np.abs(d).max() / np.hypot(np.abs(d).max(), distance)) for d in (dy, dx))
     _warn_if_coarse("a spherical wave", grid, wavelength, (sines[0], sines[1]))
     k = np.copysign(2 * np.pi / wavelength, distance)
-    z, squared = abs(distance), dy[:, None] ** 2 + dx**2
+    z = abs(distance)
     if paraxial:
-        data = np.exp(1j * k * (z + squared / (2 * z))) / z
+        along_y = np.exp(1j * k * (z + dy**2 / (2 * z))).astype(dtype)
+        data = np.outer(along_y, (np.exp(1j * k * dx**2 / (2 * z)) / z).astype(dtype))
     else:
-        r = np.sqrt(z**2 + squared)
-        data = np.exp(1j * k * r) / r
-    return Field(data.astype(dtype), grid, wavelength)
+        r = np.sqrt(z**2 + dy[:, None] ** 2 + dx**2)
+        data = (np.exp(1j * k * r) / r).astype(dtype)
+    return Field(data, grid, wavelength)
 
 
 def gaussian_beam(

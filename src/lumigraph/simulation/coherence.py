@@ -48,7 +48,7 @@ def _positive_count(count: int) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Coherent:
-    """One plane wave along the axis lights each plane of the scene; planes do not interfere with each other."""
+    """One plane wave along the axis lights each plane of the scene; planes do not interfere."""
 
     @property
     def shots(self) -> int:
@@ -194,7 +194,7 @@ class TiltedWaves:
         if (limit := wavelength / (2 * max(grid.pitch))) < self.na:
             raise SamplingError(
                 f"na is {self.na:g} but the scene's pitch of {max(grid.pitch) * 1e6:.3g} um tells directions "
-                f"apart up to {limit:.3g}. Use a scene of pitch {wavelength / (2 * self.na) * 1e6:.3g} um or finer."
+                f"apart up to {limit:.3g}. Use a pitch of {wavelength / (2 * self.na) * 1e6:.3g} um or finer."
             )
         radius, angle = self.na * np.sqrt(unit[:, 0]), 2 * math.pi * unit[:, 1]
         return np.stack([radius * np.sin(angle), radius * np.cos(angle)], axis=1)
@@ -202,10 +202,11 @@ class TiltedWaves:
     def illuminations(self, grids: list[Grid], wavelength: float, distances: list[float]) -> Iterator[list]:
         """Converging waves exp(-ikr²/2z) with a tilt."""
         k = 2 * math.pi / wavelength
+        tilts = [self.directions(grid, wavelength) for grid in grids]
         for number in range(self.count):
             planes = []
-            for grid, distance in zip(grids, distances, strict=True):
-                tilt_y, tilt_x = self.directions(grid, wavelength)[number]
+            for grid, distance, directions in zip(grids, distances, tilts, strict=True):
+                tilt_y, tilt_x = directions[number]
                 along_y = np.exp(1j * k * (tilt_y * grid.y - grid.y**2 / (2 * distance)))
                 along_x = np.exp(1j * k * (tilt_x * grid.x - grid.x**2 / (2 * distance)))
                 planes.append((along_y[:, None] * along_x).astype(np.complex64))

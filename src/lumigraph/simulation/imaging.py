@@ -185,7 +185,7 @@ def _check(camera: Camera, scene: Scene) -> None:
         if (nearest := camera.object_distance + float(depths.min())) <= 0:
             raise GeometryError(
                 f"the scene reaches {nearest * 1e3:.4g} mm in front of the main lens: depth "
-                f"{depths.min() * 1e3:.4g} mm at an object distance of {camera.object_distance * 1e3:.4g} mm. "
+                f"{depths.min() * 1e3:.4g} mm, object distance {camera.object_distance * 1e3:.4g} mm. "
                 "Use depths that stay in front of the camera."
             )
     samples = max(math.prod(grid.shape) for grid in (camera.image_grid, camera.object_grid))
@@ -228,8 +228,10 @@ def _point_shots(camera: Camera, points: Points) -> Iterator[_Shot]:
     sample_area = math.prod(camera.object_grid.pitch)
     weight = sample_area * camera.separation**2 / _pupil_area(camera)
     for (y, x, dz), intensity in zip(points.positions, points.intensities, strict=True):
-        wave = sources.point_source(grid, camera.wavelength, camera.object_distance + dz, position=(y, x))
-        yield _Shot(_single(wave), train, weight * float(intensity))
+        wave = sources.point_source(
+            grid, camera.wavelength, camera.object_distance + dz, (y, x), np.complex64
+        )
+        yield _Shot(wave, train, weight * float(intensity))
 
 
 def _slice_shots(camera: Camera, slices: list[Slice], coherence: Coherence) -> Iterator[_Shot]:
@@ -263,8 +265,10 @@ def _diffuser_shots(camera: Camera, directions: np.ndarray, brightness: float) -
     if train is None or grid is None:
         train, grid = Train(()), camera.image_grid
     for y, x, weight in directions:
-        wave = sources.point_source(grid, camera.wavelength, camera.separation, position=(y, x))
-        yield _Shot(_single(wave * camera.separation), train, weight * brightness)
+        wave = sources.point_source(
+            grid, camera.wavelength, camera.separation, (y, x), np.complex64, paraxial=True
+        )
+        yield _Shot(wave * camera.separation, train, weight * brightness)
 
 
 def _pupil_points(camera: Camera) -> np.ndarray:
@@ -284,8 +288,3 @@ def _pupil_points(camera: Camera) -> np.ndarray:
     rows, columns = np.nonzero(weights)
     picked = weights[rows, columns]
     return np.stack([grid.y[rows], grid.x[columns], picked / picked.sum()], axis=1)
-
-
-def _single(field: Field) -> Field:
-    """Single precision: the phases were computed in double."""
-    return Field(field.data.astype(np.complex64), field.grid, field.wavelength)
