@@ -32,6 +32,8 @@ PUPIL = GRID.resized(1002)
 IMAGE = GRID.resized(900)
 FULL = "full transforms (scipy.fft)"
 
+_fft2: Any = scipy.fft.fft2
+_ifft2: Any = scipy.fft.ifft2
 Step = Callable[[np.ndarray], np.ndarray]
 
 
@@ -77,9 +79,9 @@ def plain() -> Step:
     box = slice(600, 1400)
 
     def leg(data: np.ndarray) -> np.ndarray:
-        data = scipy.fft.fft2(data, overwrite_x=True, workers=WORKERS)
+        data = _fft2(data, overwrite_x=True, workers=WORKERS)
         data *= H
-        return scipy.fft.ifft2(data, overwrite_x=True, workers=WORKERS)
+        return _ifft2(data, overwrite_x=True, workers=WORKERS)
 
     def snapshot(waves: np.ndarray) -> np.ndarray:
         data = np.zeros(GRID.shape, np.complex64)
