@@ -19,9 +19,9 @@ def camera(lattice, shape):
 
 
 def lenslets_and_aperture(calibration):
-    """Ray of every pixel: lenslet position x and main-lens position u, both (y, x) [m], from first principles.
+    """Ray of every pixel: lenslet position x and main-lens position u, both (y, x) [m], by geometry.
 
-    The pixel at σ looks through its lenslet at x, whose micro-image is centred at x (1 + b/F), onto the
+    The pixel at σ looks through its lenslet at x, whose micro-image is centred at x (1 + b/F), at the
     main lens at u = -(σ - x (1 + b/F)) F/b. Distances are from the axis, the middle pixel.
     """
     ny, nx = calibration.shape
@@ -59,7 +59,7 @@ def test_a_point_comes_into_focus_at_its_own_alpha_and_place(name, alpha):
     pitch = calibration.lattice.pitch * PIXEL
     lenslet, aperture = lenslets_and_aperture(calibration)
     (t, s), (v, u) = turned(lenslet, angle), turned(aperture, angle)
-    # An object whose image lies at F' = F/α' obeys x - u (1 - α') = α'x': radiance is a function of that alone.
+    # An object whose image lies at F' = F/α' obeys x - u (1 - α') = α'x': the radiance depends on that alone.
     at, width = (1.1 * pitch, -2.3 * pitch), 2 * pitch
     raw = blob(t - v * (1 - alpha), s - u * (1 - alpha), at, width)
     views = decode(raw, calibration)
@@ -197,7 +197,7 @@ def test_places_in_the_main_image_are_metres(m):
     patch = m * pitch * z2 / length / per_px
     picture, grid = render(raw, calibration, patch, samples=12), rendered_grid(calibration, patch, 12)
     found = (picture * grid.y[:, None]).sum(), (picture * grid.x[None, :]).sum()
-    # A patch of m p (the thesis' 5.5) or tiles in raw pixels would put the point 2 % to 4 % off: 4 µm and more.
+    # A patch of m p (the thesis' 5.5) or tiles in raw pixels would put the point 2 % to 4 % off: over 4 µm.
     np.testing.assert_allclose(np.array(found) / picture.sum(), at, atol=1e-6)
     assert grid.pitch[0] == pytest.approx(pitch * z2 / length / 12, rel=1e-9)
 

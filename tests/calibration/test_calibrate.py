@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from data_folder import real
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from data_folder import real
 from lumigraph.calibration import calibrate
 from lumigraph.calibration.devignette import grey
 from lumigraph.core.lattice import Lattice
@@ -16,7 +16,7 @@ from lumigraph.errors import CalibrationError
 
 
 def drawn(lattice, shape, form="round", fill=0.9, over=4):
-    """White image: area fraction of each pixel inside round or square micro-images, on over² points a pixel."""
+    """White image: area fraction of each pixel inside micro-images, from over² points a pixel."""
     inside = np.zeros(shape)
     cos, sin = math.cos(lattice.rotation), math.sin(lattice.rotation)
     steps = (np.arange(over) - (over - 1) / 2) / over
@@ -64,7 +64,9 @@ def test_any_lattice_of_round_micro_images_is_found(layout, pitch, rotation, y, 
     assert abs(calibration.lattice.rotation - rotation) < 2e-3
 
 
-@pytest.mark.parametrize(("form", "fill"), [("square", 0.95), ("square", 0.8), ("rings", 0.95), ("round", 0.3)])
+@pytest.mark.parametrize(
+    ("form", "fill"), [("square", 0.95), ("square", 0.8), ("rings", 0.95), ("round", 0.3)]
+)
 def test_touching_ringed_and_small_micro_images(form, fill):
     lattice = Lattice.square(31.37, -0.02, (11.3, 17.8))
     calibration = calibrate(drawn(lattice, (300, 330), form, fill))
@@ -139,7 +141,11 @@ def test_colour_and_bayer_pictures_are_scaled_to_grey():
 def test_geometry_is_kept():
     white = RawImage(drawn(Lattice.square(12.0, 0, (5, 5)), (100, 100)), pixel_pitch=5e-6)
     calibration = calibrate(white, separation=0.4, lenslet_distance=0.02)
-    assert (calibration.pixel_pitch, calibration.separation, calibration.lenslet_distance) == (5e-6, 0.4, 0.02)
+    assert (calibration.pixel_pitch, calibration.separation, calibration.lenslet_distance) == (
+        5e-6,
+        0.4,
+        0.02,
+    )
     assert calibrate(white, pixel_pitch=6e-6).pixel_pitch == 6e-6
 
 
@@ -171,7 +177,9 @@ def test_real_light_field_microscope_white_image():
 
 
 def two_lattices():
-    return drawn(Lattice.square(14.2), (200, 200), fill=0.5) + drawn(Lattice.square(20.1, 0.3), (200, 200), fill=0.4)
+    return drawn(Lattice.square(14.2), (200, 200), fill=0.5) + drawn(
+        Lattice.square(20.1, 0.3), (200, 200), fill=0.4
+    )
 
 
 def with_nan():
@@ -191,7 +199,11 @@ def with_nan():
             {},
             r"shows no lattice: its autocorrelation returns to 0\.\d+",
         ),
-        (lambda: drawn(Lattice.square(40.0, 0, (20, 20)), (90, 300)), {}, r"lenslets of pitch 40|one direction"),
+        (
+            lambda: drawn(Lattice.square(40.0, 0, (20, 20)), (90, 300)),
+            {},
+            r"lenslets of pitch 40|one direction",
+        ),
         (two_lattices, {}, r"pitches|one direction|no lattice|micro-images"),
         (
             lambda: np.tile(np.sin(np.arange(120) / 3), (120, 1)),
@@ -209,8 +221,16 @@ def with_nan():
             r"no lattice of pitch 40 px: it repeats every 20\.\d px",
         ),
         (lambda: drawn(Lattice.square(20.1), (200, 200)), {"pitch": 2}, r"pitch is 2 px but .* below 4 px"),
-        (lambda: drawn(Lattice.square(20.1), (200, 200)), {"pitch": -2}, r"pitch is -2 px but must be above 0"),
-        (lambda: drawn(Lattice.square(20.1), (200, 200)), {"layout": "round"}, r"layout is 'round' but must be"),
+        (
+            lambda: drawn(Lattice.square(20.1), (200, 200)),
+            {"pitch": -2},
+            r"pitch is -2 px but must be above 0",
+        ),
+        (
+            lambda: drawn(Lattice.square(20.1), (200, 200)),
+            {"layout": "round"},
+            r"layout is 'round' but must be",
+        ),
         (
             lambda: drawn(Lattice.square(20.1), (200, 200)),
             {"layout": "hex"},

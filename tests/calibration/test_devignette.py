@@ -60,7 +60,9 @@ def test_array_library_is_kept_and_inputs_untouched(xp, white):
 
 
 def test_bad_input_is_refused(white):
-    with pytest.raises(CalibrationError, match=r"white image has shape \(24, 30\) but the raw image \(20, 30\)"):
+    with pytest.raises(
+        CalibrationError, match=r"white image has shape \(24, 30\) but the raw image \(20, 30\)"
+    ):
         devignette(np.ones((20, 30)), white)
     with pytest.raises(CalibrationError, match="white image has no light: its 99th percentile is 0"):
         devignette(np.ones((24, 30)), np.zeros((24, 30)))

@@ -46,7 +46,9 @@ def field(rng, shape=(5, 5, 12, 14), pitch=1.0):
 @pytest.mark.parametrize("pitch", [7, 8])
 @pytest.mark.parametrize("colours", [(), (3,)])
 def test_raw_and_light_field_there_and_back(rng, pitch, colours):
-    calibration = calibrated(Lattice.square(float(pitch), 0, (pitch // 2, pitch // 2)), (6 * pitch, 8 * pitch))
+    calibration = calibrated(
+        Lattice.square(float(pitch), 0, (pitch // 2, pitch // 2)), (6 * pitch, 8 * pitch)
+    )
     raw = rng.random((6 * pitch, 8 * pitch, *colours))
     views = decode(raw, calibration)
     assert views.data.shape == (pitch, pitch, 6, 8, *colours)
@@ -96,7 +98,9 @@ def test_fewer_directions_are_means_over_their_width(rng):
     raw = np.kron(rng.random((5, 5)), np.ones((12, 12)))
     views = decode(raw, calibration, directions=3, interpolation="linear")
     assert views.data.shape[:2] == (3, 3)
-    np.testing.assert_allclose(views.data[1, 1], raw[5::12, 5::12][: views.data.shape[2], : views.data.shape[3]])
+    np.testing.assert_allclose(
+        views.data[1, 1], raw[5::12, 5::12][: views.data.shape[2], : views.data.shape[3]]
+    )
     assert views.aperture.pitch[0] == pytest.approx(4 * decode(raw, calibration).aperture.pitch[0])
 
 
@@ -167,9 +171,10 @@ def test_oversampled_pictures_hold_the_plain_ones(rng):
 def test_whole_shifts_are_exact_means(rng):
     views = field(rng, (3, 3, 9, 9))
     expected = np.mean(
-        [views.data[v, u, 3 + v - 1 : 6 + v - 1, 3 + u - 1 : 6 + u - 1] for v in range(3) for u in range(3)], 0
+        [views.data[v, u, 3 + v - 1 : 6 + v - 1, 3 + u - 1 : 6 + u - 1] for v in range(3) for u in range(3)],
+        0,
     )
-    # alpha = 0: x = u, one lenslet per view. It is no camera's plane, but the largest alphas allowed come near.
+    # alpha = 0: x = u, one lenslet per view. No camera has this plane.
     np.testing.assert_allclose(refocus(views, 1e-12)[3:6, 3:6], expected, atol=1e-9)
 
 
@@ -190,7 +195,9 @@ def test_fourier_slice_of_periodic_light_is_exact(rng):
     def scene(y, x):
         return 2 + np.cos(2 * np.pi * (2 * y / 12 + x / 14)) + 0.5 * np.sin(2 * np.pi * 3 * x / 14)
 
-    data = np.array([[scene(t - v * (1 - alpha), s - u * (1 - alpha)) for u in aperture.x] for v in aperture.y])
+    data = np.array(
+        [[scene(t - v * (1 - alpha), s - u * (1 - alpha)) for u in aperture.x] for v in aperture.y]
+    )
     views = LightField(data, aperture, Grid((12, 14), 1.0), 10.0)
     np.testing.assert_allclose(refocus_fourier(views, alpha), scene(t, s), atol=2e-4)
 
@@ -245,9 +252,13 @@ def bad_raw():
 
 @pytest.mark.parametrize("read", [decode, lambda raw, calibration: render(raw, calibration, 3.0)])
 def test_raw_images_that_do_not_belong_are_refused(read):
-    with pytest.raises(CalibrationError, match="raw image has 35 x 35 pixels but the calibration was made on 35 x 42"):
+    with pytest.raises(
+        CalibrationError, match="raw image has 35 x 35 pixels but the calibration was made on 35 x 42"
+    ):
         read(np.ones((35, 35)), CALIBRATION)
-    with pytest.raises(CalibrationError, match=r"the raw image has 1 NaN or infinite values .* index \(1, 2\)"):
+    with pytest.raises(
+        CalibrationError, match=r"the raw image has 1 NaN or infinite values .* index \(1, 2\)"
+    ):
         read(bad_raw(), CALIBRATION)
     with pytest.raises(CalibrationError, match=r"has a Bayer pattern \(RGGB\).*\n?.*Demosaic it"):
         read(RawImage(np.ones((35, 42)), bayer="RGGB"), CALIBRATION)
@@ -255,7 +266,7 @@ def test_raw_images_that_do_not_belong_are_refused(read):
 
 def test_bad_numbers_are_refused(rng):
     views = field(rng)
-    with pytest.raises(GeometryError, match="alpha is 0.* but must be above 0"):
+    with pytest.raises(GeometryError, match=r"alpha is 0.* but must be above 0"):
         refocus(views, 0)
     with pytest.raises(GeometryError, match="alphas is empty"):
         refocus_stack(views, [])
@@ -273,7 +284,9 @@ def test_bad_numbers_are_refused(rng):
         reduce_aperture(views, 1.5)
     with pytest.raises(GeometryError, match="shape is 'oval' but must be 'square' or 'round'"):
         reduce_aperture(views, 0.5, shape="oval")
-    with pytest.raises(GeometryError, match="mosaic has 60 x 69 pixels but 5 x 5 views of 12 x 14 make 60 x 70"):
+    with pytest.raises(
+        GeometryError, match="mosaic has 60 x 69 pixels but 5 x 5 views of 12 x 14 make 60 x 70"
+    ):
         views_from_mosaic(np.ones((60, 69)), views.aperture, views.lenslets, 1.0)
     with pytest.raises(GeometryError, match="directions is"):
         decode(np.ones((35, 42)), CALIBRATION, directions=0)
@@ -295,7 +308,9 @@ def test_bad_patches_are_refused():
 
 def test_pictures_without_a_whole_micro_image_are_refused():
     calibration = calibrated(Lattice.square(50.0, 0, (0, 0)), (40, 40))
-    with pytest.raises(CalibrationError, match="no micro-image of pitch 50.0 px lies wholly inside 40 x 40 pixels"):
+    with pytest.raises(
+        CalibrationError, match=r"no micro-image of pitch 50\.0 px lies wholly inside 40 x 40 pixels"
+    ):
         decode(np.ones((40, 40)), calibration)
     with pytest.raises(GeometryError, match="no patch of 45 px lies wholly on the sensor of 40 x 40 px"):
         render(np.ones((40, 40)), calibration, 45.0)
@@ -305,10 +320,16 @@ def test_allocations_that_do_not_fit_are_refused_first(monkeypatch, rng):
     monkeypatch.setattr(memory, "free_bytes", lambda: 20_000)
     views = field(rng)
     for call, match in (
-        (lambda: decode(np.ones((35, 42)), CALIBRATION), r"a light field of 7 x 7 views needs .* GiB but .* fewer"),
+        (
+            lambda: decode(np.ones((35, 42)), CALIBRATION),
+            r"a light field of 7 x 7 views needs .* GiB but .* fewer",
+        ),
         (lambda: refocus_stack(views, [1.0] * 9), r"a stack of 9 pictures, 1 samples per lenslet needs"),
         (lambda: refocus_fourier(views, 1.1), "the spectrum of the light field needs"),
-        (lambda: render(np.ones((35, 42)), CALIBRATION, 3.0, samples=40), "a picture of 40 samples per lenslet"),
+        (
+            lambda: render(np.ones((35, 42)), CALIBRATION, 3.0, samples=40),
+            "a picture of 40 samples per lenslet",
+        ),
         (lambda: encode(views, CALIBRATION), "the raw image needs"),
     ):
         with pytest.raises(LumigraphError, match=match):

@@ -102,4 +102,4 @@ def _lit(light: np.ndarray) -> np.ndarray:
     if not len(light):
         return np.zeros(0, bool)
     good = np.percentile(light, 80, axis=0)
-    return (light > 0.1 * np.maximum(good, 1e-12)).all(-1)
+    return np.all(light > 0.1 * np.maximum(good, 1e-12), axis=-1)

@@ -8,7 +8,7 @@ from lumigraph.calibration.period import SMALLEST_PITCH, Surface, Vectors, flatt
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
-from lumigraph.core.lattice import Lattice, Layout
+from lumigraph.core.lattice import Lattice, Layout, Vector
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 
@@ -121,13 +121,17 @@ def _starting_lattice(picture: np.ndarray, vectors: Vectors) -> Lattice:
         wave_x = windows[1] * np.exp(-2j * np.pi * kx * np.arange(picture.shape[1]))
         phases.append(-np.angle(wave_y @ (windowed @ wave_x.astype(np.complex64))) / (2 * np.pi))
     origin = matrix @ np.array(phases)
-    basis = tuple(map(float, vectors.row)), tuple(map(float, vectors.column))
-    return _centred(Lattice(basis, tuple(map(float, origin)), vectors.layout), picture.shape)
+    lattice = Lattice((_vector(vectors.row), _vector(vectors.column)), _vector(origin), vectors.layout)
+    return _centred(lattice, picture.shape)
+
+
+def _vector(values: np.ndarray) -> Vector:
+    return float(values[0]), float(values[1])
 
 
 def _centred(lattice: Lattice, shape: tuple[int, ...]) -> Lattice:
     """The same points, with index (0, 0) nearest to the middle of the picture."""
-    index = np.stack(lattice.index(shape[0] // 2, shape[1] // 2), -1)
+    index = np.stack(lattice.index(np.array(shape[0] // 2), np.array(shape[1] // 2)), -1)
     y, x = lattice.position(index)
     return Lattice(lattice.basis, (float(y), float(x)), lattice.layout, lattice.kinds)
 
@@ -150,7 +154,7 @@ def _fit_outwards(picture: np.ndarray, original: np.ndarray, lattice: Lattice) -
         spots, lattice = _robust_fit(spots, lattice)
     spots, lattice = _robust_fit(measure(_evenly_lit(original, spots), lattice), lattice)
     centred = _centred(lattice, picture.shape)
-    moved = np.stack(lattice.index(*centred.origin), -1)
+    moved = np.stack(lattice.index(*np.array(centred.origin)), -1)
     return Spots(spots.indices - moved, spots.centers, spots.light), centred
 
 
@@ -158,7 +162,9 @@ def _evenly_lit(picture: np.ndarray, spots: Spots) -> np.ndarray:
     """Picture without the vignetting of its micro-images' brightness, which would move their centres."""
     ny, nx = picture.shape
     y, x = (2 * spots.centers[:, axis] / (n - 1) - 1 for axis, n in enumerate((ny, nx)))
-    surface = Surface(4 if len(y) > 100 else 2 if len(y) > 20 else 1).fit(y, x, spots.light / spots.light.mean())
+    surface = Surface(4 if len(y) > 100 else 2 if len(y) > 20 else 1).fit(
+        y, x, spots.light / spots.light.mean()
+    )
     rows, columns = np.linspace(-1, 1, ny, dtype=np.float32), np.linspace(-1, 1, nx, dtype=np.float32)
     return picture / surface(rows[:, None], columns[None, :])
 
@@ -167,7 +173,7 @@ def _robust_fit(spots: Spots, lattice: Lattice) -> tuple[Spots, Lattice]:
     """Least squares over the spots, leaving out those beyond four standard deviations, until it settles."""
     _check_spots(spots, lattice, "lit micro-images")
     design = np.concatenate([np.ones((len(spots.indices), 1)), spots.indices], -1)
-    keep = np.ones(len(design), bool)
+    keep, distance, weights = np.ones(len(design), bool), np.zeros(len(design)), np.zeros((3, 2))
     for _ in range(10):
         weights = np.linalg.lstsq(design[keep], spots.centers[keep], rcond=None)[0]
         distance = np.hypot(*(spots.centers - design @ weights).T)
@@ -181,10 +187,11 @@ def _robust_fit(spots: Spots, lattice: Lattice) -> tuple[Spots, Lattice]:
     if keep.mean() < 0.5 or rms > 0.1 * lattice.pitch:
         raise CalibrationError(
             f"only {keep.sum()} of {len(keep)} micro-images stand on one lattice of pitch "
-            f"{lattice.pitch:.1f} px, {rms:.2f} px rms away from it. Check the white image, or pass pitch= and layout=."
+            f"{lattice.pitch:.1f} px, {rms:.2f} px rms away from it. Check the white image, or pass pitch= "
+            "and layout=."
         )
     _check_spots(kept, lattice, "micro-images on one lattice")
-    origin, column, row = (tuple(map(float, w)) for w in weights)
+    origin, column, row = (_vector(w) for w in weights)
     return kept, Lattice((row, column), origin, lattice.layout, lattice.kinds)
 
 

@@ -5,7 +5,7 @@ The autocorrelation of a periodic picture is high at every lattice vector whatev
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.fft
@@ -57,15 +57,15 @@ def _autocorrelation(picture: np.ndarray) -> np.ndarray:
     wave = picture - picture.mean()
     for axis in (0, 1):  # takes out the highest frequency: what grey() left of a Bayer pattern
         wave = ndimage.correlate1d(wave, np.array([0.25, 0.5, 0.25], np.float32), axis=axis)
-    ny, nx = wave.shape
+    ny, nx = picture.shape
     lags = tuple(min(int(_PART * n), _LONGEST) + 2 for n in (ny, nx))
     size = tuple(scipy.fft.next_fast_len(n + lag, real=True) for n, lag in zip((ny, nx), lags, strict=True))
     windows = [np.hanning(n + 2)[1:-1].astype(np.float32) for n in (ny, nx)]
-    spectrum = scipy.fft.rfft2(wave * windows[0][:, None] * windows[1], size, workers=WORKERS)
+    spectrum: Any = scipy.fft.rfft2(wave * windows[0][:, None] * windows[1], size, workers=WORKERS)
     power = np.square(spectrum.real) + np.square(spectrum.imag)
-    raw = scipy.fft.irfft2(power, size, workers=WORKERS)
-    overlap = [
-        scipy.fft.irfft(np.abs(scipy.fft.rfft(w.astype(float), n)) ** 2, n)
+    raw: Any = scipy.fft.irfft2(power, size, workers=WORKERS)
+    overlap: list[Any] = [
+        scipy.fft.irfft(np.abs(np.asarray(scipy.fft.rfft(w.astype(float), n))) ** 2, n)
         for w, n in zip(windows, size, strict=True)
     ]
     columns = np.arange(-lags[1], lags[1] + 1)
@@ -143,7 +143,7 @@ class _Peaks:
         """Indices of true peaks above a limit, shortest first; no more than 200."""
         found: list[int] = []
         for index in np.flatnonzero(self.heights >= limit):
-            if self.dips(index):
+            if self.dips(int(index)):
                 found.append(int(index))
             if len(found) == 200:
                 break
@@ -152,7 +152,7 @@ class _Peaks:
     def top(self) -> float:
         """Height of the strongest peak that follows a dip; 0 without any."""
         for index in np.argsort(-self.heights, kind="stable")[:500]:
-            if self.dips(index):
+            if self.dips(int(index)):
                 return float(self.heights[index])
         return 0.0
 
@@ -174,8 +174,8 @@ def _shortest(peaks: _Peaks, pitch: float | None, layout: Layout | None) -> tupl
     if top < _LEAST:
         raise CalibrationError(
             f"the white image shows no lattice: its autocorrelation returns to {top:.2f} of its top at most, "
-            "where a lattice gives over {_LEAST:g}. Use an evenly lit, focused white image with dark gaps between "
-            "at least 3 x 3 micro-images."
+            "where a lattice gives over {_LEAST:g}. Use an evenly lit, focused white image with dark gaps "
+            "between at least 3 x 3 micro-images."
         )
     strong = peaks.strong(_STRONG * top)
     if pitch is not None:

@@ -77,7 +77,12 @@ def decode(
     before, after = plan.reach(frame)
     indices = lenslet_rectangle(calibration, before, after)
     _check_memory(raw, plan, indices)
-    data = _gather(as_float(raw.data), calibration.lattice.position(indices), (frame, plan, calibration.lattice), interpolation)
+    data = _gather(
+        as_float(raw.data),
+        calibration.lattice.position(indices),
+        (frame, plan, calibration.lattice),
+        interpolation,
+    )
     if calibration.lattice.layout == "hex":
         data = _straightened(data, indices[:, 0, 0] % 2 == 1, interpolation)
     pitch = plan.step[0] * frame.aperture_per_px, plan.step[1] * frame.aperture_per_px
@@ -179,7 +184,7 @@ def _lenslet_grid(calibration: Calibration, frame: Frame, indices: np.ndarray) -
     i, j = indices[shape[0] // 2, shape[1] // 2]
     middle = np.array([i, j - (i % 2) / 2 if lattice.layout == "hex" else j])
     across, along = frame.along(lattice.position(middle) - frame.axis)
-    pitch_t, pitch_s = abs(frame.along(np.array(lattice.basis[1]))[0]), lattice.pitches[1]
+    pitch_t, pitch_s = abs(float(frame.along(np.array(lattice.basis[1]))[0])), lattice.pitches[1]
     size = frame.lenslet_per_px
     return Grid(shape, (pitch_t * size, pitch_s * size), (float(across) * size, float(along) * size))
 
@@ -198,14 +203,19 @@ def _turned(
         directions = nu, nv
     views = decode(turned, calibration, directions=directions, interpolation=interpolation)
     data = xp.permute_dims(views.data, (1, 0, 3, 2, *(4 for _ in extra)))
-    swapped = [Grid(g.shape[::-1], g.pitch[::-1], g.center[::-1]) for g in (views.aperture, views.lenslets)]
-    return LightField(data, swapped[0], swapped[1], views.separation)
+    return LightField(data, _exchanged(views.aperture), _exchanged(views.lenslets), views.separation)
+
+
+def _exchanged(grid: Grid) -> Grid:
+    (ny, nx), (dy, dx), (y, x) = grid.shape, grid.pitch, grid.center
+    return Grid((nx, ny), (dx, dy), (x, y))
 
 
 def _check_memory(raw: RawImage, plan: _Directions, indices: np.ndarray) -> None:
     values = math.prod(plan.count) * indices.shape[0] * indices.shape[1] * math.prod(raw.data.shape[2:])
     size = 2.5 * values * (4 if is_single(raw.data) else 8)
     memory.require(
-        f"a light field of {plan.count[0]} x {plan.count[1]} views", size,
+        f"a light field of {plan.count[0]} x {plan.count[1]} views",
+        size,
         "Ask for {factor:.1f}x fewer directions.",
     )

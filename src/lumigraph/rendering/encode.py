@@ -16,7 +16,9 @@ from lumigraph.rendering.interpolate import Interpolation, as_float, neighbours,
 _BAND = 1 << 20  # pixels handled at a time
 
 
-def encode(views: LightField, calibration: Calibration, *, interpolation: Interpolation = "cubic") -> RawImage:
+def encode(
+    views: LightField, calibration: Calibration, *, interpolation: Interpolation = "cubic"
+) -> RawImage:
     """Raw image (y, x[, c]) that decodes to the light field.
 
     Every pixel belongs to the lenslet whose micro-image's centre is nearest, and takes the radiance

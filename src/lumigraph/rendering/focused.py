@@ -38,8 +38,8 @@ def render(
 
     .. math:: C - \frac{patch}{P} (Y - C),
 
-    where Y is the sample's place in the lattice of centres of pitch P. Tiles meet without seams for a patch of
-    any size, whole or not, on square, hexagonal and turned lattices. The picture's axes are the raw
+    where Y is the sample's place in the lattice of centres of pitch P. Tiles meet without seams for a patch
+    of any size, whole or not, on square, hexagonal and turned lattices. The picture's axes are the raw
     image's: a turned lattice does not turn the picture.
 
     Parameters
@@ -78,7 +78,7 @@ def render(
     >>> lattice = Lattice.square(10.0, origin=(5, 5))
     >>> none = np.zeros((0, 2))
     >>> render(np.ones((40, 60)), Calibration(lattice, (40, 60), none, none, 0.0), 5.2).shape
-    (20, 30)
+    (19, 29)
     """
     raw = raw if isinstance(raw, RawImage) else RawImage(raw)
     check_raw(raw, calibration)
@@ -108,7 +108,7 @@ def rendered_grid(calibration: Calibration, patch: float | Array, samples: int |
     """Where the samples of a rendered picture lie in the main image [m].
 
     X = c z2 / L, with z2 / L from the patch: 1 - a/L, and a = b / (m z2/L + b/L). Where the calibration's
-    pixel pitch, separation L or lenslet distance b is unknown, lengths are in lenslets: one lenslet's tile is 1.
+    pixel pitch, separation L or lenslet distance b is unknown, one lenslet's tile is 1.
 
     Parameters
     ----------
@@ -125,16 +125,20 @@ def rendered_grid(calibration: Calibration, patch: float | Array, samples: int |
     """
     sizes = _patches(patch, calibration)
     layout = _Layout.of(calibration, sizes, samples)
-    frame, pitch = Frame.of(calibration), calibration.lattice.pitch
-    scale = 1 / pitch
-    pixel, distance, separation = calibration.pixel_pitch, calibration.lenslet_distance, calibration.separation
+    frame, scale = Frame.of(calibration), 1 / calibration.lattice.pitch
+    pixel, distance, separation = (
+        calibration.pixel_pitch,
+        calibration.lenslet_distance,
+        calibration.separation,
+    )
     if pixel and distance and separation:
-        magnified = sizes.middle / pitch * (1 + distance / separation)  # m z2 / L
+        magnified = sizes.middle / calibration.lattice.pitch * (1 + distance / separation)  # m z2 / L
         image_distance = distance / (magnified + distance / separation)
         scale = frame.lenslet_per_px * (1 - image_distance / separation)
     middle = layout.y[len(layout.y) // 2], layout.x[len(layout.x) // 2]
     center = [(place - axis) * scale for place, axis in zip(middle, frame.axis, strict=True)]
-    return Grid((len(layout.y), len(layout.x)), (layout.step * scale,) * 2, (float(center[0]), float(center[1])))
+    pitch = layout.step * scale
+    return Grid((len(layout.y), len(layout.x)), (pitch, pitch), (float(center[0]), float(center[1])))
 
 
 def lenslet_indices(calibration: Calibration) -> np.ndarray:
@@ -189,8 +193,8 @@ def _patches(patch: float | Array, calibration: Calibration) -> _Patches:
     indices = lenslet_indices(calibration)
     if values.shape != indices.shape[:2]:
         raise GeometryError(
-            f"the map of patches has shape {values.shape} but {indices.shape[:2]} lenslets (rows, cols) have whole "
-            "micro-images. Make one size for each of lenslet_indices(calibration)."
+            f"the map of patches has shape {values.shape} but {indices.shape[:2]} lenslets (rows, cols) have "
+            "whole micro-images. Make one size for each of lenslet_indices(calibration)."
         )
     hexagonal = calibration.lattice.layout == "hex"
     i, j = (int(k) for k in indices[0, 0])
@@ -207,7 +211,7 @@ class _Layout:
 
     @classmethod
     def of(cls, calibration: Calibration, sizes: _Patches, samples: int | None) -> "_Layout":
-        """Samples of lenslets whose patch lies on the sensor; one of the samples would be on the optical axis."""
+        """Samples of lenslets whose patch lies on the sensor; one of them would be on the optical axis."""
         lattice = calibration.lattice
         if samples is None:
             samples = max(1, round(abs(sizes.middle)))

@@ -66,7 +66,7 @@ def refocus_fourier(views: LightField, alpha: float) -> Array:
 
 
 def _sliced(spectrum: Array, axis: int, frequency: np.ndarray, first: float) -> Array:
-    r"""Sum over aperture samples :math:`j` of data times exp(-i2π f (j + first)), with one f per lenslet frequency.
+    r"""Sum over aperture samples j of data times exp(-i2π f (j + first)), one f per lenslet frequency.
 
     Removes `axis` (1: u, with f along s; 0: v, with f along t) from spectrum (v, u, t, s[, c]), or, once u is
     gone, (v, t, s[, c]).
@@ -91,7 +91,6 @@ def _sliced(spectrum: Array, axis: int, frequency: np.ndarray, first: float) -> 
         weight = _kernel(place - below - step, size / count)
         term = weighted(take(flat, index, 0), weight, len(tail))
         total = term if total is None else total + term
-    assert total is not None
     # The kernel's phase was taken about sample count // 2; the samples stand at j + first.
     phase = np.exp(-2j * np.pi * frequency * (count // 2 + first))
     total = weighted(total, phase, len(tail))
@@ -99,7 +98,7 @@ def _sliced(spectrum: Array, axis: int, frequency: np.ndarray, first: float) -> 
 
 
 def _joined(fine: Array, axis: int, partner: int) -> tuple[Array, tuple[int, ...]]:
-    """Spectrum with the aperture's and the lenslets' frequency as one leading axis, and the other axes' sizes."""
+    """Spectrum with the aperture's and the lenslets' frequency as one leading axis; the others' sizes."""
     xp = namespace(fine)
     order = [axis, partner, *(k for k in range(fine.ndim) if k not in (axis, partner))]
     turned = xp.permute_dims(fine, tuple(order))
@@ -127,4 +126,6 @@ def _kernel_transform(position: np.ndarray, oversampling: float) -> np.ndarray:
 def _check_memory(views: LightField) -> None:
     itemsize = 16 if "64" in str(views.data.dtype) else 8
     size = (2.5 + 2 * _OVERSAMPLING) * math.prod(views.data.shape) * itemsize
-    memory.require("the spectrum of the light field", size, "Use refocus, which needs {factor:.0f}x less or fewer.")
+    memory.require(
+        "the spectrum of the light field", size, "Use refocus, which needs {factor:.0f}x less or fewer."
+    )

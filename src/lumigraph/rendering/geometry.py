@@ -11,7 +11,7 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.errors import CalibrationError
 
 DISTANCE_RATIO = 20.0
-"""F / b where the camera's distances are not known: only the scale of alpha and of the aperture depends on it."""
+"""F / b where the camera's distances are not known: the scale of alpha and of the aperture depends on it."""
 
 _LENSLET_F_NUMBER = 20.0  # b over the lenslet pitch, where it is not known
 
@@ -54,7 +54,7 @@ class Frame:
 
 
 def transposed(calibration: Calibration) -> Calibration | None:
-    """Calibration with y and x exchanged, where a hexagonal lattice has its dense rows along y; else None."""
+    """Calibration with y and x exchanged, where a hexagonal lattice has dense rows along y; else None."""
     lattice = calibration.lattice
     if lattice.layout != "hex" or abs(abs(lattice.rotation) - math.pi / 6) > math.pi / 12:
         return None
@@ -65,7 +65,7 @@ def transposed(calibration: Calibration) -> Calibration | None:
     turn = math.atan2(*row) + math.pi / 3
     column = min(vectors, key=lambda v: abs(math.remainder(math.atan2(*v) - turn, 2 * math.pi)))
     basis = (float(row[0]), float(row[1])), (float(column[0]), float(column[1]))
-    flipped = Lattice(basis, lattice.origin[::-1], "hex", lattice.kinds)
+    flipped = Lattice(basis, (lattice.origin[1], lattice.origin[0]), "hex", lattice.kinds)
     return replace(
         calibration,
         lattice=flipped,
@@ -76,7 +76,7 @@ def transposed(calibration: Calibration) -> Calibration | None:
 
 
 def lit(data: Array) -> np.ndarray:
-    """Which views (v, u) of a light field are not dark everywhere: those inside a round or hexagonal aperture."""
+    """Which views (v, u) are not dark everywhere: those inside a round or hexagonal aperture."""
     xp = namespace(data)
     return to_numpy(xp.any(data != 0, axis=tuple(range(2, data.ndim))))
 

@@ -1,4 +1,4 @@
-"""Values between samples, as gathered neighbours times weights: linear in the data, for every array library."""
+"""Values between samples: gathered neighbours times weights, for every array library."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -56,7 +56,9 @@ def neighbours(
 def as_float(data: Array) -> Array:
     """The data as floats: whole numbers become float32, floats stay as they are."""
     xp = namespace(data)
-    return data if xp.isdtype(data.dtype, ("real floating", "complex floating")) else xp.astype(data, xp.float32)
+    return (
+        data if xp.isdtype(data.dtype, ("real floating", "complex floating")) else xp.astype(data, xp.float32)
+    )
 
 
 def take(data: Array, index: np.ndarray, axis: int) -> Array:

@@ -68,7 +68,9 @@ def refocus_stack(
     """Pictures (n, t, s[, c]) focused on one plane for each alpha; see `refocus`."""
     alphas = [checks.positive("alpha", float(alpha), "1") for alpha in alphas]
     if not alphas:
-        raise GeometryError("alphas is empty but a stack needs at least one. Give a list of numbers such as 1.0.")
+        raise GeometryError(
+            "alphas is empty but a stack needs at least one. Give a list of numbers such as 1.0."
+        )
     checks.shape("oversample", (oversample, oversample))
     _check_memory(views, len(alphas), oversample)
     data, xp = as_float(views.data), namespace(views.data)
@@ -161,6 +163,7 @@ def _check_memory(views: LightField, count: int, oversample: int) -> None:
     picture = math.prod(views.data.shape[2:]) * oversample**2 * itemsize
     size = 2.5 * math.prod(views.data.shape) * itemsize + (count + 3) * picture
     memory.require(
-        f"a stack of {count} pictures, {oversample} samples per lenslet", size,
+        f"a stack of {count} pictures, {oversample} samples per lenslet",
+        size,
         "Refocus {factor:.1f}x fewer at a time.",
     )

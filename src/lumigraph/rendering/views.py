@@ -40,7 +40,8 @@ def point_of_view(views: LightField, y: float, x: float) -> Array:
         checks.finite(name, value)
         if not positions[0] - 1e-9 * abs(positions[0]) <= value <= positions[-1] + 1e-9 * abs(positions[-1]):
             raise GeometryError(
-                f"{name} is {value:.4g} m but the views lie between {positions[0]:.4g} and {positions[-1]:.4g} m. "
+                f"{name} is {value:.4g} m but the views lie between {positions[0]:.4g} and "
+                f"{positions[-1]:.4g} m. "
                 "Choose a place inside the aperture."
             )
     for axis, value in enumerate((y, x)):
@@ -112,7 +113,8 @@ def views_from_mosaic(mosaic: Array, aperture: Grid, lenslets: Grid, separation:
     (nv, nu), (nt, ns), tail = aperture.shape, lenslets.shape, tuple(mosaic.shape[2:])
     if tuple(mosaic.shape[:2]) != (nv * nt, nu * ns):
         raise GeometryError(
-            f"the mosaic has {mosaic.shape[0]} x {mosaic.shape[1]} pixels but {nv} x {nu} views of {nt} x {ns} "
+            f"the mosaic has {mosaic.shape[0]} x {mosaic.shape[1]} pixels but {nv} x {nu} views "
+            f"of {nt} x {ns} "
             f"make {nv * nt} x {nu * ns}. Give the grids that it was made from."
         )
     xp = namespace(mosaic)
