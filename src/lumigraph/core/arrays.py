@@ -84,8 +84,8 @@ def as_complex(array: Array) -> Array:
 def intensity(array: Array) -> Array:
     """Squared modulus, real, of the array's own precision."""
     if is_numpy_array(array):
-        result = np.square(array.real)
-        result += np.square(array.imag)
+        result = np.square(np.real(array))
+        result += np.square(np.imag(array))
         return result
     xp = namespace(array)
     return xp.real(array) ** 2 + xp.imag(array) ** 2

@@ -32,7 +32,7 @@ def positive(name: str, value: float, unit: str = "m", error: type[LumigraphErro
 
 def pair(name: str, value: float | Sequence[float], unit: str = "m") -> Pair:
     """`value` as two finite floats (y, x); one number stands for both axes."""
-    values = (value, value) if isinstance(value, Real) else tuple(value)
+    values = tuple(value) if isinstance(value, Sequence | np.ndarray) else (value, value)
     if len(values) != 2:
         raise GeometryError(f"{name} has {len(values)} numbers but must be one, or two (y, x).")
     return finite(f"{name} (y)", values[0], unit), finite(f"{name} (x)", values[1], unit)

@@ -130,7 +130,7 @@ class Camera(Part):
         """How finely the planes must be sampled, and are."""
         raise NotImplementedError
 
-    @cached_property
+    @property
     def sensor(self) -> Sensor:
         """The pixels; without a shape given, as many as all micro-images need."""
         shape = self.pixels.shape or self._covering_shape()

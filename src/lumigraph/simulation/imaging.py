@@ -30,10 +30,15 @@ Progress = Callable[[int, int], None]
 class Camera(Protocol):
     """What `simulate` asks of an instrument."""
 
-    wavelength: float
-    """In vacuum [m]."""
-    object_distance: float
-    """Focused plane to main lens, z1 [m]."""
+    @property
+    def wavelength(self) -> float:
+        """In vacuum [m]."""
+        ...
+
+    @property
+    def object_distance(self) -> float:
+        """Focused plane to main lens, z1 [m]."""
+        ...
 
     @property
     def separation(self) -> float:
