@@ -16,7 +16,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.raw import RawImage
 from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera
-from lumigraph.plots.layout import layout
+from lumigraph.plots import layout
 from lumigraph.rendering import decode, reduce_aperture, refocus, render, view
 from lumigraph.scene import Scene, targets
 from lumigraph.simulation import Incoherent, simulate
