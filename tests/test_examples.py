@@ -1,0 +1,37 @@
+"""The examples run as a reader would run them, and write what they say."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from data_folder import real
+
+import lumigraph as lg
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+@pytest.mark.parametrize(
+    ("name", "written"),
+    [("new_camera", ("rays.png", "raw.tiff", "picture.png")), ("only_waves", ("planes.png",))],
+)
+def test_an_example_runs(name, written, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
+    assert capsys.readouterr().out
+    for file in written:
+        assert (tmp_path / file).stat().st_size > 1000
+
+
+def test_the_example_with_a_real_camera_refocuses(tmp_path, monkeypatch):
+    folder = real("letters_plenoptic1")
+    paths = [str(folder / f"letters_ULF_M1{end}.png") for end in ("_white", "")]
+    monkeypatch.chdir(tmp_path)
+    example = runpy.run_path(str(EXAMPLES / "real_camera.py"))
+    example["main"](*paths)
+    sharpest = max(
+        tmp_path.glob("refocused_*.png"),
+        key=lambda path: np.abs(np.diff(lg.open(path).data.astype(float), axis=1)).max(),
+    )
+    assert 0.9 < float(sharpest.stem.split("_")[1]) < 1.1
