@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from data_folder import real
 
 import lumigraph as lg
+from data_folder import real
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

@@ -92,7 +92,7 @@ def intensity(array: Array) -> Array:
 
 
 def fft(array: Array, n: int | None = None, axis: int = -1, *, overwrite: bool = False) -> Array:
-    """1-D DFT along one axis, zero-padded or cropped to `n`; `overwrite` allows reuse of the input's memory."""
+    """1-D DFT along one axis, zero-padded or cropped to `n`; `overwrite` may reuse the input's memory."""
     if is_numpy_array(array):
         return scipy.fft.fft(array, n, axis=axis, overwrite_x=overwrite, workers=WORKERS)
     return namespace(array).fft.fft(array, n=n, axis=axis)

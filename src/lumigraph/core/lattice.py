@@ -84,7 +84,7 @@ class Lattice:
 
     @property
     def pitches(self) -> tuple[float, float]:
-        """Distance to the next row's lenslet and to the next lenslet of the row: lengths of basis[1], basis[0]."""
+        """Distances to the next row's lenslet and to the next of the row: lengths of basis[1], basis[0]."""
         return math.hypot(*self.basis[1]), math.hypot(*self.basis[0])
 
     @property
@@ -159,7 +159,7 @@ class Lattice:
         return self.position(self.indices(y_range, x_range))
 
     def scaled(self, factor: float) -> "Lattice":
-        """The lattice magnified about (0, 0), such as metres to pixels; a negative factor turns it by 180°."""
+        """The lattice magnified about (0, 0), such as metres to pixels; a factor below 0 turns it by 180°."""
         (y0, x0), (y1, x1) = self.basis
         size = abs(checks.finite("factor", factor, "1"))
         return replace(
