@@ -254,6 +254,17 @@ def test_garbage_in_a_zarr_store_is_an_error(tmp_path):
         io.open(tmp_path / "a.zarr")
 
 
+def test_one_flipped_bit_in_a_zarr_store_is_an_error(tmp_path, rng):
+    # incompressible, so that the pixels stand in the chunk as they are and decode with any value
+    io.save(rng.integers(0, 255, (64, 64), dtype=np.uint8), tmp_path / "a.zarr")
+    chunk = tmp_path / "a.zarr" / "data" / "c" / "0" / "0"
+    content = bytearray(chunk.read_bytes())
+    content[len(content) // 2] ^= 1
+    chunk.write_bytes(content)
+    with pytest.raises(FormatError, match="damaged"):
+        io.open(tmp_path / "a.zarr")
+
+
 def test_an_ordinary_zip_is_no_zarr_store(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.zarr.zip", "w") as file:
         file.writestr("hello.txt", "hello")
