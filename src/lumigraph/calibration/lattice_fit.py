@@ -174,12 +174,16 @@ def _robust_fit(spots: Spots, lattice: Lattice) -> tuple[Spots, Lattice]:
     _check_spots(spots, lattice, "lit micro-images")
     design = np.concatenate([np.ones((len(spots.indices), 1)), spots.indices], -1)
     keep, distance, weights = np.ones(len(design), bool), np.zeros(len(design)), np.zeros((3, 2))
+    inner = _surrounded(spots.indices)
     for _ in range(10):
-        weights = np.linalg.lstsq(design[keep], spots.centers[keep], rcond=None)[0]
+        used = keep & inner
+        weights = np.linalg.lstsq(design[used], spots.centers[used], rcond=None)[0]
         distance = np.hypot(*(spots.centers - design @ weights).T)
-        spread = 0.85 * float(np.median(distance))  # of one coordinate: the Rayleigh median is 1.18 of it
+        spread = 0.85 * float(
+            np.median(distance[used])
+        )  # of one coordinate: the Rayleigh median is 1.18 of it
         closer = distance <= max(4 * spread, 0.02)
-        if np.array_equal(closer, keep) or np.linalg.matrix_rank(design[closer]) < 3:
+        if np.array_equal(closer, keep) or np.linalg.matrix_rank(design[closer & inner]) < 3:
             break
         keep = closer
     kept = Spots(*(column[keep] for column in spots))
@@ -193,6 +197,22 @@ def _robust_fit(spots: Spots, lattice: Lattice) -> tuple[Spots, Lattice]:
     _check_spots(kept, lattice, "micro-images on one lattice")
     origin, column, row = (_vector(w) for w in weights)
     return kept, Lattice((row, column), origin, lattice.layout, lattice.kinds)
+
+
+def _surrounded(indices: np.ndarray) -> np.ndarray:
+    """Spots with neighbours on all sides, or all spots where fewer than 5 x 5 are left.
+
+    At the border of an array the light of the missing neighbours is missing too, which moves a
+    micro-image's centre inwards: by half a pixel where diffraction blurs micro-images into each other.
+    """
+    first = indices.min(0) - 1
+    present = np.zeros(indices.max(0) - first + 2, bool)
+    i, j = (indices - first).T
+    present[i, j] = True
+    inner = np.ones(len(indices), bool)
+    for di, dj in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, -1), (-1, 1)):
+        inner &= present[i + di, j + dj]
+    return inner if inner.sum() >= 25 else np.ones(len(indices), bool)
 
 
 def _check_spots(spots: Spots, lattice: Lattice, what: str) -> None:
