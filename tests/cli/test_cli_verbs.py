@@ -271,7 +271,11 @@ def test_warnings_are_one_line_each(lumigraph, bench, monkeypatch):
 
 def test_ctrl_c_ends_with_130_and_one_line(bench):
     words = ["simulate", "thesis-plenoptic-1", "--scene", "photo", "--count", "100000", "-o", "raw.tiff"]
-    process = subprocess.Popen([*PROGRAM, *words], stderr=subprocess.PIPE, text=True, cwd=bench)
+    program = [*PROGRAM[:2], PROGRAM[2].replace("sys.exit", "print(flush=True); sys.exit")]
+    pipe = subprocess.PIPE
+    process = subprocess.Popen([*program, *words], stdout=pipe, stderr=pipe, text=True, cwd=bench)
+    assert process.stdout is not None
+    process.stdout.readline()  # main is about to start
     time.sleep(1.5)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
