@@ -16,7 +16,9 @@ import lumigraph.io as io
 from lumigraph.cli import app as cli_app
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
+from lumigraph.core.raw import RawImage
 from lumigraph.errors import SamplingWarning
+from lumigraph.simulation import Interrupted
 
 VERBS = ("demo", "design", "simulate", "calibrate", "decode", "render", "refocus")
 PROGRAM = [sys.executable, "-c", "import sys; from lumigraph.cli import main; sys.exit(main())"]
@@ -279,8 +281,27 @@ def test_ctrl_c_ends_with_130_and_one_line(bench):
     time.sleep(1.5)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
-    assert (process.returncode, err) == (130, "lumigraph: interrupted; no output was written.\n")
+    assert process.returncode == 130
+    assert err in (
+        "lumigraph: interrupted; no output was written.\n",
+        "lumigraph: interrupted; what was finished is in raw.partial.tiff.\n",
+    )
     assert not any(path.name.startswith(".raw") for path in bench.iterdir())
+
+
+def test_ctrl_c_keeps_the_shots_that_are_finished(lumigraph, bench, monkeypatch):
+    partial = io.open(bench / "raw.tiff")
+
+    def interrupted(*_, **__):
+        raise Interrupted(RawImage(partial.data, metadata={"shots": 3}))
+
+    before = (bench / "raw.tiff").read_bytes()
+    monkeypatch.setattr("lumigraph.simulation.simulate", interrupted)
+    result = lumigraph("simulate", "camera.toml", "--scene", "photo", "-o", "raw.tiff")
+    assert result.code == 130
+    assert result.err == "lumigraph: interrupted; what was finished is in raw.partial.tiff.\n"
+    np.testing.assert_array_equal(io.open(bench / "raw.partial.tiff").data, partial.data)
+    assert (bench / "raw.tiff").read_bytes() == before
 
 
 def test_a_reader_that_leaves_early_is_no_error(bench):

@@ -76,7 +76,7 @@ def _explained(error: BaseException) -> tuple[int, str]:
     """Exit code and one line for an error."""
     match error:
         case KeyboardInterrupt():
-            return INTERRUPTED, "interrupted; no output was written."
+            return INTERRUPTED, f"interrupted; {error if error.args else 'no output was written.'}"
         case CycloptsError():
             return USAGE, f"error: {_usage(error)}"
         case LumigraphError():

@@ -139,7 +139,7 @@ def simulate(
     """
     from lumigraph import io
     from lumigraph.instruments import load_camera
-    from lumigraph.simulation import simulate
+    from lumigraph.simulation import Interrupted, simulate
 
     files.check_output(output, files.PICTURES)
     stage.check()
@@ -147,8 +147,13 @@ def simulate(
         raise FormatError(f"--seed is {seed} but must be at least 0.")
     described, coherence = load_camera(camera), light.chosen(seed)
     scene = stage.built(described.object_grid)
-    with progress("simulate") as shown:
-        raw = simulate(described, scene, coherence, progress=shown)
+    try:
+        with progress("simulate") as shown:
+            raw = simulate(described, scene, coherence, progress=shown)
+    except Interrupted as stopped:
+        kept = output.with_name(f"{output.name.split('.')[0]}.partial{''.join(output.suffixes)}")
+        io.save(stopped.partial, kept)
+        raise KeyboardInterrupt(f"what was finished is in {kept}.") from None
     if noise:
         import numpy as np
 

@@ -125,7 +125,7 @@ def save(thing: Any, path: str | os.PathLike[str], *, white: float | None = None
 
         tiff.save_stack([_raw(page).data for page in thing], check_target(path, (".tif", ".tiff")))
     else:
-        _save_raw(_raw(thing, single=kind != ".zarr"), check_target(path, PICTURES), white)
+        _save_raw(_raw(thing, single="zarr" not in kind), check_target(path, PICTURES), white)
 
 
 def _save_raw(raw: RawImage, path: Path, white: float | None) -> None:

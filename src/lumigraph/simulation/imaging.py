@@ -90,7 +90,10 @@ class Camera(Protocol):
 
 
 class Interrupted(KeyboardInterrupt):
-    """`simulate` was interrupted; `partial` is the raw image of the shots that were finished."""
+    """`simulate` was interrupted; `partial` is the raw image of the shots that were finished.
+
+    Where all shots are alike, as for extended scenes, it is as bright as the whole would have been.
+    """
 
     def __init__(self, partial: RawImage) -> None:
         super().__init__(f"interrupted after {partial.metadata['shots']} shots")
@@ -164,6 +167,8 @@ def simulate(
     except KeyboardInterrupt:
         if not done:
             raise
+        if all(isinstance(part, Slice) for part in scene.parts):  # equal shots: fewer of them, as bright
+            intensity *= total / done
         raise Interrupted(_read_out(camera, intensity, coherence, done)) from None
     return _read_out(camera, intensity, coherence, total)
 
