@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from lumigraph import design, plots, units
+    from lumigraph import analysis, design, plots, units
     from lumigraph.calibration import calibrate, devignette
     from lumigraph.core.calibration import Calibration
     from lumigraph.core.field import Field
@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from lumigraph.simulation import Coherent, Incoherent, Snapshots, TiltedWaves, simulate
 
 _HOMES = {
-    "lumigraph": ("design", "plots", "units"),
+    "lumigraph": ("analysis", "design", "plots", "units"),
     "lumigraph.calibration": ("calibrate", "devignette"),
     "lumigraph.core.calibration": ("Calibration",),
     "lumigraph.core.field": ("Field",),
@@ -142,6 +142,7 @@ __all__ = [
     "TiltedWaves",
     "Train",
     "ZernikePlate",
+    "analysis",
     "calibrate",
     "catalogue",
     "choose_method",

@@ -4,12 +4,14 @@
 - `trains`: `planes` of a train of elements
 - `lattices`: `lattice`, a calibration over its white image
 - `layout`: rays through a camera
+- `curves`: `curves` over one axis, several `images` side by side
 - `axes`: axes with lengths in readable units, colour bars
 """
 
+from lumigraph.plots.curves import curves, images
 from lumigraph.plots.lattices import lattice
 from lumigraph.plots.layout import layout
 from lumigraph.plots.pictures import show
 from lumigraph.plots.trains import planes
 
-__all__ = ["lattice", "layout", "planes", "show"]
+__all__ = ["curves", "images", "lattice", "layout", "planes", "show"]

@@ -1,0 +1,18 @@
+"""Experiments: what the thesis printed, what is right, and what lumigraph computes, side by side.
+
+- `registry`: `Row`, `Outcome`, `Context`, the decorator `experiment`, and `find`
+- `run`: runs experiments, resumes what was interrupted, writes the report
+- `thesis`: one table or figure, one file, one function
+"""
+
+from lumigraph.experiments.registry import (
+    Context,
+    Experiment,
+    Outcome,
+    Row,
+    experiment,
+    experiments,
+    find,
+)
+
+__all__ = ["Context", "Experiment", "Outcome", "Row", "experiment", "experiments", "find"]

@@ -1,0 +1,292 @@
+"""What an experiment is, what it is given, what it answers, and how it is found by its id."""
+
+import difflib
+import io
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import Any
+
+import numpy as np
+
+from lumigraph.errors import LumigraphError
+from lumigraph.io.target import write_bytes
+
+Tell = Callable[[float, str], None]
+"""Called with the fraction of an experiment that is done, and what goes on."""
+
+Tolerance = float | tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of the table of an experiment.
+
+    Parameters
+    ----------
+    quantity
+        What was computed, such as "first zero, band limited".
+    got
+        What came out, in `unit`.
+    unit
+        As it is shown: "um", "dB", "1/m"; empty for a pure number.
+    thesis
+        What is printed there, in the same unit; text where no number is; None where nothing is.
+    expected
+        What is right; None for a number that is only shown.
+    tolerance
+        Largest absolute difference from `expected`, or the largest ones (below, above); may be infinite.
+    note
+        Why this number, in a few words.
+
+    Examples
+    --------
+    >>> Row("first zero", 48.9, "um", thesis=67.0, expected=48.8, tolerance=0.3).passed
+    True
+    >>> Row("SNR", 70.0, "dB", expected=57.0, tolerance=(0.0, np.inf)).passed
+    True
+    """
+
+    quantity: str
+    got: float
+    unit: str = ""
+    thesis: float | str | None = None
+    expected: float | None = None
+    tolerance: Tolerance | None = None
+    note: str = ""
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether `got` is within the tolerance; None where nothing is expected."""
+        if self.expected is None:
+            return None
+        below, above = self.margins
+        return bool(self.expected - below <= self.got <= self.expected + above)
+
+    @property
+    def margins(self) -> tuple[float, float]:
+        """Tolerance (below, above); zero where none is given."""
+        if isinstance(self.tolerance, tuple):
+            return self.tolerance
+        margin = self.tolerance or 0.0
+        return margin, margin
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What an experiment answers.
+
+    Parameters
+    ----------
+    rows
+        Its table.
+    figures
+        (image (y, x[, 3]) or figure of `lumigraph.plots`, caption).
+    why
+        One or two sentences: why the thesis, the expected and the computed numbers differ.
+    """
+
+    rows: tuple[Row, ...]
+    figures: tuple[tuple[Any, str], ...] = ()
+    why: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rows", tuple(self.rows))
+        object.__setattr__(self, "figures", tuple(self.figures))
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What an experiment is given.
+
+    Parameters
+    ----------
+    quick
+        Run a reduced size of the same physics, in some seconds.
+    folder
+        Where finished parts are kept; None keeps nothing.
+    tell
+        Called with the fraction that is done and what goes on.
+    """
+
+    quick: bool = True
+    folder: Path | None = None
+    tell: Tell | None = None
+
+    def progress(self, fraction: float, what: str = "") -> None:
+        """Say which fraction of the experiment is done."""
+        if self.tell is not None:
+            self.tell(min(max(fraction, 0.0), 1.0), what)
+
+    def cached(self, name: str, function: Callable[[], Any]) -> Any:
+        """What `function` returns, an array or a dictionary of arrays, computed once per output folder.
+
+        An interrupted run finds the part again and goes on with the same numbers: what is returned is
+        the same whether it was computed or read.
+
+        Parameters
+        ----------
+        name
+            Of the part; letters, digits, "-", "_" and ".".
+        function
+            Computes it.
+
+        Raises
+        ------
+        LumigraphError
+            A name that is no file name.
+        """
+        if not re.fullmatch(r"[\w.-]+", name):
+            raise LumigraphError(
+                f"the name of a part is {name!r} but must consist of letters, digits, '-', '_' and '.'."
+            )
+        path = None if self.folder is None else self.folder / f"{name}.npz"
+        if path is not None and path.exists():
+            with np.load(path, allow_pickle=False) as stored:
+                return _value({key: stored[key] for key in stored.files})
+        parts = _parts(function())
+        if path is not None:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            buffer = io.BytesIO()
+            np.savez(buffer, **parts)
+            write_bytes(path, buffer.getvalue())
+        return _value(parts)
+
+
+_ALONE = "__array__"
+
+
+def _parts(value: Any) -> dict[str, Any]:
+    items: Iterable[tuple[str, Any]] = value.items() if isinstance(value, Mapping) else ((_ALONE, value),)
+    return {key: np.asarray(item) for key, item in items}
+
+
+def _value(parts: dict[str, Any]) -> Any:
+    return parts[_ALONE] if set(parts) == {_ALONE} else parts
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """A table or a figure of the thesis, and the function that makes it.
+
+    Parameters
+    ----------
+    id
+        Such as "figure-3.2", "table-5.4" or "5.6".
+    title
+        What it is about.
+    question
+        What it answers, a sentence.
+    thesis
+        Where it stands there.
+    function
+        Takes a `Context`, returns an `Outcome`.
+    camera
+        Name of the bundled camera that it uses, which the report draws; empty for none.
+    """
+
+    id: str
+    title: str
+    question: str
+    thesis: str
+    function: Callable[[Context], Outcome]
+    camera: str = ""
+
+    @property
+    def module(self) -> str:
+        """The module that holds it."""
+        return self.function.__module__
+
+    def run(self, context: Context) -> Outcome:
+        """Rows and figures."""
+        return self.function(context)
+
+
+_EXPERIMENTS: dict[str, Experiment] = {}
+
+Function = Callable[[Context], Outcome]
+
+
+def experiment(
+    id: str,  # noqa: A002
+    title: str,
+    *,
+    question: str,
+    thesis: str,
+    camera: str = "",
+) -> Callable[[Function], Function]:
+    """Decorator that registers a function of a `Context`; see `Experiment`.
+
+    Raises
+    ------
+    LumigraphError
+        Another module has registered the id.
+    """
+
+    def register(function: Function) -> Function:
+        known = _EXPERIMENTS.get(id)
+        if known is not None and known.module != function.__module__:
+            raise LumigraphError(
+                f"experiment {id!r} is defined in {known.module} and in {function.__module__}. Rename one."
+            )
+        _EXPERIMENTS[id] = Experiment(id, title, question, thesis, function, camera)
+        return function
+
+    return register
+
+
+@cache
+def _discover() -> None:
+    from lumigraph.experiments import thesis
+
+    for module in iter_modules(thesis.__path__):
+        import_module(f"{thesis.__name__}.{module.name}")
+
+
+def experiments() -> tuple[Experiment, ...]:
+    """All experiments, by chapter and number."""
+    _discover()
+    return tuple(sorted(_EXPERIMENTS.values(), key=lambda one: natural_order(one.id)))
+
+
+def natural_order(id: str) -> tuple[tuple[int, ...], str]:  # noqa: A002
+    """Sorting key of an id: its numbers, then its words.
+
+    Examples
+    --------
+    >>> sorted(["table-3.1", "2.11", "2.4", "figure-3.2"], key=natural_order)
+    ['2.4', '2.11', 'table-3.1', 'figure-3.2']
+    """
+    return tuple(int(number) for number in re.findall(r"\d+", id)), id
+
+
+def find(ids: Iterable[str]) -> tuple[Experiment, ...]:
+    """The experiments with these ids or endings of ids ("5.4" finds "table-5.4"); all for no ids.
+
+    Raises
+    ------
+    LumigraphError
+        An id that nothing matches; the message names the nearest ones.
+    """
+    known = {one.id: one for one in experiments()}
+    wanted: dict[str, Experiment] = {}
+    for text in ids:
+        matches = [name for name in known if name == text or name.endswith(f"-{text}")]
+        if not matches:
+            near = _near(text, list(known))
+            raise LumigraphError(f"there is no experiment {text!r}. Near ones: {', '.join(near)}.")
+        wanted |= {name: known[name] for name in matches}
+    chosen = wanted or known
+    return tuple(chosen[name] for name in sorted(chosen, key=natural_order))
+
+
+def _near(text: str, known: list[str]) -> list[str]:
+    """Three ids that look or count like the text."""
+    close = difflib.get_close_matches(text, known, n=3, cutoff=0.5)
+    numbers = re.findall(r"\d+", text)
+    same = [name for name in known if numbers and re.findall(r"\d+", name)[:1] == numbers[:1]]
+    return list(dict.fromkeys([*close, *same, *known]))[:3]

@@ -1,0 +1,112 @@
+"""Curves over one axis, and several images side by side."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.grid import Grid
+from lumigraph.errors import LumigraphError
+from lumigraph.plots.axes import canvas, check_image, draw
+
+MARK_COLOUR = "#8a8a8a"
+STYLES = ("-", "--", "-.", ":")
+
+
+def curves(
+    x: Any, values: Mapping[str, Any], *, xlabel: str = "", ylabel: str = "", title: str = "",
+    log: bool = False, marks: Mapping[str, float] | None = None,
+) -> Figure:  # fmt: skip
+    """Figure of one or more curves over a shared axis.
+
+    Parameters
+    ----------
+    x
+        Positions (n,), in the unit that `xlabel` names.
+    values
+        Curves by their names: y (n,), or a pair (x, y) with positions of its own.
+    xlabel, ylabel, title
+        Beside and above the axes.
+    log
+        Draws y on a logarithmic scale.
+    marks
+        Positions x, by names, shown as vertical lines.
+
+    Raises
+    ------
+    LumigraphError
+        No curves, or a curve with another number of points than x.
+
+    Examples
+    --------
+    >>> figure = curves([0, 1, 2], {"square": [0, 1, 4]}, xlabel="x [m]", marks={"limit": 1.5})
+    >>> [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    ['square']
+    """
+    if not values:
+        raise LumigraphError("there are no curves to draw. Give {name: y}.")
+    figure, (axes,) = canvas(1, 1, width=7.2, height=4.6)
+    for number, (name, given) in enumerate(values.items()):
+        across, y = given if isinstance(given, tuple) else (x, given)
+        across, y = np.asarray(to_numpy(across)), np.asarray(to_numpy(y))
+        if across.shape != y.shape:
+            raise LumigraphError(
+                f"the curve {name!r} has {y.size} points over {across.size} positions. Give one for each."
+            )
+        style = STYLES[number // 10 % len(STYLES)] if number >= 10 else "-"
+        axes.plot(across, y, style, label=name, lw=1.5, marker="o" if y.size <= 15 else None, ms=4)
+    axes.set(xlabel=xlabel, ylabel=ylabel, title=title, yscale="log" if log else "linear")
+    axes.grid(visible=True, color="#dddddd", lw=0.6)
+    for name, where in (marks or {}).items():
+        axes.axvline(where, color=MARK_COLOUR, lw=1.0, ls="--", zorder=0)
+        axes.annotate(
+            name, (where, 0.99), xycoords=("data", "axes fraction"), rotation=90, fontsize=8,
+            ha="right", va="top", color=MARK_COLOUR,
+        )  # fmt: skip
+    if len(values) > 1 or any(values):
+        axes.legend(fontsize=9, framealpha=0.9)
+    return figure
+
+
+def images(
+    pictures: Sequence[tuple[Any, str]], *, columns: int = 3, grid: Grid | None = None,
+    cmap: str | None = None, label: str = "",
+) -> Figure:  # fmt: skip
+    """Figure of several images with their titles, row by row.
+
+    Parameters
+    ----------
+    pictures
+        (image (y, x) or (y, x, 3), title).
+    columns
+        At most this many side by side.
+    grid
+        Where the samples of every image stand; the axes are then lengths. None for pixels.
+    cmap
+        Colours of grey images, a name that matplotlib knows.
+    label
+        Beside a colour bar for each grey image; empty for none.
+
+    Raises
+    ------
+    LumigraphError
+        No images, another shape, or complex numbers.
+
+    Examples
+    --------
+    >>> figure = images([(np.eye(4), "one"), (np.eye(4), "two")], columns=2)
+    >>> [axes.get_title() for axes in figure.axes]
+    ['one', 'two']
+    """
+    if not pictures:
+        raise LumigraphError("there are no images to draw. Give [(image, title), ...].")
+    count = max(1, min(columns, len(pictures)))
+    figure, panels = canvas(-(-len(pictures) // count), count)
+    for panel, (image, title) in zip(panels, pictures, strict=False):
+        draw(panel, check_image(image), grid, label=label, cmap=cmap)
+        panel.set_title(title, fontsize=10)
+    for panel in panels[len(pictures) :]:
+        panel.set_axis_off()
+    return figure
