@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,8 +15,8 @@ Stages = Callable[[str, float], None]
 """Called with what goes on and the fraction of the whole that is done."""
 
 
-def report(common: Common, text: str, values: Mapping[str, Any]) -> None:
-    """Print the result of a verb: text for people, or with `--json` one object."""
+def report(common: Common, text: str, values: Mapping[str, Any] | Sequence[Any]) -> None:
+    """Print the result of a verb: text for people, or with `--json` one object, or a list of them."""
     if common.json:
         print(json.dumps(values, default=_plain, ensure_ascii=False))
     else:

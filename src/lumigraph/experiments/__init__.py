@@ -1,7 +1,8 @@
 """Experiments: what the thesis printed, what is right, and what lumigraph computes, side by side.
 
 - `registry`: `Row`, `Outcome`, `Context`, the decorator `experiment`, and `find`
-- `run`: runs experiments, resumes what was interrupted, writes the report
+- `run`: runs experiments, resumes what was interrupted
+- `pages`: the report of a run
 - `thesis`: one table or figure, one file, one function
 """
 

@@ -1,0 +1,110 @@
+"""`lumigraph reproduce`."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from lumigraph.cli.console import report, stages
+from lumigraph.cli.options import COMMON, Common, Output
+from lumigraph.errors import FormatError, LumigraphError
+
+if TYPE_CHECKING:
+    from lumigraph.experiments.registry import Experiment
+    from lumigraph.experiments.run import Result
+
+Flag = Annotated[bool, Parameter(negative="")]
+
+
+def reproduce(
+    *ids: str,
+    list_: Annotated[bool, Parameter(name="--list", negative="")] = False,
+    quick: Flag = False,
+    fresh: Flag = False,
+    output: Output = Path("reproduce"),
+    common: Common = COMMON,
+) -> None:
+    """Compute the tables and figures of the thesis again, beside what is printed and what is right.
+
+    Writes report.html and results.json. What an interrupted run has finished is not computed again.
+    With --json prints a list of rows. The exit code is 1 if any row is out of tolerance.
+
+    Example: `lumigraph reproduce 5.4 --quick`
+
+    Parameters
+    ----------
+    ids
+        Experiments, or how their names end: 5.4 is table-5.4. All if left out.
+    list_
+        Print the experiments and run nothing.
+    quick
+        Run reduced sizes of the same physics, in minutes.
+    fresh
+        Compute everything again.
+    output
+        Folder for the results; made if it does not exist.
+    """
+    from lumigraph import experiments
+
+    chosen = experiments.find(ids)
+    if list_:
+        _list(chosen, common)
+        return
+    _check_folder(output)
+    from lumigraph.experiments import pages, run
+
+    output.mkdir(exist_ok=True)
+    with stages("reproduce") as shown:
+        results = run.run(
+            chosen, output, quick=quick, fresh=fresh, progress=shown, finished=_tell
+        )  # fmt: skip
+        shown("report", 1.0)
+        pages.write_report(chosen, results, output / "report.html", quick=quick)
+        run.write_records(results, output / "results.json")
+    text = "\n\n".join([*map(_table, results), f"Open {output / 'report.html'}"])
+    report(common, text, run.records(results))
+    _refuse_failures(results, output)
+
+
+def _check_folder(output: Path) -> None:
+    if output.exists() and not output.is_dir():
+        raise FormatError(f"--output {output} is a file. Give a folder.")
+    if not output.parent.is_dir():
+        raise FormatError(
+            f"the folder {output.parent} for --output {output.name} does not exist. Make it first."
+        )
+
+
+def _list(chosen: "tuple[Experiment, ...]", common: Common) -> None:
+    width = max((len(one.id) for one in chosen), default=0)
+    text = "\n".join(f"{one.id:<{width}}  {one.title} ({one.thesis})" for one in chosen)
+    fields = ("id", "title", "question", "thesis")
+    report(common, text, [{field: getattr(one, field) for field in fields} for one in chosen])
+
+
+def _tell(result: "Result") -> None:
+    """One line on standard error as soon as an experiment is finished."""
+    failed = f"{len(result.failed)} FAIL" if result.failed else "none fails"
+    took = "from an earlier run" if result.stored else f"{result.seconds:.1f} s"
+    print(f"{result.id}: {len(result.rows)} rows, {failed}, {took}", file=sys.stderr, flush=True)
+
+
+def _table(result: "Result") -> str:
+    """Rows of an experiment in columns."""
+    from lumigraph.experiments import pages
+
+    lines = [pages.HEADER[:-1], *(pages.cells(row)[:-1] for row in result.rows)]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
+    rows = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)) for line in lines]
+    return "\n".join([result.id, *(f"  {row}".rstrip() for row in rows)])
+
+
+def _refuse_failures(results: "list[Result]", output: Path) -> None:
+    failed = [result for result in results if result.failed]
+    if failed:
+        rows = sum(len(result.failed) for result in failed)
+        names = ", ".join(result.id for result in failed)
+        raise LumigraphError(
+            f"{rows} row{'s' * (rows > 1)} out of tolerance in {names}. See {output / 'report.html'}."
+        )

@@ -1,0 +1,213 @@
+"""Runs experiments one after the other, keeps what is finished, and writes the report."""
+
+import hashlib
+import json
+import math
+import shutil
+import sys
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from lumigraph.experiments.registry import Context, Experiment, Outcome, Row, experiments
+from lumigraph.io.target import write_bytes
+from lumigraph.report.pictures import Picture, picture
+
+Progress = Callable[[str, float], None]
+"""Called with what goes on and the fraction of the whole that is done."""
+
+_APART = ("cli", "demo", "report", "viewer")
+"""Folders of the package that change no number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """A finished experiment, as it is stored: rows, pictures ready for a page, and the time it took [s].
+
+    `memory` is the highest memory of the process until its end [byte], 0 where it cannot be known;
+    `error` the traceback of an experiment that did not run to its end.
+    """
+
+    id: str
+    rows: tuple[Row, ...]
+    pictures: tuple[Picture, ...]
+    why: str
+    seconds: float
+    memory: int = 0
+    error: str = ""
+    stored: bool = False
+
+    @property
+    def failed(self) -> tuple[Row, ...]:
+        """Rows out of tolerance."""
+        return tuple(row for row in self.rows if row.passed is False)
+
+    def to_json(self) -> bytes:
+        """Everything but `stored`."""
+        values = asdict(self)
+        del values["stored"]
+        return json.dumps(values).encode()
+
+    @classmethod
+    def from_json(cls, content: bytes) -> "Result":
+        """What `to_json` wrote."""
+        values = json.loads(content)
+        values["rows"] = tuple(Row(**{**row, "tolerance": _pair(row["tolerance"])}) for row in values["rows"])
+        values["pictures"] = tuple(Picture(**one) for one in values["pictures"])
+        return cls(**values, stored=True)
+
+
+def run(
+    chosen: Sequence[Experiment],
+    folder: Path,
+    *,
+    quick: bool = False,
+    fresh: bool = False,
+    progress: Progress | None = None,
+    finished: Callable[[Result], None] | None = None,
+) -> list[Result]:
+    """Run experiments; what an earlier run with the same sources finished is read instead.
+
+    Parameters
+    ----------
+    chosen
+        In this order.
+    folder
+        Results are kept in ``folder/parts``: the whole of a finished experiment, parts of a long one.
+    quick
+        Run reduced sizes.
+    fresh
+        Forget what earlier runs of the chosen experiments kept.
+    progress
+        Called with what goes on and the fraction of all experiments that is done.
+    finished
+        Called with each result.
+    """
+    results = []
+    for number, one in enumerate(chosen):
+
+        def tell(fraction: float, what: str, number: int = number, one: Experiment = one) -> None:
+            if progress is not None:
+                progress(f"{one.id} {what}".strip(), (number + fraction) / len(chosen))
+
+        tell(0.0, one.title)
+        results.append(_run_or_read(one, folder / "parts", quick, fresh, tell))
+        if finished is not None:
+            finished(results[-1])
+    return results
+
+
+def _run_or_read(
+    one: Experiment, folder: Path, quick: bool, fresh: bool, tell: Callable[[float, str], None]
+) -> Result:
+    name = f"{one.id}-{'quick' if quick else 'full'}-{sources(one)[:16]}"
+    whole, parts = folder / f"{name}.json", folder / name
+    if fresh:
+        whole.unlink(missing_ok=True)
+        shutil.rmtree(parts, ignore_errors=True)
+    if whole.exists():
+        return Result.from_json(whole.read_bytes())
+    folder.mkdir(parents=True, exist_ok=True)
+    result = _run(one, Context(quick, parts, tell))
+    if not result.error:
+        write_bytes(whole, result.to_json())
+        shutil.rmtree(parts, ignore_errors=True)
+    return result
+
+
+def _run(one: Experiment, context: Context) -> Result:
+    """Run an experiment; an error becomes a row that fails, so that the others still run."""
+    start, error = time.perf_counter(), ""
+    try:
+        outcome = one.run(context)
+    except Exception as problem:
+        error = traceback.format_exc()
+        note = f"{type(problem).__name__}: {problem}"
+        outcome = Outcome((Row("runs to its end", 0.0, expected=1.0, note=note),))
+    pictures = tuple(picture(image, caption) for image, caption in outcome.figures)
+    rows = tuple(_plain(row) for row in outcome.rows)
+    seconds = time.perf_counter() - start
+    return Result(one.id, rows, pictures, outcome.why, seconds, _peak_memory(), error)
+
+
+def _plain(row: Row) -> Row:
+    """The row with Python's own numbers, which JSON keeps to the last digit."""
+    values = {name: _number(getattr(row, name)) for name in ("got", "thesis", "expected")}
+    pair = isinstance(row.tolerance, tuple)
+    tolerance: Any = tuple(map(_number, row.margins)) if pair else _number(row.tolerance)
+    return replace(row, **values, tolerance=tolerance)
+
+
+def _number(value: Any) -> Any:
+    return value if value is None or isinstance(value, str) else float(value)
+
+
+def _pair(tolerance: Any) -> Any:
+    return tuple(tolerance) if isinstance(tolerance, list) else tolerance
+
+
+def sources(one: Experiment) -> str:
+    """Digest of everything that an experiment's numbers follow from: the package, less other experiments."""
+    others = {other.module for other in experiments()} - {one.module}
+    digest = hashlib.sha256()
+    for module, content in _files():
+        if module not in others:
+            digest.update(content)
+    return digest.hexdigest()
+
+
+@cache
+def _files() -> tuple[tuple[str, bytes], ...]:
+    """(module, digest) of every source and camera file of the package, and the versions of what it uses."""
+    root = Path(__file__).parents[1]
+    found = []
+    for path in sorted([*root.rglob("*.py"), *root.rglob("*.toml")]):
+        parts = path.relative_to(root.parent).with_suffix("").parts
+        if parts[1] not in _APART:
+            found.append((".".join(parts), hashlib.sha256(path.read_bytes()).digest()))
+    used = " ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "scikit-image"))
+    return (*found, ("", used.encode()))
+
+
+def _peak_memory() -> int:
+    """Highest memory of this process so far [byte]; 0 where the system does not tell."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return 0
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
+
+
+def records(results: Sequence[Result]) -> list[dict[str, Any]]:
+    """Rows of all results as dictionaries of plain values; what is not finite becomes None."""
+    return [
+        {
+            "experiment": result.id,
+            "quantity": row.quantity,
+            "unit": row.unit,
+            "thesis": _finite(row.thesis),
+            "expected": _finite(row.expected),
+            "got": _finite(row.got),
+            "tolerance": [_finite(margin) for margin in row.tolerance]
+            if isinstance(row.tolerance, tuple)
+            else _finite(row.tolerance),
+            "passed": row.passed,
+        }
+        for result in results
+        for row in result.rows
+    ]
+
+
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def write_records(results: Sequence[Result], path: Path) -> None:
+    """Write `records` as a JSON file."""
+    write_bytes(path, json.dumps(records(results), indent=1, ensure_ascii=False).encode())
