@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from lumigraph import analysis, design, plots, units
+    from lumigraph import analysis, depth, design, plots, units
     from lumigraph.calibration import calibrate, devignette
     from lumigraph.core.calibration import Calibration
     from lumigraph.core.field import Field
@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from lumigraph.simulation import Coherent, Incoherent, Snapshots, TiltedWaves, simulate
 
 _HOMES = {
-    "lumigraph": ("analysis", "design", "plots", "units"),
+    "lumigraph": ("analysis", "depth", "design", "plots", "units"),
     "lumigraph.calibration": ("calibrate", "devignette"),
     "lumigraph.core.calibration": ("Calibration",),
     "lumigraph.core.field": ("Field",),
@@ -147,6 +147,7 @@ __all__ = [
     "catalogue",
     "choose_method",
     "decode",
+    "depth",
     "design",
     "devignette",
     "encode",
