@@ -1,6 +1,7 @@
 """What a one-dimensional profile of intensity tells: zeros, widths, contrast."""
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, to_numpy
@@ -10,7 +11,8 @@ from lumigraph.errors import LumigraphError, SamplingError
 def first_zero(x: Array, profile: Array) -> float:
     """Distance from the peak of a profile to its first minimum towards larger x [unit of x].
 
-    Both are refined by a parabola through three samples: near a zero an intensity is one.
+    Both are found between samples by a cubic spline. A parabola would be too far out by 1 % where ten samples
+    lead to the zero of an Airy pattern, which is not symmetric about it.
 
     Parameters
     ----------
@@ -135,9 +137,11 @@ def _profile(x: Array, profile: Array) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _vertex(x: np.ndarray, values: np.ndarray, index: int) -> float:
-    """Extremum of the parabola through a sample and its neighbours; the sample at an end."""
+    """Extremum nearest to a sample, of a cubic spline through its neighbours; the sample at an end."""
     if not 0 < index < len(x) - 1:
         return float(x[index])
-    here = slice(index - 1, index + 2)
-    a, b, _ = np.polyfit(x[here] - x[index], values[here] / max(abs(values[here]).max(), 1e-300), 2)
-    return float(x[index] - b / (2 * a)) if a else float(x[index])
+    here = slice(max(index - 4, 0), index + 5)
+    spline = CubicSpline(x[here], values[here] / (np.abs(values[here]).max() or 1.0))
+    turns = spline.derivative().roots(extrapolate=False)
+    near = turns[np.abs(turns - x[index]) <= x[index + 1] - x[index - 1]]
+    return float(near[np.argmin(np.abs(near - x[index]))]) if near.size else float(x[index])
