@@ -251,6 +251,8 @@ OPTIONS = {
     "zero patch": ((*RENDER, "--patch", "0"), ["--patch is 0"]),
     "NaN patch": ((*RENDER, "--patch", "nan"), ["--patch is nan"]),
     "no patch": (RENDER, ["--patch", "--camera"]),
+    "depth without a camera": ((*RENDER, "--patch", "5", "--depth", "1 mm"), ["--depth", "--camera"]),
+    "depth without a unit": ((*RENDER, "--camera", "focused.toml", "--depth", "1"), ["--depth", "unit"]),
     "gigantic patch": ((*RENDER, "--patch", "1e9"), ["patch"]),
     "camera without patches": ((*RENDER, "--camera", "camera.toml"), ["camera.toml", "decode"]),
     "camera of another size": (

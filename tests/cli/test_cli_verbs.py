@@ -18,6 +18,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import SamplingWarning
+from lumigraph.instruments import load_camera
 from lumigraph.simulation import Interrupted
 
 VERBS = ("demo", "design", "simulate", "calibrate", "decode", "render", "refocus")
@@ -206,6 +207,10 @@ def test_render_takes_the_patch_from_a_camera_or_by_itself(lumigraph, bench):
     assert lumigraph(*words).code == 0
     result = lumigraph("render", "raw2.tiff", "--camera", "focused.toml", "-o", "q.png", "--json")
     assert json.loads(result.out)["patch_px"] == pytest.approx(9.653, abs=1e-3)
+    near = lumigraph(
+        "render", "raw2.tiff", "--camera", "focused.toml", "--depth", "-1 mm", "-o", "n.png", "--json"
+    )
+    assert json.loads(near.out)["patch_px"] == pytest.approx(load_camera("focused.toml").patch_at(-1e-3))
 
 
 def test_demo_is_run_in_the_folder(lumigraph, monkeypatch):

@@ -1,5 +1,6 @@
 """`lumigraph render`."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -7,11 +8,52 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress, report
-from lumigraph.cli.options import COMMON, Common, Output
+from lumigraph.cli.options import COMMON, Common, Output, length
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
     from lumigraph.core.calibration import Calibration
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Tiles:
+    """How large the piece of each micro-image is.
+
+    Parameters
+    ----------
+    patch
+        Size of the piece of each micro-image, in pixels; negative for a Galilean camera.
+    camera
+        Camera file: gives the patch, and the calibration if no other is given.
+    depth
+        Of what shall be seamless, from the focused plane of the camera, such as '5 mm' (farther) or
+        '-5 mm' (nearer); the focused plane if left out.
+    """
+
+    patch: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
+    camera: str | None = None
+    depth: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+
+    def found(self) -> "tuple[float, Calibration | None]":
+        """Patch [px] and the calibration of the camera file; a patch given by itself goes before its own."""
+        if self.camera is None and self.patch is None:
+            raise FormatError("the size of the patches is not known. Give --patch PIXELS or --camera FILE.")
+        if self.patch is not None and (not abs(self.patch) < float("inf") or self.patch == 0):
+            raise FormatError(f"--patch is {self.patch:g} px but must be a finite number other than 0.")
+        if self.depth is not None and (self.camera is None or self.patch is not None):
+            raise FormatError("--depth says the patch of a camera. Give --camera FILE, and no --patch.")
+        if self.camera is None:
+            return float(self.patch or 0.0), None
+        from lumigraph.instruments import FocusedPlenopticCamera, load_camera
+
+        described = load_camera(self.camera)
+        if not isinstance(described, FocusedPlenopticCamera):
+            raise FormatError(
+                f"--camera {self.camera} is a {described.KIND}, which is decoded: use 'lumigraph decode'."
+            )
+        size = described.patch_at(length("--depth", self.depth) or 0.0) if self.patch is None else self.patch
+        return size, described.calibration
 
 
 def render(
@@ -21,13 +63,12 @@ def render(
     output: Output,
     calibration: Path | None = None,
     white: Path | None = None,
-    patch: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
-    camera: str | None = None,
+    tiles: Tiles = Tiles(),
     common: Common = COMMON,
 ) -> None:
     """Render the picture of a focused plenoptic camera 2.0 from its raw image.
 
-    Example: `lumigraph render raw.tiff --camera camera.toml -o picture.png`
+    Example: `lumigraph render raw.tiff --camera camera.toml --depth "5 mm" -o picture.png`
 
     Parameters
     ----------
@@ -39,16 +80,12 @@ def render(
         File made by 'lumigraph calibrate'.
     white
         White image: the raw image is divided by it, and calibrated from it without --calibration.
-    patch
-        Size of the piece of each micro-image, in pixels; negative for a Galilean camera.
-    camera
-        Camera file: gives the patch, and the calibration if no other is given.
     """
     from lumigraph import calibration as verbs
     from lumigraph import io, rendering
 
     files.check_output(output, files.PICTURES)
-    size, known = _from_camera(camera, patch)
+    size, known = tiles.found()
     picture = files.read_raw(raw)
     with progress("render"):
         if known is not None and calibration is None and white is None:
@@ -63,21 +100,3 @@ def render(
     rows, columns = image.shape[:2]
     text = f"{rows} x {columns} px with patches of {size:.4g} px\nwritten {output}"
     report(common, text, {"shape": image.shape, "patch_px": size, "output": str(output)})
-
-
-def _from_camera(camera: str | None, patch: float | None) -> "tuple[float, Calibration | None]":
-    """Patch and calibration of a camera file; a patch given by itself goes before it."""
-    if camera is None and patch is None:
-        raise FormatError("the size of the patches is not known. Give --patch PIXELS or --camera FILE.")
-    if patch is not None and (not abs(patch) < float("inf") or patch == 0):
-        raise FormatError(f"--patch is {patch:g} px but must be a finite number other than 0.")
-    if camera is None:
-        return float(patch or 0.0), None
-    from lumigraph.instruments import FocusedPlenopticCamera, load_camera
-
-    described = load_camera(camera)
-    if not isinstance(described, FocusedPlenopticCamera):
-        raise FormatError(
-            f"--camera {camera} is a {described.KIND}, which is decoded: use 'lumigraph decode'."
-        )
-    return (described.patch if patch is None else patch), described.calibration

@@ -32,7 +32,7 @@ class Light:
         incoherent: like every lit scene; coherent: one plane wave; snapshots: random phases, many
         times; tilted: plane waves from many directions.
     count
-        Snapshots or tilted waves to add up.
+        Snapshots (100 if left out) or tilted waves (64) to add up: more of them, less speckle.
     na
         Numerical aperture of the tilted waves; all directions if left out.
     """
