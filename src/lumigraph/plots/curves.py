@@ -56,7 +56,8 @@ def curves(
                 f"the curve {name!r} has {y.size} points over {across.size} positions. Give one for each."
             )
         style = STYLES[number // 10 % len(STYLES)] if number >= 10 else "-"
-        axes.plot(across, y, style, label=name, lw=1.5, marker="o" if y.size <= 15 else None, ms=4)
+        width = 2.6 - 1.6 * number / max(len(values) - 1, 1)  # a curve under another one stays visible
+        axes.plot(across, y, style, label=name, lw=width, marker="o" if y.size <= 15 else None, ms=4)
     axes.set(xlabel=xlabel, ylabel=ylabel, title=title, yscale="log" if log else "linear")
     axes.grid(visible=True, color="#dddddd", lw=0.6)
     for name, where in (marks or {}).items():

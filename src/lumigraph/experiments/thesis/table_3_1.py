@@ -1,5 +1,7 @@
 """Position of the first minimum of a point's image."""
 
+import numpy as np
+
 from lumigraph.analysis import first_zero
 from lumigraph.design.resolution import airy_first_zero, f_number
 from lumigraph.experiments.registry import Context, Outcome, Row, experiment
@@ -32,6 +34,7 @@ def run(context: Context) -> Outcome:
     rows, drawn = [], {}
     near = two_f.middle(0.12 * mm)
     x = two_f.GRID.x[near]
+    fine = np.linspace(x[0], x[-1], 1201)
     for number, (diameter, tolerance) in enumerate(TOLERANCES.items()):
         expected = airy_first_zero(two_f.WAVELENGTH, f_number(two_f.DISTANCE, diameter)) / um
         for step, name in enumerate((*METHODS, *ALIASING)):
@@ -50,10 +53,10 @@ def run(context: Context) -> Outcome:
                 )
             )
         drawn[f"padded, D = {diameter / mm:g} mm"] = cut_of("band limited, padded", diameter, near)
-        drawn[f"Airy, D = {diameter / mm:g} mm"] = two_f.airy(x, diameter)
+        drawn[f"Airy, D = {diameter / mm:g} mm"] = (fine / um, two_f.clipped(two_f.airy(fine, diameter), 1e-6))
     figure = curves(
         x / um,
-        {name: two_f.clipped(cut, 1e-6) for name, cut in drawn.items()},
+        drawn,
         xlabel="x [um]",
         ylabel="intensity",
         log=True,
