@@ -80,7 +80,7 @@ def test_the_refocused_point_is_sharper_than_the_plain_one(from_matlab):
 
 @pytest.fixture
 def readme_names(tmp_path, monkeypatch):
-    """Stand-ins for what README leaves to the reader; one snapshot instead of a hundred."""
+    """Stand-ins for the reader's pictures; coarser pixels and grids, one snapshot instead of a hundred."""
     camera = lg.PlenopticCamera(
         wavelength=550 * nm,
         object_distance=200 * mm,
@@ -91,11 +91,12 @@ def readme_names(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     lg.save(lg.simulate(camera, lg.targets.white()), "white.png")
     lg.save(lg.simulate(camera, lg.targets.points([(0, 0, -10 * mm)])), "letters.png")
-    monkeypatch.setattr(lg, "simulate", functools.partial(lg.simulate, coherence=lg.Incoherent(snapshots=1)))
+    monkeypatch.setattr(lg, "simulate", functools.partial(lg.simulate, coherence=lg.Snapshots(1, rng=0)))
     monkeypatch.setattr(lg.Grid, "square", lambda n, pitch: lg.Grid((n // 4, n // 4), (2 * pitch, 2 * pitch)))
-    slit = np.zeros((500, 500), np.complex64)
-    slit[225:275, 248:252] = 1
-    return {"slit": slit}
+    coarse = lg.FocusedPlenopticCamera.from_catalogue("thesis-plenoptic-2-m050")
+    coarse = coarse.replace(sensor={"pixel_pitch": 5 * um})
+    monkeypatch.setattr(lg.FocusedPlenopticCamera, "from_catalogue", lambda name: coarse)
+    return {}
 
 
 def test_readme_runs_from_top_to_bottom(readme_names):
