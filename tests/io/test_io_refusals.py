@@ -299,7 +299,7 @@ LIGHT = LightField(np.ones((2, 2, 2, 2)), Grid.square(2, 1.0), Grid.square(2, 1.
         (np.ones((2, 2, 2), np.uint8), "a.png", r"has shape \(2, 2, 2\)"),
         (np.full((2, 2), np.nan), "a.png", "has 4 NaN or infinite values"),
         (np.ones((2, 2, 2, 2)), "a.tiff", r"shape \(2, 2, 2, 2\) is not a picture"),
-        (np.array([["a", "b"]]), "a.zarr", "cannot hold <U1"),
+        (np.array([["a", "b"]]), "a.zarr", "holds <U1 but must hold numbers"),
         ("hello", "a.png", "a str cannot be written"),
         (RawImage(np.ones((2, 2)), metadata={"f": open}), "a.tiff", r"metadata\['f'\] is a builtin"),
         (RawImage(np.ones((2, 2)), metadata={"f": [np.inf]}), "a.zarr", r"metadata\['f'\]\[0\] is inf"),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from lumigraph.core import checks
-from lumigraph.core.arrays import Array, like, namespace, to_numpy
+from lumigraph.core.arrays import Array, is_complex, like, namespace, to_numpy
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 
@@ -45,7 +45,7 @@ def devignette(
     0.0
     """
     raw, white = as_raw(raw), as_raw(white)
-    if not 0 < floor < 1:
+    if not 0 < checks.finite("floor", floor, "1", CalibrationError) < 1:
         raise CalibrationError(f"floor is {floor:g} but must be between 0 and 1, such as 0.1.")
     pictures = {"raw": raw, "white": white}
     if dark is not None:
@@ -100,6 +100,8 @@ def _check(name: str, picture: RawImage, raw: RawImage) -> None:
             f"the {name} image has shape {shape} but the raw image {expected}. "
             f"Use the {name} image taken with the same camera settings."
         )
+    if is_complex(picture.data):
+        raise CalibrationError(f"the {name} image is complex. Give its intensity.")
     checks.finite_array(f"the {name} image", picture.data, CalibrationError)
 
 

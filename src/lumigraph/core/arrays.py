@@ -44,7 +44,8 @@ def is_numpy(array: Array) -> bool:
 
 def is_single(array: Array) -> bool:
     """Whether the array holds single precision: float32 or complex64."""
-    return str(array.dtype).rsplit(".", 1)[-1] in _SINGLE
+    # NumPy's name leaves out the byte order, which str() has: '>f4'.
+    return (array.dtype.name if is_numpy_array(array) else str(array.dtype).rsplit(".", 1)[-1]) in _SINGLE
 
 
 def is_complex(array: Array) -> bool:

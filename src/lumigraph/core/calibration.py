@@ -43,6 +43,7 @@ class Calibration:
     lenslet_distance: float | None = None
 
     def __post_init__(self) -> None:
+        checks.instance("lattice", self.lattice, Lattice, CalibrationError)
         object.__setattr__(self, "shape", checks.shape("shape", self.shape))
         if self.indices.shape != self.centers.shape or self.centers.shape[1:] != (2,):
             raise CalibrationError(

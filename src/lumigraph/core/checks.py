@@ -1,7 +1,8 @@
 """One-line refusals of bad numbers: the field's name, the value, what to do."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from numbers import Real
 from typing import Any
 
@@ -12,13 +13,19 @@ from lumigraph.errors import GeometryError, LumigraphError
 
 Pair = tuple[float, float]
 
+_MOST = 2**31 - 1  # along one axis: more would overflow the index types of array libraries
+
 
 def finite(name: str, value: float, unit: str = "m", error: type[LumigraphError] = GeometryError) -> float:
     """`value` as a float, refused unless it is one finite real number."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+    number = math.nan
+    if isinstance(value, Real) and not isinstance(value, bool):
+        with suppress(OverflowError):  # a whole number beyond the largest float
+            number = float(value)
+    if not math.isfinite(number):
         told = "" if unit == "1" else f" [{unit}]"
         raise error(f"{name} is {value!r} but must be a finite number{told}.")
-    return float(value)
+    return number
 
 
 def positive(name: str, value: float, unit: str = "m", error: type[LumigraphError] = GeometryError) -> float:
@@ -32,7 +39,7 @@ def positive(name: str, value: float, unit: str = "m", error: type[LumigraphErro
 
 def pair(name: str, value: float | Sequence[float], unit: str = "m") -> Pair:
     """`value` as two finite floats (y, x); one number stands for both axes."""
-    values = tuple(value) if isinstance(value, Sequence | np.ndarray) else (value, value)
+    values = _both(value)
     if len(values) != 2:
         raise GeometryError(f"{name} has {len(values)} numbers but must be one, or two (y, x).")
     return finite(f"{name} (y)", values[0], unit), finite(f"{name} (x)", values[1], unit)
@@ -40,12 +47,54 @@ def pair(name: str, value: float | Sequence[float], unit: str = "m") -> Pair:
 
 def shape(name: str, value: int | Sequence[int]) -> tuple[int, int]:
     """`value` as two positive whole numbers (ny, nx); one number stands for both axes."""
-    values = (value, value) if isinstance(value, int | np.integer) else tuple(value)
+    values = _both(value)
     if len(values) != 2 or any(isinstance(n, bool) or not isinstance(n, int | np.integer) for n in values):
         raise GeometryError(f"{name} is {value!r} but must be two whole numbers (ny, nx).")
     if min(values) < 1:
         raise GeometryError(f"{name} is {tuple(map(int, values))} but both numbers must be at least 1.")
+    if max(values) > _MOST:
+        raise GeometryError(f"{name} is {tuple(map(int, values))} but both numbers must be at most {_MOST}.")
     return int(values[0]), int(values[1])
+
+
+def _both(value: Any) -> tuple[Any, ...]:
+    """The numbers of a list, tuple or array; anything else, a 0-d array too, stands for both axes."""
+    if isinstance(value, np.ndarray):
+        return tuple(value) if value.ndim else (value.item(), value.item())
+    listed = isinstance(value, Sequence) and not isinstance(value, str)
+    return tuple(value) if listed else (value, value)
+
+
+def whole(name: str, value: int, lowest: int = 1, error: type[LumigraphError] = GeometryError) -> int:
+    """`value` as an int, refused unless it is a whole number of at least `lowest`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < lowest:
+        raise error(f"{name} is {value!r} but must be a whole number of at least {lowest}.")
+    return int(value)
+
+
+def choice(
+    name: str, value: Any, choices: Iterable[str], error: type[LumigraphError] = GeometryError
+) -> None:
+    """Refuse a value that is not one of the names in `choices`."""
+    known = tuple(choices)
+    if not isinstance(value, str) or value not in known:
+        raise error(f"{name} is {value!r} but must be one of {', '.join(known)}.")
+
+
+def instance(name: str, value: Any, kind: type, error: type[LumigraphError] = GeometryError) -> None:
+    """Refuse a value of another class, such as an array where a `Grid` is needed."""
+    if not isinstance(value, kind):
+        raise error(f"{name} is of type {type(value).__name__} but must be a {kind.__name__}.")
+
+
+def array(name: str, value: Any, error: type[LumigraphError] = GeometryError) -> None:
+    """Refuse what is not an array of numbers: lists, scalars, text, objects; of any array library."""
+    if not hasattr(value, "shape") or not hasattr(value, "dtype"):
+        raise error(
+            f"{name} is of type {type(value).__name__} but must be an array. Use numpy.asarray(...) first."
+        )
+    if isinstance(value, np.ndarray | np.generic) and value.dtype.kind not in "biufc":
+        raise error(f"{name} holds {value.dtype} but must hold numbers. Use astype(float) first.")
 
 
 def finite_array(name: str, array: Any, error: type[LumigraphError] = LumigraphError) -> None:

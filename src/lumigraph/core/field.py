@@ -40,6 +40,8 @@ class Field:
 
     def __post_init__(self) -> None:
         checks.positive("wavelength", self.wavelength)
+        checks.array("data", self.data)
+        checks.instance("grid", self.grid, Grid)
         if tuple(self.data.shape[-2:]) != self.grid.shape:
             raise GeometryError(
                 f"data has shape {tuple(self.data.shape)} but the grid has {self.grid.shape}: "

@@ -1,6 +1,7 @@
 """Where lenslets stand: in a simulation [m], or as micro-images on a sensor [px]."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -50,20 +51,23 @@ class Lattice:
     kinds: int = 1
 
     def __post_init__(self) -> None:
+        if not isinstance(self.basis, Sequence | np.ndarray) or len(np.atleast_1d(self.basis)) != 2:
+            raise GeometryError(f"basis is {self.basis!r} but must be two vectors (y, x).")
         basis = tuple(checks.pair(f"basis[{k}]", self.basis[k]) for k in range(2))
         object.__setattr__(self, "basis", basis)
         object.__setattr__(self, "origin", checks.pair("origin", self.origin))
-        if self.layout not in ("square", "hex"):
+        if not isinstance(self.layout, str) or self.layout not in ("square", "hex"):
             raise GeometryError(f"layout is {self.layout!r} but must be 'square' or 'hex'.")
-        if self.kinds not in (1, 3) or (self.kinds == 3 and self.layout != "hex"):
-            raise GeometryError(f"kinds is {self.kinds} but must be 1, or 3 in a 'hex' layout.")
+        kinds = (1, 3) if self.layout == "hex" else (1,)
+        if isinstance(self.kinds, bool) or not isinstance(self.kinds, int) or self.kinds not in kinds:
+            raise GeometryError(f"kinds is {self.kinds!r} but must be 1, or 3 in a 'hex' layout.")
         if self.cell_area < 1e-6 * math.hypot(*basis[0]) * math.hypot(*basis[1]) or self.cell_area == 0:
             raise GeometryError(f"the basis vectors {basis[0]} and {basis[1]} are parallel: no lattice.")
 
     @classmethod
     def square(cls, pitch: float, rotation: float = 0.0, origin: Vector = (0.0, 0.0)) -> "Lattice":
         """Square lattice of one pitch, turned by `rotation` [rad] from +x towards +y."""
-        pitch = checks.positive("pitch", pitch)
+        pitch, rotation = checks.positive("pitch", pitch), checks.finite("rotation", rotation, "rad")
         sin, cos = math.sin(rotation), math.cos(rotation)
         return cls(((pitch * sin, pitch * cos), (pitch * cos, -pitch * sin)), origin)
 
@@ -72,7 +76,7 @@ class Lattice:
         cls, pitch: float, rotation: float = 0.0, origin: Vector = (0.0, 0.0), *, kinds: int = 1
     ) -> "Lattice":
         """Hexagonal lattice, rows along +x turned by `rotation` [rad], nearest neighbours `pitch` apart."""
-        pitch = checks.positive("pitch", pitch)
+        pitch, rotation = checks.positive("pitch", pitch), checks.finite("rotation", rotation, "rad")
         row, next_row = rotation, rotation + math.pi / 3
         basis = tuple((pitch * math.sin(angle), pitch * math.cos(angle)) for angle in (row, next_row))
         return cls((basis[0], basis[1]), origin, "hex", kinds)
@@ -170,4 +174,5 @@ class Lattice:
 
     def moved(self, dy: float, dx: float) -> "Lattice":
         """The lattice with its origin moved by (dy, dx)."""
+        dy, dx = checks.finite("dy", dy), checks.finite("dx", dx)
         return replace(self, origin=(self.origin[0] + dy, self.origin[1] + dx))

@@ -40,6 +40,9 @@ class LightField:
 
     def __post_init__(self) -> None:
         checks.positive("separation", self.separation)
+        checks.array("data", self.data)
+        checks.instance("aperture", self.aperture, Grid)
+        checks.instance("lenslets", self.lenslets, Grid)
         shape = tuple(self.data.shape)
         if len(shape) not in (4, 5) or shape[:4] != self.aperture.shape + self.lenslets.shape:
             raise GeometryError(

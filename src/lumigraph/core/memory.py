@@ -2,7 +2,7 @@
 
 import os
 
-from lumigraph.errors import LumigraphError
+from lumigraph.errors import LumigraphError, SamplingError
 
 
 def available() -> int | None:
@@ -15,6 +15,18 @@ def available() -> int | None:
         return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, AttributeError, IndexError):
         return None
+
+
+def require_plane(shape: tuple[int, int], itemsize: int, what: str) -> None:
+    """Refuse to draw one plane (ny, nx) that needs more memory than there is.
+
+    Raises
+    ------
+    SamplingError
+        What needs how much, how much there is.
+    """
+    needed = float(shape[0]) * shape[1] * itemsize
+    require(needed, f"{what} of {shape[0]} x {shape[1]} samples", "Use fewer samples.", SamplingError)
 
 
 def require(needed: float, what: str, remedy: str, error: type[LumigraphError] = LumigraphError) -> None:

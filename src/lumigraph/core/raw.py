@@ -33,7 +33,9 @@ class RawImage:
     Raises
     ------
     GeometryError
-        The data is not (y, x) or (y, x, c), or is empty.
+        The data's shape is not (y, x) or (y, x, c), or is empty.
+    FormatError
+        Data that is no array of numbers; a bit depth, Bayer pattern or metadata that a raw image cannot have.
     """
 
     data: Array
@@ -43,13 +45,18 @@ class RawImage:
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        checks.array("a raw image", self.data, FormatError)
         shape = tuple(self.data.shape)
         if len(shape) not in (2, 3) or min(shape) < 1:
             raise GeometryError(f"a raw image has shape (y, x) or (y, x, c), not {shape}.")
         if self.pixel_pitch is not None:
             checks.positive("pixel_pitch", self.pixel_pitch)
-        if self.bayer is not None and self.bayer not in BAYER_PATTERNS:
-            raise FormatError(f"bayer is {self.bayer!r} but must be one of {', '.join(BAYER_PATTERNS)}.")
+        if self.bit_depth is not None:
+            checks.whole("bit_depth", self.bit_depth, error=FormatError)
+        if self.bayer is not None:
+            checks.choice("bayer", self.bayer, BAYER_PATTERNS, FormatError)
+        if not isinstance(self.metadata, Mapping):
+            raise FormatError(f"metadata is {self.metadata!r} but must be a mapping of names to values.")
 
     @property
     def shape(self) -> tuple[int, int]:

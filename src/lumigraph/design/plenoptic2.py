@@ -139,7 +139,9 @@ def magnification_at(
     >>> round(magnification_at(0.06, 0.13, 0.1356, 7.8e-3), 3)
     0.323
     """
-    if object_distance <= focal_length:
+    object_distance = checks.positive("object_distance", object_distance)
+    separation = checks.positive("separation", separation)
+    if object_distance <= checks.positive("focal_length", focal_length):
         raise GeometryError(
             f"the object is {object_distance * 1e3:.6g} mm from the main lens, inside its focal length of "
             f"{focal_length * 1e3:.6g} mm: no real image. Move it beyond the focal length."
@@ -165,7 +167,11 @@ def views_per_axis(magnification: float) -> float:
     >>> views_per_axis(-0.25)
     4.0
     """
-    return 1 / abs(checks.finite("magnification", magnification, "1"))
+    if checks.finite("magnification", magnification, "1") == 0:
+        raise GeometryError(
+            "magnification is 0 but must not be: such lenslets image infinity. Use plenoptic1."
+        )
+    return 1 / abs(magnification)
 
 
 def rendered_cutoff(wavelength: float, pitch: float, magnification: float, lenslet_distance: float) -> float:

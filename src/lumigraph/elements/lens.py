@@ -81,6 +81,7 @@ class ThinLens:
     def __call__(self, field: Field) -> Field:
         """The field just behind the lens."""
         stop = math.inf if self.diameter is None else self.diameter / 2
+        checks.instance("field", field, Field)
         offsets = (field.grid.y - self.center[0], field.grid.x - self.center[1])
         radii = tuple(min(stop, float(np.abs(offset).max())) for offset in offsets)
         warn_if_coarse("a lens", field.grid, field.wavelength, self.focal_length, (radii[0], radii[1]))

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -69,9 +69,10 @@ class LensletArray:
     edge: Edge = field(default="grey", kw_only=True)
 
     def __post_init__(self) -> None:
+        checks.instance("lattice", self.lattice, Lattice)
         object.__setattr__(self, "focal_length", _focal_lengths(self.focal_length, self.lattice.kinds))
         shape = self.lattice.layout if self.shape is None else self.shape
-        if shape not in (self.lattice.layout, "round"):
+        if not isinstance(shape, str) or shape not in (self.lattice.layout, "round"):
             raise GeometryError(
                 f"shape is {shape!r} but lenslets on a {self.lattice.layout!r} lattice are "
                 f"{self.lattice.layout!r} (its cell) or 'round'."
@@ -88,6 +89,7 @@ class LensletArray:
 
     def __call__(self, field: Field) -> Field:
         """The field just behind the lenslets."""
+        checks.instance("field", field, Field)
         focal_length, size = min(map(abs, self._focal)), self.fill_factor * self.lattice.pitch
         warn_if_coarse("a lenslet", field.grid, field.wavelength, focal_length, (size / 2, size / 2))
         return transmit(self, field)
@@ -215,13 +217,14 @@ class LensletArray:
 
 
 def _focal_lengths(value: float | Sequence[float], kinds: int) -> float | tuple[float, ...]:
-    values = (value,) if isinstance(value, int | float) else tuple(value)
+    several = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) and np.ndim(value)
+    values: tuple[Any, ...] = tuple(value) if several else (value,)  # type: ignore[arg-type]
     if len(values) not in (1, kinds):
         raise GeometryError(
             f"{len(values)} focal lengths were given for a lattice of {kinds} kind{'s'[: kinds - 1]}. "
             "Give one, or one for each kind."
         )
-    for number in values:
-        if checks.finite("focal_length", number) == 0:
-            raise GeometryError("focal_length is 0 m. Give a length, negative for a diverging lenslet.")
-    return float(values[0]) if len(values) == 1 else values
+    lengths = tuple(checks.finite("focal_length", number) for number in values)
+    if 0 in lengths:
+        raise GeometryError("focal_length is 0 m. Give a length, negative for a diverging lenslet.")
+    return lengths[0] if len(lengths) == 1 else lengths

@@ -61,6 +61,8 @@ class Train:
 
 
 def _flat(elements: Iterable[Element]) -> Iterator[Element]:
+    if not isinstance(elements, Iterable):
+        raise GeometryError(f"a train is {elements!r} but must be a list of elements.")
     for number, element in enumerate(elements):
         if isinstance(element, Train):
             yield from element.elements

@@ -5,6 +5,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, like, placement
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.field import Field
@@ -29,9 +30,11 @@ class Thin(Protocol):
 
 def transmit(element: Thin, field: Field) -> Field:
     """The field behind a thin element; the factor is computed in double precision and cast last."""
+    checks.instance("field", field, Field)
     key = element, field.grid, field.wavelength, placement(field.data)
 
     def build() -> Array:
+        memory.require_plane(field.grid.shape, 16, "the transmission of an element")
         return like(element.transmission(field.grid, field.wavelength), field.data)
 
     return field * TRANSMISSIONS.get(key, build)
@@ -39,7 +42,7 @@ def transmit(element: Thin, field: Field) -> Field:
 
 def check_edge(edge: str) -> None:
     """Refuse an unknown kind of edge."""
-    if edge not in ("grey", "hard"):
+    if not isinstance(edge, str) or edge not in ("grey", "hard"):
         raise GeometryError(f"edge is {edge!r} but must be 'grey' (area fractions) or 'hard' (0 or 1).")
 
 

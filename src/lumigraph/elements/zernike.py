@@ -14,6 +14,9 @@ from lumigraph.elements.apertures import CircularAperture
 from lumigraph.elements.transmission import Edge, check_edge, transmit
 from lumigraph.errors import GeometryError
 
+HIGHEST = 1000
+"""Highest Noll index: order 43."""
+
 
 def noll_to_nm(j: int) -> tuple[int, int]:
     """Radial order n and azimuthal order m of Noll's index j = 1, 2, ...; m < 0 is the sine.
@@ -21,7 +24,7 @@ def noll_to_nm(j: int) -> tuple[int, int]:
     Raises
     ------
     GeometryError
-        j is not a whole number of at least 1.
+        j is not a whole number from 1 to `HIGHEST`.
 
     Examples
     --------
@@ -30,6 +33,10 @@ def noll_to_nm(j: int) -> tuple[int, int]:
     """
     if isinstance(j, bool) or not isinstance(j, int | np.integer) or j < 1:
         raise GeometryError(f"Noll's index is {j!r} but must be a whole number of at least 1 (1 is piston).")
+    if j > HIGHEST:
+        raise GeometryError(
+            f"Noll's index is {j} but must be at most {HIGHEST}: polynomials of higher order overflow."
+        )
     n = (math.isqrt(8 * int(j) - 7) - 1) // 2
     place = int(j) - n * (n + 1) // 2 - 1
     order = n % 2 + 2 * ((place + (n + 1) % 2) // 2)
@@ -107,9 +114,17 @@ class ZernikePlate:
     edge: Edge = "grey"
 
     def __post_init__(self) -> None:
-        pairs = sorted(dict(self.coefficients).items())
-        for j, value in pairs:
+        try:
+            table = dict(self.coefficients)
+        except (TypeError, ValueError):
+            raise GeometryError(
+                f"coefficients are {self.coefficients!r} but must be a mapping of Noll's index to [rad rms], "
+                "such as {4: 0.5}."
+            ) from None
+        for j in table:
             noll_to_nm(j)
+        pairs = sorted(table.items())
+        for j, value in pairs:
             checks.finite(f"coefficient {j}", value, "rad rms")
         object.__setattr__(self, "coefficients", tuple((int(j), float(value)) for j, value in pairs))
         checks.positive("diameter", self.diameter)

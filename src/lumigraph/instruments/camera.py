@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, ValidationError
 
+from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.design import plenoptic1, resolution, thin_lens
@@ -198,6 +199,7 @@ class Camera(Part):
         GeometryError
             The object would be inside the focal length.
         """
+        dz = checks.finite("dz", dz)
         distance, focal_length = self.object_distance + dz, self.main_lens.focal_length
         if not math.isfinite(distance) or distance <= focal_length:
             raise GeometryError(

@@ -35,6 +35,8 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 )
 """Every method by name; `"auto"` stands for the one that `choose_method` picks."""
 
+SHORTEST = 1e-100
+"""Distances nearer to zero count as zero [m]."""
 FEWEST_FREQUENCIES = 100
 """With fewer in the band, "auto" takes zoom: band-limited has 51 dB with 158 of them, 45 dB with 63."""
 
@@ -141,9 +143,14 @@ def propagate(
     >>> round(float(propagate(beam, 100*mm).power / beam.power), 6)
     1.0
     """
+    checks.instance("field", field, Field)
+    if grid is not None:
+        checks.instance("grid", grid, Grid)
     distance = checks.finite("distance", distance)
     _check_method(method)
     _check_pad(pad)
+    if abs(distance) < SHORTEST:  # dividing by it would overflow
+        distance = 0.0
     if method == "auto":
         choice = choose_method(field.grid, distance, field.wavelength, grid)
         method, pad, grid = choice.method, choice.pad, grid or field.grid
@@ -171,7 +178,10 @@ def choose_method(grid: Grid, distance: float, wavelength: float, output: Grid |
     >>> print(choose_method(Grid.square(1000, 5e-6), 0.316, 633e-9).reason)
     light spreads 20 mm, the window of 5 mm is doubled and 500 of 2000 frequencies per axis pass unaliased
     """
-    distance = checks.finite("distance", distance)
+    checks.instance("grid", grid, Grid)
+    if output is not None:
+        checks.instance("output", output, Grid)
+    distance, wavelength = checks.finite("distance", distance), checks.positive("wavelength", wavelength)
     target = output or grid
     if not _aligned(grid, target):
         return _onto_other(grid, target, distance, wavelength)
@@ -265,7 +275,7 @@ def _window_along(data: Array, axis: int, first: int, count: int) -> Array:
 
 
 def _check_method(method: str) -> None:
-    if method != "auto" and method not in METHODS:
+    if not isinstance(method, str) or method not in ("auto", *METHODS):
         raise SamplingError(f"method is {method!r} but must be 'auto' or one of {', '.join(METHODS)}.")
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lumigraph.core import checks
-from lumigraph.core.arrays import Array, is_single, namespace
+from lumigraph.core.arrays import Array, is_complex, is_single, namespace
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
@@ -15,7 +15,17 @@ from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.rendering import memory
 from lumigraph.rendering.geometry import Frame, lenslet_rectangle, transposed
-from lumigraph.rendering.interpolate import Interpolation, as_float, sample, take, weighted
+from lumigraph.rendering.interpolate import (
+    Interpolation,
+    as_float,
+    check_interpolation,
+    sample,
+    take,
+    weighted,
+)
+
+MOST_DIRECTIONS = 4096
+"""Views along one axis; more would be far beyond the pixels of any micro-image."""
 
 
 def decode(
@@ -70,6 +80,7 @@ def decode(
     (5, 5, 4, 6)
     """
     raw = raw if isinstance(raw, RawImage) else RawImage(raw)
+    check_interpolation(interpolation)
     check_raw(raw, calibration)
     if (flipped := transposed(calibration)) is not None:
         return _turned(raw, flipped, directions, interpolation)
@@ -93,7 +104,10 @@ def decode(
 
 def check_raw(raw: RawImage, calibration: Calibration) -> None:
     """Refuse a raw image that does not belong to a calibration or has no grey or full-colour pixels."""
+    checks.instance("calibration", calibration, Calibration, CalibrationError)
     calibration.check_fits(raw.shape)
+    if is_complex(raw.data):
+        raise CalibrationError("the raw image is complex. Give its intensity.")
     checks.finite_array("the raw image", raw.data, CalibrationError)
     if raw.bayer is not None:
         raise CalibrationError(
@@ -115,6 +129,11 @@ class _Directions:
             count = tuple(max(1, math.floor(p + 1e-6)) for p in calibration.lattice.pitches)
             return cls((count[0], count[1]), (1.0, 1.0))
         nv, nu = checks.shape("directions", directions)
+        if max(nv, nu) > MOST_DIRECTIONS:
+            raise CalibrationError(
+                f"directions is ({nv}, {nu}) but micro-images of {calibration.lattice.pitch:.1f} px hold no "
+                f"more than {MOST_DIRECTIONS} on either axis. Ask for as many as they have pixels."
+            )
         first, second = calibration.lattice.pitches
         return cls((nv, nu), (first / nv, second / nu))
 

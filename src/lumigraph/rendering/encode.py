@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from lumigraph.core import checks
 from lumigraph.core.arrays import Array, like, namespace
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
@@ -40,6 +41,8 @@ def encode(
     LumigraphError
         It would not fit in memory.
     """
+    checks.instance("views", views, LightField)
+    checks.instance("calibration", calibration, Calibration)
     ny, nx = calibration.shape
     memory.require("the raw image", 16.0 * ny * nx * math.prod(views.data.shape[4:]), "Use a smaller sensor.")
     xp, extra = namespace(views.data), tuple(range(4, len(views.data.shape)))

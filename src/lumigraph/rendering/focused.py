@@ -16,7 +16,7 @@ from lumigraph.errors import GeometryError
 from lumigraph.rendering import memory
 from lumigraph.rendering.decode import check_raw
 from lumigraph.rendering.geometry import Frame, largest_rectangle, lenslet_rectangle
-from lumigraph.rendering.interpolate import Interpolation, as_float, sample, weighted
+from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, sample, weighted
 
 _BAND = 1 << 20  # picture samples handled at a time
 
@@ -81,6 +81,7 @@ def render(
     (19, 29)
     """
     raw = raw if isinstance(raw, RawImage) else RawImage(raw)
+    check_interpolation(interpolation)
     check_raw(raw, calibration)
     sizes = _patches(patch, calibration)
     layout = _Layout.of(calibration, sizes, samples)
@@ -178,7 +179,12 @@ class _Patches:
 
 
 def _patches(patch: float | Array, calibration: Calibration) -> _Patches:
-    values = np.asarray(to_numpy(patch) if hasattr(patch, "shape") else patch, float)
+    try:
+        values = np.asarray(to_numpy(patch) if hasattr(patch, "shape") else patch, float)
+    except (TypeError, ValueError):
+        values = np.zeros(0)
+    if values.size == 0 or patch is None or isinstance(patch, bool | str):
+        raise GeometryError(f"patch is {patch!r} but must be a size in pixels, or a map of sizes.")
     pitch = calibration.lattice.pitch
     checks.finite_array("patch", values, GeometryError)
     smallest, largest = float(np.abs(values).min()), float(np.abs(values).max())

@@ -47,7 +47,8 @@ def refocus_fourier(views: LightField, alpha: float) -> Array:
     al., "Rapid gridding reconstruction with a minimal oversampling ratio", IEEE Trans. Med. Imaging 24, 799
     (2005).
     """
-    checks.positive("alpha", alpha, "1")
+    checks.instance("views", views, LightField)
+    alpha = checks.positive("alpha", alpha, "1")
     _check_memory(views)
     data = as_float(views.data)
     single = arrays.is_single(data)

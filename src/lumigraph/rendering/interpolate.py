@@ -23,11 +23,10 @@ def taps(fraction: np.ndarray, interpolation: Interpolation) -> list[Tap]:
     ----------
     Keys, "Cubic convolution interpolation for digital image processing", IEEE Trans. ASSP 29, 1153 (1981).
     """
+    check_interpolation(interpolation)
     f = np.asarray(fraction, float)
     if interpolation == "linear":
         return [(0, 1 - f), (1, f)]
-    if interpolation != "cubic":
-        raise LumigraphError(f"interpolation is {interpolation!r} but must be 'cubic' or 'linear'.")
     return [
         (-1, ((2 - f) * f - 1) * f / 2),
         (0, (3 * f - 5) * f * f / 2 + 1),
@@ -51,6 +50,12 @@ def neighbours(
         for step, weight in taps(position - below, interpolation)
         if np.any(weight)
     ]
+
+
+def check_interpolation(interpolation: str) -> None:
+    """Refuse an unknown interpolation."""
+    if not isinstance(interpolation, str) or interpolation not in ("cubic", "linear"):
+        raise LumigraphError(f"interpolation is {interpolation!r} but must be 'cubic' or 'linear'.")
 
 
 def as_float(data: Array) -> Array:

@@ -12,7 +12,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.errors import GeometryError
 from lumigraph.rendering import memory
 from lumigraph.rendering.geometry import lit
-from lumigraph.rendering.interpolate import Interpolation, as_float, taps, weighted
+from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, taps, weighted
 
 _PAD = 2  # samples repeated at every edge, so that the taps of a position on the edge exist
 
@@ -55,6 +55,7 @@ def refocus(
     Ng et al., "Light field photography with a hand-held plenoptic camera", Stanford CTSR 2005-02, with the
     shear written for alpha' = F / F' as in the thesis' equation 4.7 (its 4.10 moves the focus the wrong way).
     """
+    checks.positive("alpha", alpha, "1")
     return refocus_stack(views, [alpha], interpolation=interpolation, oversample=oversample)[0, ...]
 
 
@@ -66,7 +67,11 @@ def refocus_stack(
     oversample: int = 1,
 ) -> Array:
     """Pictures (n, t, s[, c]) focused on one plane for each alpha; see `refocus`."""
-    alphas = [checks.positive("alpha", float(alpha), "1") for alpha in alphas]
+    checks.instance("views", views, LightField)
+    check_interpolation(interpolation)
+    if not isinstance(alphas, Sequence | np.ndarray) or np.ndim(alphas) != 1:
+        raise GeometryError(f"alphas is {alphas!r} but must be a list of numbers such as 1.0.")
+    alphas = [checks.positive("alpha", alpha, "1") for alpha in alphas]
     if not alphas:
         raise GeometryError(
             "alphas is empty but a stack needs at least one. Give a list of numbers such as 1.0."

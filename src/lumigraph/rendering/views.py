@@ -21,7 +21,10 @@ def view(views: LightField, v: int, u: int) -> Array:
     GeometryError
         There is no such view.
     """
+    checks.instance("views", views, LightField)
     nv, nu = views.aperture.shape
+    for name, index in (("v", v), ("u", u)):
+        checks.whole(name, index, -max(nv, nu))
     if not (-nv <= v < nv and -nu <= u < nu):
         raise GeometryError(f"there is no view ({v}, {u}): the aperture has {nv} x {nu}, counted from 0.")
     return views.data[v, u, ...]
@@ -35,6 +38,7 @@ def point_of_view(views: LightField, y: float, x: float) -> Array:
     GeometryError
         The place lies outside the aperture; the message gives its limits.
     """
+    checks.instance("views", views, LightField)
     grid, places = views.aperture, []
     for name, value, positions in zip("yx", (y, x), (grid.y, grid.x), strict=True):
         checks.finite(name, value)
@@ -75,9 +79,10 @@ def reduce_aperture(
     GeometryError
         A fraction outside 0 to 1, or another shape.
     """
+    checks.instance("views", views, LightField)
     if not 0 < checks.finite("fraction", fraction, "1") <= 1:
         raise GeometryError(f"fraction is {fraction:g} but must be above 0 and at most 1.")
-    if shape not in ("square", "round"):
+    if not isinstance(shape, str) or shape not in ("square", "round"):
         raise GeometryError(f"shape is {shape!r} but must be 'square' or 'round'.")
     full = views.aperture.shape
     kept = tuple(max(1, round(n * fraction)) for n in full)
@@ -110,6 +115,7 @@ def views_from_mosaic(mosaic: Array, aperture: Grid, lenslets: Grid, separation:
     GeometryError
         The mosaic's size is not that of the grids.
     """
+    checks.array("the mosaic", mosaic)
     (nv, nu), (nt, ns), tail = aperture.shape, lenslets.shape, tuple(mosaic.shape[2:])
     if tuple(mosaic.shape[:2]) != (nv * nt, nu * ns):
         raise GeometryError(

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import checks, memory
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, SamplingWarning
@@ -38,7 +38,9 @@ def plane_wave(grid: Grid, wavelength: float, tilt: Pair = (0.0, 0.0), dtype: An
     >>> round(float(np.angle(wave.data[0, 3])), 6)  # 2π · 1 um · sin(0.1) / 500 nm
     1.254544
     """
-    sines = np.sin(checks.pair("tilt", tilt, "rad"))
+    _check(grid, wavelength)
+    tilt = checks.pair("tilt", tilt, "rad")
+    sines = np.sin(tilt)
     if np.sum(sines**2) > 1:
         raise GeometryError(
             f"tilt is ({tilt[0]:.4g}, {tilt[1]:.4g}) rad: its squared sines add to {np.sum(sines**2):.4g}, "
@@ -83,6 +85,7 @@ def point_source(
     GeometryError
         A distance of zero.
     """
+    _check(grid, wavelength)
     if checks.finite("distance", distance) == 0:
         raise GeometryError(
             "distance is 0 m: the point lies in the grid's plane. Give a distance, or a pinhole."
@@ -131,11 +134,19 @@ def gaussian_beam(
     >>> round(float(beam.power) / (np.pi * 50e-6**2 / 2), 6)  # kept over distance
     1.0
     """
+    _check(grid, wavelength)
     checks.positive("waist", waist)
     k, start = 2 * np.pi / wavelength, -1j * np.pi * waist**2 / wavelength
     q = checks.finite("distance", distance) + start
     along = [np.exp(1j * k * np.square(c) / (2 * q)) for c in (grid.y, grid.x)]
     return Field((start / q * np.exp(1j * k * distance) * np.outer(*along)).astype(dtype), grid, wavelength)
+
+
+def _check(grid: Grid, wavelength: float) -> None:
+    """Refuse what is no grid or wavelength, or a wave that would not fit in memory."""
+    checks.instance("grid", grid, Grid)
+    checks.positive("wavelength", wavelength)
+    memory.require_plane(grid.shape, 32, "a wave")
 
 
 def _warn_if_coarse(what: str, grid: Grid, wavelength: float, sines: Pair) -> None:

@@ -7,10 +7,11 @@ Edges are grey: a sample takes the fraction of its area that the target covers.
 import math
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from lumigraph.core import checks, coverage
+from lumigraph.core import checks, coverage, memory
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, SamplingWarning
@@ -45,6 +46,7 @@ def pinhole(grid: Grid, diameter: float = 10e-6, position: Pair = (0.0, 0.0)) ->
     >>> round(float(hole.intensity.sum()) * 1e-12 / (math.pi * 10e-6**2), 9)
     1.0
     """
+    _check_grid(grid)
     radius = checks.positive("diameter", diameter) / 2
     center = checks.pair("position", position)
     picture = coverage.disc((grid.y - center[0])[:, None], grid.x - center[1], radius, grid.pitch)
@@ -73,6 +75,7 @@ def edge(grid: Grid, angle: float = 0.0, position: Pair = (0.0, 0.0)) -> Scene:
     >>> edge(Grid((1, 4), 1.0)).parts[0].intensity.tolist()
     [[0.0, 0.0, 0.5, 1.0]]
     """
+    _check_grid(grid)
     center = checks.pair("position", position)
     normal = coverage.sides(checks.finite("angle", angle, "rad"))
     distance = (grid.y - center[0])[:, None] * normal[0] + (grid.x - center[1]) * normal[1]
@@ -131,7 +134,8 @@ def usaf1951(
     >>> [round(float(bar_width(2, e)) * 1e6, 2) for e in (1, 6)]
     [125.0, 70.15]
     """
-    first, last = (groups, groups) if isinstance(groups, int) else groups
+    _check_grid(grid)
+    first, last = _first_and_last(groups)
     if first > last:
         raise GeometryError(f"groups are {first} to {last}: give the coarser (smaller) number first.")
     elements = list(_usaf_elements(first, last))
@@ -185,7 +189,8 @@ def gratings(grid: Grid, frequencies: Sequence[float] = THESIS_FREQUENCIES, *, s
     >>> gratings(Grid((2, 4), 1.0), (0.25, 0.01)).parts[0].intensity[0].round(6).tolist()
     [0.0, 0.5, 1.0, 0.5]
     """
-    if not len(frequencies):
+    _check_grid(grid)
+    if not isinstance(frequencies, Sequence | np.ndarray) or not np.size(frequencies):
         raise GeometryError("no frequencies were given. Give at least one [1/m].")
     for frequency in frequencies:
         if checks.positive("frequency", frequency, "1/m") >= (limit := 1 / (2 * grid.pitch[1])):
@@ -223,6 +228,7 @@ def siemens_star(
     GeometryError
         Fewer than one spoke, or a diameter that is not above zero.
     """
+    _check_grid(grid)
     if isinstance(spokes, bool) or not isinstance(spokes, int | np.integer) or spokes < 1:
         raise GeometryError(f"spokes is {spokes!r} but must be a whole number of at least 1.")
     radius = checks.positive("diameter", 0.9 * min(grid.size) if diameter is None else diameter) / 2
@@ -258,6 +264,7 @@ def photo(grid: Grid, image: np.ndarray | None = None) -> Scene:
     >>> photo(Grid((40, 60), 1e-6)).parts[0].intensity.shape
     (40, 40)
     """
+    _check_grid(grid)
     from skimage.transform import resize
 
     if image is None:
@@ -297,17 +304,39 @@ def points(positions: Sequence[Sequence[float]], intensities: Sequence[float] | 
     [[0.0, 0.0, 0.0], [0.001, 0.0, 0.005]]
     """
     rows = []
+    if not isinstance(positions, Sequence | np.ndarray):
+        raise GeometryError(f"positions are {positions!r} but must be a list of (y, x) or (y, x, dz).")
     for number, position in enumerate(positions):
+        if not isinstance(position, Sequence | np.ndarray):
+            raise GeometryError(f"point {number} is {position!r} but must be (y, x) or (y, x, dz).")
         if len(position) not in (2, 3):
             raise GeometryError(f"point {number} has {len(position)} numbers but needs (y, x) or (y, x, dz).")
         rows.append((*position, 0.0)[:3])
-    weights = np.ones(len(rows)) if intensities is None else np.asarray(intensities, float)
-    return Scene([Points(np.array(rows, float).reshape(-1, 3), weights)])
+    weights = np.ones(len(rows)) if intensities is None else intensities
+    return Scene([Points(rows or np.zeros((0, 3)), weights)])  # type: ignore[arg-type]
 
 
 def white(intensity: float = 1.0) -> Scene:
     """An evenly lit diffuser before the main lens: the scene of a white image."""
     return Scene([Diffuser(intensity)])
+
+
+def _check_grid(grid: Grid) -> None:
+    """Refuse what is no grid, or one whose picture would not fit in memory."""
+    checks.instance("grid", grid, Grid)
+    memory.require_plane(grid.shape, 32, "a target")
+
+
+def _first_and_last(groups: int | tuple[int, int]) -> tuple[int, int]:
+    """First and last USAF group, whole numbers from -10 to 20."""
+    both: tuple[Any, ...] = (
+        tuple(groups) if isinstance(groups, Sequence | np.ndarray) and np.ndim(groups) else (groups, groups)
+    )
+    if len(both) != 2 or any(
+        isinstance(n, bool) or not isinstance(n, int | np.integer) or not -10 <= n <= 20 for n in both
+    ):
+        raise GeometryError(f"groups is {groups!r} but must be one or two whole numbers from -10 to 20.")
+    return int(both[0]), int(both[1])
 
 
 def _usaf_elements(first: int, last: int):

@@ -5,6 +5,7 @@ Depths dz [m] are counted from the focused plane: positive is farther from the c
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -47,6 +48,8 @@ class Slice:
     dz: float = 0.0
 
     def __post_init__(self) -> None:
+        checks.array("a slice", self.intensity)
+        checks.instance("grid", self.grid, Grid)
         shape = tuple(self.intensity.shape)
         if len(shape) not in (2, 3) or shape[:2] != self.grid.shape:
             raise GeometryError(
@@ -78,11 +81,11 @@ class Slice:
 
     def at(self, dz: float) -> "Slice":
         """The slice moved by `dz` [m] away from the camera."""
-        return replace(self, dz=self.dz + dz)
+        return replace(self, dz=self.dz + checks.finite("dz", dz))
 
     def scaled(self, factor: float) -> "Slice":
         """The slice with its intensity multiplied by `factor`."""
-        return replace(self, intensity=self.intensity * factor)
+        return replace(self, intensity=self.intensity * checks.finite("factor", factor, "1"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,7 +111,7 @@ class Points:
     intensities: np.ndarray
 
     def __post_init__(self) -> None:
-        positions, intensities = np.asarray(self.positions, float), np.asarray(self.intensities, float)
+        positions, intensities = (_floats(name, getattr(self, name)) for name in ("positions", "intensities"))
         if positions.ndim != 2 or positions.shape[1] != 3 or intensities.shape != positions.shape[:1]:
             raise GeometryError(
                 f"positions have shape {positions.shape} and intensities {intensities.shape} but must be "
@@ -121,11 +124,11 @@ class Points:
 
     def at(self, dz: float) -> "Points":
         """The points moved by `dz` [m] away from the camera."""
-        return replace(self, positions=self.positions + np.array([0.0, 0.0, dz]))
+        return replace(self, positions=self.positions + np.array([0.0, 0.0, checks.finite("dz", dz)]))
 
     def scaled(self, factor: float) -> "Points":
         """The points with their intensities multiplied by `factor`."""
-        return replace(self, intensities=self.intensities * factor)
+        return replace(self, intensities=self.intensities * checks.finite("factor", factor, "1"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +157,7 @@ class Diffuser:
 
     def scaled(self, factor: float) -> "Diffuser":
         """The diffuser with its intensity multiplied by `factor`."""
-        return Diffuser(self.intensity * factor)
+        return Diffuser(self.intensity * checks.finite("factor", factor, "1"))
 
 
 Part = Slice | Points | Diffuser
@@ -184,6 +187,8 @@ class Scene:
     parts: tuple[Part, ...]
 
     def __init__(self, parts: Iterable[Part] = ()) -> None:
+        if not isinstance(parts, Iterable):
+            raise GeometryError(f"parts are {parts!r} but must be a list of Slice, Points and Diffuser.")
         object.__setattr__(self, "parts", tuple(parts))
         for part in self.parts:
             if not isinstance(part, Part):
@@ -205,6 +210,13 @@ class Scene:
     def scaled(self, factor: float) -> "Scene":
         """The scene with all intensities multiplied by `factor`."""
         return Scene(part.scaled(factor) for part in self.parts)
+
+
+def _floats(name: str, values: Any) -> np.ndarray:
+    try:
+        return np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise GeometryError(f"{name} are {values!r} but must be numbers, one row for each point.") from None
 
 
 def _check_intensity(what: str, intensity: Array) -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lumigraph.core import checks
 from lumigraph.core.arrays import Array, like, namespace
 from lumigraph.core.raw import BAYER_PATTERNS
 from lumigraph.errors import FormatError, GeometryError
@@ -34,10 +35,10 @@ def mosaic(image: Array, pattern: str = "RGGB") -> Array:
     >>> mosaic(np.broadcast_to([10, 20, 30], (2, 4, 3)), "GRBG").tolist()
     [[20, 10, 20, 10], [30, 20, 30, 20]]
     """
+    checks.array("a colour image", image)
     if image.ndim != 3 or image.shape[2] != 3:
         raise GeometryError(f"a colour image has shape (y, x, 3), not {tuple(image.shape)}.")
-    if pattern not in BAYER_PATTERNS:
-        raise FormatError(f"pattern is {pattern!r} but must be one of {', '.join(BAYER_PATTERNS)}.")
+    checks.choice("pattern", pattern, BAYER_PATTERNS, FormatError)
     xp, (rows, columns) = namespace(image), np.indices(tuple(image.shape[:2])) % 2
     result = image[:, :, 1]
     for place, colour in enumerate(pattern):

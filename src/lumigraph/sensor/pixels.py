@@ -3,6 +3,7 @@
 import numpy as np
 import scipy.fft
 
+from lumigraph.core import checks
 from lumigraph.core.arrays import WORKERS, Array, like, namespace, placement
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
@@ -52,6 +53,8 @@ def integrate(intensity: Array, grid: Grid, sensor: Sensor | Grid, *, turned: bo
     >>> integrate(even, Grid.square(6, 1.0), Grid.square(3, 1.5)).round(12).tolist()
     [[1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 1.0, 1.0]]
     """
+    checks.array("intensity", intensity)
+    checks.instance("grid", grid, Grid)
     if tuple(intensity.shape[-2:]) != grid.shape:
         raise GeometryError(
             f"intensity has shape {tuple(intensity.shape)} but the grid has {grid.shape}: "
@@ -82,6 +85,8 @@ def integrate_adjoint(values: Array, grid: Grid, sensor: Sensor | Grid, *, turne
     GeometryError
         The values' last axes differ from the pixels.
     """
+    checks.array("values", values)
+    checks.instance("grid", grid, Grid)
     pixels = _pixels(sensor)
     if tuple(values.shape[-2:]) != pixels.shape:
         raise GeometryError(
@@ -94,7 +99,10 @@ def integrate_adjoint(values: Array, grid: Grid, sensor: Sensor | Grid, *, turne
 
 
 def _pixels(sensor: Sensor | Grid) -> Grid:
-    return sensor.grid if isinstance(sensor, Sensor) else sensor
+    if isinstance(sensor, Sensor):
+        return sensor.grid
+    checks.instance("sensor", sensor, Grid)
+    return sensor
 
 
 def _matrices(grid: Grid, pixels: Grid, array: Array, turned: bool) -> tuple[Array, Array]:

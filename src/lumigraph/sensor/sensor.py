@@ -99,13 +99,18 @@ class Sensor:
         LumigraphError
             NaN, infinite or negative intensities.
         """
+        checks.array("intensity", intensity)
+        if rng is not None:
+            checks.instance("rng", rng, np.random.Generator)
         light = np.asarray(to_numpy(intensity), np.float64)
         self._check(light)
         brightest = float(light.max()) if reference is None else checks.positive("reference", reference, "1")
         gain = checks.positive("fill", fill, "1") * self.full_well / (brightest or 1.0)
         electrons = light * gain
         if rng is not None:
-            electrons = rng.poisson(electrons) + rng.normal(0.0, self.read_noise, electrons.shape)
+            electrons = rng.poisson(np.minimum(electrons, 2.0**62)) + rng.normal(
+                0.0, self.read_noise, electrons.shape
+            )
         numbers = np.clip(np.rint(electrons * (self.levels / self.full_well)), 0, self.levels)
         data = numbers.astype(np.uint8 if self.bits <= 8 else np.uint16)
         known = {"electrons_per_intensity": gain, "full_well": self.full_well, "read_noise": self.read_noise}
