@@ -11,7 +11,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.errors import LumigraphError
 from lumigraph.plots.axes import canvas, check_image, draw
 
-MARK_COLOUR = "#8a8a8a"
+MARK_COLOUR = "#444444"
 STYLES = ("-", "--", "-.", ":")
 
 

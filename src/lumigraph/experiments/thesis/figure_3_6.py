@@ -34,6 +34,7 @@ def run(context: Context) -> Outcome:
     names = [name for name in two_f.METHODS if not (context.quick and name.startswith("multi"))]
     near, x = two_f.middle(250 * um), two_f.GRID.x
     pictures, profiles, spectra, rows = [], {}, {}, []
+    frequencies = np.zeros(0)
     for step, name in enumerate(names):
         context.progress(step / len(names), name)
         image, _ = two_f.point_image(name, two_f.DIAMETER, 10 * um)
