@@ -8,6 +8,7 @@ from lumigraph.analysis import centroid
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
+from lumigraph.core.raw import RawImage
 from lumigraph.experiments.registry import Context, Outcome, Row, experiment
 from lumigraph.experiments.thesis.point_images import camera
 from lumigraph.instruments import FocusedPlenopticCamera
@@ -50,8 +51,8 @@ def run(context: Context) -> Outcome:
             / found.image_distance
         )
         rows.append(
-            Row(f"error with the printed geometry, m = {m:g}", 1e6 * (wrong - _PLACE), "um", None, expected, 20.0,
-                note="± half a pitch times a/z2")
+            Row(f"error with the printed geometry, m = {m:g}", 1e6 * (wrong - _PLACE), "um", None, expected,
+                20.0, note="± half a pitch times a/z2")
         )  # fmt: skip
         panels += [
             (_near(right, grid), f"m = {m:g}: centres x (1 + b/L), patch m p z2/L"),
@@ -59,13 +60,13 @@ def run(context: Context) -> Outcome:
         ]
     return Outcome(
         tuple(rows),
-        ((images(panels, columns=2), "A point at x = 1 mm; pictures from 0.7 to 1.3 mm."),),
-        why="Equation 5.4 takes z for z + a, and 5.5 leaves z2/L out: patches overlap in what they show, and the "
-        "picture is larger than the main-lens image by L/z2.",
+        ((images(panels, columns=2), "A point at x = 1 mm; pictures from 0.5 to 1.5 mm."),),
+        why="Equation 5.4 takes z for z + a, and 5.5 leaves z2/L out: patches overlap in what they show, and "
+        "the picture is larger than the main-lens image by L/z2.",
     )
 
 
-def _printed(found: FocusedPlenopticCamera, raw: object) -> tuple[np.ndarray, Grid]:
+def _printed(found: FocusedPlenopticCamera, raw: RawImage) -> tuple[np.ndarray, Grid]:
     """Picture by equations 5.4 and 5.5, one lenslet's pitch p for each patch."""
     right, pixel = found.calibration, found.pixels.pixel_pitch
     pitch = found.lenslets.pitch * (1 + found.lenslet_distance / found.image_distance) / pixel
@@ -88,10 +89,10 @@ def _place(picture: np.ndarray, grid: Grid) -> float:
     near = np.abs(x) < 3e-4
     y = np.abs(grid.y) < 3e-4
     part = np.maximum(picture[np.ix_(y, near)], 0)
-    window = Grid(part.shape, grid.pitch, (0.0, grid.x[near][part.shape[1] // 2]))
+    window = Grid(part.shape, grid.pitch, (0.0, float(grid.x[near][part.shape[1] // 2])))
     return centroid(part, window)[1]
 
 
 def _near(picture: np.ndarray, grid: Grid) -> np.ndarray:
-    part = picture[np.ix_(np.abs(grid.y) < 3e-4, np.abs(grid.x - _PLACE) < 3e-4)]
+    part = picture[np.ix_(np.abs(grid.y) < 5e-4, np.abs(grid.x - _PLACE) < 5e-4)]
     return np.sqrt(np.maximum(part, 0))

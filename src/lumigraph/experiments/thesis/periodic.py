@@ -175,7 +175,7 @@ def _reach(camera: FocusedPlenopticCamera, dz: float) -> int:
 def _point(
     camera: FocusedPlenopticCamera, dz: float, place: tuple[float, float], size: tuple[int, int]
 ) -> np.ndarray:
-    """Intensity (reach · samples)² of a point whose chief ray meets the middle lenslet at `place` [pitches]."""
+    """Intensity (reach · samples)² of a point seen straight at `place` [pitches] of the middle lenslet."""
     samples, reach = size
     grid = Grid.square(reach * samples, camera.lenslets.pitch / samples)
     y, x = grid.y - place[0] * camera.lenslets.pitch, grid.x - place[1] * camera.lenslets.pitch

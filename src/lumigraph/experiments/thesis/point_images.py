@@ -11,6 +11,7 @@ import numpy as np
 from lumigraph.core.grid import Grid
 from lumigraph.core.raw import RawImage
 from lumigraph.instruments import FocusedPlenopticCamera, SingleLensCamera
+from lumigraph.instruments.parts import MainLens, Pixels
 from lumigraph.rendering import render
 from lumigraph.rendering.focused import rendered_grid
 from lumigraph.scene import targets
@@ -33,11 +34,9 @@ def main_lens_camera(plenoptic: FocusedPlenopticCamera, pixels: int = 401) -> Si
     return SingleLensCamera(
         wavelength=plenoptic.wavelength,
         object_distance=plenoptic.object_distance,
-        main_lens={
-            "focal_length": plenoptic.main_lens.focal_length, "diameter": plenoptic.pupil_diameter
-        },
-        sensor={"pixel_pitch": plenoptic.pixels.pixel_pitch, "shape": (pixels, pixels)},
-    )  # fmt: skip
+        main_lens=MainLens(focal_length=plenoptic.main_lens.focal_length, diameter=plenoptic.pupil_diameter),
+        sensor=Pixels(pixel_pitch=plenoptic.pixels.pixel_pitch, shape=(pixels, pixels)),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

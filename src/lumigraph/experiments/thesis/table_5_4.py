@@ -39,8 +39,8 @@ def run(context: Context) -> Outcome:
     return Outcome(
         tuple(rows),
         tuple(figures),
-        why="The lenslets pass m p/(λb); equation 5.18 prints b/p for p/b. The lower cut-offs of the thesis come "
-        "from its patches (P m, centred by x b/z), which do not meet: not from diffraction.",
+        why="The lenslets pass m p/(λb); equation 5.18 prints b/p for p/b. The lower cut-offs of the thesis "
+        "come from its patches (P m, centred by x b/z), which do not meet: not from diffraction.",
     )
 
 
