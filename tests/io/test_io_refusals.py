@@ -310,3 +310,11 @@ def test_what_no_format_holds_is_refused_and_leaves_nothing_behind(tmp_path, thi
     with pytest.raises(FormatError, match=message):
         io.save(thing, tmp_path / name)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("path", [None, 5, [], b"a.tiff"])
+def test_a_path_is_text(path):
+    with pytest.raises(FormatError, match=r"the path is .* but must be text"):
+        io.open(path)
+    with pytest.raises(FormatError, match=r"the path is .* but must be text"):
+        io.save(np.ones((2, 2)), path)

@@ -206,3 +206,9 @@ def test_real_raw_images_are_read():
     assert (letters.data.shape, letters.bit_depth) == ((960, 1280), 8)
     vesicle = io.open(real("lfm_guv", "Lightfield_GUVExperim1.tif"))
     assert (vesicle.data.shape, vesicle.data.dtype) == ((436, 436), np.dtype("uint16"))
+
+
+def test_the_byte_order_of_an_array_does_not_matter_to_a_png(tmp_path):
+    values = np.array([[1, 2], [300, 4]], ">u2")
+    io.save(values, tmp_path / "a.png")
+    assert np.array_equal(io.open(tmp_path / "a.png").data, values)

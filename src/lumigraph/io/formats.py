@@ -35,7 +35,7 @@ def ending(path: str | os.PathLike[str]) -> str:
     FormatError
         None of `ENDINGS`.
     """
-    name = Path(path).name.lower()
+    name = source.as_path(path).name.lower()
     for known in ENDINGS:
         if name.endswith(known):
             return known

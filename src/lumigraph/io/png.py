@@ -76,6 +76,7 @@ def to_integers(image: Array, *, white: float | None = None, bits: int = 16) -> 
         raise FormatError(
             f"a PNG holds (y, x) or (y, x, 3) but the picture has shape {data.shape}. Use TIFF."
         )
+    data = data.astype(data.dtype.newbyteorder("="), copy=False)
     if data.dtype == np.uint8 or (data.dtype == np.uint16 and data.ndim == 2):
         return data
     if data.dtype.kind not in "fb":

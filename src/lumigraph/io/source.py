@@ -25,6 +25,14 @@ _SIGNATURES = (
 )
 
 
+def as_path(path: str | os.PathLike[str]) -> Path:
+    """The path, refused where it is no text and no path."""
+    try:
+        return Path(path)
+    except TypeError:
+        raise FormatError(f"the path is {path!r} but must be text, such as 'raw.tiff'.") from None
+
+
 def existing(path: str | os.PathLike[str]) -> Path:
     """The path, refused where nothing lies there; near names are suggested.
 
@@ -33,7 +41,7 @@ def existing(path: str | os.PathLike[str]) -> Path:
     FormatError
         No such file, or a folder on the way that does not exist.
     """
-    path = Path(path)
+    path = as_path(path)
     if path.exists():
         return path
     if not path.parent.is_dir():
