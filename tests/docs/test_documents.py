@@ -160,3 +160,11 @@ def test_tests_named_in_the_errata_exist(reference):
         node.name for node in ast.walk(ast.parse((ROOT / file).read_text())) if hasattr(node, "name")
     ]
     assert name in functions
+
+
+@pytest.mark.parametrize("name", sorted(set(re.findall(r"`lumigraph reproduce ([^`]+)`", ERRATA))))
+def test_experiments_named_in_the_errata_exist(name):
+    from lumigraph.experiments import find
+
+    (found,) = find((name,))
+    assert found.id == name
