@@ -1,11 +1,15 @@
 """Raw images by wave optics, from a camera and a scene.
 
 - `imaging`: `simulate`
+- `periodic`: `periodic_operator`, incoherent planes before a lenslet array, exact to about 1 %; its adjoint
+- `camera`: `Camera`, what a simulation asks of an instrument
 - `coherence`: `Incoherent`, `Coherent`, `Snapshots`, `TiltedWaves`: how the scene's light interferes
 """
 
+from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Snapshots, TiltedWaves
-from lumigraph.simulation.imaging import Camera, Interrupted, simulate
+from lumigraph.simulation.imaging import Interrupted, simulate
+from lumigraph.simulation.periodic import PeriodicOperator, periodic_operator
 
 __all__ = [
     "Camera",
@@ -13,7 +17,9 @@ __all__ = [
     "Coherent",
     "Incoherent",
     "Interrupted",
+    "PeriodicOperator",
     "Snapshots",
     "TiltedWaves",
+    "periodic_operator",
     "simulate",
 ]

@@ -99,8 +99,8 @@ class Snapshots:
 
     def __post_init__(self) -> None:
         _positive_count(self.count)
-        if self.coherence_index is not None and self.coherence_index < 1:
-            raise LumigraphError(f"coherence_index is {self.coherence_index} but must be at least 1.")
+        if self.coherence_index is not None:
+            checks.whole("coherence_index", self.coherence_index, error=LumigraphError)
 
     @property
     def shots(self) -> int:
@@ -129,14 +129,15 @@ class Snapshots:
 class Incoherent:
     """Spatially incoherent light, like every lit scene.
 
-    Point scenes are exact: the intensities of all points are added. Extended scenes use white-phase
-    `Snapshots` and carry their speckle, about 1/sqrt(snapshots) rms of a pixel that resolves it; an
-    operator without speckle is to replace them.
+    Points are exact: their intensities are added. Extended scenes before a lenslet array that is not
+    turned go through the lenslet-periodic operator (`simulation.periodic`), without speckle, to about 1 %
+    rms. Single lenses, turned arrays and operators above 1 GiB take white-phase `Snapshots`, which carry
+    speckle of about 1/sqrt(snapshots) rms in a pixel that resolves it.
 
     Parameters
     ----------
     snapshots
-        Number of snapshots for extended scenes.
+        Number of snapshots, where they are needed.
     rng
         Seed or generator of the snapshots.
     """

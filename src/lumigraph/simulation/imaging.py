@@ -5,88 +5,30 @@ import warnings
 from builtins import map as serial_map
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from lumigraph.core import arrays, memory
+from lumigraph.core import arrays, checks, memory
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
-from lumigraph.core.lattice import Lattice
 from lumigraph.core.raw import RawImage
 from lumigraph.elements import CircularAperture, Train
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
 from lumigraph.propagation import propagate
 from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
-from lumigraph.sensor import Sensor, integrate
+from lumigraph.sensor import integrate
+from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.coherence import Coherence, Incoherent, Snapshots
+from lumigraph.simulation.periodic import fits, kernel_bytes, periodic_operator
 
 PUPIL_OVERSAMPLING = 1.1
 """How much denser than half of λL/p the points of the pupil stand that make a white image."""
 
+LARGEST_OPERATOR = 2.0**30
+"""Kernels of the lenslet-periodic operator above this [bytes] give way to snapshots."""
+
 Progress = Callable[[int, int], None]
-
-
-class Camera(Protocol):
-    """What `simulate` asks of an instrument."""
-
-    @property
-    def wavelength(self) -> float:
-        """In vacuum [m]."""
-        ...
-
-    @property
-    def object_distance(self) -> float:
-        """Focused plane to main lens, z1 [m]."""
-        ...
-
-    @property
-    def separation(self) -> float:
-        """Main lens to lenslets, or to the sensor where there are none [m]."""
-        ...
-
-    @property
-    def pupil_diameter(self) -> float:
-        """Of the main lens [m]."""
-        ...
-
-    @property
-    def lattice(self) -> Lattice | None:
-        """Where the lenslets stand [m]."""
-        ...
-
-    @property
-    def object_grid(self) -> Grid:
-        """Samples of the focused plane."""
-        ...
-
-    @property
-    def pupil_grid(self) -> Grid:
-        """Samples of the main lens."""
-        ...
-
-    @property
-    def lenslet_grid(self) -> Grid | None:
-        """Samples of the lenslet plane."""
-        ...
-
-    @property
-    def image_grid(self) -> Grid:
-        """Samples of the sensor plane."""
-        ...
-
-    @property
-    def sensor(self) -> Sensor:
-        """Pixels."""
-        ...
-
-    def image_train(self) -> Train:
-        """From the field just before the main lens to the sensor."""
-        ...
-
-    def relay_train(self) -> Train | None:
-        """From the field just before the lenslets to the sensor."""
-        ...
 
 
 class Interrupted(KeyboardInterrupt):
@@ -150,31 +92,52 @@ def simulate(
     Interrupted
         A KeyboardInterrupt; it carries the raw image of what was finished.
     """
-    if coherence is None:
-        coherence = Incoherent()
-    if isinstance(coherence, Incoherent):
-        coherence = Snapshots(coherence.snapshots, rng=coherence.rng)
+    coherence = Incoherent() if coherence is None else coherence
     _check(camera, scene)
-    shots, total = _shots(camera, scene, coherence)
-    intensity = np.zeros(camera.image_grid.shape)
+    exact = _periodic(camera, scene) if isinstance(coherence, Incoherent) else []
+    drawn = (
+        Snapshots(coherence.snapshots, rng=coherence.rng) if isinstance(coherence, Incoherent) else coherence
+    )
+    scene = Scene(part for part in scene.parts if part not in exact)
+    shots, total = _shots(camera, scene, drawn)
+    total += len(exact)
+    tell = progress or (lambda done, total: None)
+    intensity, pixels = np.zeros(camera.image_grid.shape), np.zeros(camera.sensor.shape)
     done = 0
     try:
+        for part in exact:
+            operator = periodic_operator(camera, part.trimmed().grid, part.dz)
+            pixels += operator.forward(arrays.to_numpy(part.trimmed().intensity).astype(np.float32))
+            done += 1
+            tell(done, total)
         for image in map(_Shot.intensity, shots):
             intensity += image
             done += 1
-            if progress is not None:
-                progress(done, total)
+            tell(done, total)
     except KeyboardInterrupt:
         if not done:
             raise
-        if all(isinstance(part, Slice) for part in scene.parts):  # equal shots: fewer of them, as bright
-            intensity *= total / done
-        raise Interrupted(_read_out(camera, intensity, coherence, done)) from None
-    return _read_out(camera, intensity, coherence, total)
+        if not exact and all(isinstance(part, Slice) for part in scene.parts):
+            intensity *= total / done  # equal shots: fewer of them, as bright
+        raise Interrupted(_read_out(camera, (intensity, pixels), coherence, done)) from None
+    return _read_out(camera, (intensity, pixels), coherence, total)
 
 
-def _read_out(camera: Camera, intensity: np.ndarray, coherence: Coherence, shots: int) -> RawImage:
-    pixels = integrate(intensity, camera.image_grid, camera.sensor)
+def _periodic(camera: Camera, scene: Scene) -> list[Slice]:
+    """Slices that the lenslet-periodic operator takes."""
+    if not fits(camera):
+        return []
+    slices = [part for part in scene.parts if isinstance(part, Slice)]
+    return [part for part in slices if kernel_bytes(camera, part.dz) <= LARGEST_OPERATOR]
+
+
+def _read_out(
+    camera: Camera, light: tuple[np.ndarray, np.ndarray], coherence: Coherence | Incoherent, shots: int
+) -> RawImage:
+    """Raw image of an intensity on the camera's grid, and of one that is on the pixels already."""
+    intensity, pixels = light
+    if intensity.any():
+        pixels = pixels + integrate(intensity, camera.image_grid, camera.sensor)
     # A hard edge rings below zero when it is interpolated to pixels; a sensor counts no negative light.
     data = np.maximum(pixels, 0).astype(np.float32)
     known = {"simulated": repr(coherence), "shots": shots, "wavelength": camera.wavelength}
@@ -183,6 +146,11 @@ def _read_out(camera: Camera, intensity: np.ndarray, coherence: Coherence, shots
 
 def _check(camera: Camera, scene: Scene) -> None:
     """Refuse scenes that are empty or behind the lens, and propagations that do not fit in memory."""
+    checks.instance("scene", scene, Scene)
+    if not hasattr(camera, "image_train"):
+        raise GeometryError(
+            f"camera is of type {type(camera).__name__} but must be a camera, such as PlenopticCamera."
+        )
     if not scene.parts:
         raise GeometryError("the scene is empty. Add targets, points or a diffuser.")
     for part in scene.parts:

@@ -1,0 +1,398 @@
+r"""Incoherent raw images without speckle: the lenslet-periodic operator.
+
+Under incoherent light the intensity on the sensor is linear in the object's, and a lenslet array repeats
+itself. Two facts make this a matrix product:
+
+1. For each place s on the sensor, the intensity h(s; x) of an object point x is band-limited in x by the
+   main lens, at D/(λz). So an object is represented by points :math:`\delta \le \lambda z/(2D)` apart.
+2. In the Fresnel approximation, without the phase exp(iπw²/(λL)) of the lenslet plane (Talanov's lens
+   transformation), the camera is telecentric: b becomes b L/(L + b), the sensor is magnified by 1 + b/L
+   afterwards, and moving the object point by c z/L moves the intensity by exactly c, a cell of the array.
+
+So only the points of one cell have images of their own. With n points along each side of a cell, the
+raw image is a sum over neighbouring cells of (cells × n²) · (n² × samples of a cell): one matrix product
+for each offset between an object's cell and an image's.
+
+The array is taken to continue beyond its border, and the image cut off there: what the outermost
+lenslets receive includes the little that lenslets beyond them would diffract into them.
+
+M. Broxton et al., Opt. Express 21, 25418 (2013) use the same periodicity in a light-field microscope.
+"""
+
+import math
+import warnings
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.special import i0
+
+from lumigraph.core import arrays, coverage, memory
+from lumigraph.core.arrays import Array
+from lumigraph.core.cache import ByteCache
+from lumigraph.core.field import Field
+from lumigraph.core.grid import Grid
+from lumigraph.elements import LensletArray, ThinLens
+from lumigraph.errors import SamplingError, SamplingWarning
+from lumigraph.propagation import propagate
+from lumigraph.scene import sources
+from lumigraph.sensor import Sensor, integrate, integrate_adjoint
+from lumigraph.simulation.camera import Camera
+
+OVERSAMPLING = 1.5
+"""How much closer than λz/(2D) the points of a cell stand, so that a short kernel interpolates them."""
+
+KERNEL = 10
+"""Half width [points] of that kernel: a Kaiser-windowed sinc, exact to 1e-5 at this oversampling."""
+
+KAISER_BETA = 10.5
+"""Of the kernel's window: 104 dB."""
+
+FINENESS = 3.0
+"""Samples of an image's cell, over what its incoherent cut-off asks for."""
+
+
+_KERNELS = ByteCache(limit=2**30)
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """Rectangular cells that tile a lenslet array, one lenslet or more in each.
+
+    Parameters
+    ----------
+    size
+        Height and width of a cell [m].
+    edge
+        Corner (y, x) of the first cell with the least coordinates [m].
+    count
+        Cells along y and x that hold the array.
+    points
+        Object points along y and x of a cell.
+    samples
+        Samples of the image along y and x of a cell; multiples of `points`.
+    extent
+        Height and width of the array, centred on the axis [m]; the cells may reach beyond it.
+    """
+
+    size: tuple[float, float]
+    edge: tuple[float, float]
+    count: tuple[int, int]
+    points: tuple[int, int]
+    samples: tuple[int, int]
+    extent: tuple[float, float]
+
+    @property
+    def step(self) -> tuple[float, float]:
+        """Pitch of the image's samples along y and x [m]."""
+        return self.size[0] / self.samples[0], self.size[1] / self.samples[1]
+
+    def grid(self, per_cell: tuple[int, int], scale: float, margin: int) -> Grid:
+        """`per_cell` samples of each cell and of `margin` more on all sides, times `scale`.
+
+        The first sample of a cell stands on its edge; a negative scale turns the plane by 180°.
+        """
+        shape, pitch, center = [], [], []
+        for size, edge, n, k in zip(self.size, self.edge, self.count, per_cell, strict=True):
+            shape.append((n + 2 * margin) * k)
+            pitch.append(size / k * abs(scale))
+            center.append((edge - margin * size + (shape[-1] // 2) * size / k) * scale)
+        return Grid((shape[0], shape[1]), (pitch[0], pitch[1]), (center[0], center[1]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PeriodicOperator:
+    """Raw image of an incoherent plane at one depth, and its adjoint.
+
+    Parameters
+    ----------
+    cells
+        Of the lenslet array.
+    kernels
+        Images of a cell's points (T, T, ny nx, my mx), float32: [dy, dx] is the image in the cell that
+        stands (dy, dx) - T // 2 from the points' own; ny nx points, my mx samples.
+    object_grid
+        Samples of the object.
+    object_scale
+        Position of a point's image on the lenslets over its own: -L/z.
+    image_scale
+        Magnification of the sensor's plane, 1 + b/L.
+    sensor
+        Pixels.
+    """
+
+    cells: Cells
+    kernels: Array
+    object_grid: Grid
+    object_scale: float
+    image_scale: float
+    sensor: Sensor
+
+    @property
+    def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:
+        """Pixels (ny, nx) of the raw image, samples (y, x) of the object."""
+        return self.sensor.shape, self.object_grid.shape
+
+    def forward(self, intensity: Array) -> Array:
+        """Raw image (ny, nx), turned by 180°, of an object's intensity (y, x) on `object_grid`."""
+        xp, (spread_y, spread_x) = arrays.namespace(intensity), self._spread(intensity)
+        points = _by_cell(spread_y @ intensity @ xp.matrix_transpose(spread_x), self.cells.points)
+        kernels = arrays.like(self.kernels, intensity)
+        rows, columns = (n + 2 for n in self.cells.count)
+        image = 0.0
+        for dy, dx, (down, across) in self._offsets():
+            part = xp.reshape(points[down, across, ...], (rows * columns, -1))
+            image = image + part @ kernels[dy, dx, ...]
+        plane = _as_plane(xp.reshape(image, (rows, columns, -1)), self.cells.samples)
+        pixels = integrate(plane, self._image_grid, self.sensor)
+        return pixels * arrays.like(self._lit, intensity)
+
+    def adjoint(self, raw: Array) -> Array:
+        """Transpose of `forward`: (y, x) on `object_grid` from a raw image (ny, nx)."""
+        xp, (spread_y, spread_x) = arrays.namespace(raw), self._spread(raw)
+        plane = integrate_adjoint(raw * arrays.like(self._lit, raw), self._image_grid, self.sensor)
+        image = _by_cell(plane, self.cells.samples)
+        rows, columns = image.shape[:2]
+        flat, kernels = xp.reshape(image, (rows * columns, -1)), arrays.like(self.kernels, raw)
+        margin = 2 * self._reach
+        points = 0.0
+        for dy, dx, _ in self._offsets():
+            part = xp.reshape(flat @ xp.matrix_transpose(kernels[dy, dx, ...]), (rows, columns, -1))
+            points = points + _surrounded(part, (margin - dy, dy), (margin - dx, dx))
+        plane = _as_plane(points, self.cells.points)
+        return xp.matrix_transpose(spread_y) @ plane @ spread_x
+
+    @property
+    def _reach(self) -> int:
+        """How many cells off an image still falls."""
+        return self.kernels.shape[0] // 2
+
+    def _offsets(self) -> Iterator[tuple[int, int, tuple[slice, slice]]]:
+        """Offsets (dy, dx) of the kernels, and the points' cells that they carry to the image's cells."""
+        margin, (rows, columns) = 2 * self._reach, (n + 2 for n in self.cells.count)
+        for dy in range(margin + 1):
+            for dx in range(margin + 1):
+                top, left = margin - dy, margin - dx
+                yield dy, dx, (slice(top, top + rows), slice(left, left + columns))
+
+    def _spread(self, array: Array) -> tuple[Array, Array]:
+        """Matrices that represent an object's samples by the points of the cells, along y and along x."""
+        points = self.cells.grid(self.cells.points, 1 / self.object_scale, self._reach + 1)
+        matrices = []
+        for axis in (0, 1):
+            at = (points.y, points.x)[axis] if self.object_scale > 0 else _descending(points, axis)
+            off = (at[:, None] - (self.object_grid.y, self.object_grid.x)[axis]) / points.pitch[axis]
+            matrix = kernel(off) * (self.object_grid.pitch[axis] / points.pitch[axis])
+            matrices.append(arrays.like(matrix, array))
+        return matrices[0], matrices[1]
+
+    @property
+    def _image_grid(self) -> Grid:
+        return self.cells.grid(self.cells.samples, self.image_scale, 1)
+
+    @property
+    def _lit(self) -> np.ndarray:
+        """Part of each pixel (ny, nx) that the array covers."""
+        along, pixels = [], self.sensor.grid
+        for axis in (0, 1):
+            half = self.cells.extent[axis] / 2 * self.image_scale
+            along.append(coverage.interval((pixels.y, pixels.x)[axis], pixels.pitch[axis], -half, half))
+        return np.outer(*along)
+
+
+def kernel(offset: np.ndarray) -> np.ndarray:
+    """Interpolation kernel at offsets [points]: a sinc in a Kaiser window of half width `KERNEL`."""
+    inside = np.clip(1 - (offset / KERNEL) ** 2, 0, None)
+    window = np.where(np.abs(offset) <= KERNEL, i0(KAISER_BETA * np.sqrt(inside)) / i0(KAISER_BETA), 0)
+    return np.sinc(offset) * window
+
+
+def periodic_operator(
+    camera: Camera, grid: Grid, dz: float = 0.0, *, dropped: float = 0.01
+) -> PeriodicOperator:
+    """Operator from a plane at depth `dz`, sampled on `grid`, to the raw image; kernels are kept for reuse.
+
+    Parameters
+    ----------
+    camera
+        With an array that is not turned: see `fits`.
+    grid
+        Samples of the object.
+    dz
+        Depth of the plane from the focused one [m], positive farther.
+    dropped
+        Part of a point's light that may fall outside the window in which its image is computed. What
+        falls inside is scaled up to all of it, so that only the faintest surroundings are lost.
+
+    Raises
+    ------
+    SamplingError
+        The array is turned, or the kernels do not fit in memory.
+    """
+    if not fits(camera):
+        raise SamplingError("the lenslet array is turned against the axes: use Snapshots, or rotation 0.")
+    distance = camera.object_distance + dz
+    cells, scale = _cells(camera, distance), 1 + _lenslet_distance(camera) / camera.separation
+    reach = _window(camera, cells, distance, dropped)
+    needed = 2 * _size(cells, reach)
+    memory.require(needed, "the periodic operator", "Use slower lenslets, or Snapshots.", SamplingError)
+    optics = (
+        camera.wavelength,
+        camera.separation,
+        scale,
+        camera.lens_train(),
+        _array(camera),
+        camera.pupil_grid,
+    )
+    kernels = _KERNELS.get(
+        repr((cells, distance, reach, optics)),
+        lambda: _kernels(camera, cells, distance, reach) / np.float32(scale**2),
+    )
+    return PeriodicOperator(cells, kernels, grid, -camera.separation / distance, scale, camera.sensor)
+
+
+def kernel_bytes(camera: Camera, dz: float = 0.0, *, dropped: float = 0.01) -> float:
+    """Memory that the kernels of `periodic_operator` take [bytes]."""
+    distance = camera.object_distance + dz
+    cells = _cells(camera, distance)
+    return _size(cells, _window(camera, cells, distance, dropped))
+
+
+def _size(cells: Cells, reach: int) -> float:
+    return 4.0 * (2 * reach + 1) ** 2 * math.prod(cells.points) * math.prod(cells.samples)
+
+
+def fits(camera: Camera) -> bool:
+    """Whether the camera has an array whose cells lie along the axes."""
+    lattice = camera.lattice
+    return lattice is not None and abs(lattice.rotation) < 1e-12 and camera.lenslet_distance is not None
+
+
+def _lenslet_distance(camera: Camera) -> float:
+    assert camera.lenslet_distance is not None  # `fits` has been asked
+    return camera.lenslet_distance
+
+
+def _array(camera: Camera) -> LensletArray:
+    train = camera.relay_train()
+    assert train is not None
+    array = train.elements[0]
+    assert isinstance(array, LensletArray)
+    return array
+
+
+def _cells(camera: Camera, distance: float) -> Cells:
+    """The smallest upright rectangle that repeats the lattice, its points and its samples."""
+    lattice, array = camera.lattice, _array(camera)
+    assert lattice is not None
+    if lattice.layout == "hex":
+        size = (math.sqrt(3) * lattice.pitch, lattice.pitch * lattice.kinds)
+    else:
+        size = lattice.pitches
+    extent = array.extent or camera.image_grid.size
+    count = tuple(max(1, math.ceil(e / s - 1e-6)) for e, s in zip(extent, size, strict=True))
+    # Cells are centred on a lattice point or, for an even number of them, on the axis' side of it.
+    edge = tuple(
+        _nearest(-n * s / 2, o - s / 2, s) for n, s, o in zip(count, size, lattice.origin, strict=True)
+    )
+    wavelength, b, L = camera.wavelength, _lenslet_distance(camera), camera.separation
+    finest = wavelength * L / (2 * camera.pupil_diameter) / OVERSAMPLING
+    image = wavelength * (b * L / (b + L)) / lattice.pitch / 2 / FINENESS
+    points = tuple(math.ceil(s / finest) for s in size)
+    samples = tuple(n * math.ceil(s / image / n) for s, n in zip(size, points, strict=True))
+    return Cells(_pair(size), _pair(edge), _pair(count), _pair(points), _pair(samples), _pair(extent))
+
+
+def _pair(values: Iterable[Any]) -> tuple[Any, Any]:
+    y, x = values
+    return y, x
+
+
+def _nearest(value: float, start: float, step: float) -> float:
+    """The number nearest to `value` among ``start + k * step``."""
+    return start + round((value - start) / step) * step
+
+
+def _window(camera: Camera, cells: Cells, distance: float, dropped: float) -> int:
+    """Cells on each side of a point's own that its image reaches."""
+    wavelength, L, D = camera.wavelength, camera.separation, camera.pupil_diameter
+    focal_length = _focal_length(camera)
+    blur = D / 2 * abs(1 - L * (1 / focal_length - 1 / distance))
+    tail = 2 * wavelength * L / D / (math.pi**2 * dropped)
+    return math.ceil((blur + tail) / min(cells.size) + 0.5)
+
+
+def _focal_length(camera: Camera) -> float:
+    lenses = [part.focal_length for part in camera.lens_train().elements if isinstance(part, ThinLens)]
+    return lenses[0]
+
+
+def _kernels(camera: Camera, cells: Cells, distance: float, reach: int) -> np.ndarray:
+    """Images of the points of a cell (T, T, points, samples), each for all of the main lens' light."""
+    T, step = 2 * reach + 1, cells.step
+    stride = tuple(k // n for k, n in zip(cells.samples, cells.points, strict=True))
+    shape = (T * cells.samples[0], T * cells.samples[1])
+    wave = _main_lens(
+        camera, distance, Grid((shape[0] + 2 * cells.samples[0], shape[1] + 2 * cells.samples[1]), step)
+    )
+    first = (cells.edge[axis] - reach * cells.size[axis] + (shape[axis] // 2) * step[axis] for axis in (0, 1))
+    window = Grid(shape, step, _pair(first))
+    array = replace(_array(camera), extent=None)
+    b, L = _lenslet_distance(camera), camera.separation
+    light = math.prod(stride)  # an even object of intensity 1 gives an even image of 1
+    kernels = np.empty((T, T, math.prod(cells.points), math.prod(cells.samples)), np.float32)
+    middle = tuple(n // 2 for n in wave.shape)
+    for ky in range(cells.points[0]):
+        for kx in range(cells.points[1]):
+            # The window begins `reach` cells before the points' own; point ky is ky strides into it.
+            top = middle[0] - reach * cells.samples[0] - ky * stride[0]
+            left = middle[1] - reach * cells.samples[1] - kx * stride[1]
+            field = Field(wave[top : top + shape[0], left : left + shape[1]], window, camera.wavelength)
+            image = propagate(array(field), b * L / (b + L), "auto").intensity
+            image *= light / field.intensity.sum()
+            parts = image.reshape(T, cells.samples[0], T, cells.samples[1]).transpose(0, 2, 1, 3)
+            kernels[:, :, ky * cells.points[1] + kx] = parts.reshape(T, T, -1)
+    return kernels
+
+
+def _main_lens(camera: Camera, distance: float, grid: Grid) -> np.ndarray:
+    """Amplitude (y, x) of a point on the axis in the lenslet plane, without the phase exp(iπw²/(λL))."""
+    point = sources.point_source(camera.pupil_grid, camera.wavelength, distance, paraxial=True)
+    with warnings.catch_warnings():  # a smooth converging wave: its samples do not stand for points
+        warnings.simplefilter("ignore", SamplingWarning)
+        field = propagate(camera.lens_train()(point), camera.separation, "fresnel", grid=grid)
+    phase = [np.exp(-1j * np.pi * c**2 / (camera.wavelength * camera.separation)) for c in (grid.y, grid.x)]
+    return (field.data * phase[0][:, None] * phase[1]).astype(np.complex64)
+
+
+def _descending(grid: Grid, axis: int) -> np.ndarray:
+    """Positions of a plane that is turned by 180°: from the largest down."""
+    n, pitch, center = grid.shape[axis], grid.pitch[axis], grid.center[axis]
+    return center - (np.arange(n) - n // 2) * pitch
+
+
+def _by_cell(plane: Array, per_cell: tuple[int, int]) -> Array:
+    """(rows ky, columns kx) to (rows, columns, ky kx)."""
+    xp, (ky, kx) = arrays.namespace(plane), per_cell
+    rows, columns = plane.shape[0] // ky, plane.shape[1] // kx
+    cells = xp.permute_dims(xp.reshape(plane, (rows, ky, columns, kx)), (0, 2, 1, 3))
+    return xp.reshape(cells, (rows, columns, ky * kx))
+
+
+def _as_plane(cells: Array, per_cell: tuple[int, int]) -> Array:
+    """(rows, columns, ky kx) to (rows ky, columns kx): the inverse of `_by_cell`."""
+    xp, (ky, kx) = arrays.namespace(cells), per_cell
+    rows, columns = cells.shape[:2]
+    plane = xp.permute_dims(xp.reshape(cells, (rows, columns, ky, kx)), (0, 2, 1, 3))
+    return xp.reshape(plane, (rows * ky, columns * kx))
+
+
+def _surrounded(cells: Array, rows: tuple[int, int], columns: tuple[int, int]) -> Array:
+    """Cells (y, x, k) with so many rows of zeros above and below, and columns left and right."""
+    xp = arrays.namespace(cells)
+    like = {"dtype": cells.dtype, "device": cells.device}
+    wide = [xp.zeros((cells.shape[0], n, cells.shape[2]), **like) for n in columns]
+    cells = xp.concat([wide[0], cells, wide[1]], axis=1)
+    high = [xp.zeros((n, *cells.shape[1:]), **like) for n in rows]
+    return xp.concat([high[0], cells, high[1]], axis=0)
