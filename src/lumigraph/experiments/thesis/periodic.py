@@ -33,7 +33,7 @@ from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.instruments.camera import Camera
 from lumigraph.propagation import propagate
 
-_PUPIL_SAMPLES = 256
+_PUPIL_SAMPLES = 192
 
 
 def main_lens_amplitude(
@@ -110,9 +110,11 @@ class LinedCamera:
         spreads = np.zeros((classes, samples, reach * samples))
         middle = classes // 2
         for iy in range(middle + 1):
-            for ix in range(middle + 1):
+            for ix in range(iy + 1):  # camera and image are the same with y and x exchanged
                 image = _point(camera, dz, (places[iy], places[ix]), (samples, reach))
                 _add_mirrored(spreads, image, (iy, ix), middle)
+                if ix != iy:
+                    _add_mirrored(spreads, image.T, (ix, iy), middle)
         return cls(camera, dz, samples, classes, spreads / spreads.sum(0).mean() / reach)
 
     @property
