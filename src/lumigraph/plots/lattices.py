@@ -1,5 +1,7 @@
 """A calibration drawn over the white image it was made from."""
 
+import math
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
@@ -12,15 +14,15 @@ from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.plots.axes import canvas, check_image, draw
 
-_MOST_ARROWS = 900
+_MOST_ARROWS = 600
 
 
 def lattice(white: RawImage | Array, calibration: Calibration, *, cells: int = 6) -> Figure:
     """Figure of the micro-images that a calibration found: residuals everywhere, cells near the middle.
 
-    Left, the whole image with an arrow from each lattice point towards the measured centre, enlarged so
-    that the root mean square one is a quarter of a pitch long. Right, `cells` pitches around the middle
-    with the borders of the micro-images and both kinds of centres.
+    Left, the whole image with an arrow from each lattice point (of many, every second, third ...) towards
+    the measured centre, enlarged so that the root mean square one is a quarter of their distance. Right,
+    `cells` pitches around the middle with the borders of the micro-images and both kinds of centres.
 
     Parameters
     ----------
@@ -69,10 +71,11 @@ def _arrows(axes: Axes, calibration: Calibration) -> None:
     rms = float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))) if len(points) else 0.0
     if rms < 1e-9:  # computed from a camera file: nothing was measured
         return
-    factor = 0.25 * calibration.lattice.pitch / rms
-    every = -(-len(points) // _MOST_ARROWS)
-    (y, x), (dy, dx) = points[::every].T, residuals[::every].T * factor
-    axes.quiver(x, y, dx, dy, angles="xy", scale_units="xy", scale=1, color="#ff5b1f", width=0.002)
+    every = math.ceil(math.sqrt(len(points) / _MOST_ARROWS))
+    factor = 0.25 * every * calibration.lattice.pitch / rms
+    drawn = (calibration.indices % every == 0).all(axis=1)
+    (y, x), (dy, dx) = points[drawn].T, residuals[drawn].T * factor
+    axes.quiver(x, y, dx, dy, angles="xy", scale_units="xy", scale=1, color="#ff5b1f", width=0.003)
     axes.set_title(f"{len(points)} lenslets, residuals x {factor:.0f}")
 
 
