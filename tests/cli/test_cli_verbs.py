@@ -21,7 +21,7 @@ from lumigraph.errors import SamplingWarning
 from lumigraph.instruments import load_camera
 from lumigraph.simulation import Interrupted
 
-VERBS = ("demo", "design", "simulate", "calibrate", "decode", "render", "refocus")
+VERBS = ("demo", "design", "simulate", "calibrate", "decode", "render", "refocus", "reproduce")
 PROGRAM = [sys.executable, "-c", "import sys; from lumigraph.cli import main; sys.exit(main())"]
 
 
