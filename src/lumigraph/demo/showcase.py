@@ -78,7 +78,7 @@ def run(
 def three_depths(grid: Grid, depths: tuple[float, float, float]) -> Scene:
     """A star in front (left), a chart in focus (middle) and a coarser star behind (right)."""
     width = grid.size[1]
-    near = targets.siemens_star(grid, 20, 0.28 * width, (0.0, -0.31 * width)).at(depths[0])
+    near = targets.siemens_star(grid, 16, 0.28 * width, (0.0, -0.31 * width)).at(depths[0])
     far = targets.siemens_star(grid, 12, 0.32 * width, (0.0, 0.32 * width)).at(depths[2])
     return near + _chart(grid).at(depths[1]) + far
 
