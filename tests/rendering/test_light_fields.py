@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lumigraph.core import memory
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
@@ -18,7 +19,6 @@ from lumigraph.rendering import (
     decode,
     encode,
     lenslet_mosaic,
-    memory,
     point_of_view,
     reduce_aperture,
     refocus,
@@ -317,7 +317,7 @@ def test_pictures_without_a_whole_micro_image_are_refused():
 
 
 def test_allocations_that_do_not_fit_are_refused_first(monkeypatch, rng):
-    monkeypatch.setattr(memory, "free_bytes", lambda: 20_000)
+    monkeypatch.setattr(memory, "available", lambda: 20_000)
     views = field(rng)
     for call, match in (
         (

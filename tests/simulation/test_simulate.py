@@ -264,6 +264,10 @@ def test_impossible_scenes_are_refused(two_f, scene, message):
 
 
 def test_impossible_coherences_are_refused(two_f):
+    with pytest.raises(GeometryError, match="coherence is of type int but must be Incoherent"):
+        simulate(two_f, targets.white(), coherence=5)
+    with pytest.raises(GeometryError, match="camera is of type int"):
+        simulate(5, targets.white())
     with pytest.raises(LumigraphError, match="count is 0"):
         Snapshots(0)
     with pytest.raises(LumigraphError, match="coherence_index is 0"):

@@ -32,6 +32,8 @@ def require_plane(shape: tuple[int, int], itemsize: int, what: str) -> None:
 def require(needed: float, what: str, remedy: str, error: type[LumigraphError] = LumigraphError) -> None:
     """Refuse `what` when it needs more memory [bytes] than there is.
 
+    `remedy` may hold ``{factor:.1f}``: how many times too large it is.
+
     Raises
     ------
     LumigraphError
@@ -39,4 +41,5 @@ def require(needed: float, what: str, remedy: str, error: type[LumigraphError] =
     """
     free = available()
     if free is not None and needed > free:
-        raise error(f"{what} needs {needed / 2**30:.3g} GiB but {free / 2**30:.3g} GiB are free. {remedy}")
+        advice = remedy.format(factor=needed / max(free, 1))
+        raise error(f"{what} needs {needed / 2**30:.3g} GiB but {free / 2**30:.3g} GiB are free. {advice}")

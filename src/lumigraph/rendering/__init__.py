@@ -7,7 +7,6 @@
 - `focused`: plenoptic 2.0: turned patches tiled without seams, of one size or one for each lenslet
 - `geometry`: lengths in metres, which lenslets form a rectangle
 - `interpolate`: values between samples, by gathering and weights, for every array library
-- `memory`: refuses what would not fit
 """
 
 from lumigraph.rendering.decode import decode

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, is_complex, is_single, namespace
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
@@ -13,7 +13,6 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
-from lumigraph.rendering import memory
 from lumigraph.rendering.geometry import Frame, lenslet_rectangle, transposed
 from lumigraph.rendering.interpolate import (
     Interpolation,
@@ -234,7 +233,7 @@ def _check_memory(raw: RawImage, plan: _Directions, indices: np.ndarray) -> None
     values = math.prod(plan.count) * indices.shape[0] * indices.shape[1] * math.prod(raw.data.shape[2:])
     size = 2.5 * values * (4 if is_single(raw.data) else 8)
     memory.require(
-        f"a light field of {plan.count[0]} x {plan.count[1]} views",
         size,
+        f"a light field of {plan.count[0]} x {plan.count[1]} views",
         "Ask for {factor:.1f}x fewer directions.",
     )

@@ -4,13 +4,12 @@ import math
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, like, namespace
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
-from lumigraph.rendering import memory
 from lumigraph.rendering.geometry import Frame, lit, transposed
 from lumigraph.rendering.interpolate import Interpolation, as_float, neighbours, take, weighted
 
@@ -44,7 +43,7 @@ def encode(
     checks.instance("views", views, LightField)
     checks.instance("calibration", calibration, Calibration)
     ny, nx = calibration.shape
-    memory.require("the raw image", 16.0 * ny * nx * math.prod(views.data.shape[4:]), "Use a smaller sensor.")
+    memory.require(16.0 * ny * nx * math.prod(views.data.shape[4:]), "the raw image", "Use a smaller sensor.")
     xp, extra = namespace(views.data), tuple(range(4, len(views.data.shape)))
     data, grids = as_float(views.data), (views.aperture, views.lenslets)
     axes = np.array([[1.0, 0.0], [0.0, 1.0]])

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, namespace, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import GeometryError
-from lumigraph.rendering import memory
 from lumigraph.rendering.decode import check_raw
 from lumigraph.rendering.geometry import Frame, largest_rectangle, lenslet_rectangle
 from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, sample, weighted
@@ -87,8 +86,8 @@ def render(
     layout = _Layout.of(calibration, sizes, samples)
     data = as_float(raw.data)
     memory.require(
-        f"a picture of {len(layout.y)} x {len(layout.x)} samples",
         16.0 * len(layout.y) * len(layout.x) * math.prod(data.shape[2:]),
+        f"a picture of {len(layout.y)} x {len(layout.x)} samples",
         "Ask for {factor:.1f}x fewer samples.",
     )
     band = max(1, _BAND // len(layout.x))
@@ -224,8 +223,8 @@ class _Layout:
         checks.shape("samples", (samples, samples))
         step = lattice.pitch / samples
         memory.require(
-            f"a picture of {samples} samples per lenslet",
             40.0 * math.prod(calibration.shape) / step**2,
+            f"a picture of {samples} samples per lenslet",
             "Ask for {factor:.1f}x fewer samples.",
         )
         axes = []

@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 
-from lumigraph.core import arrays, checks
+from lumigraph.core import arrays, checks, memory
 from lumigraph.core.arrays import Array, like, namespace
 from lumigraph.core.lightfield import LightField
-from lumigraph.rendering import memory
 from lumigraph.rendering.geometry import lit
 from lumigraph.rendering.interpolate import as_float, take, weighted
 
@@ -128,5 +127,5 @@ def _check_memory(views: LightField) -> None:
     itemsize = 16 if "64" in str(views.data.dtype) else 8
     size = (2.5 + 2 * _OVERSAMPLING) * math.prod(views.data.shape) * itemsize
     memory.require(
-        "the spectrum of the light field", size, "Use refocus, which needs {factor:.0f}x less or fewer."
+        size, "the spectrum of the light field", "Use refocus, which needs {factor:.0f}x less or fewer."
     )

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, like, namespace
 from lumigraph.core.lightfield import LightField
 from lumigraph.errors import GeometryError
-from lumigraph.rendering import memory
 from lumigraph.rendering.geometry import lit
 from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, taps, weighted
 
@@ -168,7 +167,7 @@ def _check_memory(views: LightField, count: int, oversample: int) -> None:
     picture = math.prod(views.data.shape[2:]) * oversample**2 * itemsize
     size = 2.5 * math.prod(views.data.shape) * itemsize + (count + 3) * picture
     memory.require(
-        f"a stack of {count} pictures, {oversample} samples per lenslet",
         size,
+        f"a stack of {count} pictures, {oversample} samples per lenslet",
         "Refocus {factor:.1f}x fewer at a time.",
     )

@@ -19,7 +19,7 @@ from lumigraph.propagation import propagate
 from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
 from lumigraph.sensor import integrate
 from lumigraph.simulation.camera import Camera
-from lumigraph.simulation.coherence import Coherence, Incoherent, Snapshots
+from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Snapshots, TiltedWaves
 from lumigraph.simulation.periodic import fits, kernel_bytes, periodic_operator
 
 PUPIL_OVERSAMPLING = 1.1
@@ -93,34 +93,52 @@ def simulate(
         A KeyboardInterrupt; it carries the raw image of what was finished.
     """
     coherence = Incoherent() if coherence is None else coherence
-    _check(camera, scene)
+    _check(camera, scene, coherence)
     exact = _periodic(camera, scene) if isinstance(coherence, Incoherent) else []
-    drawn = (
-        Snapshots(coherence.snapshots, rng=coherence.rng) if isinstance(coherence, Incoherent) else coherence
-    )
-    scene = Scene(part for part in scene.parts if part not in exact)
-    shots, total = _shots(camera, scene, drawn)
-    total += len(exact)
-    tell = progress or (lambda done, total: None)
-    intensity, pixels = np.zeros(camera.image_grid.shape), np.zeros(camera.sensor.shape)
-    done = 0
+    rest = Scene(part for part in scene.parts if part not in exact)
+    shots, count = _shots(camera, rest, _drawn(coherence))
+    light = _Light(np.zeros(camera.image_grid.shape), np.zeros(camera.sensor.shape))
+    total = len(exact) + count
     try:
         for part in exact:
-            operator = periodic_operator(camera, part.trimmed().grid, part.dz)
-            pixels += operator.forward(arrays.to_numpy(part.trimmed().intensity).astype(np.float32))
-            done += 1
-            tell(done, total)
+            light.pixels += _exactly(camera, part.trimmed())
+            light.count(progress, total)
         for image in map(_Shot.intensity, shots):
-            intensity += image
-            done += 1
-            tell(done, total)
+            light.intensity += image
+            light.count(progress, total)
     except KeyboardInterrupt:
-        if not done:
+        if not light.done:
             raise
-        if not exact and all(isinstance(part, Slice) for part in scene.parts):
-            intensity *= total / done  # equal shots: fewer of them, as bright
-        raise Interrupted(_read_out(camera, (intensity, pixels), coherence, done)) from None
-    return _read_out(camera, (intensity, pixels), coherence, total)
+        if not exact and all(isinstance(part, Slice) for part in rest.parts):
+            light.intensity *= total / light.done  # equal shots: fewer of them, as bright
+        raise Interrupted(_read_out(camera, light, coherence)) from None
+    return _read_out(camera, light, coherence)
+
+
+@dataclass(slots=True)
+class _Light:
+    """What has arrived so far: intensity on the camera's grid and on the pixels, after `done` shots."""
+
+    intensity: np.ndarray
+    pixels: np.ndarray
+    done: int = 0
+
+    def count(self, progress: Progress | None, total: int) -> None:
+        self.done += 1
+        if progress is not None:
+            progress(self.done, total)
+
+
+def _drawn(coherence: Coherence | Incoherent) -> Coherence:
+    """Incoherent light as snapshots, for what the periodic operator does not take."""
+    if isinstance(coherence, Incoherent):
+        return Snapshots(coherence.snapshots, rng=coherence.rng)
+    return coherence
+
+
+def _exactly(camera: Camera, part: Slice) -> np.ndarray:
+    operator = periodic_operator(camera, part.grid, part.dz)
+    return operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
 
 
 def _periodic(camera: Camera, scene: Scene) -> list[Slice]:
@@ -131,22 +149,24 @@ def _periodic(camera: Camera, scene: Scene) -> list[Slice]:
     return [part for part in slices if kernel_bytes(camera, part.dz) <= LARGEST_OPERATOR]
 
 
-def _read_out(
-    camera: Camera, light: tuple[np.ndarray, np.ndarray], coherence: Coherence | Incoherent, shots: int
-) -> RawImage:
-    """Raw image of an intensity on the camera's grid, and of one that is on the pixels already."""
-    intensity, pixels = light
-    if intensity.any():
-        pixels = pixels + integrate(intensity, camera.image_grid, camera.sensor)
+def _read_out(camera: Camera, light: _Light, coherence: Coherence | Incoherent) -> RawImage:
+    pixels = light.pixels
+    if light.intensity.any():
+        pixels = pixels + integrate(light.intensity, camera.image_grid, camera.sensor)
     # A hard edge rings below zero when it is interpolated to pixels; a sensor counts no negative light.
     data = np.maximum(pixels, 0).astype(np.float32)
-    known = {"simulated": repr(coherence), "shots": shots, "wavelength": camera.wavelength}
+    known = {"simulated": repr(coherence), "shots": light.done, "wavelength": camera.wavelength}
     return RawImage(data, pixel_pitch=camera.sensor.pixel_pitch, metadata=known)
 
 
-def _check(camera: Camera, scene: Scene) -> None:
+def _check(camera: Camera, scene: Scene, coherence: Coherence | Incoherent) -> None:
     """Refuse scenes that are empty or behind the lens, and propagations that do not fit in memory."""
     checks.instance("scene", scene, Scene)
+    if not isinstance(coherence, Incoherent | Coherent | Snapshots | TiltedWaves):
+        raise GeometryError(
+            f"coherence is of type {type(coherence).__name__} but must be Incoherent(), Coherent(), "
+            "Snapshots(...) or TiltedWaves(...)."
+        )
     if not hasattr(camera, "image_train"):
         raise GeometryError(
             f"camera is of type {type(camera).__name__} but must be a camera, such as PlenopticCamera."
