@@ -12,11 +12,11 @@ from lumigraph.plots import curves
 
 DISTANCES = tuple(float(z) for z in range(1, 11))
 QUICK = {
-    "angular spectrum": (1.0, 4.0, 10.0),
-    "band limited (circle)": (1.0, 7.0),
-    "corrected band limited": (1.0, 7.0),
+    "angular spectrum": (1.0, 10.0),
+    "band limited (circle)": (1.0,),
+    "corrected band limited": (1.0,),
     "band limited, window doubled": (1.0, 10.0),
-    "zoom": (2.0, 4.0, 10.0),
+    "zoom": (10.0,),
 }
 """The distances at which something is expected, fewer of them for slow methods [m]."""
 PADDED = {1.0: (59.8, 57.0), 4.0: (51.5, 49.0), 10.0: (45.0, 43.0)}
@@ -26,9 +26,9 @@ LEAST_OF_ZOOM = 75.0
 
 WHY = (
     "The reference is the exact diffraction integral. Unpadded, the corrected method keeps twice the band "
-    "that is free of aliases and is worse than the band-limited one up to 7 m; the plain angular spectrum never "
-    "falls to 0 dB. A circle that multiplies the phase and not H itself (2.4.2) is worse than no limit. The "
-    "cure is a window of twice the width, or frequencies chosen for the two grids (zoom)."
+    "that is free of aliases and is worse than the band-limited one up to 7 m; the plain angular spectrum "
+    "never falls to 0 dB. A circle that multiplies the phase and not H itself (2.4.2) is worse than no limit. "
+    "The cure is a window of twice the width, or frequencies chosen for the two grids (zoom)."
 )
 
 
@@ -57,11 +57,7 @@ def run(context: Context) -> Outcome:
         for z, (right, least) in PADDED.items()
     ]
     rows += [_row("zoom", z, ratios, (right, (right - LEAST_OF_ZOOM, math.inf))) for z, right in ZOOM.items()]
-    masked = _snr(_pupil.phase_masked(4.0), 4.0) - ratios["angular spectrum"][4.0]
-    rows.append(
-        Row("circle on the phase alone minus no limit, at 4 m", masked, "dB",
-            thesis="better", expected=-0.7, tolerance=0.5, note="worse than every other variant")
-    )  # fmt: skip
+    rows += [] if context.quick else [_masked_row(ratios["angular spectrum"][4.0])]
     figure = curves(
         [],
         {name: (list(values), list(values.values())) for name, values in ratios.items()},
@@ -69,6 +65,14 @@ def run(context: Context) -> Outcome:
         ylabel="SNR [dB]",
     )
     return Outcome(tuple(row for row in rows if row), ((figure, "SNR of each method"),), WHY)
+
+
+def _masked_row(unlimited: float) -> Row:
+    """The circle of 2.4.2 on the phase alone, which lets H = 1 outside; half a dB either way is noise."""
+    gain = _snr(_pupil.phase_masked(4.0), 4.0) - unlimited
+    name = "circle on the phase alone minus no limit, at 4 m"
+    note = "worse than every other variant"
+    return Row(name, gain, "dB", thesis="better", expected=-0.7, tolerance=0.5, note=note)
 
 
 def _ratios(context: Context, name: str, number: int) -> dict[float, float]:
