@@ -37,8 +37,8 @@ def run(context: Context) -> Outcome:
     rows.append(Row("slope on the raw pixels over slope on the main lens", ratio, "", None, -24.0, 1e-9))
     return Outcome(
         tuple(rows), tuple(figures),
-        why="dx/du = 1 - α' with u on the main lens; against the raw pixel's place under the lenslet the sign "
-        "is the other. The printed 0.125 and 0.25 m nearer are inside the focal length: nothing is imaged.",
+        why="dx/du = 1 - α' with u on the main lens; against the raw pixel's place under the lenslet the "
+        "sign is the other. The printed 0.125 and 0.25 m nearer are inside the focal length.",
     )  # fmt: skip
 
 

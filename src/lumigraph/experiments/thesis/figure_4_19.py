@@ -36,7 +36,8 @@ def run(context: Context) -> Outcome:
     energy = {name: float(picture.sum()) for name, picture in pictures.items()}
     rows += [
         Row(f"light when refocused on {name}, over the rendered picture's", energy[name] / energy["B"], "",
-            "unchanged", 1.0, 0.02, note="places near the edge are seen by fewer views") for name in ("A", "C")
+            "unchanged", 1.0, 0.02, note="places near the edge are seen by fewer views")
+        for name in ("A", "C")
     ]  # fmt: skip
     shown = [(pictures[name], f"refocused on {name}, α' = {alphas[name]:.4f}") for name in ("B", "A", "C")]
     return Outcome(

@@ -165,6 +165,7 @@ def _stack_figures(camera: PlenopticCamera) -> list[tuple[object, str]]:
     for dz in depths:
         views = decode(table_4_1.point(camera, dz), camera.calibration, directions=8)
         stacks[f"{dz / mm:+.0f} mm"] = (curve := on_own_planes(views, alphas)) / curve.max()
+    views = decode(table_4_1.point(camera, depths[-1]), camera.calibration, directions=8)
     blurred, sharp = (np.abs(np.fft.fftshift(np.fft.fft2(refocus(views, a)))) for a in (1.0, 1.15))
     middle = blurred.shape[0] // 2
     across = np.fft.fftshift(np.fft.fftfreq(blurred.shape[1]))
