@@ -3,10 +3,12 @@
 - `lattice_fit`: `calibrate`, the whole path: period, spots, robust fit, `Calibration`
 - `period`: the lattice vectors, by autocorrelation, before any spot is known
 - `centres`: sub-pixel centre of every micro-image
+- `diagnosis`: `diagnose`, what a white image says about how a camera is put together
 - `devignette`: divide a raw image by its white image; grey versions of colour images
 """
 
 from lumigraph.calibration.devignette import devignette
+from lumigraph.calibration.diagnosis import Diagnosis, diagnose
 from lumigraph.calibration.lattice_fit import calibrate
 
-__all__ = ["calibrate", "devignette"]
+__all__ = ["Diagnosis", "calibrate", "devignette", "diagnose"]

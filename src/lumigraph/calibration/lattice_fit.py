@@ -174,7 +174,7 @@ def _robust_fit(spots: Spots, lattice: Lattice) -> tuple[Spots, Lattice]:
     _check_spots(spots, lattice, "lit micro-images")
     design = np.concatenate([np.ones((len(spots.indices), 1)), spots.indices], -1)
     keep, distance, weights = np.ones(len(design), bool), np.zeros(len(design)), np.zeros((3, 2))
-    inner = _surrounded(spots.indices)
+    inner = surrounded(spots.indices)
     for _ in range(10):
         used = keep & inner
         weights = np.linalg.lstsq(design[used], spots.centers[used], rcond=None)[0]
@@ -199,7 +199,7 @@ def _robust_fit(spots: Spots, lattice: Lattice) -> tuple[Spots, Lattice]:
     return kept, Lattice((row, column), origin, lattice.layout, lattice.kinds)
 
 
-def _surrounded(indices: np.ndarray) -> np.ndarray:
+def surrounded(indices: np.ndarray) -> np.ndarray:
     """Spots with neighbours on all sides, or all spots where fewer than 5 x 5 are left.
 
     At the border of an array the light of the missing neighbours is missing too, which moves a
