@@ -65,7 +65,7 @@ def test_an_object_is_the_sum_of_its_points(name, dz, monkeypatch):
     share = np.prod(grid.pitch) / np.prod(camera.object_grid.pitch)
     reference = simulate(camera, targets.points(points, PATCH.ravel())).data * share
     image = periodic_operator(camera, grid, dz).forward(PATCH)
-    assert relative(image, reference) < 0.025
+    assert relative(image, reference) < 0.03
     assert image.sum() == pytest.approx(reference.sum(), rel=0.02)
 
 

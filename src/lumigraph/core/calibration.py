@@ -75,13 +75,13 @@ class Calibration:
 
     def report(self) -> str:
         """Layout, pitches, rotation, origin and quality of the fit as a few lines of text."""
-        (column, row), rotation = self.lattice.pitches, self.lattice.rotation
+        (column, row), mrad = self.lattice.pitches, round(self.lattice.rotation * 1e3, 3) + 0.0
         worst = float(np.hypot(*self.residuals.T).max()) if len(self.centers) else 0.0
         lines = [
             f"layout      {self.lattice.layout}, {len(self.centers)} lenslets on "
             f"{self.shape[0]} x {self.shape[1]} px",
             f"pitch       {self.lattice.pitch:.3f} px ({row:.3f} along rows, {column:.3f} to the next row)",
-            f"rotation    {rotation * 1e3:+.3f} mrad ({math.degrees(rotation):+.3f} deg)",
+            f"rotation    {mrad:+.3f} mrad ({math.degrees(mrad / 1e3):+.3f} deg)",
             f"origin      ({self.lattice.origin[0]:.3f}, {self.lattice.origin[1]:.3f}) px (y, x)",
             f"residual    {self.residual_px:.3f} px rms, {worst:.3f} px at worst",
         ]

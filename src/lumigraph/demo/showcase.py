@@ -19,7 +19,7 @@ from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera
 from lumigraph.plots import layout
 from lumigraph.rendering import decode, reduce_aperture, refocus, render, view
 from lumigraph.scene import Scene, targets
-from lumigraph.simulation import Incoherent, simulate
+from lumigraph.simulation import simulate
 from lumigraph.units import mm
 
 Progress = Callable[[str, float], None]
@@ -44,9 +44,7 @@ class Exposure:
     calibration: Calibration
 
 
-def run(
-    output: str | os.PathLike[str] = "demo", progress: Progress | None = None, *, snapshots: int = 48
-) -> Path:
+def run(output: str | os.PathLike[str] = "demo", progress: Progress | None = None) -> Path:
     """Run the demonstration; returns the path of the report.
 
     Writes ``report.html`` and, beside it, the camera files, raw and white images (TIFF), calibrations
@@ -58,18 +56,16 @@ def run(
         Folder to write into; made when missing.
     progress
         Called as ``progress(what, fraction)`` with the fraction of the whole that is done.
-    snapshots
-        Random-phase propagations for each raw image: more give less speckle.
     """
     folder = Path(output)
     folder.mkdir(parents=True, exist_ok=True)
     tell = progress or (lambda what, fraction: None)
     page = report.Page("lumigraph: a demonstration", INTRODUCTION)
     start = time.perf_counter()
-    _plenoptic(page, folder, snapshots, lambda what, part: tell(f"1.0 camera: {what}", 0.65 * part))
-    _focused(page, folder, snapshots, lambda what, part: tell(f"2.0 camera: {what}", 0.65 + 0.35 * part))
+    _plenoptic(page, folder, lambda what, part: tell(f"1.0 camera: {what}", 0.65 * part))
+    _focused(page, folder, lambda what, part: tell(f"2.0 camera: {what}", 0.65 + 0.35 * part))
     seconds = time.perf_counter() - start
-    page.section("Time").text(f"Both cameras took {seconds:.0f} s, with {snapshots} snapshots each.")
+    page.section("Time").text(f"Both cameras took {seconds:.0f} s.")
     page.write(folder / "report.html")
     tell("done", 1.0)
     return folder / "report.html"
@@ -98,9 +94,7 @@ def camera_file(name: str) -> str:
     return files("lumigraph.demo").joinpath(f"{name}.toml").read_text("utf-8")
 
 
-def _expose(
-    camera: PlenopticCamera | FocusedPlenopticCamera, scene: Scene, snapshots: int, tell: Progress
-) -> Exposure:
+def _expose(camera: PlenopticCamera | FocusedPlenopticCamera, scene: Scene, tell: Progress) -> Exposure:
     """White image, calibration from it, raw image; both with photon and read noise."""
     rng = np.random.default_rng(1)
 
@@ -110,15 +104,15 @@ def _expose(
     light = simulate(camera, targets.white(), progress=counted("white image", 0.0, 0.4))
     white = camera.sensor.expose(light.data, rng=rng)
     calibration = calibrate(white, separation=camera.separation, lenslet_distance=camera.lenslet_distance)
-    light = simulate(camera, scene, Incoherent(snapshots, rng=1), progress=counted("raw image", 0.4, 0.95))
+    light = simulate(camera, scene, progress=counted("raw image", 0.4, 0.95))
     return Exposure(camera.sensor.expose(light.data, rng=rng), white, calibration)
 
 
-def _plenoptic(page: report.Page, folder: Path, snapshots: int, tell: Progress) -> None:
+def _plenoptic(page: report.Page, folder: Path, tell: Progress) -> None:
     with as_file(files("lumigraph.demo").joinpath("plenoptic.toml")) as path:
         camera = PlenopticCamera.from_toml(path)
     depths = (-14 * mm, 0.0, 18 * mm)
-    exposure = _expose(camera, three_depths(camera.object_grid, depths), snapshots, tell)
+    exposure = _expose(camera, three_depths(camera.object_grid, depths), tell)
     tell("decoding", 0.96)
     views = decode(devignette(exposure.raw, exposure.white), exposure.calibration)
     alphas = [camera.alpha(dz) for dz in depths]
@@ -145,11 +139,11 @@ def _plenoptic(page: report.Page, folder: Path, snapshots: int, tell: Progress) 
     section.figure(right, "From the other side: near and far targets have moved apart", zoom=5)
 
 
-def _focused(page: report.Page, folder: Path, snapshots: int, tell: Progress) -> None:
+def _focused(page: report.Page, folder: Path, tell: Progress) -> None:
     with as_file(files("lumigraph.demo").joinpath("focused_plenoptic.toml")) as path:
         camera = FocusedPlenopticCamera.from_toml(path)
     depths = (-4 * mm, 0.0, 5 * mm)
-    exposure = _expose(camera, three_depths(camera.object_grid, depths), snapshots, tell)
+    exposure = _expose(camera, three_depths(camera.object_grid, depths), tell)
     tell("rendering", 0.96)
     raw = devignette(exposure.raw, exposure.white)
     patches = [camera.patch_at(dz) for dz in depths]

@@ -1,7 +1,7 @@
 """Raw images by wave optics, from a camera and a scene.
 
 - `imaging`: `simulate`
-- `periodic`: `periodic_operator`, incoherent planes before a lenslet array, exact to about 1 %; its adjoint
+- `periodic`: `periodic_operator`, incoherent planes before a lenslet array, and its adjoint
 - `camera`: `Camera`, what a simulation asks of an instrument
 - `coherence`: `Incoherent`, `Coherent`, `Snapshots`, `TiltedWaves`: how the scene's light interferes
 """

@@ -130,7 +130,7 @@ class Incoherent:
     """Spatially incoherent light, like every lit scene.
 
     Points are exact: their intensities are added. Extended scenes before a lenslet array that is not
-    turned go through the lenslet-periodic operator (`simulation.periodic`), without speckle, to about 1 %
+    turned go through the lenslet-periodic operator (`simulation.periodic`), without speckle, to 1 to 3 %
     rms. Single lenses, turned arrays and operators above 1 GiB take white-phase `Snapshots`, which carry
     speckle of about 1/sqrt(snapshots) rms in a pixel that resolves it.
 
