@@ -97,7 +97,7 @@ def _table(result: "Result") -> str:
     lines = [pages.HEADER[:-1], *(pages.cells(row)[:-1] for row in result.rows)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
     rows = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)) for line in lines]
-    return "\n".join([result.id, *(f"  {row}".rstrip() for row in rows)])
+    return "\n".join([result.id, *(f"  {row}".rstrip() for row in rows), *result.error.splitlines()])
 
 
 def _refuse_failures(results: "list[Result]", output: Path) -> None:

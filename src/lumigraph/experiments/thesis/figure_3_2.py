@@ -27,7 +27,7 @@ LEAST_OF_ZOOM = 75.0
 WHY = (
     "The reference is the exact diffraction integral. Unpadded, the corrected method keeps twice the band "
     "that is free of aliases and is worse than the band-limited one up to 7 m; the plain angular spectrum "
-    "never falls to 0 dB. A circle that multiplies the phase and not H itself (2.4.2) is worse than no limit. "
+    "never falls to 0 dB. A circle that multiplies the phase and not H itself (2.4.2) is worse than none. "
     "The cure is a window of twice the width, or frequencies chosen for the two grids (zoom)."
 )
 

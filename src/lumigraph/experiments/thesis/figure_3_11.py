@@ -1,0 +1,75 @@
+"""Random phase masks and the size of their areas of one phase."""
+
+import numpy as np
+
+from lumigraph.core.arrays import fft2, ifft2
+from lumigraph.core.grid import Grid
+from lumigraph.elements.masks import random_phase_mask, white_phase
+from lumigraph.experiments.registry import Context, Outcome, Row, experiment
+from lumigraph.experiments.thesis import _two_f as two_f
+from lumigraph.plots import curves, images
+from lumigraph.units import mm
+
+INDICES = (10, 50, 100, 200)
+SAMPLES, WINDOW = 1765, 10 * mm
+QUICK_SAMPLES = 882
+"""Half of the window at one pitch, with half as many sources: areas of the same size."""
+LAGS = 120
+AREA = 0.808
+"""Width at half height of a disc's correlation with itself, over its diameter: the degree of coherence of the
+wave where the discs' light has spread (van Cittert and Zernike). Its phase alone varies faster."""
+WHY = (
+    "A mask's areas of one phase are about as large as its sources, N/C samples, although light has spread "
+    "over d_c: it stays coherent over them, and a mask with C < N is never incoherent."
+)
+
+
+@experiment(
+    "figure-3.11",
+    "Random phase masks",
+    question="How large are the areas of one phase in a mask of C × C sources?",
+    thesis="Figures 3.9 to 3.11, equation 3.7",
+)
+def run(context: Context) -> Outcome:
+    """Masks for four coherence indices, and the width of their degree of coherence."""
+    grid = Grid.square(QUICK_SAMPLES if context.quick else SAMPLES, WINDOW / SAMPLES)
+    rows, pictures, drawn, rng = [], [], {}, np.random.default_rng(311)
+    lags = np.arange(LAGS)
+    for step, index in enumerate(INDICES):
+        context.progress(step / len(INDICES), f"C = {index}")
+        sources = round(index * grid.shape[0] / SAMPLES)
+        mask = random_phase_mask(grid, two_f.WAVELENGTH, sources, rng)
+        pictures.append((np.angle(mask), f"C = {index}"))
+        drawn[f"C = {index}"] = coherence = degree(mask)[:LAGS]
+        rows.append(
+            Row(f"width of an area times C/N, C = {index}", width(coherence) * index / SAMPLES,
+                expected=AREA, tolerance=(0.4, 0.0), note="0.81 N/C for the wave, less for its phase")
+        )  # fmt: skip
+        rows.append(Row(f"width of an area, C = {index}", width(coherence), "samples"))
+    drawn["white phase"] = white = degree(white_phase(grid, rng))[:LAGS]
+    rows.append(
+        Row("coherence of a white phase one sample away", white[1], expected=0.0, tolerance=0.01,
+            note="1/N for random numbers")
+    )  # fmt: skip
+    figures = (
+        (images(pictures, columns=2, cmap="twilight"), "Phase of the masks"),
+        (
+            curves(lags, drawn, xlabel="distance [samples]", ylabel="degree of coherence"),
+            "Correlation of a mask with itself",
+        ),
+    )
+    return Outcome(tuple(rows), figures, WHY)
+
+
+def degree(mask: np.ndarray) -> np.ndarray:
+    """Modulus of the correlation of a mask with itself along x, 1 at distance 0."""
+    spectrum = fft2(mask)
+    correlation = ifft2(np.square(np.abs(spectrum)).astype(np.complex64))
+    return np.abs(correlation[0]) / np.abs(correlation[0, 0])
+
+
+def width(coherence: np.ndarray) -> float:
+    """Distance over which the degree of coherence falls to a half, on both sides [samples]."""
+    below = int(np.argmax(coherence < 0.5))
+    before, after = coherence[below - 1], coherence[below]
+    return 2 * (below - 1 + (before - 0.5) / (before - after))
