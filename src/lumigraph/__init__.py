@@ -58,7 +58,7 @@ if TYPE_CHECKING:
         render,
         view,
     )
-    from lumigraph.scene import Scene, targets
+    from lumigraph.scene import Points, Scene, Slice, targets
     from lumigraph.sensor import Sensor
     from lumigraph.simulation import Coherent, Incoherent, Snapshots, TiltedWaves, simulate
 
@@ -106,7 +106,7 @@ _HOMES = {
         "render",
         "view",
     ),
-    "lumigraph.scene": ("Scene", "targets"),
+    "lumigraph.scene": ("Points", "Scene", "Slice", "targets"),
     "lumigraph.sensor": ("Sensor",),
     "lumigraph.simulation": ("Coherent", "Incoherent", "Snapshots", "TiltedWaves", "simulate"),
 }
@@ -129,6 +129,7 @@ __all__ = [
     "LightField",
     "LumigraphError",
     "PlenopticCamera",
+    "Points",
     "Propagate",
     "RawImage",
     "RectangularAperture",
@@ -137,6 +138,7 @@ __all__ = [
     "Scene",
     "Sensor",
     "SingleLensCamera",
+    "Slice",
     "Snapshots",
     "ThinLens",
     "TiltedWaves",

@@ -82,7 +82,7 @@ def calibrate(
 
 
 def _check_request(layout: str | None, pitch: float | None) -> None:
-    if layout not in (None, "square", "hex"):
+    if not (layout is None or isinstance(layout, str)) or layout not in (None, "square", "hex"):
         raise CalibrationError(f"layout is {layout!r} but must be 'square' or 'hex', or left out.")
     if pitch is not None and checks.positive("pitch", pitch, "px", CalibrationError) < SMALLEST_PITCH:
         raise CalibrationError(
@@ -188,11 +188,15 @@ def _robust_fit(spots: Spots, lattice: Lattice) -> tuple[Spots, Lattice]:
         keep = closer
     kept = Spots(*(column[keep] for column in spots))
     rms = float(np.sqrt((distance[keep] ** 2).mean()))
-    if keep.mean() < 0.5 or rms > 0.1 * lattice.pitch:
+    if keep.mean() < 0.5:
         raise CalibrationError(
             f"only {keep.sum()} of {len(keep)} micro-images stand on one lattice of pitch "
-            f"{lattice.pitch:.1f} px, {rms:.2f} px rms away from it. Check the white image, or pass pitch= "
-            "and layout=."
+            f"{lattice.pitch:.1f} px. Check the white image, or pass pitch= and layout=."
+        )
+    if rms > 0.1 * lattice.pitch:
+        raise CalibrationError(
+            f"the micro-images stand {rms:.2f} px rms away from a lattice of pitch {lattice.pitch:.1f} px, "
+            "where a tenth of the pitch is too much. Check the white image, or pass pitch= and layout=."
         )
     _check_spots(kept, lattice, "micro-images on one lattice")
     origin, column, row = (_vector(w) for w in weights)
