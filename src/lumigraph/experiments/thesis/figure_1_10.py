@@ -35,11 +35,11 @@ def run(context: Context) -> Outcome:
     return Outcome(
         tuple(rows),
         ((plots.images([(rays, "rays: u over lenslets")], columns=1),
-          "1.10: cells of phase space crossed by a point in focus (red), nearer (green) and farther (blue)"),
+          "1.10: cells of a point in focus (red), a nearer (green) and a farther one (blue); u downwards"),
          (plots.images(pictures, cmap="magma"),
           "1.10, 1.17: the same cells simulated; rendering sums each column into one pixel of the picture")),
         why="A point in focus fills one column, a defocused one a line of slope 1 - α' across the lenslets "
-        "that its blur covers. Diffraction widens the lines by a third of the column's height.",
+        "of its blur. Diffraction widens the lines by a third of the column's height.",
     )  # fmt: skip
 
 
@@ -71,7 +71,7 @@ def _rays(camera: PlenopticCamera, directions: int = 15, lenslets: int = 13) -> 
     """Drawing (y, x, 3): cells (u, s) of which a ray of each point crosses the middle."""
     picture = np.ones((directions * _CELL, lenslets * _CELL, 3))
     u = (np.arange(directions) - directions // 2) / directions * camera.pupil_diameter
-    offsets = (0, -4, 4)  # lenslets that keep the points apart
+    offsets = (0, -3, 3)  # lenslets that keep the points apart
     for dz, colour, away in zip(_DEPTHS, _COLOURS, offsets, strict=True):
         x = u * (1 - camera.alpha(dz)) / camera.lenslets.pitch + away
         for row, s in enumerate(np.rint(x).astype(int) + lenslets // 2):

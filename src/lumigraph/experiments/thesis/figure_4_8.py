@@ -96,7 +96,7 @@ def _stars(grid: Grid) -> Scene:
 
 
 def _scene_views(context: Context) -> LightField:
-    camera = table_4_1.camera(context, (25, 75))
+    camera = table_4_1.camera(context, (19, 75))
     raw = context.cached("stars", lambda: simulate(camera, _stars(camera.object_grid)).data)
     return decode(raw, camera.calibration, directions=15)
 

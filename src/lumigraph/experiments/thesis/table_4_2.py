@@ -20,6 +20,7 @@ from lumigraph.units import mm, um
 # Defocus [m]: printed estimate, the estimate of a sharpness measure on the true micro-images.
 PRINTED = {-50 * mm: (0.85, 0.791), -25 * mm: (0.925, 0.903), 25 * mm: (1.08, 1.1), 50 * mm: (1.105, 1.151)}
 FAR_OUT = -80 * mm
+DEPTHS = (FAR_OUT, *PRINTED)
 # Between lenslets on the axis, in the corner of four, and anywhere.
 PLACES = ((0.0, 0.0), (75 * um, 75 * um), (600 * um, -300 * um))
 
@@ -39,11 +40,18 @@ def run(context: Context) -> Outcome:
     plain = _measured(context, camera, camera.calibration, defocus)
     fixed = _measured(context, camera, fixed_blocks(camera), defocus)
     curve = _curve(context, camera)
-    rows = [*_printed_rows(defocus, plain, fixed), *_corrected_rows(context, camera, curve)]
+    corrected = curve(_points(context, camera))
+    rows = [*_printed_rows(defocus, plain, fixed), *_corrected_rows(camera, corrected)]
+    estimates = {
+        "true micro-images": (defocus, plain),
+        "fixed blocks of p": (defocus, fixed),
+        "printed": (np.array(list(PRINTED)), np.array([value for value, _ in PRINTED.values()])),
+        "bias corrected": (np.array(DEPTHS), corrected[:, 0]),
+    }
     context.progress(0.95, "figures")
     return Outcome(
         tuple(rows),
-        (*_stack_figures(camera), *_estimate_figures(camera, defocus, plain, fixed, curve)),
+        (*_stack_figures(camera), *_estimate_figures(camera, estimates, curve)),
         why="The lenslets resolve three directions: the oblique line of a defocused point is smeared, and "
         "the sharpest picture is drawn towards α' = 1. Fixed blocks of p in place of the micro-images' "
         "p (1 + f_µ/F) put the light of one lenslet into others as well, and at -80 mm the answer becomes 1. "
@@ -97,12 +105,17 @@ def peak(curve: np.ndarray, alphas: np.ndarray) -> float:
 
 
 def _fine(context: Context, camera: PlenopticCamera) -> Callable[[float, tuple[float, float]], float]:
-    """Refocus factor that an oversampled stack measures of a point at (depth, place)."""
-    alphas = np.arange(0.4, 1.36, 0.04 if context.quick else 0.02)
+    """Refocus factor that an oversampled stack measures of a point at (depth, place).
+
+    A coarse stack tells where to look, so that the oversampled one can be short.
+    """
+    directions, oversample, step = (6, 3, 0.04) if context.quick else (8, 4, 0.02)
+    coarse = np.arange(0.4, 1.36, 0.05)
 
     def measure(dz: float, place: tuple[float, float]) -> float:
-        views = decode(table_4_1.point(camera, dz, place), camera.calibration, directions=8)
-        return point_alpha(views, alphas, oversample=3 if context.quick else 4)
+        views = decode(table_4_1.point(camera, dz, place), camera.calibration, directions=directions)
+        near = coarse[sharpness(refocus_stack(views, coarse)).argmax()]
+        return point_alpha(views, np.arange(near - 0.12, near + 0.121, step), oversample=oversample)
 
     return measure
 
@@ -141,20 +154,22 @@ def _printed_rows(defocus: np.ndarray, plain: np.ndarray, fixed: np.ndarray) -> 
     ]  # fmt: skip
 
 
-def _corrected_rows(context: Context, camera: PlenopticCamera, curve: BiasCurve) -> list[Row]:
-    measure, rows = _fine(context, camera), []
-    depths = (*PRINTED, FAR_OUT)
+def _points(context: Context, camera: PlenopticCamera) -> np.ndarray:
+    """Measured factors (depth, place) of points that the bias was not measured on."""
+    measure = _fine(context, camera)
     places = PLACES[::2] if context.quick else PLACES
-
-    def all_points() -> np.ndarray:
-        return np.array([[measure(dz, place) for place in places] for dz in depths])
-
     context.progress(0.8, "points at other places")
-    for dz, found in zip(depths, context.cached("points", all_points), strict=True):
+    return context.cached(
+        "points", lambda: np.array([[measure(dz, place) for place in places] for dz in DEPTHS])
+    )
+
+
+def _corrected_rows(camera: PlenopticCamera, corrected: np.ndarray) -> list[Row]:
+    rows, places = [], PLACES if corrected.shape[1] == len(PLACES) else PLACES[::2]
+    for dz, found in zip(DEPTHS, corrected, strict=True):
         for (y, x), one in zip(places, found, strict=True):
             where = f"{dz / mm:+.0f} mm, point at ({y / um:.0f}, {x / um:.0f}) um"
-            rows.append(Row(f"bias corrected, {where}", float(curve(one)), "",
-                            None, camera.alpha(dz), 0.02))  # fmt: skip
+            rows.append(Row(f"bias corrected, {where}", float(one), "", None, camera.alpha(dz), 0.02))
     return rows
 
 
@@ -180,18 +195,23 @@ def _stack_figures(camera: PlenopticCamera) -> list[tuple[object, str]]:
 
 
 def _estimate_figures(
-    camera: PlenopticCamera, defocus: np.ndarray, plain: np.ndarray, fixed: np.ndarray, curve: BiasCurve
+    camera: PlenopticCamera, estimates: dict[str, tuple[np.ndarray, np.ndarray]], curve: BiasCurve
 ) -> list[tuple[object, str]]:
     """Figures 4.24 and 4.25."""
-    true = np.array([camera.alpha(float(dz)) for dz in defocus])
-    estimates = {"true micro-images": plain, "fixed blocks of p": fixed}
-    printed = (np.array(list(PRINTED)) / mm, np.array([value for value, _ in PRINTED.values()]))
-    errors = {name: values - true for name, values in estimates.items()}
+    defocus = estimates["true micro-images"][0]
+
+    def true(depths: np.ndarray) -> np.ndarray:
+        return np.array([camera.alpha(float(dz)) for dz in depths])
+
+    shown = {name: (depths / mm, values) for name, (depths, values) in estimates.items()}
+    shown = {"lens equation": (defocus / mm, true(defocus)), **shown}
+    errors = {name: (depths / mm, values - true(depths)) for name, (depths, values) in estimates.items()}
+    bias = {"true": curve.true, "measured, oversampled stack": curve.measured}
     return [
-        (plots.curves(defocus / mm, {"lens equation": true, **estimates, "printed": printed},
-                      xlabel="defocus [mm]", ylabel="α'"), "4.24: estimates against the lens equation"),
+        (plots.curves(defocus / mm, shown, xlabel="defocus [mm]", ylabel="α'"),
+         "4.24: estimates against the lens equation"),
         (plots.curves(defocus / mm, errors, xlabel="defocus [mm]", ylabel="estimate - truth"),
          "4.25: their errors"),
-        (plots.curves(curve.true, {"true": curve.true, "measured, oversampled stack": curve.measured},
-                      xlabel="true α'", ylabel="α'"), "The bias on simulated points: its inverse corrects"),
+        (plots.curves(curve.true, bias, xlabel="true α'", ylabel="α'"),
+         "The bias on simulated points: its inverse corrects"),
     ]  # fmt: skip
