@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.special import j1
@@ -27,6 +27,7 @@ LEAST_GAP = 0.03
 """Of the pitch. Below these limits a difference is no fault."""
 
 _CELL = 32  # samples of a folded micro-image per axis
+_SIGMAS = 4.0  # of their standard errors must pitch and tilt differ, too
 _PUPIL = 64  # samples over a lenslet
 _ORDERS = 3  # harmonics of the lattice that the width is fitted to
 
@@ -159,7 +160,7 @@ def diagnose(white: RawImage | Array, camera: Built) -> Diagnosis:
     pixel, separation, distance = _lengths(intended)
     found = calibrate(white, intended.lattice.layout)
     axis = np.array([n // 2 for n in found.shape], float)
-    lattice, tilt = _tilted(found, axis, (separation + distance) / pixel)
+    lattice, tilt, error = _tilted(found, axis, (separation + distance) / pixel)
     stretch = _stretch(lattice, tilt, intended.lattice)
     new_distance = (separation + distance) * stretch - separation
     pitch = lattice.pitch * pixel
@@ -174,8 +175,8 @@ def diagnose(white: RawImage | Array, camera: Built) -> Diagnosis:
     sizes = {
         "rotation": abs(rotation) / LEAST_ROTATION,
         "offset": float(np.hypot(*offset)) / LEAST_OFFSET,
-        "distance": abs(stretch - 1) / LEAST_STRETCH,
-        "tilt": math.hypot(*tilt) / LEAST_TILT,
+        "distance": abs(stretch - 1) / max(LEAST_STRETCH, _SIGMAS * error.stretch),
+        "tilt": math.hypot(*tilt) / max(LEAST_TILT, _SIGMAS * error.tilt),
         "gap": (1 - width / pitch) / LEAST_GAP,
         "overlap": (width / pitch - 1) / LEAST_GAP,
     }
@@ -200,7 +201,16 @@ def _lengths(intended: Calibration) -> tuple[float, float, float]:
     return pixel, separation, distance
 
 
-def _tilted(found: Calibration, axis: np.ndarray, total: float) -> tuple[Lattice, tuple[float, float]]:
+class _Errors(NamedTuple):
+    """Standard errors of the pitch, relative, and of the tilt [rad]."""
+
+    stretch: float
+    tilt: float
+
+
+def _tilted(
+    found: Calibration, axis: np.ndarray, total: float
+) -> tuple[Lattice, tuple[float, float], _Errors]:
     """Lattice without the distortion of a tilt, and the tilt (y, x) [rad]; lengths in pixels."""
     inner = surrounded(found.indices)  # a missing neighbour's light moves the centres at the border
     index, centers = found.indices[inner].astype(float), found.centers[inner] - axis
@@ -211,11 +221,15 @@ def _tilted(found: Calibration, axis: np.ndarray, total: float) -> tuple[Lattice
         design[rows, 3 * k] = 1
         design[rows, 3 * k + 1 : 3 * k + 3] = index
         design[rows, 6:] = -ideal[:, [k]] * ideal / total
-    fit = np.linalg.lstsq(design, centers.T.ravel(), rcond=None)[0]
+    measured = centers.T.ravel()
+    fit = np.linalg.lstsq(design, measured, rcond=None)[0]
+    variance = np.square(measured - design @ fit).sum() / max(len(measured) - 8, 1)
+    errors = np.sqrt(variance * np.diag(np.linalg.pinv(design.T @ design)))
     origin = (float(fit[0] + axis[0]), float(fit[3] + axis[1]))
     basis = (float(fit[2]), float(fit[5])), (float(fit[1]), float(fit[4]))
-    lattice = found.lattice
-    return Lattice(basis, origin, lattice.layout, lattice.kinds), (float(fit[6]), float(fit[7]))
+    lattice = Lattice(basis, origin, found.lattice.layout, found.lattice.kinds)
+    error = _Errors(float(errors[[1, 2, 4, 5]].max()) / lattice.pitch, float(errors[6:].max()))
+    return lattice, (float(fit[6]), float(fit[7])), error
 
 
 def _stretch(lattice: Lattice, tilt: tuple[float, float], intended: Lattice) -> float:

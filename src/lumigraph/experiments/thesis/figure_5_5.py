@@ -36,15 +36,23 @@ def run(context: Context) -> Outcome:
             for patch, size in _patches(found, dz).items()
         }
         rows += _rows(name, found, dz, seen)
-        text = "; ".join(seen)
-        panels = [(np.tile(one.profile[None], (80, 1)), patch) for patch, one in seen.items()]
-        figures.append((images(panels, columns=1), f"{name} at {dz * 1e3:+g} mm: {text}."))
+        figures.append(_bands(seen, f"{name} at {dz * 1e3:+g} mm"))
     return Outcome(
         tuple(rows),
         tuple(figures),
         why="The sensor does not move with the depth: m' = b/a' (equation 5.9 has b'/a'), and the patch is "
         "m' p z2'/L (5.10 has m' p).",
     )
+
+
+def _bands(seen: dict[str, "_Picture"], what: str) -> tuple[object, str]:
+    """The pictures' middles, one below the other."""
+    strips = []
+    for one in seen.values():
+        middle = one.profile[len(one.profile) // 4 : 3 * len(one.profile) // 4]
+        strips += [np.tile(middle[None], (100, 1)), np.full((12, len(middle)), middle.max())]
+    order = ", ".join(seen)
+    return images([(np.concatenate(strips[:-1]), what)], columns=1), f"{what}; from the top: {order}."
 
 
 def _cases() -> list[tuple[str, FocusedPlenopticCamera, float]]:
