@@ -28,7 +28,7 @@ WHY = (
 def run(context: Context) -> Outcome:
     """Rows through the middle of the window, and the exact integral."""
     rows, figures = [], []
-    distances = (1.0, 10.0) if context.quick else DISTANCES
+    distances = (10.0,) if context.quick else DISTANCES
     for step, z in enumerate(distances):
         context.progress(step / len(distances), f"{z:g} m")
         drawn = {}
