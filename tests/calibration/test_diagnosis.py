@@ -114,7 +114,7 @@ def test_a_simulated_camera_as_it_was_meant_has_no_fault():
     )
     found = diagnose(lg.simulate(camera, lg.targets.white()), camera)
     assert found.faults == ()
-    assert found.diameter == pytest.approx(2.7577e-3, rel=0.02)
+    assert found.diameter == pytest.approx(2.7577e-3, rel=0.005)
 
 
 def test_lengths_must_be_known():
