@@ -132,6 +132,10 @@ def test_centroid_and_encircled_energy_of_an_airy_pattern():
     assert analysis.encircled_energy(image, grid, 1.0, (1.0, 3.0)) < 0.01
 
 
+def test_the_radius_of_encircled_energy_is_a_length():
+    assert analysis.encircled_energy(np.ones((5, 5)), Grid.square(5, 2.0), 2.0) == pytest.approx(5 / 25)
+
+
 def test_point_measures_refuse():
     grid = Grid.square(3, 1.0)
     with pytest.raises(GeometryError, match=r"shape \(2, 3\) but the grid \(3, 3\)"):

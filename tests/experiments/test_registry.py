@@ -56,6 +56,8 @@ def test_an_id_is_found_by_its_ending_but_not_within_a_number():
     assert [one.id for one in find(["3.2"])] == ["figure-3.2", "table-3.2"]
     assert [one.id for one in find(["table-3.1", "2.34"])] == ["2.34", "table-3.1"]
     assert find([]) == experiments()
+    with pytest.raises(LumigraphError, match="no experiment '34'"):
+        find(["34"])  # not 2.34
 
 
 def test_an_unknown_id_names_near_ones():
