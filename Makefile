@@ -40,7 +40,8 @@ format: $(READY)
 bench: $(READY)  ## speed against plain SciPy, ratios within one run
 	$(BIN)/python -m benchmarks
 
-reproduce: $(READY)  ## the long experiments
+reproduce: $(READY)  ## the thesis' experiments at full size, and the long tests; resumes what was interrupted
+	$(BIN)/lumigraph reproduce
 	$(BIN)/python -m pytest -m long tests
 
 torch: $(READY)  ## optional: PyTorch, so that the array tests run on it too
