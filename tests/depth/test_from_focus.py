@@ -60,7 +60,7 @@ def test_depths_outside_the_stack_have_no_confidence():
 
 def test_colours_are_averaged():
     grey = two_planes()
-    colour = np.stack([grey, grey, grey], -1)
+    colour = np.stack([np.full_like(grey, grey.mean()), 2 * grey, 3 * grey - grey.mean()], -1) / 2
     one = from_focus(LightField(grey, APERTURE, LENSLETS, 20.0), ALPHAS)
     three = from_focus(LightField(colour, APERTURE, LENSLETS, 20.0), ALPHAS)
     np.testing.assert_allclose(three.alpha, one.alpha, atol=1e-9)
@@ -74,6 +74,11 @@ def test_a_point_seen_by_ray_optics_is_where_it_is_sharpest(alpha):
     views = LightField(plane(spot, alpha), APERTURE, LENSLETS, 20.0)
     # Without diffraction there is no bias: only the step of the stack is left.
     assert point_alpha(views, ALPHAS) == pytest.approx(alpha, abs=0.004)
+
+
+def test_confidence_does_not_depend_on_brightness():
+    bright, dim = (LightField(k * two_planes(), APERTURE, LENSLETS, 20.0) for k in (1.0, 1e-3))
+    np.testing.assert_allclose(from_focus(dim, ALPHAS).confidence, from_focus(bright, ALPHAS).confidence)
 
 
 def test_a_correction_is_applied_to_what_was_measured():

@@ -119,6 +119,6 @@ def _middle(camera: FocusedPlenopticCamera, raw: RawImage, reach: float = 6.5) -
     middle, half = raw.shape[0] // 2, int(reach * pitch)
     part = np.sqrt(raw.data[middle - half : middle + half + 1, middle - half : middle + half + 1])
     part = part / part.max()
-    width = max(0.5, reach * pitch / 400)
+    width = max(0.5, half / 220)
     border = np.abs(np.abs(np.arange(-half, half + 1)) % pitch - pitch / 2) <= width
     return np.maximum(part, 0.25 * (border[:, None] | border))

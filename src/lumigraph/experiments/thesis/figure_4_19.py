@@ -39,12 +39,15 @@ def run(context: Context) -> Outcome:
             "unchanged", 1.0, 0.02, note="places near the edge are seen by fewer views")
         for name in ("A", "C")
     ]  # fmt: skip
-    shown = [(pictures[name], f"refocused on {name}, α' = {alphas[name]:.4f}") for name in ("B", "A", "C")]
+    shown = [
+        (np.sqrt(np.maximum(pictures[name], 0)), f"refocused on {name}, α' = {alphas[name]:.4f}")
+        for name in ("B", "A", "C")
+    ]
     return Outcome(
         tuple(rows),
         ((plots.images([(np.sqrt(raw.data), "raw, amplitude"), shown[0]], columns=2, cmap="magma"),
-          "4.19: raw image, and the picture rendered without refocusing: B is in focus"),
-         (plots.images(shown[1:], columns=2, cmap="magma"), "4.21: refocused on A and on C")),
+          "4.19: raw image and the picture without refocusing, amplitudes: B is in focus"),
+         (plots.images(shown[1:], columns=2, cmap="magma"), "4.21: refocused on A and on C, amplitudes")),
         why="The text refocuses A with α' = 0.7; its own equation gives 0.7368. Points stand where the ray "
         "through the middle of the main lens goes: A at 3.79 mm, C at 2.48 mm, not at 3 mm.",
     )  # fmt: skip
