@@ -39,8 +39,8 @@ def run(context: Context) -> Outcome:
         Row("directions left in Table 4.1", plenoptic1.resolvable_directions(wavelength, 150 * um, f), "",
             30.0, 2.914, 1e-3),
         Row("light kept by lenslets of 150 um", at[150], "", None, 0.904, 0.01),
-        Row("light kept at the limit", at[124], "", None, 0.808, 0.006, note="0.8082 by a finer sum"),
-        Row("light kept by lenslets of 100 um", at[100], "", None, 0.827, 0.006, note="0.8271 by a finer sum"),
+        Row("light kept at the limit", at[124], "", None, 0.808, 0.006, note="finer sum: 0.8082"),
+        Row("light kept by lenslets of 100 um", at[100], "", None, 0.827, 0.006, note="finer sum: 0.8271"),
         Row("light lost by lenslets of 100 um over 150 um", (1 - at[100]) / (1 - at[150]), "", "more", 1.5,
             (0.0, np.inf), note="below the limit"),
     )  # fmt: skip
