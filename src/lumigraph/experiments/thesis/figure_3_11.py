@@ -61,7 +61,7 @@ def run(context: Context) -> Outcome:
 def _area_row(index: int, areas: float) -> Row:
     """Checked where light has spread over d_c: the discs' Fresnel number (W/C)²/(λ d_c) = N/C² is below 1."""
     name = f"width of an area times C/N, C = {index}"
-    if SAMPLES > index**2:
+    if index**2 < SAMPLES:
         return Row(name, areas, note="light has not spread: discs, and fringes where they meet")
     note = "0.81 N/C for the wave, less for its phase"
     return Row(name, areas, expected=AREA, tolerance=(0.25, 0.0), note=note)
