@@ -59,9 +59,10 @@ def _overview(
 
 
 def _section(section: report.Section, one: Experiment, result: Result) -> None:
-    section.text(f"{one.question}\n\nIn the thesis: {one.thesis}.")
+    section.text(one.question)
     if one.camera:
         section.parts.append(_drawn(one.camera))
+    section.text(f"In the thesis: {one.thesis}.")
     section.parts += result.pictures
     section.table([cells(row) for row in result.rows], header=HEADER)
     if result.why:

@@ -53,7 +53,8 @@ def run(context: Context) -> Outcome:
                 )
             )
         drawn[f"padded, D = {diameter / mm:g} mm"] = cut_of("band limited, padded", diameter, near)
-        drawn[f"Airy, D = {diameter / mm:g} mm"] = (fine / um, two_f.clipped(two_f.airy(fine, diameter), 1e-6))
+        right = two_f.clipped(two_f.airy(fine, diameter), 1e-6)
+        drawn[f"Airy, D = {diameter / mm:g} mm"] = (fine / um, right)
     figure = curves(
         x / um,
         drawn,
