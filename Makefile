@@ -52,4 +52,4 @@ lock: $(READY)  ## compile requirements.lock again (needs uv)
 		--custom-compile-command "make lock" -o requirements.lock pyproject.toml
 
 clean:
-	rm -rf .venv demo build dist
+	rm -rf .venv demo reproduce build dist
