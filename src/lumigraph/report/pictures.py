@@ -13,6 +13,9 @@ from lumigraph.core.raw import RawImage
 from lumigraph.errors import FormatError
 from lumigraph.io import png
 
+_PANELS = 1.7
+"""A matplotlib figure this much wider than high holds panels side by side, unreadable in a column."""
+
 
 @dataclass(frozen=True, slots=True)
 class Picture:
@@ -46,7 +49,7 @@ def picture(
     white
         Value shown as white; the maximum of the image, or the full scale of its bit depth, if left out.
     wide
-        Takes the whole width of the page.
+        Takes the whole width of the page, as a matplotlib figure of several panels side by side always does.
     """
     if zoom is not None and (not isinstance(zoom, int) or zoom < 1):
         raise FormatError(f"zoom is {zoom!r} but must be a whole number from 1.")
@@ -54,6 +57,7 @@ def picture(
     columns, rows = struct.unpack(">II", content[16:24])
     uri = "data:image/png;base64," + base64.b64encode(content).decode()
     scale = zoom or 1
+    wide = wide or (hasattr(image, "savefig") and columns > _PANELS * rows)
     return Picture(uri, columns * scale, rows * scale, caption, alt or caption, zoom is not None, wide)
 
 
