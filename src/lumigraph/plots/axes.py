@@ -20,7 +20,7 @@ def canvas(
     rows: int, columns: int, *, width: float = PANEL, height: float = PANEL
 ) -> tuple[Figure, list[Axes]]:
     """A figure of panels and its axes, row by row; no window is opened and no global state is touched."""
-    figure = Figure(figsize=(width * columns, height * rows), layout="constrained")
+    figure = Figure(figsize=(width * columns, height * rows), layout="compressed")
     return figure, list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
 
 
