@@ -8,7 +8,15 @@ from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError
 from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera
 from lumigraph.scene import Scene, Slice, targets
-from lumigraph.simulation import Incoherent, Snapshots, imaging, periodic, periodic_operator, simulate
+from lumigraph.simulation import (
+    Incoherent,
+    Snapshots,
+    imaging,
+    periodic,
+    periodic_operator,
+    point_images,
+    simulate,
+)
 from lumigraph.units import mm, nm, um
 
 
@@ -128,7 +136,7 @@ def test_the_adjoint_is_the_transpose(xp, rng):
 def test_the_kernel_interpolates_what_the_main_lens_passes():
     """A cosine at the lens' cut-off, sampled at the points, comes back between them to 1e-5."""
     points = np.arange(-40, 41)
-    for frequency in (0.1, 0.5 / periodic.OVERSAMPLING):
+    for frequency in (0.1, 0.5 / point_images.OVERSAMPLING):
         for place in (0.0, 0.3, 0.5):
             value = (periodic.kernel(place - points) * np.cos(2 * np.pi * frequency * points)).sum()
             assert value == pytest.approx(np.cos(2 * np.pi * frequency * place), abs=2e-5)

@@ -2,6 +2,7 @@
 
 - `imaging`: `simulate`
 - `periodic`: `periodic_operator`, incoherent planes before a lenslet array, and its adjoint
+- `point_images`: what it repeats: the images of the points of one cell of the array
 - `camera`: `Camera`, what a simulation asks of an instrument
 - `coherence`: `Incoherent`, `Coherent`, `Snapshots`, `TiltedWaves`: how the scene's light interferes
 """

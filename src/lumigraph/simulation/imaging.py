@@ -20,7 +20,8 @@ from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
 from lumigraph.sensor import integrate
 from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Snapshots, TiltedWaves
-from lumigraph.simulation.periodic import fits, kernel_bytes, periodic_operator
+from lumigraph.simulation.periodic import kernel_bytes, periodic_operator
+from lumigraph.simulation.point_images import fits
 
 PUPIL_OVERSAMPLING = 1.1
 """How much denser than half of λL/p the points of the pupil stand that make a white image."""

@@ -19,11 +19,8 @@ lenslets receive includes the little that lenslets beyond them would diffract in
 M. Broxton et al., Opt. Express 21, 25418 (2013) use the same periodicity in a light-field microscope.
 """
 
-import math
-import warnings
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import i0
@@ -31,17 +28,20 @@ from scipy.special import i0
 from lumigraph.core import arrays, coverage, memory
 from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache
-from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
-from lumigraph.elements import LensletArray, ThinLens
-from lumigraph.errors import SamplingError, SamplingWarning
-from lumigraph.propagation import propagate
-from lumigraph.scene import sources
+from lumigraph.errors import SamplingError
 from lumigraph.sensor import Sensor, integrate, integrate_adjoint
 from lumigraph.simulation.camera import Camera
-
-OVERSAMPLING = 1.5
-"""How much closer than λz/(2D) the points of a cell stand, so that a short kernel interpolates them."""
+from lumigraph.simulation.point_images import (
+    Cells,
+    cells_of,
+    fits,
+    lenslet_array,
+    lenslet_distance,
+    point_images,
+    reach_of,
+    size_of,
+)
 
 KERNEL = 10
 """Half width [points] of that kernel: a Kaiser-windowed sinc, exact to 1e-5 at this oversampling."""
@@ -49,59 +49,11 @@ KERNEL = 10
 KAISER_BETA = 10.5
 """Of the kernel's window: 104 dB."""
 
-FINENESS = 2.6
-"""Samples of an image's cell, over what its incoherent cut-off asks for."""
-
 FAINT = 1e-3
 """Part of the light in the faintest offsets between cells, which are left out."""
 
 
 _KERNELS = ByteCache(limit=2**30)
-
-
-@dataclass(frozen=True, slots=True)
-class Cells:
-    """Rectangular cells that tile a lenslet array, one lenslet or more in each.
-
-    Parameters
-    ----------
-    size
-        Height and width of a cell [m].
-    edge
-        Corner (y, x) of the first cell with the least coordinates [m].
-    count
-        Cells along y and x that hold the array.
-    points
-        Object points along y and x of a cell.
-    samples
-        Samples of the image along y and x of a cell; multiples of `points`.
-    extent
-        Height and width of the array, centred on the axis [m]; the cells may reach beyond it.
-    """
-
-    size: tuple[float, float]
-    edge: tuple[float, float]
-    count: tuple[int, int]
-    points: tuple[int, int]
-    samples: tuple[int, int]
-    extent: tuple[float, float]
-
-    @property
-    def step(self) -> tuple[float, float]:
-        """Pitch of the image's samples along y and x [m]."""
-        return self.size[0] / self.samples[0], self.size[1] / self.samples[1]
-
-    def grid(self, per_cell: tuple[int, int], scale: float, margin: int) -> Grid:
-        """`per_cell` samples of each cell and of `margin` more on all sides, times `scale`.
-
-        The first sample of a cell stands on its edge; a negative scale turns the plane by 180°.
-        """
-        shape, pitch, center = [], [], []
-        for size, edge, n, k in zip(self.size, self.edge, self.count, per_cell, strict=True):
-            shape.append((n + 2 * margin) * k)
-            pitch.append(size / k * abs(scale))
-            center.append((edge - margin * size + (shape[-1] // 2) * size / k) * scale)
-        return Grid((shape[0], shape[1]), (pitch[0], pitch[1]), (center[0], center[1]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,7 +138,7 @@ class PeriodicOperator:
         points = self.cells.grid(self.cells.points, 1 / self.object_scale, self._reach + 1)
         matrices = []
         for axis in (0, 1):
-            at = (points.y, points.x)[axis] if self.object_scale > 0 else _descending(points, axis)
+            at = _descending(points, axis)  # object_scale is below 0: the main lens turns the picture
             off = (at[:, None] - (self.object_grid.y, self.object_grid.x)[axis]) / points.pitch[axis]
             matrix = kernel(off) * (self.object_grid.pitch[axis] / points.pitch[axis])
             matrices.append(arrays.like(matrix, array))
@@ -238,21 +190,21 @@ def periodic_operator(
     if not fits(camera):
         raise SamplingError("the lenslet array is turned against the axes: use Snapshots, or rotation 0.")
     distance = camera.object_distance + dz
-    cells, scale = _cells(camera, distance), 1 + _lenslet_distance(camera) / camera.separation
-    reach = _window(camera, cells, distance, dropped)
-    needed = 2 * _size(cells, reach)
+    cells, scale = cells_of(camera, distance), 1 + lenslet_distance(camera) / camera.separation
+    reach = reach_of(camera, cells, distance, dropped)
+    needed = 2 * size_of(cells, reach)
     memory.require(needed, "the periodic operator", "Use slower lenslets, or Snapshots.", SamplingError)
     optics = (
         camera.wavelength,
         camera.separation,
         scale,
         camera.lens_train(),
-        _array(camera),
+        lenslet_array(camera),
         camera.pupil_grid,
     )
     kernels = _KERNELS.get(
         repr((cells, distance, reach, optics)),
-        lambda: _kernels(camera, cells, distance, reach),
+        lambda: point_images(camera, cells, distance, reach),
     )
     return PeriodicOperator(
         cells, kernels, _bright(kernels), grid, -camera.separation / distance, scale, camera.sensor
@@ -262,106 +214,8 @@ def periodic_operator(
 def kernel_bytes(camera: Camera, dz: float = 0.0, *, dropped: float = 0.01) -> float:
     """Memory that the kernels of `periodic_operator` take [bytes]."""
     distance = camera.object_distance + dz
-    cells = _cells(camera, distance)
-    return _size(cells, _window(camera, cells, distance, dropped))
-
-
-def _size(cells: Cells, reach: int) -> float:
-    return 4.0 * (2 * reach + 1) ** 2 * math.prod(cells.points) * math.prod(cells.samples)
-
-
-def fits(camera: Camera) -> bool:
-    """Whether the camera has an array whose cells lie along the axes."""
-    lattice = camera.lattice
-    return lattice is not None and abs(lattice.rotation) < 1e-12 and camera.lenslet_distance is not None
-
-
-def _lenslet_distance(camera: Camera) -> float:
-    assert camera.lenslet_distance is not None  # `fits` has been asked
-    return camera.lenslet_distance
-
-
-def _array(camera: Camera) -> LensletArray:
-    train = camera.relay_train()
-    assert train is not None
-    array = train.elements[0]
-    assert isinstance(array, LensletArray)
-    return array
-
-
-def _cells(camera: Camera, distance: float) -> Cells:
-    """The smallest upright rectangle that repeats the lattice, its points and its samples."""
-    lattice, array = camera.lattice, _array(camera)
-    assert lattice is not None
-    if lattice.layout == "hex":
-        size = (math.sqrt(3) * lattice.pitch, lattice.pitch * lattice.kinds)
-    else:
-        size = lattice.pitches
-    extent = array.extent or camera.image_grid.size
-    count = tuple(max(1, math.ceil(e / s - 1e-6)) for e, s in zip(extent, size, strict=True))
-    # Cells are centred on a lattice point or, for an even number of them, on the axis' side of it.
-    edge = tuple(
-        _nearest(-n * s / 2, o - s / 2, s) for n, s, o in zip(count, size, lattice.origin, strict=True)
-    )
-    wavelength, b, L = camera.wavelength, _lenslet_distance(camera), camera.separation
-    finest = wavelength * L / (2 * camera.pupil_diameter) / OVERSAMPLING
-    image = wavelength * (b * L / (b + L)) / lattice.pitch / 2 / FINENESS
-    points = tuple(math.ceil(s / finest) for s in size)
-    samples = tuple(n * math.ceil(s / image / n) for s, n in zip(size, points, strict=True))
-    return Cells(_pair(size), _pair(edge), _pair(count), _pair(points), _pair(samples), _pair(extent))
-
-
-def _pair(values: Iterable[Any]) -> tuple[Any, Any]:
-    y, x = values
-    return y, x
-
-
-def _nearest(value: float, start: float, step: float) -> float:
-    """The number nearest to `value` among ``start + k * step``."""
-    return start + round((value - start) / step) * step
-
-
-def _window(camera: Camera, cells: Cells, distance: float, dropped: float) -> int:
-    """Cells on each side of a point's own that its image reaches."""
-    wavelength, L, D = camera.wavelength, camera.separation, camera.pupil_diameter
-    focal_length = _focal_length(camera)
-    blur = D / 2 * abs(1 - L * (1 / focal_length - 1 / distance))
-    tail = 2 * wavelength * L / D / (math.pi**2 * dropped)
-    return math.ceil((blur + tail) / min(cells.size) + 0.5)
-
-
-def _focal_length(camera: Camera) -> float:
-    lenses = [part.focal_length for part in camera.lens_train().elements if isinstance(part, ThinLens)]
-    return lenses[0]
-
-
-def _kernels(camera: Camera, cells: Cells, distance: float, reach: int) -> np.ndarray:
-    """Images of the points of a cell (T, T, points, samples), each for all of the main lens' light."""
-    T, step = 2 * reach + 1, cells.step
-    stride = tuple(k // n for k, n in zip(cells.samples, cells.points, strict=True))
-    shape = (T * cells.samples[0], T * cells.samples[1])
-    wave = _main_lens(
-        camera, distance, Grid((shape[0] + 2 * cells.samples[0], shape[1] + 2 * cells.samples[1]), step)
-    )
-    first = (cells.edge[axis] - reach * cells.size[axis] + (shape[axis] // 2) * step[axis] for axis in (0, 1))
-    window = Grid(shape, step, _pair(first))
-    array = replace(_array(camera), extent=None)
-    b, L = _lenslet_distance(camera), camera.separation
-    # An even object of intensity 1 gives an even image of 1, and that is magnified onto the sensor.
-    light = math.prod(stride) / (1 + b / L) ** 2
-    kernels = np.empty((T, T, math.prod(cells.points), math.prod(cells.samples)), np.float32)
-    middle = tuple(n // 2 for n in wave.shape)
-    for ky in range(cells.points[0]):
-        for kx in range(cells.points[1]):
-            # The window begins `reach` cells before the points' own; point ky is ky strides into it.
-            top = middle[0] - reach * cells.samples[0] - ky * stride[0]
-            left = middle[1] - reach * cells.samples[1] - kx * stride[1]
-            field = Field(wave[top : top + shape[0], left : left + shape[1]], window, camera.wavelength)
-            image = propagate(array(field), b * L / (b + L), "auto").intensity
-            image *= light / field.intensity.sum()
-            parts = image.reshape(T, cells.samples[0], T, cells.samples[1]).transpose(0, 2, 1, 3)
-            kernels[:, :, ky * cells.points[1] + kx] = parts.reshape(T, T, -1)
-    return kernels
+    cells = cells_of(camera, distance)
+    return size_of(cells, reach_of(camera, cells, distance, dropped))
 
 
 def _bright(kernels: np.ndarray) -> tuple[tuple[int, int], ...]:
@@ -371,16 +225,6 @@ def _bright(kernels: np.ndarray) -> tuple[tuple[int, int], ...]:
     faint = np.cumsum(light.ravel()[order]) <= FAINT * light.sum()
     kept = np.sort(order[~faint])
     return tuple((int(k) // light.shape[1], int(k) % light.shape[1]) for k in kept)
-
-
-def _main_lens(camera: Camera, distance: float, grid: Grid) -> np.ndarray:
-    """Amplitude (y, x) of a point on the axis in the lenslet plane, without the phase exp(iπw²/(λL))."""
-    point = sources.point_source(camera.pupil_grid, camera.wavelength, distance, paraxial=True)
-    with warnings.catch_warnings():  # a smooth converging wave: its samples do not stand for points
-        warnings.simplefilter("ignore", SamplingWarning)
-        field = propagate(camera.lens_train()(point), camera.separation, "fresnel", grid=grid)
-    phase = [np.exp(-1j * np.pi * c**2 / (camera.wavelength * camera.separation)) for c in (grid.y, grid.x)]
-    return (field.data * phase[0][:, None] * phase[1]).astype(np.complex64)
 
 
 def _descending(grid: Grid, axis: int) -> np.ndarray:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from lumigraph import plots
+from lumigraph.core.raw import RawImage
 from lumigraph.experiments.registry import Context, Outcome, Row, experiment
 from lumigraph.experiments.thesis import table_4_1
 from lumigraph.instruments import PlenopticCamera
@@ -51,23 +52,23 @@ def _camera(pitch: float, count: int) -> PlenopticCamera:
     )
 
 
-def _blur(camera: PlenopticCamera, raw: object) -> float:
+def _blur(camera: PlenopticCamera, raw: RawImage) -> float:
     """Root mean square distance of a rendered point's light from its lenslet, within three lenslets."""
-    picture = decode(raw, camera.calibration).data.mean((0, 1))  # type: ignore[arg-type]
+    picture = decode(raw, camera.calibration).data.mean((0, 1))
     middle = picture.shape[0] // 2
     part = picture[middle - 3 : middle + 4, middle - 3 : middle + 4]
     away = np.arange(-3, 4)
     return float(np.sqrt((part * (away[:, None] ** 2 + away**2)).sum() / part.sum()))
 
 
-def _figures(camera: PlenopticCamera, raw: object, name: str) -> list[tuple[object, str]]:
-    data, pitch = raw.data, camera.calibration.lattice.pitch  # type: ignore[attr-defined]
+def _figures(camera: PlenopticCamera, raw: RawImage, name: str) -> list[tuple[object, str]]:
+    data, pitch = raw.data, camera.calibration.lattice.pitch
     middle, half = data.shape[0] // 2, int(2.5 * pitch)
     part = np.sqrt(data[middle - half : middle + half + 1, middle - half : middle + half + 1])
     part = part / part.max()
     borders = np.abs(np.abs(np.arange(-half, half + 1)) % pitch - pitch / 2) <= 0.5
     part[borders[:, None] | borders] = np.maximum(part[borders[:, None] | borders], 0.3)
-    views = decode(raw, camera.calibration)  # type: ignore[arg-type]
+    views = decode(raw, camera.calibration)
     epi = views.data[views.data.shape[0] // 2, :, views.data.shape[2] // 2]
     s = epi.shape[1] // 2
     phase_space = np.sqrt(np.maximum(epi[:, s - 4 : s + 5], 0))
