@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from lumigraph.core.lattice import Lattice
     from lumigraph.core.lightfield import LightField
     from lumigraph.core.raw import RawImage
+    from lumigraph.core.volume import Volume
     from lumigraph.elements import (
         CircularAperture,
         LensletArray,
@@ -71,6 +72,7 @@ _HOMES = {
     "lumigraph.core.lattice": ("Lattice",),
     "lumigraph.core.lightfield": ("LightField",),
     "lumigraph.core.raw": ("RawImage",),
+    "lumigraph.core.volume": ("Volume",),
     "lumigraph.elements": (
         "CircularAperture",
         "LensletArray",
@@ -143,6 +145,7 @@ __all__ = [
     "ThinLens",
     "TiltedWaves",
     "Train",
+    "Volume",
     "ZernikePlate",
     "analysis",
     "calibrate",

@@ -6,6 +6,7 @@
 - `raw`: `RawImage`, what a sensor read out
 - `calibration`: `Calibration`, the micro-images found on a white image
 - `lightfield`: `LightField`, decoded radiance (v, u, t, s)
+- `volume`: `Volume`, reconstructed intensities (z, y, x)
 - `arrays`: the only file that knows array libraries
 - `checks`: one-line refusals of bad numbers
 - `cache`: arrays kept within a bound of memory

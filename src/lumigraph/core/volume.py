@@ -1,0 +1,87 @@
+"""What was reconstructed: intensities in space."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lumigraph.core import checks
+from lumigraph.core.arrays import Array
+from lumigraph.core.grid import Grid
+from lumigraph.errors import GeometryError
+
+_EVEN = 1e-6
+"""Steps that differ by this part of their mean count as equal."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Volume:
+    """Intensity of a stack of planes across the optical axis, in object space.
+
+    Parameters
+    ----------
+    data
+        Intensities (z, y, x) or (z, y, x, c).
+    grid
+        Where the samples of every plane stand [m].
+    depths
+        Of the planes from the focused one (z,) [m], positive farther from the camera; ascending or
+        descending.
+
+    Raises
+    ------
+    GeometryError
+        The data's shape differs from the grid's and the depths', depths that are not finite or not in order.
+
+    Examples
+    --------
+    >>> volume = Volume(np.ones((3, 4, 5)), Grid((4, 5), 1e-6), (-2e-6, 0.0, 2e-6))
+    >>> volume.depth_step, volume.shape
+    (2e-06, (3, 4, 5))
+    """
+
+    data: Array
+    grid: Grid
+    depths: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        checks.array("data", self.data)
+        checks.instance("grid", self.grid, Grid)
+        depths = np.atleast_1d(np.asarray(self.depths, np.float64))
+        object.__setattr__(self, "depths", tuple(float(dz) for dz in depths.ravel()))
+        shape = tuple(self.data.shape)
+        if len(shape) not in (3, 4) or shape[:3] != depths.shape + self.grid.shape:
+            raise GeometryError(
+                f"data has shape {shape} but must be (z, y, x[, c]) with z = {len(self.depths)} of the "
+                f"depths and (y, x) = {self.grid.shape} of the grid."
+            )
+        if not np.isfinite(depths).all():
+            raise GeometryError(f"depths are {self.depths} but must be finite numbers [m].")
+        steps = np.diff(depths)
+        if len(steps) and not ((steps > 0).all() or (steps < 0).all()):
+            raise GeometryError(
+                "depths must ascend or descend, each plane at its own depth. Sort the planes."
+            )
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Planes, rows and columns (nz, ny, nx)."""
+        return len(self.depths), *self.grid.shape
+
+    @property
+    def depth_step(self) -> float | None:
+        """Distance from each plane to the next [m]; None for one plane, or steps that differ."""
+        steps = np.diff(self.depths)
+        if not len(steps) or np.ptp(steps) > _EVEN * abs(steps.mean()):
+            return None
+        return float(steps.mean())
+
+    @property
+    def spacing(self) -> tuple[float, float, float]:
+        """Mean distance between neighbouring samples (dz, dy, dx) [m]; dz is 0 for one plane."""
+        steps = np.abs(np.diff(self.depths))
+        return float(steps.mean()) if len(steps) else 0.0, *self.grid.pitch
+
+    def plane(self, dz: float) -> Array:
+        """The plane (y, x[, c]) whose depth is nearest to `dz` [m]."""
+        nearest = int(np.argmin(np.abs(np.asarray(self.depths) - checks.finite("dz", dz))))
+        return self.data[nearest, ...]
