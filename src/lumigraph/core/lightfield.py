@@ -26,17 +26,21 @@ class LightField:
         Where the lenslets stand [m].
     separation
         Main lens to lenslets, F [m].
+    valid
+        Which samples (v, u, t, s) rest on good pixels, true or false; None where all do. What sums over
+        views leaves the others out.
 
     Raises
     ------
     GeometryError
-        The data's shape differs from the two grids', or the separation is not above zero.
+        The data's or the mask's shape differs from the two grids', or the separation is not above zero.
     """
 
     data: Array
     aperture: Grid
     lenslets: Grid
     separation: float
+    valid: Array | None = None
 
     def __post_init__(self) -> None:
         checks.positive("separation", self.separation)
@@ -49,6 +53,13 @@ class LightField:
                 f"data has shape {shape} but must be (v, u, t, s[, c]) with (v, u) = {self.aperture.shape} "
                 f"of the aperture and (t, s) = {self.lenslets.shape} of the lenslets."
             )
+        if self.valid is not None:
+            checks.array("valid", self.valid)
+            if tuple(self.valid.shape) != shape[:4]:
+                raise GeometryError(
+                    f"valid has shape {tuple(self.valid.shape)} but the data has {shape[:4]} samples "
+                    "(v, u, t, s). Give one true or false for each."
+                )
 
     def view(self, v: int, u: int) -> Array:
         """Picture (t, s[, c]) seen from one place on the main lens; indices as in NumPy."""
