@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from lumigraph.core.lightfield import LightField
     from lumigraph.core.raw import RawImage
     from lumigraph.core.volume import Volume
+    from lumigraph.deconvolution import deconvolve, deconvolve_series
     from lumigraph.elements import (
         CircularAperture,
         LensletArray,
@@ -73,6 +74,7 @@ _HOMES = {
     "lumigraph.core.lightfield": ("LightField",),
     "lumigraph.core.raw": ("RawImage",),
     "lumigraph.core.volume": ("Volume",),
+    "lumigraph.deconvolution": ("deconvolve", "deconvolve_series"),
     "lumigraph.elements": (
         "CircularAperture",
         "LensletArray",
@@ -152,6 +154,8 @@ __all__ = [
     "catalogue",
     "choose_method",
     "decode",
+    "deconvolve",
+    "deconvolve_series",
     "depth",
     "design",
     "devignette",

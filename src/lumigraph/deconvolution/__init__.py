@@ -1,8 +1,30 @@
 """Objects from raw images: what a camera must have seen, from a model of how it sees.
 
+- `deconvolve`: `deconvolve` and, for time series, `deconvolve_series`; `Step`, `Interrupted`
 - `forward`: `ForwardModel`, what a deconvolution asks of a camera
+- `exposure`: `Exposure`, what is known of the raw image besides its values
+- `problem`: the three put together: model, sensitivity, deviance
+- `methods`: `Stop`, and what methods share
+- `richardson_lucy`: `RichardsonLucy`
+- `checkpoint`: `Checkpoint`, a file from which a killed run goes on
 """
 
+from lumigraph.deconvolution.checkpoint import Checkpoint
+from lumigraph.deconvolution.deconvolve import Interrupted, Step, deconvolve, deconvolve_series
+from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.forward import ForwardModel, PlacedModel
+from lumigraph.deconvolution.methods import Stop
+from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
 
-__all__ = ["ForwardModel", "PlacedModel"]
+__all__ = [
+    "Checkpoint",
+    "Exposure",
+    "ForwardModel",
+    "Interrupted",
+    "PlacedModel",
+    "RichardsonLucy",
+    "Step",
+    "Stop",
+    "deconvolve",
+    "deconvolve_series",
+]

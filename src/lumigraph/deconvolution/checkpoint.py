@@ -1,0 +1,159 @@
+"""Where a deconvolution stands, kept in a file, so that a killed one goes on where it was."""
+
+import hashlib
+import os
+import secrets
+import time
+import zipfile
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lumigraph.core import arrays, checks
+from lumigraph.core.arrays import Array
+from lumigraph.deconvolution.methods import State
+from lumigraph.deconvolution.problem import Problem
+from lumigraph.errors import FormatError
+
+_PREFIX = "memory."
+_SAME = 1e-4
+"""Sensitivities of one operator differ by less: sums run in another order on another machine."""
+
+
+@dataclass(slots=True)
+class Checkpoint:
+    """A file (.npz) that is written now and then, and read at the start if it is there.
+
+    It holds the estimate, what the method remembers, and a digest of the raw image and the settings; the
+    number of iterations is not among them, so that a finished run can be continued. Written atomically.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    every
+        Time between two writings [s]; 0 writes after every iteration.
+    """
+
+    path: Path
+    every: float = 20.0
+    _written: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.path = Path(self.path)
+        if not self.path.parent.is_dir():
+            raise FormatError(f"the folder {self.path.parent} for {self.path.name} does not exist.")
+        if self.path.suffix != ".npz":
+            raise FormatError(f"the checkpoint {self.path} must end in .npz.")
+        if checks.finite("every", self.every, "s") < 0:
+            raise FormatError(f"every is {self.every:g} s but must be at least 0.")
+        self._written = time.monotonic()
+
+    @classmethod
+    def of(cls, place: "Checkpoint | str | os.PathLike[str]") -> "Checkpoint":
+        """Itself, or a checkpoint at a path."""
+        return place if isinstance(place, Checkpoint) else cls(Path(place))
+
+    def keep(self, problem: Problem, state: State, key: str, *, now: bool = False) -> None:
+        """Write the state if it is time to, or `now`."""
+        if not now and time.monotonic() - self._written < self.every:
+            return
+        content = {f"{_PREFIX}{name}": arrays.to_numpy(array) for name, array in state.memory.items()}
+        content |= {"estimate": arrays.to_numpy(state.estimate), "done": np.int64(state.done)}
+        content |= {"key": np.str_(key), "sensitivity": _trace(problem)}
+        _write(self.path, content)
+        self._written = time.monotonic()
+
+    def found(self, problem: Problem, key: str) -> State | None:
+        """The state in the file; None where there is no file.
+
+        Raises
+        ------
+        FormatError
+            A damaged file, or one of another raw image, camera or method.
+        """
+        if not self.path.exists():
+            return None
+        content = _read(self.path)
+        like, shape = problem.data, tuple(problem.scale.sensitivity.shape)
+        trace = content["sensitivity"]
+        mine = _trace(problem)
+        same = trace.shape == mine.shape and np.allclose(trace, mine, rtol=_SAME, atol=_SAME * mine.max())
+        if str(content["key"]) != key or not same or content["estimate"].shape != shape:
+            what = "raw image or settings" if same else "camera or grid"
+            raise FormatError(
+                f"the checkpoint {self.path} belongs to another {what}. Remove it, or give another name."
+            )
+        memory = {name[len(_PREFIX) :]: v for name, v in content.items() if name.startswith(_PREFIX)}
+        return State.at(
+            problem,
+            arrays.like(content["estimate"], like),
+            {name: arrays.like(value, like) for name, value in memory.items()},
+            int(content["done"]),
+        )
+
+
+def fingerprint(*things: Any) -> str:
+    """Digest of arrays, dataclasses of them and plain values, by content.
+
+    Examples
+    --------
+    >>> fingerprint(np.ones(3)) == fingerprint(np.ones(3))
+    True
+    >>> fingerprint(np.ones(3)) == fingerprint(np.ones(3, np.float32))
+    False
+    """
+    digest = hashlib.sha256()
+    _absorb(digest, things)
+    return digest.hexdigest()
+
+
+def _absorb(digest: Any, thing: Any) -> None:
+    if is_dataclass(thing) and not isinstance(thing, type):
+        digest.update(type(thing).__qualname__.encode())
+        for item in fields(thing):
+            digest.update(item.name.encode())
+            _absorb(digest, getattr(thing, item.name))
+    elif isinstance(thing, tuple | list):
+        digest.update(f"{len(thing)} of".encode())
+        for item in thing:
+            _absorb(digest, item)
+    elif hasattr(thing, "shape") and hasattr(thing, "dtype"):
+        values = np.ascontiguousarray(arrays.to_numpy(thing))
+        digest.update(f"{values.dtype} {values.shape}".encode())
+        digest.update(values.tobytes())
+    elif callable(thing):  # its address in memory would differ in the next run
+        digest.update(getattr(thing, "__qualname__", type(thing).__qualname__).encode())
+    else:
+        digest.update(repr(thing).encode())
+
+
+def _trace(problem: Problem) -> np.ndarray:
+    """Some of the sensitivity's values: they tell one operator from another."""
+    values: Array = arrays.to_numpy(problem.scale.sensitivity).ravel()
+    return values[:: max(1, values.size // 997)]
+
+
+def _write(path: Path, content: dict[str, Any]) -> None:
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(6)}.tmp")
+    try:
+        with temporary.open("wb") as file:
+            np.savez(file, **content)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _read(path: Path) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            content = {name: file[name] for name in file.files}
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
+        raise FormatError(f"the checkpoint {path} is damaged ({error}). Remove it.") from error
+    if not {"estimate", "done", "key", "sensitivity"} <= content.keys():
+        raise FormatError(f"{path} is no checkpoint of a deconvolution. Give another name.")
+    return content

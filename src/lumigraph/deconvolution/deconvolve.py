@@ -1,0 +1,256 @@
+"""`deconvolve`: from a raw image to what was in front of the camera; `deconvolve_series` for many."""
+
+import math
+import os
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lumigraph.core import arrays, memory
+from lumigraph.core.arrays import Array
+from lumigraph.core.raw import RawImage
+from lumigraph.core.volume import Volume
+from lumigraph.deconvolution.checkpoint import Checkpoint, fingerprint
+from lumigraph.deconvolution.exposure import Exposure
+from lumigraph.deconvolution.forward import ForwardModel, PlacedModel, depths_of
+from lumigraph.deconvolution.methods import Method, State, Stop
+from lumigraph.deconvolution.problem import Problem, Scale, values
+from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
+from lumigraph.errors import GeometryError, SamplingError
+
+COPIES = 12
+"""Arrays of the object's size that an iteration holds at most, a prior's memory included."""
+
+Result = Array | Volume | RawImage
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """How a deconvolution goes on.
+
+    Parameters
+    ----------
+    iteration, iterations
+        Done, and at most to do.
+    deviance
+        Poisson deviance per pixel of the estimate: -2 ln of its likelihood over that of a perfect fit,
+        in electrons where the gain is known. See `Stop`.
+    change
+        Of the last step, ‖Δo‖/‖o‖.
+    elapsed, remaining
+        Time [s] so far, and still to go at the present pace.
+    stopped
+        Why it stops before the last iteration; empty while it goes on.
+    """
+
+    iteration: int
+    iterations: int
+    deviance: float
+    change: float
+    elapsed: float
+    remaining: float
+    stopped: str = ""
+
+
+Progress = Callable[[Step], None]
+
+
+class Interrupted(KeyboardInterrupt):
+    """A deconvolution was interrupted; `partial` is what it had reached after `iterations`."""
+
+    def __init__(self, partial: Result, iterations: int) -> None:
+        super().__init__(f"interrupted after {iterations} iterations")
+        self.partial = partial
+        self.iterations = iterations
+
+
+def deconvolve(
+    raw: RawImage | Array,
+    operator: ForwardModel,
+    iterations: int | Stop = 30,
+    *,
+    method: Method = RichardsonLucy(),  # noqa: B008 - frozen
+    exposure: Exposure | None = None,
+    progress: Progress | None = None,
+    checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
+) -> Any:
+    """What was in front of the camera: intensities (y, x) or (z, y, x), at least 0.
+
+    Parameters
+    ----------
+    raw
+        What the camera saw (ny, nx), as it was read: dark and white images go into the exposure.
+    operator
+        How it sees, such as ``camera.operator()``.
+    iterations
+        At most; or a `Stop`, which ends them where the noise begins to be fitted.
+    method
+        `RichardsonLucy` (default) with or without a prior, or `LeastSquares`.
+    exposure
+        Background, vignetting, dead pixels, noise; None for what a `RawImage` tells of its noise.
+    progress
+        Called with a `Step` after each iteration.
+    checkpoint
+        A file (.npz) or `Checkpoint`: written now and then, and read at the start if it is there, so that a
+        killed run goes on and ends with the same result bit for bit.
+
+    Returns
+    -------
+    Volume, RawImage or array
+        Of an array an array of its library and precision. Of a `RawImage`, where the operator knows its
+        ``object_grid``, a `Volume` if the object has planes, else a picture (`RawImage`) of the grid's pitch.
+
+    Raises
+    ------
+    CalibrationError
+        A raw image of another shape than the operator's, a colour mosaic, NaN where pixels count, no light.
+    GeometryError
+        A start of the wrong shape, or an operator without sensitivity.
+    FormatError
+        A checkpoint that is damaged or belongs to another raw image.
+    Interrupted
+        A KeyboardInterrupt; it carries the estimate that was reached, and the checkpoint is written.
+
+    """
+    limits = iterations if isinstance(iterations, Stop) else Stop(iterations)
+    exposure = _known(raw, exposure)
+    data = values(raw, operator, exposure)
+    _require(operator, data)
+    scale = Scale.of(operator, exposure, data)
+    problem = Problem.of(raw, exposure, scale)
+    run = _Run(problem, method, limits, progress)
+    if checkpoint is not None:
+        run.checkpoint = Checkpoint.of(checkpoint)
+        run.key = fingerprint(data, exposure, method)
+    return _finished(run, raw)
+
+
+def deconvolve_series(
+    frames: Iterable[RawImage | Array],
+    operator: ForwardModel,
+    iterations: int | Stop = 30,
+    *,
+    method: Method = RichardsonLucy(),  # noqa: B008 - frozen
+    exposure: Exposure | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Any]:
+    """The result of each frame of a time series, one after the other, as `deconvolve` gives it.
+
+    The operator and its sensitivity are held once; a frame is read when its turn comes and forgotten, so
+    that any number of frames needs the memory of one.
+
+    Parameters
+    ----------
+    frames
+        Raw images, such as a generator that opens one file after the other.
+    operator, iterations, method, exposure, progress
+        As in `deconvolve`; the exposure is that of the first frame for all of them.
+    """
+    limits = iterations if isinstance(iterations, Stop) else Stop(iterations)
+    scale: Scale | None = None
+    for raw in frames:
+        if scale is None:
+            exposure = _known(raw, exposure)
+            data = values(raw, operator, exposure)
+            _require(operator, data)
+            scale = Scale.of(operator, exposure, data)
+        assert exposure is not None
+        problem = Problem.of(raw, exposure, scale)
+        yield _finished(_Run(problem, method, limits, progress), raw)
+
+
+@dataclass(slots=True)
+class _Run:
+    problem: Problem
+    method: Method
+    limits: Stop
+    progress: Progress | None
+    checkpoint: Checkpoint | None = None
+    key: str = ""
+    began: float = 0.0
+
+    def states(self) -> Iterator[State]:
+        """The first state and each that follows, until it is time to stop."""
+        self.began = time.perf_counter()
+        state = self._first()
+        first, change = state.done, np.inf
+        yield state
+        while not self.limits.reached(state.done, state.deviance, change):
+            before, state = state, self.method.step(self.problem, state)
+            change = _change(before.estimate, state.estimate)
+            if self.checkpoint is not None:
+                self.checkpoint.keep(self.problem, state, self.key)
+            yield state
+            self._tell(state, change, first)
+        if self.checkpoint is not None and state.done > first:
+            self.checkpoint.keep(self.problem, state, self.key, now=True)
+
+    def _first(self) -> State:
+        kept = None if self.checkpoint is None else self.checkpoint.found(self.problem, self.key)
+        if kept is not None:
+            return kept
+        if self.method.start is None:
+            return State.at(self.problem, self.problem.flat())
+        start, needed = self.method.start, tuple(self.problem.scale.sensitivity.shape)
+        if tuple(start.shape) != needed:
+            raise GeometryError(f"start has shape {tuple(start.shape)} but the object has {needed}.")
+        return State.at(self.problem, arrays.like(np.asarray(arrays.to_numpy(start)), self.problem.data))
+
+    def _tell(self, state: State, change: float, first: int) -> None:
+        if self.progress is None:
+            return
+        elapsed = time.perf_counter() - self.began
+        stopped = self.limits.reached(state.done, state.deviance, change)
+        left = 0 if stopped else self.limits.iterations - state.done
+        remaining = left * elapsed / (state.done - first)
+        self.progress(
+            Step(state.done, self.limits.iterations, state.deviance, change, elapsed, remaining, stopped)
+        )
+
+
+def _finished(run: _Run, raw: RawImage | Array) -> Any:
+    reached: list[State] = []
+    try:
+        for state in run.states():
+            reached[:] = [state]
+    except KeyboardInterrupt:
+        if not reached:
+            raise
+        if run.checkpoint is not None:
+            run.checkpoint.keep(run.problem, reached[0], run.key, now=True)
+        partial = _placed(reached[0].estimate, raw, run.problem.scale.operator)
+        raise Interrupted(partial, reached[0].done) from None
+    return _placed(reached[0].estimate, raw, run.problem.scale.operator)
+
+
+def _placed(estimate: Array, raw: RawImage | Array, operator: ForwardModel) -> Any:
+    """The estimate with its place in space, where the raw image is one and the operator knows it."""
+    if not isinstance(raw, RawImage) or not isinstance(operator, PlacedModel):
+        return estimate
+    grid = operator.object_grid
+    if len(estimate.shape) == 3:
+        depths = depths_of(operator)
+        return estimate if depths is None else Volume(estimate, grid, depths)
+    known = {"center": grid.center, "wavelength": raw.metadata.get("wavelength")}
+    return RawImage(estimate, float(np.mean(grid.pitch)), metadata=known)
+
+
+def _known(raw: RawImage | Array, exposure: Exposure | None) -> Exposure:
+    if exposure is not None:
+        return exposure
+    return Exposure.of(raw) if isinstance(raw, RawImage) else Exposure()
+
+
+def _require(operator: ForwardModel, data: Array) -> None:
+    size = math.prod(operator.shape[1]) * (4 if arrays.is_single(data) else 8)
+    what = f"a deconvolution into {' x '.join(map(str, operator.shape[1]))} samples"
+    memory.require(COPIES * size, what, "Use fewer planes, or coarser samples.", SamplingError)
+
+
+def _change(before: Array, after: Array) -> float:
+    xp = arrays.namespace(after)
+    moved, whole = float(xp.sum((after - before) ** 2)), float(xp.sum(after**2))
+    return math.sqrt(moved / whole) if whole > 0 else 0.0

@@ -1,0 +1,89 @@
+"""What is known of a raw image besides its values: offset, response, dead pixels, noise."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lumigraph.core import checks
+from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.raw import RawImage
+from lumigraph.errors import CalibrationError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Exposure:
+    r"""How a raw image r follows from the light A o on the pixels.
+
+    .. math:: g\,r \sim \mathrm{Poisson}(g\,(v \cdot A o + b)) + \mathcal N(0, \sigma^2)
+
+    Nothing is subtracted from a raw image or divided out of it, which would spoil the noise's statistics:
+    a dark image is given as `background`, a white image's vignetting as `response`.
+
+    Parameters
+    ----------
+    background
+        b: what a pixel reads without light, in the raw image's values: a number or (ny, nx).
+    response
+        v: what a pixel makes of light over what the model expects (ny, nx); None for 1.
+    weights
+        How much each pixel counts (ny, nx), from 0 to 1: 0 for dead or saturated ones, whose values are
+        not read and may be NaN. None for 1.
+    gain
+        g: photo-electrons per unit of the raw image's values; known, it gives `Stop.deviance` its scale.
+    read_noise
+        σ, standard deviation of the reading [electrons]; needs the gain.
+
+    Raises
+    ------
+    CalibrationError
+        Values that are negative, not finite or above their limit, or a read noise without a gain.
+    """
+
+    background: float | Array = 0.0
+    response: Array | None = None
+    weights: Array | None = None
+    gain: float | None = None
+    read_noise: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("background", "response", "weights"):
+            if (value := getattr(self, name)) is not None:
+                _check_plane(name, value, 1.0 if name == "weights" else None)
+        if self.gain is not None:
+            checks.positive("gain", self.gain, "electrons per value", CalibrationError)
+        noise = checks.finite("read_noise", self.read_noise, "electrons", CalibrationError)
+        if noise < 0 or (noise > 0 and self.gain is None):
+            raise CalibrationError(
+                f"read_noise is {noise:g} electrons but must be at least 0, and needs the gain. "
+                "Give gain=, the electrons per unit of the raw image's values."
+            )
+
+    @classmethod
+    def of(cls, raw: RawImage, **known: Any) -> "Exposure":
+        """Gain and read noise as a raw image of `Sensor.expose` tells them, and what else is `known`."""
+        full_well, noise = (raw.metadata.get(name) for name in ("full_well", "read_noise"))
+        found: dict[str, Any] = {}
+        if full_well is not None and raw.bit_depth is not None:
+            found["gain"] = float(full_well) / (2**raw.bit_depth - 1)
+            found["read_noise"] = float(noise or 0.0)
+        return cls(**{**found, **known})
+
+    @property
+    def offset(self) -> float:
+        """σ²/g, which shifts both data and model so that their sum of noises stays Poisson's.
+
+        D. L. Snyder, A. M. Hammoud & R. L. White, J. Opt. Soc. Am. A 10, 1014 (1993).
+        """
+        return 0.0 if self.gain is None else self.read_noise**2 / self.gain
+
+
+def _check_plane(name: str, value: Any, most: float | None) -> None:
+    if not hasattr(value, "shape"):
+        value = checks.finite(name, value, "1", CalibrationError)
+    values = np.asarray(to_numpy(value) if hasattr(value, "shape") else value)
+    checks.finite_array(name, values, CalibrationError)
+    lowest, highest = float(values.min()), float(values.max())
+    if lowest < 0 or (most is not None and highest > most):
+        limit = "at least 0" if most is None else f"from 0 to {most:g}"
+        raise CalibrationError(f"{name} goes from {lowest:.4g} to {highest:.4g} but must be {limit}.")

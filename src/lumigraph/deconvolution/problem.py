@@ -1,0 +1,190 @@
+"""A raw image, its camera and its noise, put together: what every method asks of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lumigraph.core import arrays, checks
+from lumigraph.core.arrays import Array
+from lumigraph.core.raw import RawImage
+from lumigraph.deconvolution.exposure import Exposure
+from lumigraph.deconvolution.forward import ForwardModel
+from lumigraph.errors import CalibrationError, GeometryError
+
+UNSEEN = 1e-3
+"""Object samples whose light reaches the sensor by less than this part of the most are left dark."""
+
+FAINT = 1e-6
+"""Floor of the model, as a part of the data's mean: an operator may ring a little below zero."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scale:
+    """What does not depend on the raw image, so that a time series needs it once.
+
+    Parameters
+    ----------
+    operator
+        A.
+    response, weights
+        v and w of `Exposure` (ny, nx), or None for 1.
+    background
+        b + σ²/g: a number or (ny, nx).
+    sensitivity
+        Aᵀ(v w): light on the pixels of each object sample, per intensity.
+    seen
+        Truth values: which object samples the sensor sees.
+    gain
+        Electrons per unit of the data.
+    """
+
+    operator: ForwardModel
+    response: Array | None
+    weights: Array | None
+    background: Array | float
+    sensitivity: Array
+    seen: Array
+    gain: float
+
+    @classmethod
+    def of(cls, operator: ForwardModel, exposure: Exposure, like: Array) -> "Scale":
+        """Of an operator, in the library and precision of an array."""
+        shape, xp = tuple(operator.shape[0]), arrays.namespace(like)
+        response = _plane("response", exposure.response, shape, like)
+        weights = _plane("weights", exposure.weights, shape, like)
+        background = exposure.background
+        if hasattr(background, "shape") and len(background.shape):  # type: ignore[union-attr]
+            background = _plane("background", background, shape, like)
+        ones = xp.ones(shape, dtype=like.dtype, device=arrays.device(like))
+        for factor in (response, weights):
+            ones = ones if factor is None else ones * factor
+        sensitivity = operator.adjoint(ones)
+        highest = float(xp.max(sensitivity))
+        if not highest > 0:
+            raise GeometryError("no light of the object reaches a pixel that counts. Check grid and weights.")
+        seen = sensitivity > UNSEEN * highest
+        total = background + exposure.offset  # type: ignore[operator]
+        return cls(operator, response, weights, total, sensitivity, seen, exposure.gain or 1.0)
+
+    @property
+    def mean_sensitivity(self) -> float:
+        """Of the object samples that are seen."""
+        xp = arrays.namespace(self.sensitivity)
+        kept = xp.where(self.seen, self.sensitivity, 0 * self.sensitivity)
+        return float(xp.sum(kept)) / float(xp.sum(xp.astype(self.seen, kept.dtype)))
+
+    def over_sensitivity(self, values: Array) -> Array:
+        """`values` over the sensitivity; 0 where nothing is seen."""
+        xp = arrays.namespace(values)
+        safe = xp.where(self.seen, self.sensitivity, xp.ones_like(self.sensitivity))
+        return xp.where(self.seen, values / safe, xp.zeros_like(values))
+
+    def back(self, residual: Array) -> Array:
+        """Aᵀ(v w residual): an object from (ny, nx)."""
+        for factor in (self.response, self.weights):
+            residual = residual if factor is None else residual * factor
+        return self.operator.adjoint(residual)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """One raw image to explain.
+
+    Parameters
+    ----------
+    scale
+        What the frames of a series share.
+    data
+        r + σ²/g (ny, nx), at least 0.
+    floor
+        Least value of a model.
+    """
+
+    scale: Scale
+    data: Array
+    floor: float
+
+    @classmethod
+    def of(cls, raw: RawImage | Array, exposure: Exposure, scale: Scale) -> "Problem":
+        """Of a raw image that `values` has accepted."""
+        data = values(raw, scale.operator, exposure)
+        xp = arrays.namespace(data)
+        if scale.weights is not None:
+            data = xp.where(scale.weights > 0, data, xp.zeros_like(data))
+        checks.finite_array("the raw image", data, CalibrationError)
+        data = data + exposure.offset
+        data = xp.where(data > 0, data, xp.zeros_like(data))
+        if not float(xp.sum(data)) > 0:
+            raise CalibrationError("the raw image is dark: there is nothing to deconvolve.")
+        return cls(scale, data, FAINT * float(xp.mean(data)))
+
+    def model(self, estimate: Array) -> Array:
+        """Expected data (ny, nx) of an estimate: v A o + b, kept above 0."""
+        light = self.scale.operator.forward(estimate)
+        xp = arrays.namespace(light)
+        if self.scale.response is not None:
+            light = light * self.scale.response
+        return xp.where(light > 0, light, xp.zeros_like(light)) + self.scale.background + self.floor
+
+    @property
+    def level(self) -> float:
+        """Intensity of the even object that sends as much light as was measured."""
+        xp = arrays.namespace(self.data)
+        light = self._weighted(self.data - self.scale.background)
+        total = float(xp.sum(self.scale.sensitivity * xp.astype(self.scale.seen, self.data.dtype)))
+        return max(float(xp.sum(light)), self.floor) / total
+
+    def flat(self) -> Array:
+        """The even object of `level`, 0 where nothing is seen."""
+        zeros = arrays.namespace(self.data).zeros_like(self.scale.sensitivity)
+        return arrays.namespace(self.data).where(self.scale.seen, zeros + self.level, zeros)
+
+    def deviance(self, model: Array) -> float:
+        r"""Poisson deviance of a model per pixel that counts, in electrons; near 1 where only noise is left.
+
+        .. math:: D = \frac{2 g}{\sum w} \sum w \left[ r \ln\frac{r}{m} - (r - m) \right]
+        """
+        xp, data = arrays.namespace(model), self.data
+        off = model - data
+        safe = xp.where(data > 0, data, xp.ones_like(data))
+        terms = off - xp.where(data > 0, data * xp.log1p(off / safe), xp.zeros_like(data))
+        count = float(np.prod(data.shape))
+        if self.scale.weights is not None:
+            count = float(xp.sum(self.scale.weights))
+        return 2 * self.scale.gain * float(xp.sum(self._weighted(terms))) / count
+
+    def _weighted(self, plane: Array) -> Array:
+        return plane if self.scale.weights is None else plane * self.scale.weights
+
+
+def values(raw: RawImage | Array, operator: ForwardModel, exposure: Exposure) -> Array:
+    """A raw image's values (ny, nx) as real floating-point numbers of its library, shape and kind checked."""
+    data = raw.data if isinstance(raw, RawImage) else raw
+    checks.array("the raw image", data, CalibrationError)
+    if isinstance(raw, RawImage) and raw.bayer is not None and exposure.weights is None:
+        raise CalibrationError(
+            f"the raw image is a {raw.bayer} mosaic, whose colours the model mixes. Demosaic it and take one "
+            "colour, or count the pixels of one colour by Exposure(weights=...)."
+        )
+    expected = tuple(operator.shape[0])
+    if tuple(data.shape) != expected:
+        raise CalibrationError(
+            f"the raw image has shape {tuple(data.shape)} but the operator makes {expected}. "
+            "Use the camera that took it, one colour at a time."
+        )
+    xp = arrays.namespace(data)
+    if arrays.is_complex(data):
+        raise CalibrationError("the raw image is complex. Give its intensity.")
+    if not xp.isdtype(data.dtype, "real floating") or str(data.dtype).endswith("float16"):
+        data = xp.astype(data, xp.float32)
+    return data
+
+
+def _plane(name: str, plane: Array | None, shape: tuple[int, ...], like: Array) -> Array | None:
+    if plane is None:
+        return None
+    if tuple(plane.shape) != shape:
+        raise CalibrationError(
+            f"{name} has shape {tuple(plane.shape)} but the raw image {shape}: one value for each pixel."
+        )
+    return arrays.like(np.asarray(arrays.to_numpy(plane), np.float64), like)
