@@ -1,179 +1,142 @@
-"""Images of the points of one cell of a lenslet array: what the lenslet-periodic operator repeats."""
+"""Images of the points of a cell of a lenslet array: what the lenslet-periodic operator repeats."""
 
-import math
 import warnings
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.interpolate import CubicSpline
+from scipy.special import j0
 
-from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
-from lumigraph.elements import LensletArray, ThinLens
+from lumigraph.elements import ThinLens
 from lumigraph.errors import SamplingWarning
-from lumigraph.propagation import propagate
 from lumigraph.scene import sources
 from lumigraph.simulation.camera import Camera
+from lumigraph.simulation.cell_response import STEP, Axis, Response, legendre
 
-OVERSAMPLING = 1.5
-"""How much closer than λz/(2D) the points of a cell stand, so that a short kernel interpolates them."""
-
-FINENESS = 2.6
-"""Samples of an image's cell, over what its incoherent cut-off asks for."""
+PUPIL = 1024
+"""Samples across the main lens."""
 
 
-@dataclass(frozen=True, slots=True)
-class Cells:
-    """Rectangular cells that tile a lenslet array, one lenslet or more in each.
+@dataclass(frozen=True, slots=True, eq=False)
+class Wave:
+    """Amplitude of a point's light in the lenslet plane, at whole multiples of the points' pitch.
 
     Parameters
     ----------
-    size
-        Height and width of a cell [m].
-    edge
-        Corner (y, x) of the first cell with the least coordinates [m].
-    count
-        Cells along y and x that hold the array.
-    points
-        Object points along y and x of a cell.
-    samples
-        Samples of the image along y and x of a cell; multiples of `points`.
-    extent
-        Height and width of the array, centred on the axis [m]; the cells may reach beyond it.
+    data
+        (y, x), complex64, for light of 1 in all at that pitch.
+    first
+        Multiples (y, x) of the first sample.
     """
 
-    size: tuple[float, float]
-    edge: tuple[float, float]
-    count: tuple[int, int]
-    points: tuple[int, int]
-    samples: tuple[int, int]
-    extent: tuple[float, float]
+    data: np.ndarray
+    first: tuple[int, int]
 
     @property
-    def step(self) -> tuple[float, float]:
-        """Pitch of the image's samples along y and x [m]."""
-        return self.size[0] / self.samples[0], self.size[1] / self.samples[1]
-
-    def grid(self, per_cell: tuple[int, int], scale: float, margin: int) -> Grid:
-        """`per_cell` samples of each cell and of `margin` more on all sides, times `scale`.
-
-        The first sample of a cell stands on its edge; a negative scale turns the plane by 180°.
-        """
-        shape, pitch, center = [], [], []
-        for size, edge, n, k in zip(self.size, self.edge, self.count, per_cell, strict=True):
-            shape.append((n + 2 * margin) * k)
-            pitch.append(size / k * abs(scale))
-            center.append((edge - margin * size + (shape[-1] // 2) * size / k) * scale)
-        return Grid((shape[0], shape[1]), (pitch[0], pitch[1]), (center[0], center[1]))
+    def even(self) -> bool:
+        """Whether it is the same in a mirror, left and right and up and down."""
+        middle = [-f for f in self.first]
+        span = [min(m, n - 1 - m) for m, n in zip(middle, self.data.shape, strict=True)]
+        core = self.data[middle[0] - span[0] : middle[0] + span[0] + 1]
+        core = core[:, middle[1] - span[1] : middle[1] + span[1] + 1]
+        tolerance = 1e-5 * float(np.abs(core).max())
+        return all(np.abs(core - np.flip(core, axis)).max() < tolerance for axis in (0, 1))
 
 
-def fits(camera: Camera) -> bool:
-    """Whether the camera has an array whose cells lie along the axes."""
-    lattice = camera.lattice
-    return lattice is not None and abs(lattice.rotation) < 1e-12 and camera.lenslet_distance is not None
-
-
-def lenslet_distance(camera: Camera) -> float:
-    """Lenslets to sensor, b [m], of a camera that has lenslets."""
-    assert camera.lenslet_distance is not None  # `fits` has been asked
-    return camera.lenslet_distance
-
-
-def lenslet_array(camera: Camera) -> LensletArray:
-    """The array of a camera that has lenslets, as the first element behind the lenslet plane."""
-    train = camera.relay_train()
-    assert train is not None
-    array = train.elements[0]
-    assert isinstance(array, LensletArray)
-    return array
-
-
-def cells_of(camera: Camera, distance: float) -> Cells:
-    """The smallest upright rectangle that repeats the lattice, its points and its samples."""
-    lattice, array = camera.lattice, lenslet_array(camera)
-    assert lattice is not None
-    if lattice.layout == "hex":
-        size = (math.sqrt(3) * lattice.pitch, lattice.pitch * lattice.kinds)
+def wave(camera: Camera, distance: float, axes: tuple[Axis, Axis], reach: Sequence[int]) -> Wave:
+    """Of a point on the axis, without the phase exp(iπw²/(λL)), wide enough for cells `reach` away."""
+    multiples = []
+    for axis, cells in zip(axes, reach, strict=True):
+        n = axis.margin + (cells + 1) * axis.points + STEP
+        multiples.append(np.arange(-n, n + 1))
+    pitch = [axis.size / axis.points for axis in axes]
+    y, x = (m * step for m, step in zip(multiples, pitch, strict=True))
+    lens = camera.lens_train().elements
+    if len(lens) == 1 and isinstance(lens[0], ThinLens) and lens[0].diameter is not None:
+        data = _round(camera, distance, np.hypot(y[:, None], x))
     else:
-        size = lattice.pitches
-    extent = array.extent or camera.image_grid.size
-    count = tuple(max(1, math.ceil(e / s - 1e-6)) for e, s in zip(extent, size, strict=True))
-    # Cells are centred on a lattice point or, for an even number of them, on the axis' side of it.
-    edge = tuple(
-        _nearest(-n * s / 2, o - s / 2, s) for n, s, o in zip(count, size, lattice.origin, strict=True)
-    )
-    wavelength, b, L = camera.wavelength, lenslet_distance(camera), camera.separation
-    finest = wavelength * L / (2 * camera.pupil_diameter) / OVERSAMPLING
-    image = wavelength * (b * L / (b + L)) / lattice.pitch / 2 / FINENESS
-    points = tuple(math.ceil(s / finest) for s in size)
-    samples = tuple(n * math.ceil(s / image / n) for s, n in zip(size, points, strict=True))
-    return Cells(_pair(size), _pair(edge), _pair(count), _pair(points), _pair(samples), _pair(extent))
+        data = _sampled(camera, distance, y, x)
+    data *= np.sqrt(np.prod(pitch))
+    return Wave(data.astype(np.complex64), (int(multiples[0][0]), int(multiples[1][0])))
 
 
-def _pair(values: Iterable[Any]) -> tuple[Any, Any]:
-    y, x = values
-    return y, x
+def _round(camera: Camera, distance: float, radius: np.ndarray) -> np.ndarray:
+    """Amplitude behind a round lens at a radius [m], for light of 1 in all: a Hankel transform of its pupil."""
+    (lens,) = camera.lens_train().elements
+    assert isinstance(lens, ThinLens)
+    half, squared = camera.pupil_diameter / 2, camera.wavelength * camera.separation
+    focus = np.pi / camera.wavelength * (1 / distance + 1 / camera.separation - 1 / lens.focal_length)
+    widest = float(radius.max())
+    turns = (abs(focus) * half**2 + 2 * np.pi * widest * half / squared) / np.pi
+    rho, weight = legendre(0, half, 64 + 3 * int(turns))
+    at = np.arange(0, widest + squared / half, squared / half / 64)
+    pupil = np.exp(1j * focus * rho**2) * 2 * np.pi * rho * weight
+    values = j0(2 * np.pi / squared * np.outer(at, rho)) @ pupil
+    return CubicSpline(at, values)(radius) / (squared * half * np.sqrt(np.pi))
 
 
-def _nearest(value: float, start: float, step: float) -> float:
-    """The number nearest to `value` among ``start + k * step``."""
-    return start + round((value - start) / step) * step
-
-
-def reach_of(camera: Camera, cells: Cells, distance: float, dropped: float) -> int:
-    """Cells on each side of a point's own that its image reaches."""
-    wavelength, L, D = camera.wavelength, camera.separation, camera.pupil_diameter
-    focal_length = _focal_length(camera)
-    blur = D / 2 * abs(1 - L * (1 / focal_length - 1 / distance))
-    tail = 2 * wavelength * L / D / (math.pi**2 * dropped)
-    return math.ceil((blur + tail) / min(cells.size) + 0.5)
-
-
-def _focal_length(camera: Camera) -> float:
-    lenses = [part.focal_length for part in camera.lens_train().elements if isinstance(part, ThinLens)]
-    return lenses[0]
-
-
-def point_images(camera: Camera, cells: Cells, distance: float, reach: int) -> np.ndarray:
-    """Images of the points of a cell (T, T, points, samples), each for all of the main lens' light."""
-    T, step = 2 * reach + 1, cells.step
-    stride = tuple(k // n for k, n in zip(cells.samples, cells.points, strict=True))
-    shape = (T * cells.samples[0], T * cells.samples[1])
-    wave = _main_lens(
-        camera, distance, Grid((shape[0] + 2 * cells.samples[0], shape[1] + 2 * cells.samples[1]), step)
-    )
-    first = (cells.edge[axis] - reach * cells.size[axis] + (shape[axis] // 2) * step[axis] for axis in (0, 1))
-    window = Grid(shape, step, _pair(first))
-    array = replace(lenslet_array(camera), extent=None)
-    b, L = lenslet_distance(camera), camera.separation
-    # An even object of intensity 1 gives an even image of 1, and that is magnified onto the sensor.
-    light = math.prod(stride) / (1 + b / L) ** 2
-    kernels = np.empty((T, T, math.prod(cells.points), math.prod(cells.samples)), np.float32)
-    middle = tuple(n // 2 for n in wave.shape)
-    for ky in range(cells.points[0]):
-        for kx in range(cells.points[1]):
-            # The window begins `reach` cells before the points' own; point ky is ky strides into it.
-            top = middle[0] - reach * cells.samples[0] - ky * stride[0]
-            left = middle[1] - reach * cells.samples[1] - kx * stride[1]
-            field = Field(wave[top : top + shape[0], left : left + shape[1]], window, camera.wavelength)
-            image = propagate(array(field), b * L / (b + L), "auto").intensity
-            image *= light / field.intensity.sum()
-            parts = image.reshape(T, cells.samples[0], T, cells.samples[1]).transpose(0, 2, 1, 3)
-            kernels[:, :, ky * cells.points[1] + kx] = parts.reshape(T, T, -1)
-    return kernels
-
-
-def size_of(cells: Cells, reach: int) -> float:
-    """Memory of the images of all points of a cell, `reach` cells to each side [bytes]."""
-    return 4.0 * (2 * reach + 1) ** 2 * math.prod(cells.points) * math.prod(cells.samples)
-
-
-def _main_lens(camera: Camera, distance: float, grid: Grid) -> np.ndarray:
-    """Amplitude (y, x) of a point on the axis in the lenslet plane, without the phase exp(iπw²/(λL))."""
-    point = sources.point_source(camera.pupil_grid, camera.wavelength, distance, paraxial=True)
-    with warnings.catch_warnings():  # a smooth converging wave: its samples do not stand for points
+def _sampled(camera: Camera, distance: float, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Amplitude (y, x) behind any lens, for light of 1 in all: a matrix Fourier transform of its pupil."""
+    grid = Grid.square(PUPIL + 8, camera.pupil_diameter / PUPIL)
+    with warnings.catch_warnings():  # what is sampled is the product of all phases
         warnings.simplefilter("ignore", SamplingWarning)
-        field = propagate(camera.lens_train()(point), camera.separation, "fresnel", grid=grid)
-    phase = [np.exp(-1j * np.pi * c**2 / (camera.wavelength * camera.separation)) for c in (grid.y, grid.x)]
-    return (field.data * phase[0][:, None] * phase[1]).astype(np.complex64)
+        point = sources.point_source(grid, camera.wavelength, distance, paraxial=True)
+        pupil = camera.lens_train()(point).data
+    squared = camera.wavelength * camera.separation
+    pupil = pupil * np.outer(*(np.exp(1j * np.pi * c**2 / squared) for c in (grid.y, grid.x)))
+    light = (np.abs(pupil) ** 2).sum() * squared**2 / np.prod(grid.pitch)
+    down = np.exp(-2j * np.pi / squared * np.outer(y, grid.y))
+    across = np.exp(-2j * np.pi / squared * np.outer(grid.x, x))
+    return down @ pupil @ across / np.sqrt(light)
+
+
+def images(
+    light: Wave, lenslets: Response, axes: tuple[Axis, Axis], row: int, columns: range
+) -> np.ndarray:
+    """Intensity (columns, points, samples) in a cell of the points of the cells (row, columns) beside it."""
+    y, x = axes
+    down, across = lenslets.down.astype(np.complex64), lenslets.across.astype(np.complex64).T
+    result = np.empty((len(columns), y.points, x.points, y.samples * x.samples), np.float32)
+    starts = [-x.margin - (d * x.points + k) - light.first[1] for d in columns for k in range(x.points)]
+    first, last = starts[0], starts[-1]  # descending, one by one
+    for k in range(y.points):
+        top = -y.margin - (row * y.points + k) - light.first[0]
+        part = down @ light.data[top : top + STEP * down.shape[1] : STEP]
+        windows = sliding_window_view(part, STEP * across.shape[0] - 1, axis=1)[:, last : first + 1, ::STEP]
+        field = windows[:, ::-1] @ across
+        if lenslets.core is None:
+            field = field.transpose(1, 0, 2)
+        else:
+            field = field.transpose(1, 0, 2).reshape(len(starts), -1) @ lenslets.core.T.astype(np.complex64)
+        intensity = field.real**2 + field.imag**2
+        result[:, k] = intensity.reshape(len(columns), x.points, -1)
+    return result.reshape(len(columns), y.points * x.points, -1)
+
+
+def mirrored(factor: np.ndarray, shape: tuple[int, int], up: bool, left: bool) -> np.ndarray:
+    """Rows (shape[0] shape[1], r) of a plane turned over, up and down or left and right."""
+    plane = factor.reshape(*shape, -1)
+    return plane[:: -1 if up else 1, :: -1 if left else 1].reshape(factor.shape)
+
+
+def factors(block: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """``block ≈ left @ right``, (points, r) and (r, samples), and their strengths above `least`.
+
+    Most blocks have few: a sketch of a fifth of the points finds them, or finds that it needs them all.
+    """
+    points = block.shape[0]
+    if np.linalg.norm(block) <= least:
+        return np.zeros((points, 0)), np.zeros((0, block.shape[1])), np.zeros(0)
+    sketch = np.random.default_rng(0).standard_normal((points, points // 5), np.float32)
+    for basis in (np.linalg.qr(block @ (block.T @ sketch))[0], None):
+        seen = (block if basis is None else basis.T @ block).astype(np.float64)
+        strength, vectors = np.linalg.eigh(seen @ seen.T)
+        strength = np.sqrt(np.maximum(strength, 0))
+        if strength[0] < least / 2:
+            break
+    kept = strength > least
+    left, right = vectors[:, kept], vectors[:, kept].T @ seen
+    return left if basis is None else basis @ left, right, strength[kept]

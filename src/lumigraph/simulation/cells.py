@@ -1,0 +1,181 @@
+"""Cells of a lenslet array: the period of the lenslet-periodic operator, and how finely it is sampled."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from lumigraph.core.grid import Grid
+from lumigraph.core.lattice import Lattice
+from lumigraph.elements import LensletArray, ThinLens
+from lumigraph.simulation.camera import Camera
+
+OVERSAMPLING = 1.5
+"""How much closer than λL/(2D) the points of a cell stand, so that a short kernel interpolates them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """Rectangular cells that tile a lenslet array, one lenslet or more in each.
+
+    Parameters
+    ----------
+    size
+        Height and width of a cell [m].
+    edge
+        Corner (y, x) of the first cell with the least coordinates [m].
+    count
+        Cells along y and x that hold the array.
+    points
+        Object points along y and x of a cell, even.
+    samples
+        Samples of the image along y and x of a cell.
+    """
+
+    size: tuple[float, float]
+    edge: tuple[float, float]
+    count: tuple[int, int]
+    points: tuple[int, int]
+    samples: tuple[int, int]
+
+    def grid(self, per_cell: tuple[int, int], scale: float, margin: tuple[int, int]) -> Grid:
+        """`per_cell` samples of each cell and of `margin` more on all sides, times `scale`.
+
+        The samples stand evenly inside their cell; a negative scale turns the plane by 180°.
+        """
+        shape, pitch, center = [], [], []
+        for size, edge, n, k, m in zip(self.size, self.edge, self.count, per_cell, margin, strict=True):
+            shape.append((n + 2 * m) * k)
+            pitch.append(size / k * abs(scale))
+            center.append((edge - m * size + (shape[-1] // 2 + 0.5) * size / k) * scale)
+        return Grid((shape[0], shape[1]), (pitch[0], pitch[1]), (center[0], center[1]))
+
+
+@dataclass(frozen=True, slots=True)
+class Fineness:
+    """What an accuracy asks for: found on the thesis' cameras against runs with twice as much of each.
+
+    Parameters
+    ----------
+    accuracy
+        Relative rms error of the raw image.
+    """
+
+    accuracy: float
+
+    @property
+    def oversampling(self) -> float:
+        """Samples of the image over what its cut-off p/(λb) asks for."""
+        return 3.75 * (1e-3 / self.accuracy) ** 0.27
+
+    @property
+    def neighbours(self) -> int:
+        """Lenslets on each side of an image's cell whose light is followed into it."""
+        return math.ceil(4 * (8e-4 / self.accuracy) ** 0.23)
+
+    @property
+    def rank(self) -> float:
+        """Part of the kernels' norm that their factors may leave out."""
+        return self.accuracy / 3
+
+    @property
+    def border(self) -> float:
+        """Lenslets that are missing farther than this from a cell [pitches] are not missed."""
+        return 2 * (1e-3 / self.accuracy) ** 0.25
+
+    def near(self, blur: float, airy: float) -> float:
+        """As `reach`, for what the lenslets that are missing beyond the border take away."""
+        return blur + 8 * airy * (1e-3 / self.accuracy) ** 0.4
+
+    def reach(self, blur: float, airy: float) -> float:
+        """How far from its geometric image a point's light is followed in full.
+
+        Parameters
+        ----------
+        blur
+            Radius of that image.
+        airy
+            Width λL/D of the diffraction at the main lens, in the same unit as `blur` and the result.
+        """
+        return blur + 16 * airy * (1e-3 / self.accuracy) ** 0.45
+
+
+def fits(camera: Camera) -> bool:
+    """Whether the camera has lenslets."""
+    return camera.lattice is not None and camera.lenslet_distance is not None
+
+
+def lenslet_distance(camera: Camera) -> float:
+    """Lenslets to sensor, b [m], of a camera that has lenslets."""
+    assert camera.lenslet_distance is not None  # `fits` has been asked
+    return camera.lenslet_distance
+
+
+def telecentric_distance(camera: Camera) -> float:
+    """Lenslets to sensor of the telecentric camera with the same image, b L/(L + b) [m]."""
+    b, L = lenslet_distance(camera), camera.separation
+    return b * L / (b + L)
+
+
+def lenslet_array(camera: Camera) -> LensletArray:
+    """The array of a camera that has lenslets, turned about the axis so that its rows lie along x."""
+    train = camera.relay_train()
+    assert train is not None
+    array = train.elements[0]
+    assert isinstance(array, LensletArray)
+    return replace(array, lattice=straight(array.lattice))
+
+
+def straight(lattice: Lattice) -> Lattice:
+    """The lattice turned about (0, 0) so that its rows lie along x."""
+    sin, cos = math.sin(lattice.rotation), math.cos(lattice.rotation)
+    (row, column), origin = lattice.basis, lattice.origin
+
+    def turned(vector: tuple[float, float]) -> tuple[float, float]:
+        return vector[0] * cos - vector[1] * sin, vector[0] * sin + vector[1] * cos
+
+    row = (0.0, turned(row)[1])
+    y, x = turned(column)
+    column = (y, 0.0 if lattice.layout == "square" else x)
+    return replace(lattice, basis=(row, column), origin=turned(origin))
+
+
+def cells_of(camera: Camera, array: LensletArray, fineness: Fineness) -> Cells:
+    """The smallest upright rectangle that repeats the lattice, its points and its samples."""
+    lattice = array.lattice
+    if lattice.layout == "hex":
+        size = (math.sqrt(3) * lattice.pitch, lattice.pitch * lattice.kinds)
+    else:
+        size = lattice.pitches
+    extent = array.extent or camera.image_grid.size
+    count = tuple(max(1, math.ceil(e / s - 1e-6)) for e, s in zip(extent, size, strict=True))
+    # Cells are centred on a lattice point or, for an even number of them, on the axis' side of it.
+    edge = tuple(
+        _nearest(-n * s / 2, o - s / 2, s) for n, s, o in zip(count, size, lattice.origin, strict=True)
+    )
+    finest = airy(camera) / 2 / OVERSAMPLING
+    image = camera.wavelength * telecentric_distance(camera) / lattice.pitch / 2 / fineness.oversampling
+    points = tuple(2 * math.ceil(s / finest / 2) for s in size)
+    samples = tuple(math.ceil(s / image) for s in size)
+    return Cells(_pair(size), _pair(edge), _pair(count), _pair(points), _pair(samples))
+
+
+def airy(camera: Camera) -> float:
+    """λL/D in the lenslet plane [m]: the finest period that the main lens' light has there."""
+    return camera.wavelength * camera.separation / camera.pupil_diameter
+
+
+def blur(camera: Camera, distance: float) -> float:
+    """Radius of a point's geometric image in the lenslet plane [m]."""
+    (focal_length,) = (p.focal_length for p in camera.lens_train().elements if isinstance(p, ThinLens))
+    return camera.pupil_diameter / 2 * abs(1 - camera.separation * (1 / focal_length - 1 / distance))
+
+
+def _pair(values: Iterable[Any]) -> tuple[Any, Any]:
+    y, x = values
+    return y, x
+
+
+def _nearest(value: float, start: float, step: float) -> float:
+    """The number nearest to `value` among ``start + k * step``."""
+    return start + round((value - start) / step) * step

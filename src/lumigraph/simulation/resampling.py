@@ -1,0 +1,138 @@
+"""Band-limited pictures from one sampling to another: a banded matrix for each axis."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.special import i0
+
+from lumigraph.core import arrays
+from lumigraph.core.arrays import Array
+from lumigraph.core.grid import Grid
+
+KERNEL = 10
+"""Half width [samples] of the interpolation kernel: exact to 1e-5 up to two thirds of the band."""
+
+KAISER_BETA = 10.5
+"""Of the kernel's window: 104 dB."""
+
+_ROWS = 64
+_ZERO = np.zeros((0, 0))
+
+
+def kernel(offset: np.ndarray) -> np.ndarray:
+    """Interpolation kernel at offsets [samples]: a sinc in a Kaiser window of half width `KERNEL`."""
+    inside = np.clip(1 - (offset / KERNEL) ** 2, 0, None)
+    window = np.where(np.abs(offset) <= KERNEL, i0(KAISER_BETA * np.sqrt(inside)) / i0(KAISER_BETA), 0)
+    return np.sinc(offset) * window
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Banded:
+    """Matrix (rows, columns) of blocks of rows that see few columns each.
+
+    Parameters
+    ----------
+    columns
+        Their number.
+    blocks
+        (first column, matrix), row after row.
+    """
+
+    columns: int
+    blocks: tuple[tuple[int, np.ndarray], ...]
+
+    def forward(self, plane: Array) -> Array:
+        """``matrix @ plane``: (columns, n) to (rows, n)."""
+        xp = arrays.namespace(plane)
+        return xp.concat(
+            [arrays.like(m, plane) @ plane[first : first + m.shape[1], :] for first, m in self.blocks], axis=0
+        )
+
+    def adjoint(self, plane: Array) -> Array:
+        """``matrix.T @ plane``: (rows, n) to (columns, n)."""
+        xp = arrays.namespace(plane)
+        result = xp.zeros((self.columns, plane.shape[1]), dtype=plane.dtype, device=plane.device)
+        row = 0
+        for first, m in self.blocks:
+            part = xp.matrix_transpose(arrays.like(m, plane)) @ plane[row : row + m.shape[0], :]
+            result[first : first + m.shape[1], :] += part
+            row += m.shape[0]
+        return result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Resampling:
+    """Two matrices: one for the rows of a picture (y, x), one for its columns."""
+
+    y: Banded
+    x: Banded
+
+    def forward(self, picture: Array) -> Array:
+        """(y, x) to (rows of `y`, rows of `x`)."""
+        xp = arrays.namespace(picture)
+        return xp.matrix_transpose(self.x.forward(xp.matrix_transpose(self.y.forward(picture))))
+
+    def adjoint(self, picture: Array) -> Array:
+        """The transpose of `forward`."""
+        xp = arrays.namespace(picture)
+        return self.y.adjoint(xp.matrix_transpose(self.x.adjoint(xp.matrix_transpose(picture))))
+
+
+def represented(source: Grid, points: Grid, turned: bool) -> Resampling:
+    """Samples of an object as band-limited light on points; the sum times the area is kept.
+
+    Parameters
+    ----------
+    source
+        Samples of any pitch.
+    points
+        Where the light is wanted; turned by 180°: from the largest coordinate down.
+    turned
+        Whether the points are so ordered.
+    """
+    matrices = []
+    for axis in (0, 1):
+        pitch = points.pitch[axis]
+        at = _ordered(points, axis, turned) / pitch
+        samples = (source.y, source.x)[axis] / pitch
+        scale = source.pitch[axis] / pitch
+        matrices.append(banded(at, samples, lambda d, s=scale: kernel(d) * s, KERNEL))
+    return Resampling(matrices[0], matrices[1])
+
+
+def averaged(plane: Grid, pixels: Grid) -> Resampling:
+    """Means over the areas of pixels of a band-limited plane, the pixels turned by 180°."""
+    matrices = []
+    for axis in (0, 1):
+        pitch, width = plane.pitch[axis], pixels.pitch[axis] / plane.pitch[axis]
+        nodes, weights = np.polynomial.legendre.leggauss(6 + 2 * int(np.ceil(width)))
+
+        def mean(d: np.ndarray, nodes: Any = nodes * width / 2, weights: Any = weights / 2) -> np.ndarray:
+            return sum(w * kernel(d + n) for n, w in zip(nodes, weights, strict=True))
+
+        at = _ordered(pixels, axis, True) / pitch
+        matrices.append(banded(at, (plane.y, plane.x)[axis] / pitch, mean, KERNEL + width / 2))
+    return Resampling(matrices[0], matrices[1])
+
+
+def banded(
+    rows: np.ndarray, columns: np.ndarray, entries: Callable[[np.ndarray], np.ndarray], reach: float
+) -> Banded:
+    """Matrix ``entries(row - column)`` of sorted positions; farther apart than `reach` it is zero."""
+    blocks = []
+    for start in range(0, len(rows), _ROWS):
+        mine = rows[start : start + _ROWS]
+        first = int(np.searchsorted(columns, mine.min() - reach, "left"))
+        last = int(np.searchsorted(columns, mine.max() + reach, "right"))
+        offsets = mine[:, None] - columns[first:last]
+        blocks.append((first, np.asarray(entries(offsets)).reshape(len(mine), last - first)))
+    return Banded(len(columns), tuple(blocks))
+
+
+def _ordered(grid: Grid, axis: int, turned: bool) -> np.ndarray:
+    """Positions along an axis; of a plane turned by 180°, those of its counterpart: from the largest down."""
+    n, pitch, center = grid.shape[axis], grid.pitch[axis], grid.center[axis]
+    steps = (np.arange(n) - n // 2) * pitch
+    return center - steps if turned else center + steps
