@@ -11,8 +11,10 @@
 
 from lumigraph.rendering.decode import decode
 from lumigraph.rendering.encode import encode
-from lumigraph.rendering.focused import render, rendered_grid
+from lumigraph.rendering.focused import render, render_stack, rendered_grid
 from lumigraph.rendering.fourier_slice import refocus_fourier
+from lumigraph.rendering.patches import lenslet_indices
+from lumigraph.rendering.pixels import hot_pixels
 from lumigraph.rendering.refocus import refocus, refocus_stack
 from lumigraph.rendering.views import (
     lenslet_mosaic,
@@ -26,6 +28,8 @@ from lumigraph.rendering.views import (
 __all__ = [
     "decode",
     "encode",
+    "hot_pixels",
+    "lenslet_indices",
     "lenslet_mosaic",
     "point_of_view",
     "reduce_aperture",
@@ -33,6 +37,7 @@ __all__ = [
     "refocus_fourier",
     "refocus_stack",
     "render",
+    "render_stack",
     "rendered_grid",
     "view",
     "views_from_mosaic",

@@ -32,8 +32,8 @@ def warn_if_focused(data: Array, calibration: Calibration) -> None:
         return
     warnings.warn(
         "this looks like a raw image of a plenoptic camera 2.0: neighbouring micro-images show the same "
-        f"sharp details, {abs(found):.1f} px apart. Use render with patch={found:.3g}, or go on if it is one of a "
-        "camera 1.0.",
+        f"sharp details, {abs(found):.1f} px apart. Use render with patch={found:.3g}, or go on if it is one "
+        "of a camera 1.0.",
         SamplingWarning,
         stacklevel=3,
     )
