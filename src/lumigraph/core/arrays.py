@@ -71,7 +71,7 @@ def like(values: np.ndarray, array: Array) -> Array:
         values = values.astype(np.float32 if single else np.float64, copy=False)
     if is_numpy_array(array):
         return values
-    return namespace(array).asarray(np.ascontiguousarray(values), device=device(array))
+    return namespace(array).asarray(np.asarray(values, order="C"), device=device(array))
 
 
 def as_complex(array: Array) -> Array:
@@ -118,3 +118,17 @@ def ifft2(array: Array, *, overwrite: bool = False) -> Array:
     if is_numpy_array(array):
         return scipy.fft.ifft2(array, overwrite_x=overwrite, workers=WORKERS)
     return namespace(array).fft.ifftn(array, axes=(-2, -1))
+
+
+def rfft2(array: Array, shape: tuple[int, int]) -> Array:
+    """2-D DFT of the last two axes of a real array, zero-padded to `shape`: (..., ny, nx // 2 + 1)."""
+    if is_numpy_array(array):
+        return scipy.fft.rfft2(array, shape, workers=WORKERS)
+    return namespace(array).fft.rfftn(array, s=shape, axes=(-2, -1))
+
+
+def irfft2(array: Array, shape: tuple[int, int]) -> Array:
+    """The real array (..., *shape) whose `rfft2` this is."""
+    if is_numpy_array(array):
+        return scipy.fft.irfft2(array, shape, workers=WORKERS)
+    return namespace(array).fft.irfftn(array, s=shape, axes=(-2, -1))
