@@ -18,11 +18,13 @@ if TYPE_CHECKING:
     from lumigraph import analysis, depth, design, plots, units
     from lumigraph.calibration import calibrate, devignette
     from lumigraph.core.calibration import Calibration
+    from lumigraph.core.cloud import PointCloud
     from lumigraph.core.field import Field
     from lumigraph.core.grid import Grid
     from lumigraph.core.lattice import Lattice
     from lumigraph.core.lightfield import LightField
     from lumigraph.core.raw import RawImage
+    from lumigraph.core.stack import Stack
     from lumigraph.core.volume import Volume
     from lumigraph.deconvolution import deconvolve, deconvolve_series
     from lumigraph.elements import (
@@ -48,7 +50,7 @@ if TYPE_CHECKING:
         catalogue,
         load_camera,
     )
-    from lumigraph.io import open, save  # noqa: A004
+    from lumigraph.io import contents, open, save  # noqa: A004
     from lumigraph.propagation import METHODS, Propagate, choose_method, propagate
     from lumigraph.rendering import (
         decode,
@@ -68,11 +70,13 @@ _HOMES = {
     "lumigraph": ("analysis", "depth", "design", "plots", "units"),
     "lumigraph.calibration": ("calibrate", "devignette"),
     "lumigraph.core.calibration": ("Calibration",),
+    "lumigraph.core.cloud": ("PointCloud",),
     "lumigraph.core.field": ("Field",),
     "lumigraph.core.grid": ("Grid",),
     "lumigraph.core.lattice": ("Lattice",),
     "lumigraph.core.lightfield": ("LightField",),
     "lumigraph.core.raw": ("RawImage",),
+    "lumigraph.core.stack": ("Stack",),
     "lumigraph.core.volume": ("Volume",),
     "lumigraph.deconvolution": ("deconvolve", "deconvolve_series"),
     "lumigraph.elements": (
@@ -98,7 +102,7 @@ _HOMES = {
         "catalogue",
         "load_camera",
     ),
-    "lumigraph.io": ("open", "save"),
+    "lumigraph.io": ("contents", "open", "save"),
     "lumigraph.propagation": ("METHODS", "Propagate", "choose_method", "propagate"),
     "lumigraph.rendering": (
         "decode",
@@ -133,6 +137,7 @@ __all__ = [
     "LightField",
     "LumigraphError",
     "PlenopticCamera",
+    "PointCloud",
     "Points",
     "Propagate",
     "RawImage",
@@ -144,6 +149,7 @@ __all__ = [
     "SingleLensCamera",
     "Slice",
     "Snapshots",
+    "Stack",
     "ThinLens",
     "TiltedWaves",
     "Train",
@@ -153,6 +159,7 @@ __all__ = [
     "calibrate",
     "catalogue",
     "choose_method",
+    "contents",
     "decode",
     "deconvolve",
     "deconvolve_series",
