@@ -53,17 +53,22 @@ if TYPE_CHECKING:
     from lumigraph.io import contents, open, save  # noqa: A004
     from lumigraph.propagation import METHODS, Propagate, choose_method, propagate
     from lumigraph.rendering import (
+        all_in_focus,
         decode,
         encode,
+        hot_pixels,
         reduce_aperture,
         refocus,
         refocus_fourier,
         refocus_stack,
         render,
+        render_stack,
+        super_resolve,
         view,
+        view_path,
     )
     from lumigraph.scene import Points, Scene, Slice, targets
-    from lumigraph.sensor import Sensor
+    from lumigraph.sensor import Sensor, demosaic
     from lumigraph.simulation import Coherent, Incoherent, Snapshots, TiltedWaves, simulate
 
 _HOMES = {
@@ -106,6 +111,7 @@ _HOMES = {
     "lumigraph.propagation": ("METHODS", "Propagate", "choose_method", "propagate"),
     "lumigraph.rendering": (
         "decode",
+    "demosaic",
         "encode",
         "reduce_aperture",
         "refocus",
@@ -115,7 +121,7 @@ _HOMES = {
         "view",
     ),
     "lumigraph.scene": ("Points", "Scene", "Slice", "targets"),
-    "lumigraph.sensor": ("Sensor",),
+    "lumigraph.sensor": ("Sensor", "demosaic"),
     "lumigraph.simulation": ("Coherent", "Incoherent", "Snapshots", "TiltedWaves", "simulate"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
@@ -155,6 +161,7 @@ __all__ = [
     "Train",
     "Volume",
     "ZernikePlate",
+    "all_in_focus",
     "analysis",
     "calibrate",
     "catalogue",
@@ -167,6 +174,7 @@ __all__ = [
     "design",
     "devignette",
     "encode",
+    "hot_pixels",
     "load_camera",
     "open",
     "plots",
@@ -176,11 +184,14 @@ __all__ = [
     "refocus_fourier",
     "refocus_stack",
     "render",
+    "render_stack",
     "save",
     "simulate",
+    "super_resolve",
     "targets",
     "units",
     "view",
+    "view_path",
 ]
 
 

@@ -18,9 +18,7 @@ from lumigraph.rendering.interpolate import Interpolation, as_float, check_inter
 from lumigraph.rendering.patches import Layout, Patches, checked_focus
 
 _BAND = 1 << 20  # picture samples handled at a time
-_FARTHEST = (
-    1.6  # pitches to the farthest lenslet that shows a place; one of each kind stands within 1
-)
+_FARTHEST = 1.6  # pitches to the farthest lenslet that shows a place; one of each kind stands within 1
 _SHARP = 1.5  # pixels of blur by which another kind of lenslet loses against the sharpest one
 
 

@@ -124,6 +124,54 @@ def checked_focus(focus: Sequence[float] | None, calibration: Calibration) -> np
     return values
 
 
+def sharp_patches(
+    calibration: Calibration, virtual_depths: Sequence[tuple[float, float]]
+) -> tuple[float, ...]:
+    """Patches [px] at which three kinds of lenslets are sharp, for ``render(focus=...)``.
+
+    Virtual depth v is the distance of a Galilean camera's main-lens image behind the lenslets over b, so that
+    the patch is -P/v. Ranges that meet are those of equal blur, |patch - sharp patch| of both kinds.
+
+    Parameters
+    ----------
+    calibration
+        Of the camera.
+    virtual_depths
+        Nearest and farthest virtual depth of each kind, in the order of `lattice.kind`, as the calibration
+        files of multi-focus cameras give them.
+
+    Raises
+    ------
+    GeometryError
+        Another number of ranges than kinds, or depths that do not ascend from above 0.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> none = np.zeros((0, 2))
+    >>> from lumigraph.core.lattice import Lattice
+    >>> calibration = Calibration(Lattice.hex(36.0, kinds=3), (400, 400), none, none, 0.0)
+    >>> sharp_patches(calibration, [(1, 3), (3, 4), (4, 100)])
+    (-13.5, -10.5, -7.5)
+    """
+    kinds, pitch = calibration.lattice.kinds, calibration.lattice.pitch
+    ranges = np.asarray(virtual_depths, float)
+    if ranges.shape != (kinds, 2) or kinds != 3:
+        raise GeometryError(
+            f"virtual_depths has shape {ranges.shape} for a lattice of {kinds} kinds of lenslets. "
+            "Give (nearest, farthest) for each of three kinds."
+        )
+    checks.finite_array("virtual_depths", ranges, GeometryError)
+    order = np.argsort(ranges[:, 0])
+    ends = ranges[order]
+    if (ranges[:, 0] <= 0).any() or (np.diff(ends, axis=1) <= 0).any():
+        raise GeometryError(f"virtual_depths are {ranges.tolist()} but must ascend from above 0.")
+    near, far = (pitch * 2 / (ends[k, 1] + ends[k + 1, 0]) for k in (0, 1))
+    middle = (near + far) / 2
+    sharp = np.clip([2 * near - middle, middle, 2 * far - middle], 0.01 * pitch, pitch)
+    return tuple(-float(sharp[int(np.flatnonzero(order == kind)[0])]) for kind in range(kinds))
+
+
 @dataclass(frozen=True, slots=True)
 class Layout:
     """Places of the picture's rows and columns in the lattice of micro-image centres [px]."""
