@@ -8,6 +8,7 @@
 - `warp`: `Warp`, tilt and distortion of their lattice
 - `lightfield`: `LightField`, decoded radiance (v, u, t, s)
 - `volume`: `Volume`, reconstructed intensities (z, y, x)
+- `stack`: `Stack`, pictures in an order; `cloud`: `PointCloud`, points in space
 - `arrays`: the only file that knows array libraries
 - `checks`: one-line refusals of bad numbers
 - `cache`: arrays kept within a bound of memory
