@@ -74,6 +74,33 @@ def like(values: np.ndarray, array: Array) -> Array:
     return namespace(array).asarray(np.asarray(values, order="C"), device=device(array))
 
 
+def is_parameter(value: Any) -> bool:
+    """Whether a number is a 0-d array of a library other than NumPy, such as a PyTorch scalar."""
+    return getattr(value, "shape", None) == () and not is_numpy_array(value) and not np.isscalar(value)
+
+
+def number(value: Any) -> float:
+    """A number or a 0-d array as a float, cut off from derivatives."""
+    return float(to_numpy(value) if is_parameter(value) else value)
+
+
+def parameter(value: Array) -> Array:
+    """A 0-d array in double precision, through which derivatives go."""
+    return namespace(value).astype(value, namespace(value).float64)
+
+
+def turned(values: Array, coefficient: np.ndarray, amount: Array) -> Array:
+    """Complex `values` times exp(i coefficient amount).
+
+    `amount` is a 0-d array that is zero and has a derivative: `values` come from NumPy in double precision,
+    as they do without derivatives, and this factor lets those of a parameter through.
+    """
+    xp, factor = namespace(values), like(coefficient, values)
+    real = xp.float32 if is_single(values) else xp.float64
+    amount = xp.astype(amount, real if not np.iscomplexobj(coefficient) else values.dtype)
+    return values * xp.exp(1j * as_complex(factor * amount))
+
+
 def as_complex(array: Array) -> Array:
     """The array as complex numbers of its own precision; a complex array is returned as it is."""
     if is_complex(array):
