@@ -12,13 +12,14 @@ from lumigraph.core.arrays import Array, like, to_numpy
 from lumigraph.core.lightfield import LightField
 from lumigraph.errors import GeometryError
 from lumigraph.rendering.geometry import lit
-from lumigraph.rendering.interpolate import Interpolation, as_float, weighted
-from lumigraph.rendering.refocus import Progress, refocus_stack
+from lumigraph.rendering.interpolate import Interpolation, as_float, taps, weighted
+from lumigraph.rendering.refocus import Progress, refocus_stack, shifts
 
 _PLANES_AT_ONCE = 8
 _STEP = 0.5  # lenslets by which the outermost view may move from one plane to the next
 _MOST_PLANES = 512
 _FEWEST = 3
+_MOST_VIEWS = 5  # along each axis, that are compared with each other
 
 
 class AllInFocus(NamedTuple):
@@ -55,8 +56,9 @@ def all_in_focus(
 
     .. math:: C(x, \alpha') = \langle \overline{L^2} - \overline{L}^2 \rangle,
 
-    the variance over the views, smoothed over the window ⟨·⟩; the minimum is found between the planes by a
-    parabola. The picture is then blended from the two planes next to each place's factor, so that all views
+    the variance over up to 5 x 5 of the views, smoothed over the window ⟨·⟩; the minimum is found between
+    the planes by a parabola. The picture is then blended from the two planes next to each place's factor, so
+    that all views
     add up to it and noise is as low as in a refocused picture.
 
     Parameters
@@ -144,19 +146,19 @@ def _given(depth: Array, views: LightField) -> np.ndarray:
 def _agreeing(views: LightField, alphas: np.ndarray, window: float, shown) -> tuple[np.ndarray, np.ndarray]:
     """Refocus factor of each place on which the views agree best, and how clearly."""
     window = checks.positive("window", window, "lenslets")
-    data = as_float(views.data)
-    squares = LightField(data * data, views.aperture, views.lenslets, views.separation, views.valid)
+    pictures, chosen = _some_grey(views)
     costs = []
-    for first in range(0, len(alphas), _PLANES_AT_ONCE):
-        part = alphas[first : first + _PLANES_AT_ONCE]
-        mean, power = (
-            np.asarray(to_numpy(refocus_stack(v, part, interpolation="linear"))) for v in (views, squares)
-        )
-        variance = power - mean**2
-        variance = variance.mean(-1) if variance.ndim == 4 else variance
-        costs.append(gaussian_filter(np.maximum(variance, 0), (0, window, window)))
-        shown(min(first + _PLANES_AT_ONCE, len(alphas)))
-    cost = np.concatenate(costs)
+    for k, alpha in enumerate(alphas):
+        down, right = shifts(views, float(alpha))
+        total, power = np.zeros((2, *views.lenslets.shape), np.float32)
+        for picture, (v, u) in zip(pictures, chosen, strict=True):
+            moved = _moved(picture, float(down[v]), float(right[u]))
+            total += moved
+            power += moved * moved
+        variance = power / len(chosen) - (total / len(chosen)) ** 2
+        costs.append(gaussian_filter(np.maximum(variance, 0), window))
+        shown(k + 1)
+    cost = np.stack(costs)
     lowest, usual = cost.min(0), np.median(cost, axis=0)
     best = cost.argmin(0)
     middle = np.clip(best, 1, len(alphas) - 2)
@@ -167,6 +169,41 @@ def _agreeing(views: LightField, alphas: np.ndarray, window: float, shown) -> tu
     factors = alphas[best] + np.clip(move, -0.5, 0.5) * (alphas[1] - alphas[0])
     trust = np.where(usual > 0, (usual - lowest) / np.where(usual > 0, usual, 1), 0.0)
     return median_filter(factors, 3), trust
+
+
+def _some_grey(views: LightField) -> tuple[list[np.ndarray], list[tuple[int, int]]]:
+    """Grey pictures, and the indices (v, u), of up to 5 x 5 views that are not dark."""
+    used = lit(views.data)
+    rows, columns = (_some(np.asarray(used.any(1 - axis))) for axis in (0, 1))
+    chosen = [(int(v), int(u)) for v in rows for u in columns if used[v, u]] or [(0, 0)]
+    data = as_float(views.data)
+    pictures = [np.asarray(to_numpy(data[v, u, ...]), np.float32) for v, u in chosen]
+    return [p.mean(-1) if p.ndim == 3 else p for p in pictures], chosen
+
+
+def _some(used: np.ndarray) -> np.ndarray:
+    """Up to so many indices of views, the first and the last among them."""
+    first, last = (int(k) for k in np.flatnonzero(used)[[0, -1]]) if used.any() else (0, 0)
+    return np.unique(np.linspace(first, last, _MOST_VIEWS).astype(int))
+
+
+def _moved(picture: np.ndarray, down: float, right: float) -> np.ndarray:
+    """Picture (t, s) at places moved by (down, right) [samples], along one axis and then the other."""
+    for axis, move in ((0, down), (1, right)):
+        count, below = picture.shape[axis], math.floor(move)
+        found = [
+            (below + step, np.float32(weight))
+            for step, weight in taps(np.array(move - below), "cubic")
+            if weight != 0
+        ]
+        total = None
+        for step, weight in found:
+            index = np.clip(np.arange(count) + step, 0, count - 1)
+            term = np.take(picture, index, axis) * weight
+            total = term if total is None else np.add(total, term, out=total)
+        assert total is not None
+        picture = total
+    return picture
 
 
 def _planes(views: LightField, factors: np.ndarray) -> np.ndarray:
