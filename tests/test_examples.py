@@ -1,6 +1,7 @@
 """The examples run as a reader would run them, and write what they say."""
 
 import runpy
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,17 @@ def test_an_example_runs(name, written, tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().out
     for file in written:
         assert (tmp_path / file).stat().st_size > 1000
+
+
+def test_the_example_with_gradients_finds_what_closed_forms_confirm(capsys):
+    example = runpy.run_path(str(EXAMPLES / "optimise_lenslets.py"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        pytest.importorskip("torch", reason="PyTorch is not installed (make torch)")
+    example["main"]()
+    told = capsys.readouterr().out
+    found = [float(number) for number in told.strip().splitlines()[-1].split(":")[1].split(",")]
+    assert found == pytest.approx(list(example["WANTED"].values()), abs=0.005)
 
 
 def test_the_example_with_a_real_camera_refocuses(tmp_path, monkeypatch):

@@ -18,11 +18,13 @@ if TYPE_CHECKING:
     from lumigraph import analysis, depth, design, plots, units
     from lumigraph.calibration import calibrate, devignette
     from lumigraph.core.calibration import Calibration
+    from lumigraph.core.cloud import PointCloud
     from lumigraph.core.field import Field
     from lumigraph.core.grid import Grid
     from lumigraph.core.lattice import Lattice
     from lumigraph.core.lightfield import LightField
     from lumigraph.core.raw import RawImage
+    from lumigraph.core.stack import Stack
     from lumigraph.core.volume import Volume
     from lumigraph.deconvolution import deconvolve, deconvolve_series
     from lumigraph.elements import (
@@ -48,31 +50,38 @@ if TYPE_CHECKING:
         catalogue,
         load_camera,
     )
-    from lumigraph.io import open, save  # noqa: A004
+    from lumigraph.io import contents, open, save  # noqa: A004
     from lumigraph.propagation import METHODS, Propagate, choose_method, propagate
     from lumigraph.rendering import (
+        all_in_focus,
         decode,
         encode,
+        hot_pixels,
         reduce_aperture,
         refocus,
         refocus_fourier,
         refocus_stack,
         render,
+        render_stack,
+        super_resolve,
         view,
+        view_path,
     )
     from lumigraph.scene import Points, Scene, Slice, targets
-    from lumigraph.sensor import Sensor
+    from lumigraph.sensor import Sensor, demosaic
     from lumigraph.simulation import Coherent, Incoherent, Snapshots, TiltedWaves, simulate
 
 _HOMES = {
     "lumigraph": ("analysis", "depth", "design", "plots", "units"),
     "lumigraph.calibration": ("calibrate", "devignette"),
     "lumigraph.core.calibration": ("Calibration",),
+    "lumigraph.core.cloud": ("PointCloud",),
     "lumigraph.core.field": ("Field",),
     "lumigraph.core.grid": ("Grid",),
     "lumigraph.core.lattice": ("Lattice",),
     "lumigraph.core.lightfield": ("LightField",),
     "lumigraph.core.raw": ("RawImage",),
+    "lumigraph.core.stack": ("Stack",),
     "lumigraph.core.volume": ("Volume",),
     "lumigraph.deconvolution": ("deconvolve", "deconvolve_series"),
     "lumigraph.elements": (
@@ -98,20 +107,25 @@ _HOMES = {
         "catalogue",
         "load_camera",
     ),
-    "lumigraph.io": ("open", "save"),
+    "lumigraph.io": ("contents", "open", "save"),
     "lumigraph.propagation": ("METHODS", "Propagate", "choose_method", "propagate"),
     "lumigraph.rendering": (
+        "all_in_focus",
         "decode",
         "encode",
+        "hot_pixels",
         "reduce_aperture",
         "refocus",
         "refocus_fourier",
         "refocus_stack",
         "render",
+        "render_stack",
+        "super_resolve",
         "view",
+        "view_path",
     ),
     "lumigraph.scene": ("Points", "Scene", "Slice", "targets"),
-    "lumigraph.sensor": ("Sensor",),
+    "lumigraph.sensor": ("Sensor", "demosaic"),
     "lumigraph.simulation": ("Coherent", "Incoherent", "Snapshots", "TiltedWaves", "simulate"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
@@ -133,6 +147,7 @@ __all__ = [
     "LightField",
     "LumigraphError",
     "PlenopticCamera",
+    "PointCloud",
     "Points",
     "Propagate",
     "RawImage",
@@ -144,23 +159,29 @@ __all__ = [
     "SingleLensCamera",
     "Slice",
     "Snapshots",
+    "Stack",
     "ThinLens",
     "TiltedWaves",
     "Train",
     "Volume",
     "ZernikePlate",
+    "all_in_focus",
     "analysis",
     "calibrate",
     "catalogue",
     "choose_method",
+    "contents",
     "decode",
     "deconvolve",
     "deconvolve_series",
+    "demosaic",
     "depth",
     "design",
     "devignette",
     "encode",
+    "hot_pixels",
     "load_camera",
+    "lumigraph",
     "open",
     "plots",
     "propagate",
@@ -169,11 +190,14 @@ __all__ = [
     "refocus_fourier",
     "refocus_stack",
     "render",
+    "render_stack",
     "save",
     "simulate",
+    "super_resolve",
     "targets",
     "units",
     "view",
+    "view_path",
 ]
 
 

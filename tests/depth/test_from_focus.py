@@ -6,7 +6,7 @@ import pytest
 from lumigraph.core.arrays import namespace, to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
-from lumigraph.depth import BiasCurve, FocusMap, from_focus, point_alpha, sharpness
+from lumigraph.depth import BiasCurve, DepthMap, from_focus, point_alpha, sharpness
 from lumigraph.errors import CalibrationError, GeometryError
 
 ALPHAS = np.linspace(0.8, 1.2, 21)
@@ -32,7 +32,8 @@ def two_planes():
 def test_two_textured_planes_are_told_apart(xp):
     data = xp.asarray(two_planes())
     found = from_focus(LightField(data, APERTURE, LENSLETS, 20.0), ALPHAS)
-    assert isinstance(found, FocusMap)
+    assert isinstance(found, DepthMap)
+    assert (found.quantity, found.unit) == ("alpha", "1")
     assert namespace(found.alpha) is namespace(data)
     alpha, trust = to_numpy(found.alpha), to_numpy(found.confidence)
     # The texture is slow against the lenslets, so that interpolation does not bias the peak.

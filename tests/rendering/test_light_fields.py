@@ -282,7 +282,7 @@ def test_bad_numbers_are_refused(rng):
         point_of_view(views, 3, 0)
     with pytest.raises(GeometryError, match=r"fraction is 1\.5 but must be above 0 and at most 1"):
         reduce_aperture(views, 1.5)
-    with pytest.raises(GeometryError, match="shape is 'oval' but must be 'square' or 'round'"):
+    with pytest.raises(GeometryError, match="shape is 'oval' but must be 'square', 'round'"):
         reduce_aperture(views, 0.5, shape="oval")
     with pytest.raises(
         GeometryError, match="mosaic has 60 x 69 pixels but 5 x 5 views of 12 x 14 make 60 x 70"

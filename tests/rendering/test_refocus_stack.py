@@ -49,7 +49,8 @@ def test_invalid_samples_do_not_count(xp, rng):
     stack = refocus_stack(field(xp.asarray(even), xp.asarray(valid)), [0.7, 1.0, 1.3])
     np.testing.assert_allclose(to_numpy(stack), 2.0, rtol=2e-5)
     everywhere = field(views, np.ones(views.shape[:4], bool))
-    np.testing.assert_allclose(refocus_stack(everywhere, [1.3]), refocus_stack(field(views), [1.3]), rtol=1e-5)
+    plain = refocus_stack(field(views), [1.3])
+    np.testing.assert_allclose(refocus_stack(everywhere, [1.3]), plain, rtol=1e-5)
 
 
 def test_a_mask_of_another_shape_is_refused(rng):

@@ -18,12 +18,13 @@ from lumigraph.cli.refocus import refocus
 from lumigraph.cli.render import render
 from lumigraph.cli.reproduce import reproduce
 from lumigraph.cli.simulate import simulate
+from lumigraph.cli.view import view
 from lumigraph.errors import LumigraphError
 
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
 """Exit codes: something went wrong, the command was written wrongly, Ctrl-C."""
 
-VERBS = (demo, design, simulate, calibrate, decode, render, refocus, reproduce)
+VERBS = (demo, design, simulate, calibrate, decode, render, refocus, view, reproduce)
 """In the order of their use."""
 
 

@@ -171,11 +171,15 @@ def simulate(
     text = (
         f"{rows} x {columns} px, mean {raw.data.mean():.4g}, largest {raw.data.max():.4g}\nwritten {output}"
     )
+    error = raw.metadata.get("estimated_error")
+    if error is not None:
+        text = f"{text}\nestimated error {100 * error:.2g} % rms, from the difference of two halves"
     values = {
         "shape": raw.shape,
         "mean": raw.data.mean(),
         "largest": raw.data.max(),
         "pixel_pitch": raw.pixel_pitch,
+        "estimated_error": error,
     }
     report(common, text, {**values, "coherence": light.coherence, "output": str(output)})
 

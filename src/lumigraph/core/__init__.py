@@ -4,9 +4,11 @@
 - `lattice`: `Lattice`, where lenslets stand, in a simulation [m] or on a white image [px]
 - `field`: `Field`, a complex scalar wave on a grid
 - `raw`: `RawImage`, what a sensor read out
-- `calibration`: `Calibration`, the micro-images found on a white image
+- `calibration`: `Calibration`, the micro-images found on a raw image
+- `warp`: `Warp`, tilt and distortion of their lattice
 - `lightfield`: `LightField`, decoded radiance (v, u, t, s)
 - `volume`: `Volume`, reconstructed intensities (z, y, x)
+- `stack`: `Stack`, pictures in an order; `cloud`: `PointCloud`, points in space
 - `arrays`: the only file that knows array libraries
 - `checks`: one-line refusals of bad numbers
 - `cache`: arrays kept within a bound of memory

@@ -71,7 +71,34 @@ def like(values: np.ndarray, array: Array) -> Array:
         values = values.astype(np.float32 if single else np.float64, copy=False)
     if is_numpy_array(array):
         return values
-    return namespace(array).asarray(np.ascontiguousarray(values), device=device(array))
+    return namespace(array).asarray(np.asarray(values, order="C"), device=device(array))
+
+
+def is_parameter(value: Any) -> bool:
+    """Whether a number is a 0-d array of a library other than NumPy, such as a PyTorch scalar."""
+    return getattr(value, "shape", None) == () and not is_numpy_array(value) and not np.isscalar(value)
+
+
+def number(value: Any) -> float:
+    """A number or a 0-d array as a float, cut off from derivatives."""
+    return float(to_numpy(value) if is_parameter(value) else value)
+
+
+def parameter(value: Array) -> Array:
+    """A 0-d array in double precision, through which derivatives go."""
+    return namespace(value).astype(value, namespace(value).float64)
+
+
+def turned(values: Array, coefficient: np.ndarray, amount: Array) -> Array:
+    """Complex `values` times exp(i coefficient amount).
+
+    `amount` is a 0-d array that is zero and has a derivative: `values` come from NumPy in double precision,
+    as they do without derivatives, and this factor lets those of a parameter through.
+    """
+    xp, factor = namespace(values), like(coefficient, values)
+    real = xp.float32 if is_single(values) else xp.float64
+    amount = xp.astype(amount, real if not np.iscomplexobj(coefficient) else values.dtype)
+    return values * xp.exp(1j * as_complex(factor * amount))
 
 
 def as_complex(array: Array) -> Array:
@@ -118,3 +145,17 @@ def ifft2(array: Array, *, overwrite: bool = False) -> Array:
     if is_numpy_array(array):
         return scipy.fft.ifft2(array, overwrite_x=overwrite, workers=WORKERS)
     return namespace(array).fft.ifftn(array, axes=(-2, -1))
+
+
+def rfft2(array: Array, shape: tuple[int, int]) -> Array:
+    """2-D DFT of the last two axes of a real array, zero-padded to `shape`: (..., ny, nx // 2 + 1)."""
+    if is_numpy_array(array):
+        return scipy.fft.rfft2(array, shape, workers=WORKERS)
+    return namespace(array).fft.rfftn(array, s=shape, axes=(-2, -1))
+
+
+def irfft2(array: Array, shape: tuple[int, int]) -> Array:
+    """The real array (..., *shape) whose `rfft2` this is."""
+    if is_numpy_array(array):
+        return scipy.fft.irfft2(array, shape, workers=WORKERS)
+    return namespace(array).fft.irfftn(array, s=shape, axes=(-2, -1))

@@ -1,18 +1,27 @@
 """The micro-images found on a white image, or known from a camera's geometry."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from lumigraph.core import checks
-from lumigraph.core.lattice import Lattice
+from lumigraph.core.lattice import Lattice, Vector
+from lumigraph.core.warp import Warp
 from lumigraph.errors import CalibrationError
+
+
+def _none() -> np.ndarray:
+    return np.zeros((0, 2), np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
     """Where the micro-images stand on a raw image, and how light reached them.
+
+    Micro-images stand at `position(indices)`: the points of `lattice`, moved by `warp` where the camera has
+    one. Whoever needs a place on the picture asks `position`, `index`, `offset` or `centers_within`; the
+    lattice by itself tells pitches and directions.
 
     Parameters
     ----------
@@ -31,6 +40,20 @@ class Calibration:
         Main lens to lenslets, F or z2 + a [m]; None where unknown.
     lenslet_distance
         Lenslets to sensor, b [m]; None where unknown.
+    warp
+        Tilt and radial distortion that move the lattice points [px]; None where the lattice is regular.
+    light
+        Brightness (k,) of the measured micro-images, 1 for a bright one; None where unknown.
+    fill
+        Width of the lit part of a micro-image over the pitch: 1 where the f-numbers of main lens and
+        lenslets match, less where the main lens is stopped down; None where it could not be measured.
+    missing
+        Indices (m, 2) of lenslets that ought to stand on the picture and were not found, or not where they
+        ought to be: dead ones, dust.
+    sharpness
+        Contrast of each of the three kinds of lenslets, `lattice.kind`, over their mean; empty for one kind.
+    notes
+        What to know before trusting the result, one sentence each.
     """
 
     lattice: Lattice
@@ -41,6 +64,12 @@ class Calibration:
     pixel_pitch: float | None = None
     separation: float | None = None
     lenslet_distance: float | None = None
+    warp: Warp | None = None
+    light: np.ndarray | None = None
+    fill: float | None = None
+    missing: np.ndarray = field(default_factory=_none)
+    sharpness: tuple[float, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         checks.instance("lattice", self.lattice, Lattice, CalibrationError)
@@ -50,14 +79,75 @@ class Calibration:
                 f"indices have shape {self.indices.shape} and centers {self.centers.shape}: "
                 "both must be (k, 2), one row for each lenslet."
             )
-        for name in ("pixel_pitch", "separation", "lenslet_distance"):
+        if self.light is not None and self.light.shape != self.centers.shape[:1]:
+            raise CalibrationError(
+                f"light has shape {self.light.shape} but there are {len(self.centers)} centers: "
+                "give one brightness for each."
+            )
+        if self.missing.ndim != 2 or self.missing.shape[1] != 2:
+            raise CalibrationError(f"missing has shape {self.missing.shape} but must be (m, 2).")
+        if self.warp is not None:
+            checks.instance("warp", self.warp, Warp, CalibrationError)
+        for name in ("pixel_pitch", "separation", "lenslet_distance", "fill"):
             if (value := getattr(self, name)) is not None:
                 checks.positive(name, value, error=CalibrationError)
 
     @property
     def residuals(self) -> np.ndarray:
-        """Measured centre minus lattice point of each lenslet (k, 2) as (y, x) [px]."""
-        return self.centers - self.lattice.position(self.indices)
+        """Measured centre minus the fitted place of each lenslet (k, 2) as (y, x) [px]."""
+        return self.centers - self.position(self.indices)
+
+    def position(self, indices: np.ndarray) -> np.ndarray:
+        """Micro-image centres (..., 2) as (y, x) [px] of lenslets (..., 2) as (i, j)."""
+        points = self.lattice.position(indices)
+        return points if self.warp is None else self.warp.applied(points)
+
+    def straightened(self, y: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places of the picture [px] in the plane of the regular lattice; y and x broadcast."""
+        if self.warp is None:
+            return y, x
+        points = self.warp.removed(np.stack(np.broadcast_arrays(y, x), -1))
+        return points[..., 0], points[..., 1]
+
+    def index(self, y: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Index (i, j) of the lenslet whose micro-image each place [px] belongs to; y and x broadcast."""
+        return self.lattice.index(*self.straightened(y, x))
+
+    def offset(self, y: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Way (dy, dx) [px] from the centre of its micro-image to each place; y and x broadcast."""
+        center = self.position(np.stack(self.index(y, x), -1))
+        return y - center[..., 0], x - center[..., 1]
+
+    def indices_within(self, y_range: Vector, x_range: Vector) -> np.ndarray:
+        """Index pairs (k, 2) as (i, j) of all lenslets whose centres lie in the closed ranges [px]."""
+        if self.warp is None:
+            return self.lattice.indices(y_range, x_range)
+        border = np.array([(y, x) for y in np.linspace(*y_range, 33) for x in np.linspace(*x_range, 33)])
+        flat, margin = self.warp.removed(border), self.lattice.pitch
+        (y0, x0), (y1, x1) = flat.min(0) - margin, flat.max(0) + margin
+        indices = self.lattice.indices((y0, y1), (x0, x1))
+        y, x = self.position(indices).T
+        inside = (y >= y_range[0]) & (y <= y_range[1]) & (x >= x_range[0]) & (x <= x_range[1])
+        return indices[inside]
+
+    def centers_within(self, y_range: Vector, x_range: Vector) -> np.ndarray:
+        """Micro-image centres (k, 2) as (y, x) [px] in the closed ranges, row by row."""
+        return self.position(self.indices_within(y_range, x_range))
+
+    def transposed(self) -> "Calibration":
+        """The same micro-images on the picture with y and x exchanged; indices are exchanged too."""
+        lattice, kinds = self.lattice, self.sharpness
+        basis, origin = tuple(vector[::-1] for vector in reversed(lattice.basis)), lattice.origin[::-1]
+        return replace(
+            self,
+            lattice=replace(lattice, basis=basis, origin=origin),
+            shape=self.shape[::-1],
+            indices=self.indices[:, ::-1],
+            centers=self.centers[:, ::-1],
+            missing=self.missing[:, ::-1],
+            warp=None if self.warp is None else self.warp.transposed(),
+            sharpness=(kinds[0], kinds[2], kinds[1]) if len(kinds) == 3 else kinds,
+        )
 
     def check_fits(self, shape: tuple[int, int]) -> None:
         """Refuse a raw image of another size.

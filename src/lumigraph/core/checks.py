@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lumigraph.core.arrays import to_numpy
+from lumigraph.core.arrays import is_parameter, number, to_numpy
 from lumigraph.errors import GeometryError, LumigraphError
 
 Pair = tuple[float, float]
@@ -35,6 +35,14 @@ def positive(name: str, value: float, unit: str = "m", error: type[LumigraphErro
         told = "" if unit == "1" else f" {unit}"
         raise error(f"{name} is {value:g}{told} but must be above 0{told}.")
     return number
+
+
+def parameter(name: str, value: Any, unit: str = "m", error: type[LumigraphError] = GeometryError) -> Any:
+    """`value` as a float; a 0-d array of another library than NumPy stays one, to be differentiated."""
+    if is_parameter(value):
+        finite(name, number(value), unit, error)
+        return value
+    return finite(name, value, unit, error)
 
 
 def pair(name: str, value: float | Sequence[float], unit: str = "m") -> Pair:

@@ -6,25 +6,36 @@
 - `problem`: the three put together: model, sensitivity, deviance
 - `methods`: `Stop`, and what methods share
 - `richardson_lucy`: `RichardsonLucy`
+- `least_squares`: `LeastSquares`
+- `total_variation`, `wavelets`: priors `TotalVariation` and `Wavelets`
+- `filters`: `LowPass`, against artefacts of the lenslets
 - `checkpoint`: `Checkpoint`, a file from which a killed run goes on
 """
 
 from lumigraph.deconvolution.checkpoint import Checkpoint
 from lumigraph.deconvolution.deconvolve import Interrupted, Step, deconvolve, deconvolve_series
 from lumigraph.deconvolution.exposure import Exposure
+from lumigraph.deconvolution.filters import LowPass
 from lumigraph.deconvolution.forward import ForwardModel, PlacedModel
+from lumigraph.deconvolution.least_squares import LeastSquares
 from lumigraph.deconvolution.methods import Stop
 from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
+from lumigraph.deconvolution.total_variation import TotalVariation
+from lumigraph.deconvolution.wavelets import Wavelets
 
 __all__ = [
     "Checkpoint",
     "Exposure",
     "ForwardModel",
     "Interrupted",
+    "LeastSquares",
+    "LowPass",
     "PlacedModel",
     "RichardsonLucy",
     "Step",
     "Stop",
+    "TotalVariation",
+    "Wavelets",
     "deconvolve",
     "deconvolve_series",
 ]

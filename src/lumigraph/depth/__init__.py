@@ -1,11 +1,25 @@
 """Depth from a light field.
 
-- `from_focus`: a map of refocus factors with a confidence, from the sharpness of a focal stack; `point_alpha`
-  for a picture of one point, and `BiasCurve`, which corrects what diffraction does to either
-
-Refocus factors α' = F/F' become distances by `lumigraph.design.plenoptic1.defocus`.
+- `result`: `DepthMap`, what every estimate returns: values of one quantity, and a confidence for each
+- `epi`: disparities from the slopes of the lines of epipolar-plane images
+- `from_focus`: refocus factors from the sharpness of a focal stack; `point_alpha` for a picture of one
+  point, and `BiasCurve`, which corrects what diffraction does to either
+- `pictures`, `sweep`, `lines`: the steps of `epi`: even views, a plane sweep, least squares on all views
+- `volume`: costs of many labels: guided filter, semi-global matching, the best label
+- `smooth`: surfaces through uncertain values that may be slanted, bent and torn
 """
 
-from lumigraph.depth.from_focus import BiasCurve, FocusMap, from_focus, point_alpha, sharpness
+from lumigraph.depth.epi import epi
+from lumigraph.depth.from_focus import BiasCurve, from_focus, point_alpha, sharpness
+from lumigraph.depth.result import DepthMap, alpha_of, disparity_of
 
-__all__ = ["BiasCurve", "FocusMap", "from_focus", "point_alpha", "sharpness"]
+__all__ = [
+    "BiasCurve",
+    "DepthMap",
+    "alpha_of",
+    "disparity_of",
+    "epi",
+    "from_focus",
+    "point_alpha",
+    "sharpness",
+]

@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, like, to_numpy
 from lumigraph.core.lightfield import LightField
+from lumigraph.depth.result import DepthMap
 from lumigraph.errors import CalibrationError, GeometryError
 from lumigraph.rendering import refocus_stack
 
@@ -89,23 +90,6 @@ class BiasCurve:
         return np.asarray(curve(to_numpy(measured) if hasattr(measured, "shape") else measured))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FocusMap:
-    """Refocus factors (t, s) of what each lenslet sees, and how much to trust them.
-
-    Parameters
-    ----------
-    alpha
-        α' = F/F'; NaN where nothing can be said.
-    confidence
-        0 where the sharpness is the same in the whole stack, or highest at its end, to 1 where it stands
-        out.
-    """
-
-    alpha: Array
-    confidence: Array
-
-
 def sharpness(stack: Array) -> np.ndarray:
     r"""How concentrated the light of each picture (n, t, s) of a focal stack is (n,) [1/lenslets²].
 
@@ -163,7 +147,7 @@ def point_alpha(
 
 def from_focus(
     views: LightField, alphas: Alphas, *, window: float = 1.5, correction: BiasCurve | None = None
-) -> FocusMap:
+) -> DepthMap:
     r"""Refocus factor of what each lenslet sees: where the stack has its highest local contrast.
 
     .. math:: C(x) = \frac{\langle E^2 \rangle - \langle E \rangle^2}{\langle E \rangle^2}
@@ -181,8 +165,8 @@ def from_focus(
 
     Returns
     -------
-    FocusMap
-        Of the light field's library and precision. Even surfaces have no contrast: their confidence is low.
+    DepthMap
+        Refocus factors (t, s), of the light field's library and precision. Even surfaces have no contrast: their confidence is low.
 
     Raises
     ------
@@ -204,7 +188,7 @@ def from_focus(
     stands_out = (highest - usual) / (highest + _NO_CONTRAST)
     inside = (contrast.argmax(0) % (len(alphas) - 1)) > 0
     trust = np.where(inside & np.isfinite(alpha), stands_out, 0.0)
-    return FocusMap(like(alpha, views.data), like(trust, views.data))
+    return DepthMap(like(alpha, views.data), like(trust, views.data), "alpha")
 
 
 def _contrast(stack: np.ndarray, window: float) -> np.ndarray:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import arrays, checks
+from lumigraph.core.arrays import Array
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.elements.apertures import CircularAperture
@@ -30,7 +31,7 @@ class ThinLens:
     Parameters
     ----------
     focal_length
-        [m]; negative for a diverging lens.
+        [m]; negative for a diverging lens. A 0-d array such as a PyTorch scalar is differentiated through.
     diameter
         [m]; None for a lens as large as the field.
     center
@@ -55,13 +56,13 @@ class ThinLens:
     -0.15708
     """
 
-    focal_length: float
+    focal_length: float | Array
     diameter: float | None = None
     center: tuple[float, float] = (0.0, 0.0)
     edge: Edge = "grey"
 
     def __post_init__(self) -> None:
-        if checks.finite("focal_length", self.focal_length) == 0:
+        if arrays.number(checks.parameter("focal_length", self.focal_length)) == 0:
             raise GeometryError("focal_length is 0 m. Give a length, negative for a diverging lens.")
         if self.diameter is not None:
             checks.positive("diameter", self.diameter)
@@ -70,9 +71,10 @@ class ThinLens:
 
     def transmission(self, grid: Grid, wavelength: float) -> np.ndarray:
         """Complex factor (ny, nx) of each sample."""
+        focal_length = arrays.number(self.focal_length)
         phase = np.outer(
-            lens_phase(grid.y - self.center[0], self.focal_length, wavelength),
-            lens_phase(grid.x - self.center[1], self.focal_length, wavelength),
+            lens_phase(grid.y - self.center[0], focal_length, wavelength),
+            lens_phase(grid.x - self.center[1], focal_length, wavelength),
         )
         if self.diameter is None:
             return phase
@@ -84,5 +86,11 @@ class ThinLens:
         checks.instance("field", field, Field)
         offsets = (field.grid.y - self.center[0], field.grid.x - self.center[1])
         radii = tuple(min(stop, float(np.abs(offset).max())) for offset in offsets)
-        warn_if_coarse("a lens", field.grid, field.wavelength, self.focal_length, (radii[0], radii[1]))
-        return transmit(self, field)
+        focal_length = arrays.number(self.focal_length)
+        warn_if_coarse("a lens", field.grid, field.wavelength, focal_length, (radii[0], radii[1]))
+        if not arrays.is_parameter(self.focal_length):
+            return transmit(self, field)
+        squares = np.square(offsets[0])[:, None] + np.square(offsets[1])
+        factor = arrays.like(self.transmission(field.grid, field.wavelength), field.data)
+        bend = 1 / arrays.parameter(self.focal_length) - 1 / focal_length
+        return field * arrays.turned(factor, -np.pi / field.wavelength * squares, bend)

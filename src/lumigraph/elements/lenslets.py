@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from lumigraph.core import checks, coverage
+from lumigraph.core import arrays, checks, coverage
+from lumigraph.core.arrays import Array
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice, Vector
@@ -36,7 +37,8 @@ class LensletArray:
     lattice
         Where the lenslets stand [m].
     focal_length
-        [m], one number, or three for a lattice of three kinds.
+        [m], one number, or three for a lattice of three kinds. A 0-d array such as a PyTorch scalar is
+        differentiated through.
     shape
         "square" or "hex": the lattice's own cell, so that lenslets abut; "round". None takes the cell.
     fill_factor
@@ -46,12 +48,15 @@ class LensletArray:
         missing, and opaque. None for an array as large as the field.
     edge
         "grey" (area fractions; exact along straight edges and circles) or "hard".
+    stretch
+        Factor of all distances of the lattice, about the axis: the pitch over the lattice's. As a 0-d array
+        it is differentiated through, for lenslets that abut everywhere: the edges' own movement is not.
 
     Raises
     ------
     GeometryError
         A focal length of zero or of the wrong count, a cell of the other layout, a fill factor outside
-        0 to 1, or an extent that is not above zero.
+        0 to 1, an extent or a stretch that is not above zero, or one to be differentiated where lenslets end.
 
     Examples
     --------
@@ -62,11 +67,12 @@ class LensletArray:
     """
 
     lattice: Lattice
-    focal_length: float | tuple[float, ...]
+    focal_length: float | Array | tuple[float | Array, ...]
     shape: Shape | None = field(default=None, kw_only=True)
     fill_factor: float = field(default=1.0, kw_only=True)
     extent: tuple[float, float] | None = field(default=None, kw_only=True)
     edge: Edge = field(default="grey", kw_only=True)
+    stretch: float | Array = field(default=1.0, kw_only=True)
 
     def __post_init__(self) -> None:
         checks.instance("lattice", self.lattice, Lattice)
@@ -86,16 +92,66 @@ class LensletArray:
                 checks.positive(f"extent ({name})", value)
             object.__setattr__(self, "extent", extent)
         check_edge(self.edge)
+        self._stretched()
+
+    def _stretched(self) -> None:
+        """A plain stretch goes into the lattice; one to be differentiated stays."""
+        stretch = checks.parameter("stretch", self.stretch, "1")
+        checks.positive("stretch", arrays.number(stretch), "1")
+        if not arrays.is_parameter(stretch):
+            if stretch != 1:
+                object.__setattr__(self, "lattice", self.lattice.scaled(stretch))
+            object.__setattr__(self, "stretch", 1.0)
+        elif not self._open_everywhere:
+            raise GeometryError(
+                "stretch is to be differentiated but the lenslets end, and their edges' movement has no "
+                "derivative here. Use abutting lenslets: fill_factor 1, the lattice's cell, no extent."
+            )
 
     def __call__(self, field: Field) -> Field:
         """The field just behind the lenslets."""
         checks.instance("field", field, Field)
-        focal_length, size = min(map(abs, self._focal)), self.fill_factor * self.lattice.pitch
+        fixed = self._fixed()
+        focal_length, size = min(map(abs, fixed._focal)), self.fill_factor * fixed.lattice.pitch
         warn_if_coarse("a lenslet", field.grid, field.wavelength, focal_length, (size / 2, size / 2))
-        return transmit(self, field)
+        return transmit(self, field) if fixed is self else self._differentiable(fixed, field)
+
+    def _fixed(self) -> "LensletArray":
+        """The array with plain numbers; itself where it has no others."""
+        if not any(map(arrays.is_parameter, (self.stretch, *self._focal))):
+            return self
+        focal_lengths = tuple(map(arrays.number, self._focal))
+        return replace(self, focal_length=focal_lengths, stretch=arrays.number(self.stretch))
+
+    def _differentiable(self, fixed: "LensletArray", field: Field) -> Field:
+        """What `transmit` gives, with the derivatives of its phase -π|x - s c|²/(λ f).
+
+        They are those after the focal lengths f and the stretch s of the centres c.
+        """
+        y, x, turn = field.grid.y[:, None], field.grid.x, -np.pi / field.wavelength
+        factor = arrays.like(fixed.transmission(field.grid, field.wavelength), field.data)
+        i, j = fixed.lattice.index(y, x)
+        here = arrays.number(self.stretch)
+        center_y, center_x = (c / here for c in fixed._position(i, j))
+        squares = (y - here * center_y) ** 2 + (x - here * center_x) ** 2
+        kind = self.lattice.kind(i, j) % len(self._focal)
+        stretch = arrays.parameter(self.stretch) if arrays.is_parameter(self.stretch) else None
+        for k, focal_length in enumerate(self._focal):
+            own = turn * (kind == k)
+            if arrays.is_parameter(focal_length):
+                focal_length = arrays.parameter(focal_length)
+                bend = 1 / focal_length - 1 / arrays.number(focal_length)
+                factor = arrays.turned(factor, own * squares, bend)
+            if stretch is not None:
+                across, centers = y * center_y + x * center_x, center_y**2 + center_x**2
+                factor = arrays.turned(factor, -2 * own * across, (stretch - here) / focal_length)
+                factor = arrays.turned(factor, own * centers, (stretch**2 - here**2) / focal_length)
+        return field * factor
 
     def transmission(self, grid: Grid, wavelength: float) -> np.ndarray:
         """Complex factor (ny, nx) of each sample."""
+        if (fixed := self._fixed()) is not self:
+            return fixed.transmission(grid, wavelength)
         if self._along_axes:
             return np.outer(*(self._along(grid, wavelength, axis) for axis in (0, 1)))
         result = np.empty(grid.shape, np.complex128)
@@ -111,7 +167,7 @@ class LensletArray:
         return result
 
     @property
-    def _focal(self) -> tuple[float, ...]:
+    def _focal(self) -> tuple[Any, ...]:
         return self.focal_length if isinstance(self.focal_length, tuple) else (self.focal_length,)
 
     @property
@@ -216,15 +272,16 @@ class LensletArray:
         ]
 
 
-def _focal_lengths(value: float | Sequence[float], kinds: int) -> float | tuple[float, ...]:
-    several = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) and np.ndim(value)
-    values: tuple[Any, ...] = tuple(value) if several else (value,)  # type: ignore[arg-type]
+def _focal_lengths(value: Any, kinds: int) -> Any:
+    listed = isinstance(value, Sequence) and not isinstance(value, str)
+    several = listed or (isinstance(value, np.ndarray) and value.ndim)
+    values = tuple(value) if several else (value,)
     if len(values) not in (1, kinds):
         raise GeometryError(
             f"{len(values)} focal lengths were given for a lattice of {kinds} kind{'s'[: kinds - 1]}. "
             "Give one, or one for each kind."
         )
-    lengths = tuple(checks.finite("focal_length", number) for number in values)
-    if 0 in lengths:
+    lengths = tuple(checks.parameter("focal_length", number) for number in values)
+    if 0 in map(arrays.number, lengths):
         raise GeometryError("focal_length is 0 m. Give a length, negative for a diverging lenslet.")
     return lengths[0] if len(lengths) == 1 else lengths

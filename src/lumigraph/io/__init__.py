@@ -1,17 +1,39 @@
 """Files: `open` reads one, `save` writes one; one format, one file.
 
-- `formats`: `open`, `save` and the table of extensions
-- `tiff`: TIFF, 8 and 16 bits or floats, grey or colour; several pages for a stack
-- `png`: PNG, 8 and 16 bits grey, 8 bits colour
-- `zarr`: Zarr v3 stores, a folder or one `.zarr.zip`, with named axes and coordinates
-- `calibration`: a `Calibration` as TOML
+- `formats`: `open`, `save`, `contents` and the table of formats
+- `tiff`, `tiff_pixels`, `ome`: TIFF of any bit depth; OME-TIFF for stacks and volumes
+- `png`: PNG, 1 to 16 bits
+- `zarr`, `zarr_chunks`, `ngff`: Zarr v3 stores, a folder or one `.zarr.zip`; OME-Zarr for volumes
+- `hdf5`: HDF5, our own, Heidelberg light fields, arrays by others
+- `lytro`, `lytro_metadata`, `bits`: Lytro containers, packed raw frames, what the camera recorded
+- `views`, `eslf`, `cameras`: folders of views, ESLF mosaics; which camera is which view
+- `pfm`, `ply`: maps of floats; clouds of points
+- `movie`: GIF and MP4
+- `calibration`, `raytrix`, `plenoptomos`: a `Calibration` as TOML; calibrations by others
 - `source`: what is checked before a file is decoded
 - `target`: where a result may be written, and atomic writing
 - `header`: what lumigraph writes beside the pixels, as JSON
 """
 
 from lumigraph.io.calibration import load_calibration, save_calibration
-from lumigraph.io.formats import open, save  # noqa: A004  lumigraph.open is meant to read like the builtin
+from lumigraph.io.formats import (  # lumigraph.open is meant to read like the builtin
+    FORMATS,
+    Format,
+    Part,
+    contents,
+    open,  # noqa: A004
+    save,
+)
 from lumigraph.io.target import check_target
 
-__all__ = ["check_target", "load_calibration", "open", "save", "save_calibration"]
+__all__ = [
+    "FORMATS",
+    "Format",
+    "Part",
+    "check_target",
+    "contents",
+    "load_calibration",
+    "open",
+    "save",
+    "save_calibration",
+]

@@ -1,5 +1,6 @@
 """A `Calibration` as TOML: the lattice in pixels, the geometry, and every measured centre."""
 
+import json
 import os
 import tomllib
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
+from lumigraph.core.warp import Warp
 from lumigraph.errors import FormatError, LumigraphError
 from lumigraph.io import source, target
 from lumigraph.units import parse
@@ -33,6 +35,7 @@ def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> 
         f"shape = {list(calibration.shape)}  # rows, columns",
         f"residual_px = {float(calibration.residual_px)!r}",
         *lengths,
+        *_quality(calibration),
         "",
         "[lattice]  # points origin + i * basis[1] + j * basis[0]; pairs are (y, x)",
         f'layout = "{lattice.layout}"',
@@ -43,8 +46,31 @@ def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> 
         "[lenslets]  # one row each: the index (i, j) and the measured centre (y, x)",
         f"indices = [{_rows(to_numpy(calibration.indices))}]",
         f"centers = [{_rows(to_numpy(calibration.centers))}]",
+        f"missing = {to_numpy(calibration.missing).tolist()}  # indices of those not found",
     ]
+    if calibration.light is not None:
+        lines.append(f"light = {_row(calibration.light)}")
+    if calibration.warp is not None:
+        lines += ["", *_warp_lines(calibration.warp)]
     target.write_bytes(path, ("\n".join(lines) + "\n").encode())
+
+
+def _quality(calibration: Calibration) -> list[str]:
+    lines = [] if calibration.fill is None else [f"fill = {float(calibration.fill)!r}  # of the pitch"]
+    if calibration.sharpness:
+        lines.append(f"sharpness = {_row(calibration.sharpness)}  # of the three kinds")
+    # A JSON string is a TOML string, but for DEL.
+    notes = [json.dumps(note.replace("\x7f", "")) for note in calibration.notes]
+    return [*lines, f"notes = [{', '.join(notes)}]"] if notes else lines
+
+
+def _warp_lines(warp: Warp) -> list[str]:
+    return [
+        "[warp]  # q from center: q / (1 + tilt.q), then times 1 + radial |q|^2",
+        f"center = {_row(warp.center)}",
+        f"tilt = {_row(warp.tilt)}",
+        f"radial = {warp.radial!r}",
+    ]
 
 
 def load_calibration(path: str | os.PathLike[str]) -> Calibration:
@@ -69,6 +95,15 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
         return _calibration(found)
     except LumigraphError as error:
         raise FormatError(f"{path}: {error}") from error
+
+
+def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> Calibration:
+    """`load_calibration`, as `open` calls it."""
+    del max_pixels  # a calibration has no pixels; its file's size is limited
+    return load_calibration(path)
+
+
+save = save_calibration
 
 
 def _check_kind(path: Path, found: dict[str, Any]) -> None:
@@ -105,7 +140,29 @@ def _calibration(found: dict[str, Any]) -> Calibration:
         centers=centers,
         residual_px=float(_numbers(found, "residual_px", ())),
         **{name: _length(name, found[name]) for name in _LENGTHS if name in found},
+        **_extras(found, lenslets),
     )
+
+
+def _extras(found: dict[str, Any], lenslets: dict[str, Any]) -> dict[str, Any]:
+    """What files of the first versions do not have."""
+    extras: dict[str, Any] = {}
+    if "missing" in lenslets:
+        extras["missing"] = _numbers(lenslets, "lenslets.missing", (-1, 2)).astype(np.int64)
+    if "light" in lenslets:
+        extras["light"] = _numbers(lenslets, "lenslets.light", (-1,))
+    if "fill" in found:
+        extras["fill"] = float(_numbers(found, "fill", ()))
+    if "sharpness" in found:
+        extras["sharpness"] = tuple(_numbers(found, "sharpness", (-1,)).tolist())
+    if "warp" in found:
+        warp = _table(found, "warp")
+        center, tilt = (tuple(_numbers(warp, f"warp.{name}", (2,)).tolist()) for name in ("center", "tilt"))
+        extras["warp"] = Warp(center, tilt, float(_numbers(warp, "warp.radial", ())))
+    notes = found.get("notes", [])
+    if not isinstance(notes, list) or not all(isinstance(note, str) for note in notes):
+        raise FormatError("notes must be a list of texts.")
+    return extras | {"notes": tuple(notes)}
 
 
 def _table(found: dict[str, Any], name: str) -> dict[str, Any]:

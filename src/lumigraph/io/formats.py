@@ -1,67 +1,170 @@
-"""`open` and `save`: the extension says which format."""
+"""`open`, `save` and `contents`: the extension says which format; `FORMATS` is the table of them."""
 
 import os
-from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.cloud import PointCloud
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
+from lumigraph.core.stack import Stack
+from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
 from lumigraph.io import source
-from lumigraph.io.calibration import load_calibration, save_calibration
 from lumigraph.io.source import MAX_PIXELS
 from lumigraph.io.target import check_target
 
-PICTURES = (".tif", ".tiff", ".png", ".zarr", ".zarr.zip")
-"""Endings that a picture or a raw image may have."""
+Noun = RawImage | LightField | Stack | Volume | Calibration | PointCloud
+"""What a file can hold."""
 
-LIGHT_FIELDS = (".zarr", ".zarr.zip")
-"""Endings that a light field may have."""
-
-ENDINGS = (*PICTURES, ".toml")
-"""Every ending that can be opened; `.toml` holds a calibration."""
+FOLDER = "/"
+"""Stands for the ending of a folder of views, which has none."""
 
 
-def ending(path: str | os.PathLike[str]) -> str:
-    """The known extension that a path ends in, in small letters.
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One thing in a file: `name` is what ``open(path, what=name)`` takes; its noun, and a few words."""
+
+    name: str
+    noun: str
+    about: str
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A row of the table.
+
+    Parameters
+    ----------
+    name
+        Of the format.
+    endings
+        Of its files, in small letters.
+    module
+        Of `lumigraph.io`, which has ``load`` and, if it writes, ``save``; imported on first use.
+    writes
+        Nouns that ``save`` takes; empty if the format is only read.
+    reads
+        Nouns that ``load`` gives; empty if the format is only written.
+    options
+        Keywords of `open` that ``load`` takes.
+    """
+
+    name: str
+    endings: tuple[str, ...]
+    module: str
+    writes: tuple[str, ...]
+    reads: tuple[str, ...]
+    options: tuple[str, ...] = ()
+
+    def imported(self) -> Any:
+        """The module."""
+        return import_module(f"lumigraph.io.{self.module}")
+
+
+_ALL = ("RawImage", "LightField", "Volume")
+_LYTRO = ("RawImage", "Stack", "Calibration")
+_PLANES = ("RawImage", "Stack", "Volume")
+FORMATS = (
+    Format("TIFF", (".tif", ".tiff"), "tiff", _PLANES, _PLANES, ("page",)),
+    Format("Lytro ESLF", ("_eslf.png",), "eslf", ("LightField",), ("LightField",), ("views",)),
+    Format("PNG", (".png",), "png", ("RawImage",), ("RawImage",), ("views",)),
+    Format("Zarr", (".zarr", ".zarr.zip"), "zarr", _ALL, _ALL),
+    Format("HDF5", (".h5", ".hdf5"), "hdf5", _ALL, (*_ALL, "Stack"), ("what",)),
+    Format("PFM", (".pfm",), "pfm", ("RawImage",), ("RawImage",)),
+    Format("PLY", (".ply",), "ply", ("PointCloud",), ("PointCloud",)),
+    Format("Lytro", (".lfp", ".lfr", ".lfx", ".raw"), "lytro", (), _LYTRO, ("what",)),
+    Format("GIF, MP4", (".gif", ".mp4"), "movie", ("Stack",), ()),
+    Format("calibration", (".toml",), "calibration", ("Calibration",), ("Calibration",)),
+    Format("Raytrix calibration", (".xml",), "raytrix", (), ("Calibration",), ("shape",)),
+    Format("plenoptomos geometry", (".ini",), "plenoptomos", (), ("Calibration",), ("shape",)),
+    Format("Lytro metadata", (".json", ".txt"), "lytro_metadata", (), ("Calibration",)),
+    Format("folder of views", (FOLDER,), "views", ("LightField",), ("LightField",)),
+)  # fmt: skip
+"""Every format; where two endings fit, the longer one counts."""
+
+
+def _endings(noun: str = "", *, read: bool = False) -> tuple[str, ...]:
+    rows = [row for row in FORMATS if (row.reads if read else noun in row.writes)]
+    return tuple(ending for row in rows for ending in row.endings)
+
+
+PICTURES = _endings("RawImage")
+"""Endings that a picture or a raw image may be saved with."""
+
+LIGHT_FIELDS = _endings("LightField")
+"""Endings that a light field may be saved with."""
+
+ENDINGS = _endings(read=True)
+"""Every ending that can be opened."""
+
+
+def format_of(path: str | os.PathLike[str]) -> Format:
+    """The row of `FORMATS` for a path: by its ending, or a folder of views.
 
     Raises
     ------
     FormatError
-        None of `ENDINGS`.
+        None of the known endings.
     """
-    name = source.as_path(path).name.lower()
-    for known in ENDINGS:
-        if name.endswith(known):
-            return known
-    raise FormatError(f"{path} has no extension that lumigraph knows. Known are {', '.join(ENDINGS)}.")
+    place = source.as_path(path)
+    name = place.name.lower()
+    found = [
+        (len(end), row) for row in FORMATS for end in row.endings if end[0] in "._" and name.endswith(end)
+    ]
+    if found:
+        return max(found, key=lambda pair: pair[0])[1]
+    if place.is_dir() or not place.suffix:
+        return FORMATS[-1]
+    known = ", ".join(sorted({end for row in FORMATS for end in row.endings if end.startswith(".")}))
+    raise FormatError(f"{path} has no extension that lumigraph knows. Known are {known}.")
 
 
 def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
-    path: str | os.PathLike[str], *, page: int | None = None, max_pixels: int = MAX_PIXELS
-) -> RawImage | LightField | Calibration:
-    """What a file holds: a raw image, a light field (Zarr) or a calibration (TOML).
+    path: str | os.PathLike[str],
+    *,
+    what: str | None = None,
+    page: int | None = None,
+    views: int | tuple[int, int] | None = None,
+    shape: tuple[int, int] | None = None,
+    max_pixels: int = MAX_PIXELS,
+) -> Any:
+    """What a file or a folder of views holds; its ending says which format (`docs/formats.md` has the table).
 
-    The size is read from the header and checked before anything is decoded.
+    Sizes are read from the headers and checked, against the file's own size too, before anything is
+    decoded.
 
     Parameters
     ----------
     path
-        A file that ends in `.tif`, `.tiff`, `.png`, `.zarr`, `.zarr.zip` or `.toml`.
+        A file, a Zarr store, or a folder of views.
+    what
+        Which part, where a file holds several (Lytro, HDF5): `contents` lists them.
     page
-        Which page of a TIFF stack; needed only where there are several.
+        Which page of a TIFF stack; without it several pages open as a `Stack`, or as a `Volume` where
+        they were saved as one.
+    views
+        Views (v, u) of an ESLF mosaic; one number for both.
+    shape
+        Rows and columns of the raw images, for calibration files that do not tell (`.xml`, `.ini`).
     max_pixels
         Larger pictures are refused; four channels, or four values of a light field, count as one pixel.
+
+    Returns
+    -------
+    RawImage | LightField | Stack | Volume | Calibration | PointCloud
+        By the format and by what the file says it holds.
 
     Raises
     ------
     FormatError
-        Nothing there, another kind of file than its name says, damaged, or too large.
+        Nothing there, another kind of file than its name says, damaged, or too large; an option that the
+        format does not have.
 
     Examples
     --------
@@ -74,84 +177,120 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     ((4, 4), 1e-06, 12)
     """
     path = source.existing(path)
-    kind = ending(path)
-    if kind == ".toml":
-        return load_calibration(path)
-    if kind == ".png":
-        from lumigraph.io import png
-
-        return png.load(path, max_pixels=max_pixels)
-    if kind in (".tif", ".tiff"):
-        from lumigraph.io import tiff
-
-        return tiff.load(path, page=page, max_pixels=max_pixels)
-    from lumigraph.io import zarr
-
-    return zarr.load(path, max_pixels=max_pixels)
+    row = format_of(path)
+    if not row.reads:
+        raise FormatError(f"{path}: {row.name} files are written, not read. Open the pictures themselves.")
+    given = {"what": what, "page": page, "views": views, "shape": shape}
+    options = {name: value for name, value in given.items() if value is not None}
+    for name in options:
+        if name not in row.options:
+            raise FormatError(f"{name}= means nothing for {path}, a {row.name} file. Leave it out.")
+    if row.module == "png" and views is not None:
+        return import_module("lumigraph.io.eslf").load(path, views=views, max_pixels=max_pixels)
+    return row.imported().load(path, max_pixels=max_pixels, **options)
 
 
-def save(thing: Any, path: str | os.PathLike[str], *, white: float | None = None) -> None:
-    """Write a raw image, a picture, a stack of pictures, a light field or a calibration; atomically.
+def contents(path: str | os.PathLike[str]) -> tuple[Part, ...]:
+    """The parts of a file, in the order in which they stand; most formats hold one.
 
-    Integers are written as they are. Floats go into TIFF and Zarr as they are (a bare array into TIFF
-    as float32); into PNG, which holds whole numbers, 0 ... `white` becomes 0 ... 65535 (grey) or
-    0 ... 255 (colour) and what lies outside is clipped.
+    Raises
+    ------
+    FormatError
+        As `open`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> path = Path(tempfile.mkdtemp()) / "raw.tiff"
+    >>> save(np.zeros((3, 4), np.uint8), path)
+    >>> contents(path)
+    (Part(name='', noun='RawImage', about='3 x 4, uint8'),)
+    """
+    path = source.existing(path)
+    row = format_of(path)
+    listed = getattr(row.imported(), "contents", None)
+    if listed is not None:
+        return tuple(Part(*part) for part in listed(path))
+    thing = open(path)
+    data = getattr(thing, "data", None)
+    if data is None:
+        return (Part("", type(thing).__name__, row.name),)
+    return (Part("", type(thing).__name__, f"{' x '.join(map(str, data.shape))}, {data.dtype}"),)
+
+
+def save(
+    thing: Any, path: str | os.PathLike[str], *, white: float | None = None, fps: float | None = None
+) -> None:
+    """Write a picture, a stack, a light field, a volume, a calibration or points; atomically.
+
+    Integers are written as they are. Floats go into TIFF, HDF5 and Zarr as they are (a bare array into
+    TIFF as float32); into PNG and films, which hold whole numbers, 0 ... `white` becomes 0 ... 65535
+    (grey PNG) or 0 ... 255 (colour, films) and what lies outside is clipped.
 
     Parameters
     ----------
     thing
-        `RawImage`; an array (y, x) or (y, x, c); a list of arrays, which become the pages of a TIFF;
-        `LightField` (Zarr only); `Calibration` (TOML only).
+        `RawImage`; an array (y, x) or (y, x, c); a depth map, of which the values are kept; `Stack`, or a
+        list of arrays; `LightField`, `Volume`, `Calibration`, `PointCloud`.
     path
-        Its extension says which format: `.tif`, `.tiff`, `.png`, `.zarr`, `.zarr.zip` or `.toml`.
+        Its ending says which format; a light field goes into a folder of views where it has none.
     white
-        Float that becomes white in a PNG; the maximum if left out.
+        Float that becomes white in a PNG or a film; the maximum if left out.
+    fps
+        Pictures per second of a film (GIF, MP4); 10 if left out.
 
     Raises
     ------
     FormatError
         A format that cannot hold the thing, or a folder that does not exist.
     """
-    kind = ending(path)
-    if isinstance(thing, Calibration):
-        check_target(path, (".toml",))
-        save_calibration(thing, path)
-    elif isinstance(thing, LightField):
-        from lumigraph.io import zarr
-
-        zarr.save_light_field(thing, check_target(path, LIGHT_FIELDS))
-    elif isinstance(thing, list | tuple):
-        from lumigraph.io import tiff
-
-        tiff.save_stack([_raw(page).data for page in thing], check_target(path, (".tif", ".tiff")))
-    else:
-        _save_raw(_raw(thing, single="zarr" not in kind), check_target(path, PICTURES), white)
-
-
-def _save_raw(raw: RawImage, path: Path, white: float | None) -> None:
-    kind = ending(path)
-    if kind == ".png":
-        from lumigraph.io import png
-
-        png.save(raw, path, white=white)
-    elif kind in (".tif", ".tiff"):
-        from lumigraph.io import tiff
-
-        tiff.save(raw, path)
-    else:
-        from lumigraph.io import zarr
-
-        zarr.save_raw(raw, path)
+    row = format_of(path)
+    thing = _noun(thing, single=row.module == "tiff")
+    noun = type(thing).__name__
+    if noun not in row.writes or (isinstance(thing, LightField) and row.module == "png"):
+        fitting = tuple("a name without extension" if end == FOLDER else end for end in _endings(noun))
+        raise FormatError(
+            f"{path} has the wrong extension for this result, a {noun}. Use one of {', '.join(fitting)}."
+        )
+    options = {"white": white} if row.module in ("png", "movie", "eslf", "views") else {}
+    if row.module == "movie" and fps is not None:
+        options["fps"] = fps
+    elif fps is not None:
+        raise FormatError(f"fps= means nothing for {path}. Use .gif or .mp4 for a film.")
+    row.imported().save(thing, check_target(path, folder=row.endings == (FOLDER,)), **options)
 
 
-def _raw(thing: Any, *, single: bool = True) -> RawImage:
-    """`thing` as a raw image on the CPU; of a bare array floats become float32, truth values 0 and 255."""
+def _noun(thing: Any, *, single: bool) -> Noun:
+    """`thing` as a noun; of bare arrays floats become float32 if `single`, truth values 0 and 255."""
+    if isinstance(thing, LightField | Volume | Calibration | PointCloud):
+        return thing
+    if isinstance(thing, RawImage | Stack):
+        return replace(thing, data=to_numpy(thing.data))
+    if isinstance(thing, list | tuple):
+        return _stack([_picture(page, single=single) for page in thing])
+    return _picture(thing, single=single)
+
+
+def _stack(pages: list[RawImage]) -> Stack:
+    if not pages:
+        raise FormatError("there are no pictures to write: the list is empty.")
+    if len(shapes := {page.data.shape for page in pages}) > 1:
+        raise FormatError(f"the pictures of a stack have shapes {sorted(shapes)} but must have one.")
+    first = pages[0]
+    return Stack(np.stack([page.data for page in pages]), (), "page", first.pixel_pitch, first.bit_depth)
+
+
+def _picture(thing: Any, *, single: bool) -> RawImage:
     if isinstance(thing, RawImage):
-        return RawImage(to_numpy(thing.data), thing.pixel_pitch, thing.bit_depth, thing.bayer, thing.metadata)
-    if isinstance(thing, Sequence) or not hasattr(thing, "shape"):
+        return thing
+    if hasattr(thing, "quantity") and hasattr(thing, "values"):  # a DepthMap, which stands on a higher floor
+        known = {"quantity": thing.quantity, "unit": getattr(thing, "unit", "")}
+        return RawImage(to_numpy(thing.values).astype(np.float32), metadata=known)
+    if not hasattr(thing, "shape"):
         raise FormatError(
             f"a {type(thing).__name__} cannot be written to a file. Give a RawImage, an array (y, x[, c]), "
-            "a list of arrays, a LightField or a Calibration."
+            "a list of arrays, a LightField, a Volume, a Stack, a PointCloud or a Calibration."
         )
     data = to_numpy(thing)
     if data.ndim not in (2, 3) or data.size == 0:

@@ -8,7 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from lumigraph.core.grid import Grid
+from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
+from lumigraph.core.stack import Stack
+from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError, LumigraphError
 
 FORMAT = 1
@@ -63,6 +67,71 @@ def restore(data: np.ndarray, found: Mapping[str, Any] | None, bit_depth: int | 
         )
     except (LumigraphError, TypeError) as error:
         raise FormatError(f"the lumigraph header is damaged: {error}") from error
+
+
+def describe_stack(stack: Stack) -> dict[str, Any]:
+    """Fields of a stack other than its pixels, as JSON values."""
+    return {
+        "lumigraph": FORMAT,
+        "kind": "Stack",
+        "positions": list(stack.positions),
+        "quantity": stack.quantity,
+        "pixel_pitch": stack.pixel_pitch,
+        "bit_depth": stack.bit_depth,
+        "metadata": plain(stack.metadata, "metadata"),
+    }
+
+
+def describe_volume(volume: Volume) -> dict[str, Any]:
+    """Fields of a volume other than its data, as JSON values."""
+    return {
+        "lumigraph": FORMAT,
+        "kind": "Volume",
+        "depths": list(volume.depths),
+        "grid": describe_grid(volume.grid),
+    }
+
+
+def describe_views(views: LightField) -> dict[str, Any]:
+    """Fields of a light field other than its data, as JSON values."""
+    return {
+        "lumigraph": FORMAT,
+        "kind": "LightField",
+        "aperture": describe_grid(views.aperture),
+        "lenslets": describe_grid(views.lenslets),
+        "separation": float(views.separation),
+    }
+
+
+def describe_grid(grid: Grid) -> dict[str, list[float]]:
+    """A grid as JSON values; `grid` reads them."""
+    return {"shape": list(grid.shape), "pitch": list(grid.pitch), "center": list(grid.center)}
+
+
+def grid(fields: Any) -> Grid:
+    """The grid that `describe_grid` wrote."""
+    if not isinstance(fields, Mapping):
+        raise FormatError("the lumigraph header is damaged: a grid is missing.")
+    return Grid(tuple(fields["shape"]), tuple(fields["pitch"]), tuple(fields["center"]))
+
+
+def restore_planes(data: np.ndarray, found: Mapping[str, Any]) -> Stack | Volume:
+    """The stack or the volume with these planes and the fields that `loads` found.
+
+    Raises
+    ------
+    FormatError
+        Fields that neither can have, or of another kind.
+    """
+    try:
+        if found.get("kind") == "Volume":
+            return Volume(data, grid(found["grid"]), found["depths"])
+        if found.get("kind") == "Stack":
+            fields = ("quantity", "pixel_pitch", "bit_depth", "metadata")
+            return Stack(data, tuple(found["positions"]), *(found[name] for name in fields))
+    except (LumigraphError, TypeError, KeyError, ValueError) as error:
+        raise FormatError(f"the lumigraph header is damaged: {error}") from error
+    raise FormatError(f"the lumigraph header is of a {found.get('kind')!r}, not of planes. Update lumigraph.")
 
 
 def plain(value: Any, name: str) -> Any:

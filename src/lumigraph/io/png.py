@@ -1,7 +1,11 @@
-"""PNG: 8 and 16 bits grey, 8 bits colour; fields of the raw image in a text chunk."""
+"""PNG: 1 to 16 bits, grey or colour, are read; 8 and 16 bits grey and 8 bits colour are written.
+
+Fields of the raw image stand in a text chunk.
+"""
 
 import io
 import struct
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +19,13 @@ from lumigraph.errors import FormatError
 from lumigraph.io import header, source, target
 
 _KEY = "lumigraph"
-_COLOUR_TYPES = (2, 6)  # RGB, RGBA
+_SAMPLES = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # of a colour type
+_GREY_ALPHA = 4
+_WIDE = {
+    2: ("RGB", ("RGB;16B", "RGB;16L")),
+    6: ("RGBA", ("RGBA;16B", "RGBA;16L")),
+    _GREY_ALPHA: ("RGBA", ("RGBA", "RGBA")),
+}  # colour type to Pillow's mode, and the raw modes that take the high and the low bytes of big-endian pixels
 _DEPTHS = (1, 2, 4, 8, 16)
 
 
@@ -25,19 +35,40 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> RawImage:
     Raises
     ------
     FormatError
-        Not a PNG, damaged, too large, or 16 bits of colour.
+        Not a PNG, damaged, or too large.
     """
     path = source.regular_file(path)
     shape, depth, colour = _read_header(path)
     source.check_size(path, shape, max_pixels)
-    if depth == 16 and colour in _COLOUR_TYPES:
-        raise FormatError(f"{path} holds 16-bit colour, of which 8 bits would be lost. Convert it to TIFF.")
+    needed = ceil(shape[0] * shape[1] * _SAMPLES.get(colour, 1) * depth / 8)
+    source.check_stored(path, needed, path.stat().st_size)
+    if depth == 16 and colour in _WIDE:
+        return _wide(path, colour)
     # The class is called itself, not Image.open, which has a size limit of its own for the whole process.
     with source.decoding(path, "a PNG"), PngImageFile(path) as image:
         mode = {"I;16": "I;16", "I": "I;16", "L": "L", "1": "L", "LA": "L"}.get(image.mode, "RGB")
         text = image.text.get(_KEY)  # before load(): chunks ahead of the pixels
         data = np.array(image if image.mode == mode else image.convert(mode))
     return header.restore(data, header.loads(text), bit_depth=data.dtype.itemsize * 8)
+
+
+def _wide(path: Path, colour: int) -> RawImage:
+    """Colour, or grey with transparency, of 16 bits: Pillow decodes 8 of them at a time, high, then low."""
+    parts, text = [], None
+    with source.decoding(path, "a PNG"):
+        for half in range(2):
+            with PngImageFile(path) as image:
+                mode, raw_modes = _WIDE[colour]
+                image._mode = mode
+                image.tile = [tile._replace(args=raw_modes[half]) for tile in image.tile]
+                parts.append(np.array(image))
+                text = image.text.get(_KEY)  # which decodes, and must come after the tiles are set
+    high, low = parts
+    if colour == _GREY_ALPHA:  # four bytes: high and low of grey, high and low of transparency
+        data = (high[..., 0].astype(np.uint16) << 8) | high[..., 1]
+    else:
+        data = ((high.astype(np.uint16) << 8) | low)[..., :3]
+    return header.restore(np.ascontiguousarray(data), header.loads(text), bit_depth=16)
 
 
 def save(raw: RawImage, path: Path, *, white: float | None = None) -> None:

@@ -2,6 +2,7 @@
 
 import difflib
 import os
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import ceil, prod
@@ -22,7 +23,15 @@ _SIGNATURES = (
     (b"\xff\xd8\xff", "JPEG", ".jpg"),
     (b"GIF8", "GIF", ".gif"),
     (b"%PDF", "PDF", ".pdf"),
+    (b"PF\n", "PFM", ".pfm"),
+    (b"Pf\n", "PFM", ".pfm"),
+    (b"ply", "PLY", ".ply"),
+    (b"\x89HDF\r\n\x1a\n", "HDF5", ".h5"),
+    (b"\x89LFP", "Lytro", ".lfp"),
 )
+
+MOST_INFLATED = 1032
+"""Bytes that one byte of Deflate can become at most (P. Deutsch, RFC 1951: 258 bytes from two bits)."""
 
 
 def as_path(path: str | os.PathLike[str]) -> Path:
@@ -102,6 +111,53 @@ def check_size(path: Path, shape: tuple[int, ...], max_pixels: int) -> None:
             f"{path} declares {_times(shape)} = {pixels:.3g} pixels but at most {max_pixels:.3g} are read. "
             f"If that is right, call lumigraph.io.open(path, max_pixels={pixels})."
         )
+
+
+def check_stored(path: Path, needed: float, stored: int, most: float = MOST_INFLATED) -> None:
+    """Refuse a file that declares more bytes of pixels than its own bytes can hold, before any is allocated.
+
+    Parameters
+    ----------
+    path
+        The file.
+    needed
+        Bytes of the pixels that its header declares.
+    stored
+        Bytes there are for them.
+    most
+        Bytes that one stored byte can become: 1 if nothing is compressed.
+
+    Raises
+    ------
+    FormatError
+        The file is cut short or its header is wrong.
+    """
+    if needed > stored * most + (64 if most > 1 else 0):
+        raise FormatError(
+            f"{path} is cut short or damaged: it declares {needed:.0f} bytes of pixels but its {stored} "
+            "bytes cannot hold them. Copy it again."
+        )
+
+
+def check_inflated(path: Path, packed: bytes, limit: int) -> None:
+    """Refuse Deflate data (zlib or gzip) that becomes more than `limit` bytes; little memory is used.
+
+    Raises
+    ------
+    FormatError
+        It becomes more, as a file made to fill the memory does.
+    """
+    if len(packed) * MOST_INFLATED <= limit:
+        return
+    engine, total, rest = zlib.decompressobj(wbits=47), 0, packed
+    while rest and not engine.eof:
+        total += len(engine.decompress(rest, 1 << 20))
+        rest = engine.unconsumed_tail
+        if total > limit:
+            raise FormatError(
+                f"{path} holds {len(packed)} bytes that become more than the {limit} its header declares: "
+                "damaged, or made to fill the memory. Do not open it."
+            )
 
 
 @contextmanager

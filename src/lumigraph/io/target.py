@@ -14,7 +14,11 @@ _EXCHANGE = 2  # RENAME_EXCHANGE of Linux' renameat2
 _HERE = -100  # AT_FDCWD
 
 
-def check_target(path: str | os.PathLike[str], endings: Sequence[str] = ()) -> Path:
+VIEWS = "views.json"
+"""What marks a folder of views that lumigraph wrote."""
+
+
+def check_target(path: str | os.PathLike[str], endings: Sequence[str] = (), *, folder: bool = False) -> Path:
     """The path, refused where writing would fail in the end; called before a long computation.
 
     Parameters
@@ -23,6 +27,8 @@ def check_target(path: str | os.PathLike[str], endings: Sequence[str] = ()) -> P
         Where a result is to be written.
     endings
         Extensions that suit the result, such as ``(".tiff", ".png")``; empty for any.
+    folder
+        Whether the result is a folder of views.
 
     Raises
     ------
@@ -37,6 +43,10 @@ def check_target(path: str | os.PathLike[str], endings: Sequence[str] = ()) -> P
         raise FormatError(f"the folder {path.parent} for {path.name} does not exist. Make it first.")
     if not os.access(path.parent, os.W_OK):
         raise FormatError(f"the folder {path.parent} may not be written to. Choose another one.")
+    if folder:
+        if path.is_dir() and any(path.iterdir()) and not (path / VIEWS).is_file():
+            raise FormatError(f"{path} is a folder that holds other things. Choose another name.")
+        return path
     if path.is_dir() and not name.endswith(".zarr"):
         raise FormatError(f"{path} is a folder. Give the name of a file.")
     if path.is_dir() and any(path.iterdir()) and not (path / "zarr.json").is_file():
@@ -51,13 +61,13 @@ def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+def replacing(path: str | os.PathLike[str], *, folder: bool = False) -> Iterator[Path]:
     """Context that gives a temporary path beside `path`, which takes its place at the end.
 
     The temporary path does not exist yet: write a file there, or make a folder. If the block fails it
     is removed and what was at `path` stays.
     """
-    target = check_target(path)
+    target = check_target(path, folder=folder)
     if target.is_symlink():
         target = target.resolve()
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(6)}.tmp")

@@ -1,107 +1,174 @@
-"""TIFF: grey or colour, whole numbers or floats; fields of the raw image as JSON in ImageDescription."""
+"""TIFF and OME-TIFF: any bit depth, grey or colour, whole numbers or floats, one page or several.
 
+Fields of a raw image stand as JSON in ImageDescription. Stacks and volumes become OME-TIFF, whose physical
+sizes microscopy programs read. Compression: none, Deflate, PackBits; LZW and JPEG through Pillow.
+"""
+
+import json
 import logging
 from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tifffile
 
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.grid import Grid
 from lumigraph.core.raw import RawImage
+from lumigraph.core.stack import Stack
+from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
-from lumigraph.io import header, source, target
+from lumigraph.io import header, ome, source, target
+from lumigraph.io.tiff_pixels import pixels
 
 _TYPES = frozenset(f"{kind}{bits}" for kind in ("uint", "int") for bits in (8, 16, 32)) | {
     "float16",
     "float32",
     "float64",
 }
+_MOST_PAGES = 100_000
 # tifffile logs what it finds odd; whoever wants that adds a handler, others get our one-line errors.
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 
-def load(path: Path, *, page: int | None = None, max_pixels: int = source.MAX_PIXELS) -> RawImage:
-    """One page of a TIFF file (y, x) or (y, x, c); transparency is left out.
+def load(
+    path: Path, *, page: int | None = None, max_pixels: int = source.MAX_PIXELS
+) -> RawImage | Stack | Volume:
+    """The picture in a TIFF file (y, x) or (y, x, c), or its pages; transparency is left out.
+
+    Several pages of one size open as a `Stack`, or as a `Volume` where the file tells the size of a voxel
+    (OME-XML with PhysicalSizeX, Y and Z and neither channels nor times). Depths of a volume by another
+    program count from its middle plane unless it gives positions.
 
     Raises
     ------
     FormatError
-        Not a TIFF, damaged, cut short, too large, of several pages, or compressed in a way that needs
-        a codec which is not installed.
+        Not a TIFF, damaged, cut short, too large, no such page, or compressed in a way that is not read.
     """
     path = source.regular_file(path)
     with path.open("rb") as file:
         source.check_signature(path, file.read(8), "TIFF")
     with source.decoding(path, "a TIFF"), tifffile.TiffFile(path) as file:
-        image = _page(path, file, page)
-        _check_page(path, image, max_pixels)
-        found = header.loads(image.description)
-        data = _pixels(image)
-        depth = image.bitspersample if data.dtype.kind in "iu" else None
-    if found is not None and "shape" in found and data.size == np.prod(found["shape"]):
-        data = data.reshape(found["shape"])
-    return header.restore(data, found, depth)
+        count = _count(path, file)
+        if page is not None and (
+            isinstance(page, bool) or not isinstance(page, int) or not 0 <= page < count
+        ):
+            raise FormatError(f"page is {page!r} but {path} has {count}. Choose 0 ... {count - 1}.")
+        planes = ome.parse(file.pages.first.description)
+        if page is None and (count > 1 or (planes is not None and planes.note)):
+            return _pages(path, file, count, planes, max_pixels)
+        return _single(path, _page(path, file, page or 0), max_pixels)
 
 
-def save(raw: RawImage, path: Path) -> None:
-    """Write a raw image; the resolution tags hold its pixel pitch for other programs.
+def save(thing: RawImage | Stack | Volume, path: Path) -> None:
+    """Write a raw image as plain TIFF, a stack or a volume as OME-TIFF.
+
+    Resolution tags and OME physical sizes hold the pitches for other programs.
 
     Raises
     ------
     FormatError
         Complex numbers, or another type that TIFF readers do not share.
     """
-    data = _checked(raw.data)
-    pixels = data[..., 0] if data.shape[2:] == (1,) else data
-    with target.replacing(path) as temporary, tifffile.TiffWriter(temporary) as file:
-        file.write(
-            pixels,
-            photometric="rgb" if pixels.shape[2:] in ((3,), (4,)) else "minisblack",
-            planarconfig="contig" if pixels.ndim == 3 else None,
-            description=header.dumps(raw, shape=list(data.shape)),
-            metadata=None,
-            software="lumigraph",
-            **_resolution(raw.pixel_pitch),
-        )
+    if isinstance(thing, Volume):
+        _save_volume(thing, path)
+    elif isinstance(thing, Stack):
+        _save_stack(thing, path)
+    else:
+        _save_raw(thing, path)
 
 
-def save_stack(images: list[np.ndarray], path: Path) -> None:
-    """Write pictures of one shape and type as the pages of one file.
-
-    Raises
-    ------
-    FormatError
-        No pictures, or pictures of several shapes.
-    """
-    if not images:
-        raise FormatError(f"there are no pictures to write to {path}.")
-    if len(shapes := {image.shape for image in images}) > 1:
-        raise FormatError(f"the pictures of a stack have shapes {sorted(shapes)} but must have one.")
-    with target.replacing(path) as temporary, tifffile.TiffWriter(temporary) as file:
-        for image in images:
-            colour = image.shape[2:] == (3,)
-            file.write(_checked(image), photometric="rgb" if colour else "minisblack", metadata=None)
+def contents(path: Path) -> list[tuple[str, str, str]]:
+    """The pages of a TIFF file: (name, noun, about) each; nothing is decoded."""
+    path = source.regular_file(path)
+    with path.open("rb") as file:
+        source.check_signature(path, file.read(8), "TIFF")
+    with source.decoding(path, "a TIFF"), tifffile.TiffFile(path) as file:
+        count = _count(path, file)
+        first = file.pages.first
+        size = " x ".join(map(str, first.shape))
+        if count == 1:
+            return [("", "RawImage", f"{size}, {first.dtype}")]
+        planes = ome.parse(first.description)
+        noun = "Volume" if _is_volume(planes, count) else "Stack"
+        return [("", noun, f"{count} pages of {size}, {first.dtype}; page=0 ... {count - 1} opens one")]
 
 
-def _page(path: Path, file: tifffile.TiffFile, page: int | None) -> tifffile.TiffPage:
-    count = len(file.pages)
-    if count == 0:
+def _count(path: Path, file: tifffile.TiffFile) -> int:
+    """Pages of one size; a first page with smaller ones behind it counts alone."""
+    if len(file.pages) == 0:
         raise FormatError(f"{path} is a TIFF without a picture. Copy or save it again.")
-    if page is None and count > 1 and file.pages.get(1).shape == file.pages.first.shape:
-        raise FormatError(
-            f"{path} holds {count} pages where one picture is needed. Choose one by page=0 ... {count - 1}."
-        )
-    if page is not None and not 0 <= page < count:
-        raise FormatError(f"page is {page} but {path} has {count}. Choose 0 ... {count - 1}.")
-    image = file.pages.get(page or 0)
+    count = len(file.pages)
+    if count > _MOST_PAGES:
+        raise FormatError(f"{path} has {count} pages but at most {_MOST_PAGES} are read. Split it.")
+    return count
+
+
+def _page(path: Path, file: tifffile.TiffFile, index: int) -> tifffile.TiffPage:
+    image = file.pages.get(index)
     if not isinstance(image, tifffile.TiffPage):
         raise FormatError(f"{path} has a page of an unknown kind.")
     return image
 
 
+def _single(path: Path, image: tifffile.TiffPage, max_pixels: int) -> RawImage:
+    _check_page(path, image, max_pixels)
+    found = header.loads(image.description)
+    data = pixels(path, image, transparent=found is not None)
+    depth = image.bitspersample if data.dtype.kind in "iu" else None
+    if found is not None and "shape" in found and data.size == np.prod(found["shape"]):
+        data = data.reshape(found["shape"])
+    return header.restore(data, found, depth)
+
+
+def _pages(
+    path: Path, file: tifffile.TiffFile, count: int, planes: ome.Planes | None, max_pixels: int
+) -> RawImage | Stack | Volume:
+    first = _page(path, file, 0)
+    _check_page(path, first, max_pixels)
+    if count > 1 and _page(path, file, 1).shape != first.shape:  # a picture and its thumbnails
+        return _single(path, first, max_pixels)
+    channels = (first.samplesperpixel,) if first.samplesperpixel > 1 else ()
+    source.check_size(path, (count * first.imagelength, first.imagewidth, *channels), max_pixels)
+    data = None
+    for k in range(count):
+        image = _page(path, file, k)
+        if image.shape != first.shape or image.dtype != first.dtype:
+            raise FormatError(
+                f"page {k} has another size or type than the first. Choose one by page=0 ... {count - 1}."
+            )
+        _check_page(path, image, max_pixels)
+        plane = pixels(path, image, transparent=False)
+        data = np.empty((count, *plane.shape), plane.dtype) if data is None else data
+        data[k] = plane
+    assert data is not None  # count is at least 1
+    return _noun(data, planes, first)
+
+
+def _noun(data: np.ndarray, planes: ome.Planes | None, first: tifffile.TiffPage) -> Stack | Volume:
+    found = header.loads(planes.note) if planes is not None else None
+    if found is not None:
+        return header.restore_planes(data, found)
+    if planes is not None and _is_volume(planes, len(data)):
+        dz, dy, dx = (value or 1.0 for value in planes.pitch)
+        depths = planes.depths or tuple((np.arange(len(data)) - len(data) // 2) * dz)
+        return Volume(data, Grid(data.shape[1:3], (dy, dx)), depths)
+    pitch = planes.pitch[2] if planes is not None and planes.pitch[1] == planes.pitch[2] else None
+    return Stack(data, pixel_pitch=pitch, bit_depth=first.bitspersample if data.dtype.kind in "iu" else None)
+
+
+def _is_volume(planes: ome.Planes | None, count: int) -> bool:
+    if planes is None:
+        return False
+    if (found := header.loads(planes.note)) is not None:
+        return found.get("kind") == "Volume"
+    return None not in planes.pitch and planes.sizes[0] == count and planes.sizes[2] == 1
+
+
 def _check_page(path: Path, image: tifffile.TiffPage, max_pixels: int) -> None:
     """Refuse what would be large, cut short or undecodable, before it is decoded."""
-    if len(image.shape) not in (2, 3) or image.dtype is None:
+    if len(image.shape) not in (2, 3) or image.bitspersample < 1:
         raise FormatError(f"{path} holds data of shape {image.shape}, not a picture (y, x) or (y, x, c).")
     channels = (image.samplesperpixel,) if image.samplesperpixel > 1 else ()
     source.check_size(path, (image.imagelength, image.imagewidth, *channels), max_pixels)
@@ -109,34 +176,66 @@ def _check_page(path: Path, image: tifffile.TiffPage, max_pixels: int) -> None:
         source.check_size(path, (image.tilelength, image.tilewidth), max(max_pixels, 1 << 24))
     size = path.stat().st_size
     last = max((a + n for a, n in zip(image.dataoffsets, image.databytecounts, strict=False)), default=0)
-    stored = sum(image.databytecounts)
+    stored = min(sum(image.databytecounts), size * max(1, len(image.databytecounts)))
     expected = ceil(image.imagelength * image.imagewidth * image.samplesperpixel * image.bitspersample / 8)
     if last > size or (image.compression == 1 and stored < expected):
         raise FormatError(
             f"{path} is cut short: its pixels need {max(last, expected)} bytes but the file has {size}. "
             "Copy it again."
         )
+    # LZW makes at most 1365 bytes from one; JPEG has no bound, its decoder stops at the picture's size.
+    source.check_stored(path, expected, size if image.compression == 1 else stored, 1 << 16)
 
 
-def _pixels(image: tifffile.TiffPage) -> np.ndarray:
-    try:
-        data = image.asarray()
-    except ValueError as error:
-        if "imagecodecs" in str(error):
-            name = getattr(image.compression, "name", image.compression)
-            raise FormatError(
-                f"its compression {name} cannot be read here. Save it uncompressed or with Deflate, "
-                "or install the package imagecodecs."
-            ) from error
-        raise
-    if image.planarconfig == 2 and data.ndim == 3 and image.samplesperpixel > 1:
-        data = np.moveaxis(data, 0, -1)
-    if image.photometric == tifffile.PHOTOMETRIC.MINISWHITE and data.dtype.kind == "u":
-        data = (2**image.bitspersample - 1) - data
-    if image.extrasamples and header.loads(image.description) is None:
-        data = data[..., : image.samplesperpixel - len(image.extrasamples)]
-        data = data[..., 0] if data.shape[-1] == 1 else data
-    return np.ascontiguousarray(data, dtype=data.dtype.newbyteorder("="))
+def _save_raw(raw: RawImage, path: Path) -> None:
+    data = _checked(raw.data)
+    values = data[..., 0] if data.shape[2:] == (1,) else data
+    with target.replacing(path) as temporary, tifffile.TiffWriter(temporary) as file:
+        file.write(
+            values,
+            photometric="rgb" if values.shape[2:] in ((3,), (4,)) else "minisblack",
+            planarconfig="contig" if values.ndim == 3 else None,
+            description=header.dumps(raw, shape=list(data.shape)),
+            metadata=None,
+            software="lumigraph",
+            **_resolution(raw.pixel_pitch),
+        )
+
+
+def _save_stack(stack: Stack, path: Path) -> None:
+    data = _checked(stack.data)
+    lengths = stack.positions if stack.quantity == "dz [m]" else ()
+    step = abs(lengths[1] - lengths[0]) if len(lengths) > 1 else None
+    note = json.dumps(header.describe_stack(stack))
+    pitch = (step or None, stack.pixel_pitch, stack.pixel_pitch)
+    text = ome.text(data.shape, data.dtype.name, pitch=pitch, depths=lengths, name=stack.quantity, note=note)
+    _write_planes(data, path, text, stack.pixel_pitch)
+
+
+def _save_volume(volume: Volume, path: Path) -> None:
+    data = _checked(to_numpy(volume.data))
+    dz, dy, dx = volume.spacing
+    text = ome.text(
+        data.shape, data.dtype.name, pitch=(dz or None, dy, dx), depths=volume.depths, name="volume",
+        note=json.dumps(header.describe_volume(volume)),
+    )  # fmt: skip
+    _write_planes(data, path, text, dx)
+
+
+def _write_planes(data: np.ndarray, path: Path, description: str, pitch: float | None) -> None:
+    colour, common = data.shape[3:] == (3,), _resolution(pitch)
+    big = data.nbytes > 3.9e9
+    with target.replacing(path) as temporary, tifffile.TiffWriter(temporary, bigtiff=big) as file:
+        for k, plane in enumerate(data):
+            file.write(
+                plane,
+                photometric="rgb" if colour else "minisblack",
+                planarconfig="contig" if plane.ndim == 3 else None,
+                description=description if k == 0 else None,
+                metadata=None,
+                software="lumigraph" if k == 0 else None,
+                **common,
+            )
 
 
 def _checked(data: np.ndarray) -> np.ndarray:
@@ -145,7 +244,7 @@ def _checked(data: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(data)
 
 
-def _resolution(pixel_pitch: float | None) -> dict:
+def _resolution(pixel_pitch: float | None) -> dict[str, Any]:
     if pixel_pitch is None or not 1e-11 < pixel_pitch < 1e3:  # what a TIFF rational can hold
         return {}
     return {"resolution": (0.01 / pixel_pitch,) * 2, "resolutionunit": "CENTIMETER"}

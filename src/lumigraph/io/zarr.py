@@ -1,4 +1,7 @@
-"""Zarr v3 stores, a folder or one `.zarr.zip`: named axes, coordinates with units, exact round trips."""
+"""Zarr v3 stores, a folder or one `.zarr.zip`: named axes, coordinates with units, exact round trips.
+
+Volumes are OME-Zarr (NGFF 0.5), which microscopy programs open; those by other programs are read too.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,22 +14,24 @@ from zarr.codecs import ZstdCodec
 from zarr.storage import LocalStore, ZipStore
 
 from lumigraph.core.arrays import to_numpy
-from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
+from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
-from lumigraph.io import header, source, target
+from lumigraph.io import header, ngff, source, target, zarr_chunks
 
 _SIDE = 1024  # pixels of a chunk along each axis of a raw image
+_SIDES = (16, 256, 256)  # voxels of a chunk of a volume
+Names = tuple[str, ...]
 
 
-def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> RawImage | LightField:
-    """The raw image or the light field in a Zarr store that lumigraph wrote.
+def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> RawImage | LightField | Volume:
+    """The raw image, light field or volume in a Zarr store by lumigraph, or the volume in any OME-Zarr.
 
     Raises
     ------
     FormatError
-        No Zarr store, one by another program, damaged, or too large.
+        No Zarr store, one by another program that is no OME-Zarr volume, damaged, or too large.
     """
     path = source.existing(path)
     if path.is_dir() and not (path / "zarr.json").is_file():
@@ -35,75 +40,116 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> RawImage | Light
         source.regular_file(path)
         with path.open("rb") as file:
             source.check_signature(path, file.read(8), "ZIP")
-    with source.decoding(path, "a Zarr v3 store"), _reading(path) as group:
-        found: dict[str, Any] = dict(group.attrs)
-        if "lumigraph" not in found:
-            raise FormatError(f"{path} was not written by lumigraph. Only its own stores are read.")
-        data = _values(path, group, max_pixels)
-        if found.get("kind") == "LightField":
-            return LightField(data, _grid(found["aperture"]), _grid(found["lenslets"]), found["separation"])
-        if found.get("kind") == "RawImage":
-            return header.restore(data, found, None)
-        raise FormatError(f"{path} holds a {found.get('kind')!r}, which this lumigraph does not know.")
+    with source.decoding(path, "a Zarr v3 store"):
+        zarr_chunks.check_entries(path, 16 * max_pixels)
+        with _reading(path) as group:
+            return _noun(path, group, max_pixels)
 
 
-def save_raw(raw: RawImage, path: Path) -> None:
-    """Write a raw image, with coordinates from the first pixel in metres where the pitch is known."""
+def save(thing: RawImage | LightField | Volume, path: Path) -> None:
+    """Write a raw image, a light field or a volume.
+
+    Coordinates are in metres, in pixels where a raw image has no pitch. A volume becomes OME-Zarr.
+    """
+    if isinstance(thing, LightField):
+        _save_light_field(thing, path)
+    elif isinstance(thing, Volume):
+        data, names = ngff.data(to_numpy(thing.data)), ngff.names(thing)
+        chunks = tuple(min(n, side) for n, side in zip(data.shape[-3:], _SIDES, strict=True))
+        attributes = {**header.describe_volume(thing), "ome": ngff.describe(thing)}
+        _write(path, [(ngff.LEVEL, data, (1,) * (data.ndim - 3) + chunks, names, {})], attributes)
+    else:
+        _save_raw(thing, path)
+
+
+def _save_raw(raw: RawImage, path: Path) -> None:
     data = to_numpy(raw.data)
     pitch, unit = (raw.pixel_pitch, "m") if raw.pixel_pitch else (1.0, "px")
-    coordinates = {name: np.arange(n) * pitch for name, n in zip("yx", data.shape, strict=False)}
-    attributes = {"kind": "RawImage", **header.describe(raw)}
+    names = ("y", "x", "c")[: data.ndim]
+    along = {name: np.arange(n) * pitch for name, n in zip("yx", data.shape, strict=False)}
     chunks = tuple(min(n, _SIDE) for n in data.shape[:2]) + data.shape[2:]
-    _write(path, data, chunks, ("y", "x", "c")[: data.ndim], coordinates, unit, attributes)
+    axes = {"axes": _axes(names, "meter" if raw.pixel_pitch else "pixel")}
+    arrays = [("data", data, chunks, names, axes), *_coordinates(along, unit)]
+    _write(path, arrays, {"kind": "RawImage", **header.describe(raw)})
 
 
-def save_light_field(views: LightField, path: Path) -> None:
-    """Write a light field, with the coordinates of its four axes in metres."""
+def _save_light_field(views: LightField, path: Path) -> None:
     data = to_numpy(views.data)
-    attributes = {
-        "lumigraph": header.FORMAT,
-        "kind": "LightField",
-        "aperture": _plain(views.aperture),
-        "lenslets": _plain(views.lenslets),
-        "separation": float(views.separation),
-    }
-    coordinates = {"v": views.aperture.y, "u": views.aperture.x, "t": views.lenslets.y, "s": views.lenslets.x}
-    chunks = (1, *data.shape[1:])
-    _write(path, data, chunks, ("v", "u", "t", "s", "c")[: data.ndim], coordinates, "m", attributes)
+    names = ("v", "u", "t", "s", "c")[: data.ndim]
+    along = {"v": views.aperture.y, "u": views.aperture.x, "t": views.lenslets.y, "s": views.lenslets.x}
+    chunks, axes = (1, *data.shape[1:]), {"axes": _axes(names, "meter")}
+    arrays = [("data", data, chunks, names, axes), *_coordinates(along, "m")]
+    if views.valid is not None:
+        arrays.append(("valid", to_numpy(views.valid), (1, *data.shape[1:4]), names[:4], {}))
+    _write(path, arrays, header.describe_views(views))
 
 
-def _write(
-    path: Path, data: np.ndarray, chunks: tuple[int, ...], names: tuple[str, ...],
-    coordinates: dict[str, np.ndarray], unit: str, attributes: dict[str, Any],
-) -> None:  # fmt: skip
-    if data.dtype.kind not in "iufbc":
-        raise FormatError(f"a Zarr store cannot hold {data.dtype} here. Save numbers.")
+def _axes(names: Names, unit: str) -> list[dict[str, str]]:
+    """The axes as OME-Zarr describes them: a name, a type, a unit."""
+    return [
+        {"name": name, "type": "channel"} if name == "c" else {"name": name, "type": "space", "unit": unit}
+        for name in names
+    ]
+
+
+def _coordinates(along: dict[str, np.ndarray], unit: str) -> list[tuple[Any, ...]]:
+    return [(name, values, values.shape, (name,), {"units": unit}) for name, values in along.items()]
+
+
+def _write(path: Path, arrays: list[tuple[Any, ...]], attributes: dict[str, Any]) -> None:
+    for _, data, *_ in arrays:
+        if data.dtype.kind not in "iufbc":
+            raise FormatError(f"a Zarr store cannot hold {data.dtype} here. Save numbers.")
     with target.replacing(path) as temporary, _writing(temporary, path.suffix == ".zip") as store:
         group = zarr.create_group(store, zarr_format=3, attributes=attributes)
-        _add(group, "data", data, chunks, names, {})
-        for name, values in coordinates.items():
-            _add(group, name, values, values.shape, (name,), {"units": unit})
+        for array in arrays:
+            _add(group, array)
 
 
-def _add(
-    group: zarr.Group, name: str, values: np.ndarray, chunks: tuple[int, ...], names: tuple[str, ...],
-    attributes: dict[str, Any],
-) -> None:  # fmt: skip
+def _add(group: zarr.Group, what: tuple[Any, ...]) -> None:
     # A checksum, and chunks of zeros written out: a damaged or missing chunk is an error, not zeros.
+    name, values, chunks, names, more = what
     array = group.create_array(
         name, shape=values.shape, dtype=values.dtype, chunks=chunks, dimension_names=names,
-        attributes=attributes, compressors=[ZstdCodec(level=3, checksum=True)],
+        attributes=more, compressors=[ZstdCodec(level=3, checksum=True)],
         config={"write_empty_chunks": True},
     )  # fmt: skip
     array[...] = values
 
 
-def _values(path: Path, group: zarr.Group, max_pixels: int) -> np.ndarray:
-    array = group["data"]
+def _noun(path: Path, group: zarr.Group, max_pixels: int) -> RawImage | LightField | Volume:
+    found: dict[str, Any] = dict(group.attrs)
+    if "lumigraph" not in found:
+        if "ome" not in found:
+            raise FormatError(
+                f"{path} was not written by lumigraph and is no OME-Zarr 0.5. Only those stores are read."
+            )
+        name, axes, scales = ngff.level(found["ome"])
+        return ngff.volume(_values(path, group, name, max_pixels), axes, scales)
+    if found.get("kind") == "Volume":
+        values = _values(path, group, ngff.LEVEL, max_pixels)
+        restored = header.restore_planes(np.moveaxis(values, 0, -1) if values.ndim == 4 else values, found)
+        assert isinstance(restored, Volume)  # restore_planes goes by the kind
+        return restored
+    data = _values(path, group, "data", max_pixels)
+    if found.get("kind") == "LightField":
+        aperture, lenslets = header.grid(found.get("aperture")), header.grid(found.get("lenslets"))
+        mask = _values(path, group, "valid", max_pixels).astype(bool) if "valid" in group else None
+        return LightField(data, aperture, lenslets, found["separation"], mask)
+    if found.get("kind") == "RawImage":
+        return header.restore(data, found, None)
+    raise FormatError(f"{path} holds a {found.get('kind')!r}, which this lumigraph does not know.")
+
+
+def _values(path: Path, group: zarr.Group, name: str, max_pixels: int) -> np.ndarray:
+    array = group.get(name)
     if not isinstance(array, zarr.Array):
-        raise FormatError(f"{path} has no array named data. Save it again.")
+        raise FormatError(f"{path} has no array named {name}. Save it again.")
     source.check_size(path, array.shape, max_pixels)
     source.check_size(path, array.chunks, max(max_pixels, 1 << 24))
+    if array.dtype.kind not in "biufc":
+        raise FormatError(f"{path} holds {array.dtype}, no numbers. Save it again.")
+    zarr_chunks.check_chunks(path, array, name)
     if array.nchunks_initialized != array.nchunks:
         raise FormatError(
             f"{path} is incomplete: {array.nchunks_initialized} of {array.nchunks} chunks are there. Copy it."
@@ -127,11 +173,3 @@ def _writing(path: Path, zipped: bool) -> Iterator[LocalStore | ZipStore]:
         yield store
     finally:
         store.close()
-
-
-def _plain(grid: Grid) -> dict[str, list[float]]:
-    return {"shape": list(grid.shape), "pitch": list(grid.pitch), "center": list(grid.center)}
-
-
-def _grid(fields: dict[str, Any]) -> Grid:
-    return Grid(tuple(fields["shape"]), tuple(fields["pitch"]), tuple(fields["center"]))

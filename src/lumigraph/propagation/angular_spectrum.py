@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from lumigraph.core import arrays
+from lumigraph.core.arrays import Array
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.propagation import sampling
@@ -22,25 +23,26 @@ from lumigraph.propagation.pruned import Band, Transfer, convolve
 from lumigraph.propagation.window import check_memory, reach, window_shape
 
 Pair = tuple[float, float]
+Distance = float | Array
 CIRCULAR = ("band_limited_circular", "corrected_band_limited")
 
 
-def angular_spectrum(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
+def angular_spectrum(field: Field, distance: Distance, pad: float, grid: Grid | None) -> Field:
     """Plain: every frequency of the window, aliased or not."""
     return _propagate(field, distance, "angular_spectrum", pad, grid or field.grid)
 
 
-def band_limited(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
+def band_limited(field: Field, distance: Distance, pad: float, grid: Grid | None) -> Field:
     """Zero outside the rectangle of `sampling.band_limits` (Matsushima and Shimobaba 2009)."""
     return _propagate(field, distance, "band_limited", pad, grid or field.grid)
 
 
-def band_limited_circular(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
+def band_limited_circular(field: Field, distance: Distance, pad: float, grid: Grid | None) -> Field:
     """Zero outside the circle of radius f_max (the thesis' 2.4.2); an ellipse on unequal windows."""
     return _propagate(field, distance, "band_limited_circular", pad, grid or field.grid)
 
 
-def corrected_band_limited(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
+def corrected_band_limited(field: Field, distance: Distance, pad: float, grid: Grid | None) -> Field:
     """Zero outside the circle of radius max(f_max, W/(λz)) (the thesis' 2.4.3); W is the input's width."""
     return _propagate(field, distance, "corrected_band_limited", pad, grid or field.grid)
 
@@ -77,6 +79,13 @@ def transfer_function(fy: np.ndarray, fx: np.ndarray, distance: float, wavelengt
     return H
 
 
+def wave_numbers(fy: np.ndarray, fx: np.ndarray, wavelength: float) -> np.ndarray:
+    """Phase of `transfer_function` per distance (fy, fx) [rad/m]: complex where waves are evanescent."""
+    s = 1 - ((wavelength * fy) ** 2)[:, None] - (wavelength * fx) ** 2
+    root = np.sqrt(s.astype(np.complex128)) if (s < 0).any() else np.sqrt(s)
+    return 2 * math.pi / wavelength * root
+
+
 def kept_frequencies(method: str, grid: Grid, window: Grid, distance: float, wavelength: float) -> Pair:
     """Highest frequencies (y, x) that a method keeps [1/m]; infinite for the plain one."""
     if method == "angular_spectrum":
@@ -88,7 +97,8 @@ def kept_frequencies(method: str, grid: Grid, window: Grid, distance: float, wav
     return max(free[0], cutoff[0]), max(free[1], cutoff[1])
 
 
-def _propagate(field: Field, distance: float, method: str, pad: float, output: Grid) -> Field:
+def _propagate(field: Field, way: Distance, method: str, pad: float, output: Grid) -> Field:
+    distance = arrays.number(way)
     first = output.samples_to(field.grid)
     window = Grid(window_shape(field.grid, output, pad, first), field.grid.pitch)
     limits = kept_frequencies(method, field.grid, window, distance, field.wavelength)
@@ -104,6 +114,10 @@ def _propagate(field: Field, distance: float, method: str, pad: float, output: G
             _on_band(window, (rows, columns), first, (distance, field.wavelength), circle), field.data
         ),
     )
+    if arrays.is_parameter(way):
+        across, up = rows.take(window.fy), columns.take(window.fx)  # values are (columns, rows)
+        waves = wave_numbers(up, across, field.wavelength)
+        values = arrays.turned(values, waves, arrays.parameter(way) - distance)
     return replace(
         field, data=convolve(field.data, Transfer(values, rows, columns), output.shape), grid=output
     )

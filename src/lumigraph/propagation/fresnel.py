@@ -28,12 +28,15 @@ MOST_STEPS = 10_000
 """Multi-step Fresnel refuses more steps than this."""
 
 
-def fresnel(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
+def fresnel(field: Field, distance: float | Array, pad: float, grid: Grid | None) -> Field:
     """One step: a single FFT onto its own pitch λ|z|/(N p), or a matrix DFT onto `grid`.
 
     `pad` has no use here: nothing wraps round, and a finer output is what `grid` is for. The matrix
     DFT is exact for input samples that are points, in the paraxial approximation.
     """
+    if arrays.is_parameter(distance) and grid is not None:
+        return _differentiable(field, distance, grid)
+    distance = arrays.number(distance)
     if distance == 0:
         raise SamplingError("fresnel cannot go 0 m: its output pitch would be 0 m. Use another method.")
     step = _onto_grid if grid is not None else _onto_own_grid
@@ -148,6 +151,30 @@ def _onto_grid(field: Field, distance: float, output: Grid) -> Field:
     data = _conjugate_if(distance < 0, field.data)
     data = _product(rows, data, columns) * _carrier(abs(distance), field.wavelength)
     return replace(field, data=_conjugate_if(distance < 0, data), grid=output)
+
+
+def _differentiable(field: Field, distance: Array, output: Grid) -> Field:
+    """`_onto_grid`, with derivatives after the distance: of both matrices, and of the carrier."""
+    way = arrays.parameter(distance)
+    here, xp = arrays.number(distance), arrays.namespace(field.data)
+    _check_points(field, here, output)
+    area, nearer = abs(here) * field.wavelength, 1 / way - 1 / here
+    data, matrices = field.data, []
+    for axes, pitch in (
+        ((output.y, field.grid.y), field.grid.pitch[0]),
+        ((output.x, field.grid.x), field.grid.pitch[1]),
+    ):
+        matrix = _matrix(field, axes, pitch, area)
+        squares = (axes[0][:, None] - axes[1]) ** 2
+        bent = arrays.turned(
+            matrix if here > 0 else xp.conj(matrix), math.pi / field.wavelength * squares, nearer
+        )
+        matrices.append(bent * xp.astype(xp.sqrt(here / way), xp.real(data).dtype))
+    data = _product(matrices[0], data, matrices[1])
+    carrier = _carrier(abs(here), field.wavelength)
+    data = data * (carrier if here > 0 else carrier.conjugate())
+    whole = np.array(2 * math.pi / field.wavelength)
+    return replace(field, data=arrays.turned(data, whole, way - here), grid=output)
 
 
 def _matrix(field: Field, axes: tuple[np.ndarray, np.ndarray], pitch: float, area: float) -> Array:

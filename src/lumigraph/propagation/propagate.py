@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
 from lumigraph.core import arrays, checks
 from lumigraph.core.arrays import Array
@@ -20,7 +21,7 @@ from lumigraph.propagation.angular_spectrum import (
 from lumigraph.propagation.fresnel import fresnel, multi_step_fresnel
 from lumigraph.propagation.zoom import zoom
 
-Method = Callable[[Field, float, float, Grid | None], Field]
+Method = Callable[[Field, Any, float, Grid | None], Field]
 
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
@@ -34,6 +35,9 @@ METHODS: Mapping[str, Method] = MappingProxyType(
     }
 )
 """Every method by name; `"auto"` stands for the one that `choose_method` picks."""
+
+DIFFERENTIABLE = ("angular_spectrum", "band_limited", "band_limited_circular", "corrected_band_limited")
+"""Methods through whose distance derivatives go."""
 
 SHORTEST = 1e-100
 """Distances nearer to zero count as zero [m]."""
@@ -67,13 +71,13 @@ class Propagate:
     True
     """
 
-    distance: float
+    distance: float | Array
     method: str = "band_limited"
     pad: float = 1.0
     grid: Grid | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "distance", checks.finite("distance", self.distance))
+        object.__setattr__(self, "distance", checks.parameter("distance", self.distance))
         _check_method(self.method)
         _check_pad(self.pad)
 
@@ -84,7 +88,7 @@ class Propagate:
 
 def propagate(
     field: Field,
-    distance: float,
+    distance: float | Array,
     method: str = "band_limited",
     pad: float = 1.0,
     *,
@@ -99,7 +103,8 @@ def propagate(
     field
         Amplitude (..., y, x); leading axes are a batch. NumPy, PyTorch or another array API library.
     distance
-        z [m]; negative goes back. Zero returns the field on `grid`.
+        z [m]; negative goes back. Zero returns the field on `grid`. A 0-d array such as a PyTorch scalar is
+        differentiated through, by the spectral methods and by "fresnel" onto a given grid.
     method
         One of `METHODS`, or "auto". "fresnel" has its own output pitch λ|z|/(N p) unless `grid` is
         given, "zoom" needs `grid`, the others keep the pitch.
@@ -119,7 +124,8 @@ def propagate(
     Raises
     ------
     SamplingError
-        An unknown method, "zoom" without a grid, "fresnel" over zero distance, a window that needs
+        An unknown method, one that cannot be differentiated by the distance, "zoom" without a grid, "fresnel"
+        over zero distance, a window that needs
         more memory than there is, or an output too far off.
     GeometryError
         A distance or pad that is not a finite number, or an output grid that a method cannot reach.
@@ -146,7 +152,8 @@ def propagate(
     checks.instance("field", field, Field)
     if grid is not None:
         checks.instance("grid", grid, Grid)
-    distance = checks.finite("distance", distance)
+    way = checks.parameter("distance", distance)
+    distance = arrays.number(way)
     _check_method(method)
     _check_pad(pad)
     if abs(distance) < SHORTEST:  # dividing by it would overflow
@@ -154,8 +161,23 @@ def propagate(
     if method == "auto":
         choice = choose_method(field.grid, distance, field.wavelength, grid)
         method, pad, grid = choice.method, choice.pad, grid or field.grid
+    if arrays.is_parameter(way):
+        return _differentiable(field, way, method, pad, grid)
     if distance == 0 and method not in ("fresnel", "zoom"):
         return _on_window(field, grid or field.grid)
+    return METHODS[method](field, distance, pad, grid)
+
+
+def _differentiable(field: Field, distance: Array, method: str, pad: float, grid: Grid | None) -> Field:
+    """Through a distance that is a 0-d array, where the method can."""
+    known = (*DIFFERENTIABLE, *(("fresnel",) if grid is not None else ()))
+    if method not in known:
+        raise SamplingError(
+            f"method {method!r} cannot be differentiated by its distance. Use one of "
+            f"{', '.join(DIFFERENTIABLE)}, or 'fresnel' onto a grid."
+        )
+    if arrays.number(distance) == 0:
+        raise SamplingError("a distance of 0 m cannot be differentiated. Give one above 0, or a plain 0.")
     return METHODS[method](field, distance, pad, grid)
 
 

@@ -1,19 +1,28 @@
 """From raw images to pictures.
 
-- `decode`: a plenoptic 1.0 raw image to a `LightField`, on its true micro-image lattice; `encode` back
-- `views`: single views, points of view, a smaller aperture, mosaics of views and of micro-images
-- `refocus`: shear and sum, for one depth or a stack
+- `decode`: a plenoptic 1.0 raw image to a `LightField`, on its true micro-image lattice; `encode` back;
+  `squared`: hexagonal lattices onto a square grid, and finer; `pixels`: hot pixels found and filled;
+  `kind_check`: tells a raw image of a camera 2.0
+- `views`: single views, points of view, a smaller aperture, mosaics of views and of micro-images;
+  `paths`: a point of view that moves
+- `refocus`: shear and sum, for one depth or a stack; `sharp`: one picture focused everywhere
 - `fourier_slice`: the same by a slice through the four-dimensional spectrum
-- `focused`: plenoptic 2.0: turned patches tiled without seams, of one size or one for each lenslet
+- `focused`: plenoptic 2.0: turned patches tiled without seams, of one size or one for each lenslet;
+  `patches`: their sizes; `super_resolution`: finer than one micro-image samples
 - `geometry`: lengths in metres, which lenslets form a rectangle
 - `interpolate`: values between samples, by gathering and weights, for every array library
 """
 
 from lumigraph.rendering.decode import decode
 from lumigraph.rendering.encode import encode
-from lumigraph.rendering.focused import render, rendered_grid
+from lumigraph.rendering.focused import render, render_stack, rendered_grid
 from lumigraph.rendering.fourier_slice import refocus_fourier
+from lumigraph.rendering.patches import lenslet_indices, sharp_patches
+from lumigraph.rendering.paths import view_path
+from lumigraph.rendering.pixels import hot_pixels
 from lumigraph.rendering.refocus import refocus, refocus_stack
+from lumigraph.rendering.sharp import AllInFocus, all_in_focus
+from lumigraph.rendering.super_resolution import super_resolve
 from lumigraph.rendering.views import (
     lenslet_mosaic,
     point_of_view,
@@ -24,8 +33,12 @@ from lumigraph.rendering.views import (
 )
 
 __all__ = [
+    "AllInFocus",
+    "all_in_focus",
     "decode",
     "encode",
+    "hot_pixels",
+    "lenslet_indices",
     "lenslet_mosaic",
     "point_of_view",
     "reduce_aperture",
@@ -33,8 +46,12 @@ __all__ = [
     "refocus_fourier",
     "refocus_stack",
     "render",
+    "render_stack",
     "rendered_grid",
+    "sharp_patches",
+    "super_resolve",
     "view",
+    "view_path",
     "views_from_mosaic",
     "views_mosaic",
 ]

@@ -14,14 +14,10 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.rendering.geometry import Frame, lenslet_rectangle, transposed
-from lumigraph.rendering.interpolate import (
-    Interpolation,
-    as_float,
-    check_interpolation,
-    sample,
-    take,
-    weighted,
-)
+from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, sample, weighted
+from lumigraph.rendering.kind_check import warn_if_focused
+from lumigraph.rendering.pixels import checked_mask, repaired
+from lumigraph.rendering.squared import Squared
 
 MOST_DIRECTIONS = 4096
 """Views along one axis; more would be far beyond the pixels of any micro-image."""
@@ -32,39 +28,55 @@ def decode(
     calibration: Calibration,
     *,
     directions: int | tuple[int, int] | None = None,
+    samples: int = 1,
     interpolation: Interpolation = "cubic",
+    bad: Array | None = None,
 ) -> LightField:
     r"""Light field L(v, u, t, s) of a plenoptic 1.0 raw image.
 
     Every micro-image is sampled about its own centre, c (1 + b/F) for a lenslet at c, along the lattice's
-    own axes. Light from the main lens at u lands at -u b/F from that centre, so the order of the pixels
-    turns round. A hexagonal lattice is resampled onto rows √3/2 pitch apart, every other row interpolated
-    half a pitch along itself; the views outside its hexagonal cell, whose pixels belong to other lenslets,
-    are 0 and do not count in `refocus`.
+    own axes; the raw image is neither turned nor scaled before, so that each value is interpolated once.
+    Light from the main lens at u lands at -u b/F from that centre, so the order of the pixels turns round.
+
+    A hexagonal lattice comes out on a square grid: its rows stay, √3/2 of a pitch apart, and each is sampled
+    along itself at that same distance. Nothing is mixed across rows, and no detail is lost. The views
+    outside its hexagonal cell, whose pixels belong to other lenslets, are 0 and do not count in `refocus`.
 
     Parameters
     ----------
     raw
-        Pixels (y, x[, c]); devignetted, if pictures shall not darken at their edges. Whole numbers become
-        float32.
+        Pixels (y, x[, c]), demosaiced if they had a Bayer pattern; devignetted, if pictures shall not darken
+        at their edges. Whole numbers become float32.
     calibration
         Of the same camera. Where its pixel pitch is unknown, lengths are in lenslet pitches; where its
         distances are unknown, F/b = 20 is assumed: only the scale of `alpha` depends on it.
     directions
         Views along (v, u); one pixel apart, as many as fit in a micro-image, where None. Otherwise the
         micro-image's pitch is divided into that many, each the mean over its width.
+    samples
+        Samples of a view per lenslet along each axis (of a hexagonal lattice, per row): those between the
+        lenslets are interpolated.
     interpolation
-        "cubic" or "linear".
+        "linear" (bilinear), "cubic" or "band_limited", between pixels and between lenslets.
+    bad
+        Pixels (y, x) to leave out, true or false, such as `hot_pixels` finds. They are filled from their
+        neighbours, and samples that rest on them for more than half are marked in ``valid``.
 
     Returns
     -------
     LightField
-        Of the largest rectangle of lenslets with whole micro-images.
+        Of the largest rectangle of lenslets with whole micro-images; with `valid` where `bad` is given or
+        the calibration misses lenslets.
+
+    Warns
+    -----
+    SamplingWarning
+        The raw image looks like that of a camera 2.0, which is not decoded but rendered.
 
     Raises
     ------
     CalibrationError
-        The raw image has another size than the white image, NaN, or a Bayer pattern.
+        The raw image has another size than the white image, NaN, or a Bayer pattern; bad has another size.
     LumigraphError
         It would not fit in memory.
 
@@ -74,31 +86,63 @@ def decode(
     >>> from lumigraph.core.lattice import Lattice
     >>> lattice = Lattice.square(5.0, origin=(2, 2))
     >>> none = np.zeros((0, 2))
-    >>> views = decode(np.ones((20, 30)), Calibration(lattice, (20, 30), none, none, 0.0))
-    >>> views.data.shape
+    >>> calibration = Calibration(lattice, (20, 30), none, none, 0.0)
+    >>> decode(np.ones((20, 30)), calibration).data.shape
     (5, 5, 4, 6)
+    >>> decode(np.ones((20, 30)), calibration, samples=3).data.shape
+    (5, 5, 10, 16)
     """
     raw = raw if isinstance(raw, RawImage) else RawImage(raw)
     check_interpolation(interpolation)
     check_raw(raw, calibration)
-    if (flipped := transposed(calibration)) is not None:
-        return _turned(raw, flipped, directions, interpolation)
-    frame, plan = Frame.of(calibration), _Directions.of(calibration, directions)
+    samples = checks.whole("samples", samples)
+    warn_if_focused(raw.data, calibration)
+    data, mask = as_float(raw.data), None
+    if bad is not None:
+        mask = checked_mask(bad, raw)
+        data = repaired(data, mask)
+    if (flipped := transposed(calibration)) is None:
+        return _decoded(data, mask, calibration, _How(directions, samples, interpolation))
+    # A hexagonal lattice with dense columns: y and x are exchanged, and exchanged back.
+    xp, extra = namespace(data), tuple(range(2, data.ndim))
+    if directions is not None:
+        nv, nu = checks.shape("directions", directions)
+        directions = nu, nv
+    how, turned = _How(directions, samples, interpolation), None if mask is None else mask.T
+    views = _decoded(xp.permute_dims(data, (1, 0, *extra)), turned, flipped, how)
+    data = xp.permute_dims(views.data, (1, 0, 3, 2, *(4 for _ in extra)))
+    valid = None if views.valid is None else xp.permute_dims(views.valid, (1, 0, 3, 2))
+    return LightField(data, _exchanged(views.aperture), _exchanged(views.lenslets), views.separation, valid)
+
+
+@dataclass(frozen=True, slots=True)
+class _How:
+    """What the user chose."""
+
+    directions: int | tuple[int, int] | None
+    samples: int
+    interpolation: Interpolation
+
+
+def _decoded(data: Array, bad: np.ndarray | None, calibration: Calibration, how: _How) -> LightField:
+    """Light field of an image (y, x[, c]) whose lattice has dense rows, without checks."""
+    frame, plan = Frame.of(calibration), _Directions.of(calibration, how.directions)
     before, after = plan.reach(frame)
     indices = lenslet_rectangle(calibration, before, after)
-    _check_memory(raw, plan, indices)
-    data = _gather(
-        as_float(raw.data),
-        calibration.lattice.position(indices),
-        (frame, plan, calibration.lattice),
-        interpolation,
-    )
-    if calibration.lattice.layout == "hex":
-        data = _straightened(data, indices[:, 0, 0] % 2 == 1, interpolation)
+    squared = Squared.of(calibration.lattice, indices, how.samples, _row_spacing(calibration, frame))
+    _check_memory(data, plan, squared)
+    centers = calibration.position(indices)
+    taken = _gather(data, centers, (frame, plan, calibration.lattice), how.interpolation)
+    result, valid = squared.apply(taken, how.interpolation), None
+    good = None if bad is None else (~bad).astype(np.float32)
+    if good is not None or len(calibration.missing):
+        good = good if good is not None else np.ones(calibration.shape, np.float32)
+        seen = _gather(good, centers, (frame, plan, calibration.lattice), "linear")
+        seen = seen * ~_among(indices, calibration.missing)
+        valid = namespace(data).asarray(squared.apply(seen, "linear") > 0.5, device=data.device)
     pitch = plan.step[0] * frame.aperture_per_px, plan.step[1] * frame.aperture_per_px
-    return LightField(
-        data, Grid(plan.count, pitch), _lenslet_grid(calibration, frame, indices), frame.separation
-    )
+    grid = _lenslet_grid(calibration, frame, indices, squared)
+    return LightField(result, Grid(plan.count, pitch), grid, frame.separation, valid)
 
 
 def check_raw(raw: RawImage, calibration: Calibration) -> None:
@@ -111,7 +155,7 @@ def check_raw(raw: RawImage, calibration: Calibration) -> None:
     if raw.bayer is not None:
         raise CalibrationError(
             f"the raw image has a Bayer pattern ({raw.bayer}): its neighbours have different colours. "
-            "Demosaic it to (y, x, 3) first."
+            "Demosaic it to (y, x, 3) first: lg.demosaic(raw)."
         )
 
 
@@ -180,48 +224,35 @@ def _own(vectors: np.ndarray, lattice: Lattice) -> np.ndarray:
     return ((i == 0) & (j == 0)).astype(float)
 
 
-def _straightened(data: Array, odd: np.ndarray, interpolation: Interpolation) -> Array:
-    """Rows `odd` (t,) of a hexagonal light field moved by half a pitch along s, onto the other rows' columns.
-
-    Half way between samples, six points of Lagrange's polynomial are far better than four.
-    """
-    xp, columns = namespace(data), data.shape[3]
-    weights = (0.5, 0.5) if interpolation == "linear" else tuple(w / 256 for w in (3, -25, 150, 150, -25, 3))
-    moved = None
-    for step, weight in enumerate(weights, start=-len(weights) // 2):
-        index = np.clip(np.arange(columns) + step, 0, columns - 1)
-        term = take(data, index, 3) * weight
-        moved = term if moved is None else moved + term
-    mask = xp.asarray(odd.reshape((-1,) + (1,) * (data.ndim - 3)), device=data.device)
-    return xp.where(mask, moved, data)
+def _among(indices: np.ndarray, some: np.ndarray) -> np.ndarray:
+    """Which lenslets (rows, cols, 2) are among others (k, 2)."""
+    listed = {(int(i), int(j)) for i, j in some}
+    return np.array([[(int(i), int(j)) in listed for i, j in row] for row in indices])
 
 
-def _lenslet_grid(calibration: Calibration, frame: Frame, indices: np.ndarray) -> Grid:
-    """Where the lenslets of a rectangle stand, along the lattice's own axes."""
-    lattice, shape = calibration.lattice, (indices.shape[0], indices.shape[1])
-    i, j = indices[shape[0] // 2, shape[1] // 2]
-    middle = np.array([i, j - (i % 2) / 2 if lattice.layout == "hex" else j])
+def _row_spacing(calibration: Calibration, frame: Frame) -> float:
+    """Distance of the rows of lenslets, in pitches along the rows."""
+    (to_next, along) = (np.array(vector) for vector in calibration.lattice.basis[::-1])
+    return abs(float(frame.along(to_next)[0])) / float(np.hypot(*along))
+
+
+def _lenslet_grid(calibration: Calibration, frame: Frame, indices: np.ndarray, squared: Squared) -> Grid:
+    """Where the samples of views stand, along the lattice's own axes."""
+    lattice, shape = calibration.lattice, (len(squared.t), len(squared.s))
+    t, s = squared.t[shape[0] // 2], squared.s[shape[1] // 2]
+    i, j = (int(k) for k in indices[0, 0])
+    # Columns are counted from the even rows' lenslets; (i, j) counts along a slanted axis in a hexagonal one.
+    middle = np.array([i + t, j + i // 2 + s - (i + t) / 2 if lattice.layout == "hex" else j + s])
     across, along = frame.along(lattice.position(middle) - frame.axis)
-    pitch_t, pitch_s = abs(float(frame.along(np.array(lattice.basis[1]))[0])), lattice.pitches[1]
-    size = frame.lenslet_per_px
-    return Grid(shape, (pitch_t * size, pitch_s * size), (float(across) * size, float(along) * size))
+    row, size = lattice.pitches[1], frame.lenslet_per_px
+    steps = _row_spacing(calibration, frame) * _step(squared.t, 1.0), _step(squared.s, 1.0)
+    return Grid(
+        shape, (row * steps[0] * size, row * steps[1] * size), (float(across) * size, float(along) * size)
+    )
 
 
-def _turned(
-    raw: RawImage,
-    calibration: Calibration,
-    directions: int | tuple[int, int] | None,
-    interpolation: Interpolation,
-) -> LightField:
-    """Decode with y and x exchanged, and exchange them back: a hexagonal lattice with dense columns."""
-    xp, extra = namespace(raw.data), tuple(range(2, len(raw.data.shape)))
-    turned = RawImage(xp.permute_dims(raw.data, (1, 0, *extra)), raw.pixel_pitch)
-    if directions is not None:
-        nv, nu = checks.shape("directions", directions)
-        directions = nu, nv
-    views = decode(turned, calibration, directions=directions, interpolation=interpolation)
-    data = xp.permute_dims(views.data, (1, 0, 3, 2, *(4 for _ in extra)))
-    return LightField(data, _exchanged(views.aperture), _exchanged(views.lenslets), views.separation)
+def _step(places: np.ndarray, alone: float) -> float:
+    return float(places[1] - places[0]) if len(places) > 1 else alone
 
 
 def _exchanged(grid: Grid) -> Grid:
@@ -229,11 +260,10 @@ def _exchanged(grid: Grid) -> Grid:
     return Grid((nx, ny), (dx, dy), (x, y))
 
 
-def _check_memory(raw: RawImage, plan: _Directions, indices: np.ndarray) -> None:
-    values = math.prod(plan.count) * indices.shape[0] * indices.shape[1] * math.prod(raw.data.shape[2:])
-    size = 2.5 * values * (4 if is_single(raw.data) else 8)
+def _check_memory(data: Array, plan: _Directions, squared: Squared) -> None:
+    values = math.prod(plan.count) * len(squared.t) * len(squared.s) * math.prod(data.shape[2:])
     memory.require(
-        size,
+        2.5 * values * (4 if is_single(data) else 8),
         f"a light field of {plan.count[0]} x {plan.count[1]} views",
         "Ask for {factor:.1f}x fewer directions.",
     )

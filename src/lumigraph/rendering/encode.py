@@ -87,8 +87,8 @@ class _Coordinates:
         # Half way between two micro-images, the pixel belongs to the one before it: decode turns the order
         # of the pixels round, so that with an even number of them the last one stands half a pitch after.
         nudge = 1e-6 * lattice.pitch
-        i, j = lattice.index(y - nudge, x - nudge)
-        centers = lattice.position(np.stack([i, j], -1))
+        i, j = self.calibration.index(y - nudge, x - nudge)
+        centers = self.calibration.position(np.stack([i, j], -1))
         across, along = frame.along(np.stack([y, x], -1) - centers)
         t, s = frame.along(centers - frame.axis)
         v, u = (self.aperture.index(k, -d * frame.aperture_per_px) for k, d in enumerate((across, along)))

@@ -1,23 +1,25 @@
 """Plenoptic 2.0 pictures: every micro-image's patch, turned and tiled without seams."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from lumigraph.core import checks, memory
-from lumigraph.core.arrays import Array, namespace, to_numpy
+from lumigraph.core.arrays import Array, namespace
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
-from lumigraph.core.lattice import Lattice
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import GeometryError
 from lumigraph.rendering.decode import check_raw
-from lumigraph.rendering.geometry import Frame, largest_rectangle, lenslet_rectangle
+from lumigraph.rendering.geometry import Frame
 from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, sample, weighted
+from lumigraph.rendering.patches import Layout, Patches, checked_focus
 
 _BAND = 1 << 20  # picture samples handled at a time
+_FARTHEST = 1.6  # pitches to the farthest lenslet that shows a place; one of each kind stands within 1
+_SHARP = 1.5  # pixels of blur by which another kind of lenslet loses against the sharpest one
 
 
 def render(
@@ -27,6 +29,7 @@ def render(
     *,
     samples: int | None = None,
     blend: bool = False,
+    focus: Sequence[float] | None = None,
     interpolation: Interpolation = "cubic",
 ) -> Array:
     r"""Picture (y, x[, c]) of the main image plane behind a plenoptic 2.0 raw image.
@@ -38,8 +41,8 @@ def render(
     .. math:: C - \frac{patch}{P} (Y - C),
 
     where Y is the sample's place in the lattice of centres of pitch P. Tiles meet without seams for a patch
-    of any size, whole or not, on square, hexagonal and turned lattices. The picture's axes are the raw
-    image's: a turned lattice does not turn the picture.
+    of any size, whole or not, on square, hexagonal and turned lattices; tilt and distortion of the lattice
+    are taken out of the picture. The picture's axes are the raw image's: a turned lattice does not turn it.
 
     Parameters
     ----------
@@ -49,19 +52,26 @@ def render(
         Of the same camera.
     patch
         Size of one tile on the sensor, m p z2 / L [px]: above 0 Keplerian, below 0 Galilean; or one size for
-        each lenslet, (rows, cols) of `lenslet_indices`, for scenes of several depths.
+        each lenslet, (rows, cols) of `lenslet_indices`, for scenes of several depths: the sensor stays, so
+        it is P b/a' z2'/L of each depth. With the right map the picture is sharp all over.
     samples
         Samples of the picture per lenslet; the patch size to the nearest whole number where None.
     blend
         Take the mean of all micro-images that show a place, weighted by a window about their centres, instead
-        of the nearest one: less noise and softer seams where the depth is not right.
+        of the nearest one: less noise, and no seams. What lies at another depth than `patch` says is blurred,
+        as by a large lens focused there. A map of patches is interpolated between the lenslets.
+    focus
+        For an array of three focal lengths: the patch [px] at which each kind of lenslet, `lattice.kind`, is
+        sharp. The picture is blended, mostly of the kind that is sharp at each place's patch: a lenslet blurs
+        by the difference of the two patches, in pixels.
     interpolation
-        "cubic" or "linear", between the raw image's pixels.
+        "linear", "cubic" or "band_limited", between the raw image's pixels.
 
     Raises
     ------
     GeometryError
-        A patch of 0, NaN, larger than a micro-image, or a map of another shape than the lenslets.
+        A patch of 0, NaN, larger than a micro-image, a map of another shape than the lenslets, or another
+        number of `focus` than kinds of lenslets.
     CalibrationError
         The raw image has another size than the white image, NaN, or a Bayer pattern.
     LumigraphError
@@ -70,38 +80,69 @@ def render(
     References
     ----------
     Georgiev and Lumsdaine, "Focused plenoptic camera and rendering", J. Electron. Imaging 19, 021106 (2010).
+    Several focal lengths: Perwass and Wietzke, "Single lens 3D-camera with extended depth-of-field", Proc.
+    SPIE 8291 (2012).
 
     Examples
     --------
     >>> import numpy as np
+    >>> from lumigraph.core.lattice import Lattice
     >>> lattice = Lattice.square(10.0, origin=(5, 5))
     >>> none = np.zeros((0, 2))
     >>> render(np.ones((40, 60)), Calibration(lattice, (40, 60), none, none, 0.0), 5.2).shape
     (19, 29)
     """
-    raw = raw if isinstance(raw, RawImage) else RawImage(raw)
-    check_interpolation(interpolation)
-    check_raw(raw, calibration)
-    sizes = _patches(patch, calibration)
-    layout = _Layout.of(calibration, sizes, samples)
+    raw = _checked(raw, calibration, interpolation)
+    sizes = Patches.of(patch, calibration)
+    layout = Layout.of(calibration, sizes, samples)
+    source = _Source(calibration, sizes, blend or focus is not None, checked_focus(focus, calibration))
+    return _picture(as_float(raw.data), layout, source, interpolation)
+
+
+def render_stack(
+    raw: RawImage | Array,
+    calibration: Calibration,
+    patches: Sequence[float] | np.ndarray,
+    *,
+    samples: int | None = None,
+    focus: Sequence[float] | None = None,
+    interpolation: Interpolation = "cubic",
+) -> Array:
+    """Pictures (n, y, x[, c]) focused on one plane for each patch, blended, all of the same places.
+
+    What lies at the depth of a patch is sharp in its picture; what does not is blurred. See `render`.
+
+    Parameters
+    ----------
+    raw, calibration, focus, interpolation
+        As for `render`.
+    patches
+        One size [px] for each picture, all of one sign.
+    samples
+        Samples per lenslet; the largest patch to the nearest whole number where None.
+
+    Raises
+    ------
+    GeometryError
+        No patches, both signs, or sizes that no patch can have.
+    """
+    raw = _checked(raw, calibration, interpolation)
+    if not isinstance(patches, Sequence | np.ndarray) or np.ndim(patches) != 1 or not len(patches):
+        raise GeometryError(f"patches is {patches!r} but must be a list of sizes in pixels.")
+    values = [checks.finite("patches", patch, "px") for patch in patches]
+    if min(values) < 0 < max(values):
+        raise GeometryError(
+            f"patches are from {min(values):g} to {max(values):g} px but those of one camera have one sign. "
+            "Give all above 0 (Keplerian) or all below 0 (Galilean)."
+        )
+    sizes = [Patches.of(patch, calibration) for patch in values]
+    largest = max(sizes, key=lambda size: size.largest)
+    layout, kinds = Layout.of(calibration, largest, samples), checked_focus(focus, calibration)
     data = as_float(raw.data)
-    memory.require(
-        16.0 * len(layout.y) * len(layout.x) * math.prod(data.shape[2:]),
-        f"a picture of {len(layout.y)} x {len(layout.x)} samples",
-        "Ask for {factor:.1f}x fewer samples.",
-    )
-    band = max(1, _BAND // len(layout.x))
-    source = _blended if blend else _nearest
-    parts = []
-    for k in range(0, len(layout.y), band):
-        y, x = np.meshgrid(layout.y[k : k + band], layout.x, indexing="ij")
-        total = None
-        for places, weight in source(y, x, calibration, sizes):
-            term = sample(data, places[0], places[1], interpolation)
-            term = term if weight is None else weighted(term, weight, len(data.shape) - 2)
-            total = term if total is None else total + term
-        parts.append(total)
-    return namespace(data).concat(parts, axis=0)
+    pictures = [
+        _picture(data, layout, _Source(calibration, size, True, kinds), interpolation) for size in sizes
+    ]
+    return namespace(data).stack(pictures)
 
 
 def rendered_grid(calibration: Calibration, patch: float | Array, samples: int | None = None) -> Grid:
@@ -118,13 +159,14 @@ def rendered_grid(calibration: Calibration, patch: float | Array, samples: int |
     Examples
     --------
     >>> import numpy as np
+    >>> from lumigraph.core.lattice import Lattice
     >>> none = np.zeros((0, 2))
     >>> calibration = Calibration(Lattice.square(10.0, origin=(5, 5)), (40, 60), none, none, 0.0)
     >>> rendered_grid(calibration, 5.2).pitch
     (0.2, 0.2)
     """
-    sizes = _patches(patch, calibration)
-    layout = _Layout.of(calibration, sizes, samples)
+    sizes = Patches.of(patch, calibration)
+    layout = Layout.of(calibration, sizes, samples)
     frame, scale = Frame.of(calibration), 1 / calibration.lattice.pitch
     pixel, distance, separation = (
         calibration.pixel_pitch,
@@ -141,153 +183,119 @@ def rendered_grid(calibration: Calibration, patch: float | Array, samples: int |
     return Grid((len(layout.y), len(layout.x)), (pitch, pitch), (float(center[0]), float(center[1])))
 
 
-def lenslet_indices(calibration: Calibration) -> np.ndarray:
-    """Indices (rows, cols, 2) as (i, j) of the lenslets that a map of patches stands for.
-
-    They are those with whole micro-images; lenslets outside take the nearest one's patch. In a hexagonal
-    lattice every other row stands half a pitch to the right.
-    """
-    half = calibration.lattice.pitches[0] / 2, calibration.lattice.pitches[1] / 2
-    return lenslet_rectangle(calibration, half, half)
+def _checked(raw: RawImage | Array, calibration: Calibration, interpolation: str) -> RawImage:
+    raw = raw if isinstance(raw, RawImage) else RawImage(raw)
+    check_interpolation(interpolation)
+    check_raw(raw, calibration)
+    return raw
 
 
-@dataclass(frozen=True, slots=True)
-class _Patches:
-    """Patch sizes [px]: one, or one for each lenslet of a rectangle."""
-
-    values: np.ndarray
-    first: tuple[int, int] = (0, 0)
-    hexagonal: bool = False
-
-    @property
-    def middle(self) -> float:
-        return float(np.median(self.values))
-
-    @property
-    def largest(self) -> float:
-        return float(np.abs(self.values).max())
-
-    def at(self, i: np.ndarray, j: np.ndarray) -> np.ndarray | float:
-        """Patch size of lenslets of index (i, j)."""
-        if self.values.ndim == 0:
-            return float(self.values)
-        column = j + i // 2 if self.hexagonal else j
-        rows, columns = self.values.shape
-        row, column = i - self.first[0], column - self.first[1]
-        return self.values[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
+def _picture(data: Array, layout: Layout, source: "_Source", interpolation: Interpolation) -> Array:
+    """Picture (y, x[, c]) of an image (y, x[, c]), a band of rows at a time."""
+    memory.require(
+        16.0 * len(layout.y) * len(layout.x) * math.prod(data.shape[2:]),
+        f"a picture of {len(layout.y)} x {len(layout.x)} samples",
+        "Ask for {factor:.1f}x fewer samples.",
+    )
+    band = max(1, _BAND // len(layout.x))
+    parts = []
+    for k in range(0, len(layout.y), band):
+        y, x = np.meshgrid(layout.y[k : k + band], layout.x, indexing="ij")
+        total = None
+        for places, weight in source.places(y, x):
+            term = sample(data, places[0], places[1], interpolation)
+            term = term if weight is None else weighted(term, weight, len(data.shape) - 2)
+            total = term if total is None else total + term
+        parts.append(total)
+    return namespace(data).concat(parts, axis=0)
 
 
-def _patches(patch: float | Array, calibration: Calibration) -> _Patches:
-    try:
-        values = np.asarray(to_numpy(patch) if hasattr(patch, "shape") else patch, float)
-    except (TypeError, ValueError):
-        values = np.zeros(0)
-    if values.size == 0 or patch is None or isinstance(patch, bool | str):
-        raise GeometryError(f"patch is {patch!r} but must be a size in pixels, or a map of sizes.")
-    pitch = calibration.lattice.pitch
-    checks.finite_array("patch", values, GeometryError)
-    smallest, largest = float(np.abs(values).min()), float(np.abs(values).max())
-    if smallest == 0 or largest > pitch * (1 + 1e-6):
-        shown = 0.0 if smallest == 0 else largest
-        raise GeometryError(
-            f"patch is {shown:g} px but must be above 0 and at most the micro-images' pitch, {pitch:.4g} px "
-            "(below 0 for a Galilean camera). Its size is m p z2 / L in pixels."
-        )
-    if values.ndim == 0:
-        return _Patches(values)
-    indices = lenslet_indices(calibration)
-    if values.shape != indices.shape[:2]:
-        raise GeometryError(
-            f"the map of patches has shape {values.shape} but {indices.shape[:2]} lenslets (rows, cols) have "
-            "whole micro-images. Make one size for each of lenslet_indices(calibration)."
-        )
-    hexagonal = calibration.lattice.layout == "hex"
-    i, j = (int(k) for k in indices[0, 0])
-    return _Patches(values, (i, j + i // 2 if hexagonal else j), hexagonal)
+_Places = Iterator[tuple[tuple[np.ndarray, np.ndarray], np.ndarray | None]]
 
 
 @dataclass(frozen=True, slots=True)
-class _Layout:
-    """Places of the picture's rows and columns in the lattice of micro-image centres [px]."""
+class _Source:
+    """Where on the sensor each sample of the picture is seen, and with what weight."""
 
-    y: np.ndarray
-    x: np.ndarray
-    step: float
+    calibration: Calibration
+    sizes: Patches
+    blend: bool
+    focus: np.ndarray | None
 
-    @classmethod
-    def of(cls, calibration: Calibration, sizes: _Patches, samples: int | None) -> "_Layout":
-        """Samples of lenslets whose patch lies on the sensor; one of them would be on the optical axis."""
-        lattice = calibration.lattice
-        if samples is None:
-            samples = max(1, round(abs(sizes.middle)))
-        checks.shape("samples", (samples, samples))
-        step = lattice.pitch / samples
-        memory.require(
-            40.0 * math.prod(calibration.shape) / step**2,
-            f"a picture of {samples} samples per lenslet",
-            "Ask for {factor:.1f}x fewer samples.",
+    def places(self, y: np.ndarray, x: np.ndarray) -> _Places:
+        """Places (y, x) [px] on the sensor of samples, and their weights, which add up to 1."""
+        i, j = self.calibration.lattice.index(y, x)
+        if self.blend:
+            yield from self._blended(y, x, (i, j))
+        else:
+            yield self._seen(y, x, (i, j), self.sizes.at(i, j)), None
+
+    def _seen(
+        self,
+        y: np.ndarray,
+        x: np.ndarray,
+        index: tuple[np.ndarray, np.ndarray],
+        size: np.ndarray | float,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        indices = np.stack(index, -1)
+        flat, on_sensor = self.calibration.lattice.position(indices), self.calibration.position(indices)
+        ratio = size / self.calibration.lattice.pitch
+        return (
+            on_sensor[..., 0] - ratio * (y - flat[..., 0]),
+            on_sensor[..., 1] - ratio * (x - flat[..., 1]),
         )
-        axes = []
-        for n in calibration.shape:
-            first, last = math.ceil(-(n // 2) / step), math.floor((n - 1 - n // 2) / step)
-            axes.append(n // 2 + np.arange(first, last + 1) * step)
-        i, j = lattice.index(axes[0][:, None], axes[1][None, :])
-        centers = lattice.position(np.stack([i, j], -1))
-        half = sizes.largest / 2
-        whole = np.ones(i.shape, bool)
-        for axis, n in enumerate(calibration.shape):
-            whole &= (centers[..., axis] - half >= -1) & (centers[..., axis] + half <= n)
-        top, bottom, left, right = largest_rectangle(whole)
-        if bottom <= top or right <= left:
-            raise GeometryError(
-                f"no patch of {sizes.largest:g} px lies wholly on the sensor of {calibration.shape[0]} x "
-                f"{calibration.shape[1]} px. Use a smaller patch or the whole sensor's picture."
-            )
-        return cls(axes[0][top:bottom], axes[1][left:right], step)
 
+    def _blended(self, y: np.ndarray, x: np.ndarray, index: tuple[np.ndarray, np.ndarray]) -> _Places:
+        lattice, (i, j) = self.calibration.lattice, index
+        size = self.sizes.between(*self._fractional(y, x))
+        # Two pixels from the edge of the micro-image, so that no tap falls into the next one.
+        inside = max(0.5 * lattice.pitch - 2, 0.25 * lattice.pitch)
+        reach = np.minimum(inside / np.abs(size), _FARTHEST) * lattice.pitch
+        farthest = float(np.max(reach))
+        steps = math.ceil(farthest / lattice.pitch * 1.2) + 1
+        around = [(di, dj) for di in range(-steps, steps + 1) for dj in range(-steps, steps + 1)]
+        near = [d for d in around if np.hypot(*(lattice.matrix @ d)) < farthest + 0.75 * lattice.pitch]
+        trust = self._sharp(size)
+        weights = [self._weight(y, x, (i + di, j + dj), reach, trust) for di, dj in near]
+        weights[near.index((0, 0))] += 1e-6  # corners that no window reaches take the nearest lenslet
+        total = np.sum(weights, axis=0)
+        for (di, dj), weight in zip(near, weights, strict=True):
+            if np.any(weight):
+                yield self._seen(y, x, (i + di, j + dj), size), weight / total
 
-_Source = Iterator[tuple[tuple[np.ndarray, np.ndarray], np.ndarray | None]]
+    def _fractional(self, y: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        lattice = self.calibration.lattice
+        inverse, dy, dx = np.linalg.inv(lattice.matrix), y - lattice.origin[0], x - lattice.origin[1]
+        return inverse[0, 0] * dy + inverse[0, 1] * dx, inverse[1, 0] * dy + inverse[1, 1] * dx
 
+    def _sharp(self, size: np.ndarray | float) -> np.ndarray | None:
+        """Weight of every kind of lenslets (kinds, ...) at places of a patch size; the sharpest one has 1.
 
-def _nearest(y: np.ndarray, x: np.ndarray, calibration: Calibration, sizes: _Patches) -> _Source:
-    """Where on the sensor (y, x) each sample is seen by the lenslet whose cell holds it."""
-    i, j = calibration.lattice.index(y, x)
-    yield _seen(y, x, calibration.lattice, sizes, i, j), None
+        Behind a lenslet of pitch P, light that comes to a focus at another distance a' is spread over
+        P |b/a' - b/a| on the sensor, which is the difference of the two patches.
+        """
+        if self.focus is None:
+            return None
+        blur = np.stack([np.square(np.asarray(size) - sharp) for sharp in self.focus])
+        return np.exp(-(blur - blur.min(0)) / (2 * _SHARP**2))
 
-
-def _seen(
-    y: np.ndarray, x: np.ndarray, lattice: Lattice, sizes: _Patches, i: np.ndarray, j: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    center = np.moveaxis(lattice.position(np.stack([i, j], -1)), -1, 0)
-    ratio = sizes.at(i, j) / lattice.pitch
-    return center[0] - ratio * (y - center[0]), center[1] - ratio * (x - center[1])
-
-
-def _blended(y: np.ndarray, x: np.ndarray, calibration: Calibration, sizes: _Patches) -> _Source:
-    """The same for every lenslet that sees a sample inside its micro-image, with weights that add up to 1."""
-    lattice = calibration.lattice
-    i, j = lattice.index(y, x)
-    # Two pixels from the edge of the micro-image, so that no tap falls into the next one.
-    inside = max(0.5 * lattice.pitch - 2, 0.25 * lattice.pitch)
-    reach = min(inside * lattice.pitch / sizes.largest, 2 * lattice.pitch)
-    steps = math.ceil(reach / lattice.pitch * 1.2) + 1
-    around = [(di, dj) for di in range(-steps, steps + 1) for dj in range(-steps, steps + 1)]
-    near = [d for d in around if np.hypot(*(lattice.matrix @ d)) < reach + 0.75 * lattice.pitch]
-    weights = [_window(y, x, calibration, (i + di, j + dj), reach) for di, dj in near]
-    weights[near.index((0, 0))] += 1e-6  # corners that no window reaches take the nearest lenslet
-    total = np.sum(weights, axis=0)
-    for (di, dj), weight in zip(near, weights, strict=True):
-        if np.any(weight):
-            yield _seen(y, x, lattice, sizes, i + di, j + dj), weight / total
-
-
-def _window(
-    y: np.ndarray, x: np.ndarray, calibration: Calibration, index: tuple[np.ndarray, np.ndarray], reach: float
-) -> np.ndarray:
-    """Weight of a lenslet for samples around it; 0 where its micro-image is cut by the sensor's edge."""
-    lattice, (ny, nx) = calibration.lattice, calibration.shape
-    cy, cx = np.moveaxis(lattice.position(np.stack(index, -1)), -1, 0)
-    distance = np.minimum(np.hypot(y - cy, x - cx) / reach, 1)
-    half = lattice.pitch / 2
-    whole = (cy >= half - 1) & (cy + half <= ny) & (cx >= half - 1) & (cx + half <= nx)
-    return np.cos(math.pi / 2 * distance) ** 2 * (distance < 1) * whole
+    def _weight(
+        self,
+        y: np.ndarray,
+        x: np.ndarray,
+        index: tuple[np.ndarray, np.ndarray],
+        reach: np.ndarray | float,
+        trust: np.ndarray | None,
+    ) -> np.ndarray:
+        """Weight of a lenslet for samples around it; 0 where its micro-image is cut by the sensor's edge."""
+        lattice, (ny, nx) = self.calibration.lattice, self.calibration.shape
+        indices = np.stack(index, -1)
+        flat, on_sensor = lattice.position(indices), self.calibration.position(indices)
+        distance = np.minimum(np.hypot(y - flat[..., 0], x - flat[..., 1]) / reach, 1)
+        half, cy, cx = lattice.pitch / 2, on_sensor[..., 0], on_sensor[..., 1]
+        whole = (cy >= half - 1) & (cy + half <= ny) & (cx >= half - 1) & (cx + half <= nx)
+        weight = np.cos(math.pi / 2 * distance) ** 2 * (distance < 1) * whole
+        if trust is None:
+            return weight
+        kind = lattice.kind(*index)
+        return weight * np.choose(kind, [np.broadcast_to(part, kind.shape) for part in trust])

@@ -66,12 +66,16 @@ def transposed(calibration: Calibration) -> Calibration | None:
     column = min(vectors, key=lambda v: abs(math.remainder(math.atan2(*v) - turn, 2 * math.pi)))
     basis = (float(row[0]), float(row[1])), (float(column[0]), float(column[1]))
     flipped = Lattice(basis, (lattice.origin[1], lattice.origin[0]), "hex", lattice.kinds)
+    missing = np.stack(flipped.index(*lattice.position(calibration.missing).T[::-1]), -1)
     return replace(
         calibration,
         lattice=flipped,
         shape=calibration.shape[::-1],
         indices=np.zeros((0, 2), int),
         centers=np.zeros((0, 2)),
+        light=None,
+        missing=missing,
+        warp=None if calibration.warp is None else calibration.warp.transposed(),
     )
 
 
@@ -96,7 +100,7 @@ def lenslet_rectangle(
         What a micro-image needs on both sides of its centre (y, x) [px]; one pixel may lie outside.
     """
     lattice, (ny, nx) = calibration.lattice, calibration.shape
-    inside = lattice.indices((0, ny - 1), (0, nx - 1))
+    inside = calibration.indices_within((0, ny - 1), (0, nx - 1))
     if not len(inside):
         raise _none_whole(calibration)
     skew = inside[:, 0] // 2 if lattice.layout == "hex" else 0
@@ -105,7 +109,7 @@ def lenslet_rectangle(
     columns = np.arange(places.min(), places.max() + 1)
     i, s = np.meshgrid(rows, columns, indexing="ij")
     indices = np.stack([i, s - (i // 2 if lattice.layout == "hex" else 0)], -1)
-    centers = lattice.position(indices)
+    centers = calibration.position(indices)
     whole = np.ones(i.shape, bool)
     for axis, n in enumerate((ny, nx)):
         whole &= (centers[..., axis] - before[axis] >= -1) & (centers[..., axis] + after[axis] <= n)

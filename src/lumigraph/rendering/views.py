@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from lumigraph.core import checks
-from lumigraph.core.arrays import Array, like, namespace
+from lumigraph.core.arrays import Array, like, namespace, to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.errors import GeometryError
@@ -60,7 +60,7 @@ def point_of_view(views: LightField, y: float, x: float) -> Array:
 
 
 def reduce_aperture(
-    views: LightField, fraction: float, *, shape: Literal["square", "round"] = "square"
+    views: LightField, fraction: float = 1.0, *, shape: Literal["square", "round", "ring"] | Array = "square"
 ) -> LightField:
     """Light field of a smaller aperture: the outer views are left out, the middle one stays the middle.
 
@@ -72,29 +72,53 @@ def reduce_aperture(
         Width kept, above 0 and up to 1; at least one view stays.
     shape
         "round" also sets the views in the corners to 0, outside the circle (an ellipse, where the numbers
-        of views differ) that touches the kept views' outer edges; they do not count in `refocus`.
+        of views differ) that touches the kept views' outer edges; "ring" those inside half that circle too,
+        as behind a mirror lens, whose blur is ring-shaped. Or any mask (v, u) of the views that are kept,
+        true or false. Views set to 0 do not count in `refocus`.
 
     Raises
     ------
     GeometryError
-        A fraction outside 0 to 1, or another shape.
+        A fraction outside 0 to 1, another shape, a mask of another size or one that keeps nothing.
     """
     checks.instance("views", views, LightField)
     if not 0 < checks.finite("fraction", fraction, "1") <= 1:
         raise GeometryError(f"fraction is {fraction:g} but must be above 0 and at most 1.")
-    if not isinstance(shape, str) or shape not in ("square", "round"):
-        raise GeometryError(f"shape is {shape!r} but must be 'square' or 'round'.")
     full = views.aperture.shape
     kept = tuple(max(1, round(n * fraction)) for n in full)
     first = [n // 2 - k // 2 for n, k in zip(full, kept, strict=True)]
-    data = views.data[first[0] : first[0] + kept[0], first[1] : first[1] + kept[1], ...]
-    aperture = views.aperture.resized((kept[0], kept[1]))
-    if shape == "round":
-        v, u = ((np.arange(k) - (k - 1) / 2) / (k / 2) for k in kept)
-        disc = (v[:, None] ** 2 + u**2 <= 1).astype(float)
+    rows, columns = (slice(start, start + count) for start, count in zip(first, kept, strict=True))
+    opening = _opening(shape, full)[rows, columns] if not isinstance(shape, str) else _named(shape, kept)
+    if not opening.any():
+        raise GeometryError(
+            f"an aperture of {kept[0]} x {kept[1]} views in this shape keeps none of them. Use a larger one."
+        )
+    data, valid = views.data[rows, columns, ...], views.valid
+    if not opening.all():
         data = as_float(data)
-        data = data * like(disc.reshape(disc.shape + (1,) * (len(data.shape) - 2)), data)
-    return LightField(data, aperture, views.lenslets, views.separation)
+        data = data * like(opening.astype(float).reshape(opening.shape + (1,) * (len(data.shape) - 2)), data)
+    valid = None if valid is None else valid[rows, columns, ...]
+    aperture = views.aperture.resized((kept[0], kept[1]))
+    return LightField(data, aperture, views.lenslets, views.separation, valid)
+
+
+def _named(shape: str, kept: tuple[int, ...]) -> np.ndarray:
+    """Views (v, u) inside a shape known by name."""
+    if shape not in ("square", "round", "ring"):
+        raise GeometryError(f"shape is {shape!r} but must be 'square', 'round', 'ring' or a mask of views.")
+    v, u = ((np.arange(k) - (k - 1) / 2) / (k / 2) for k in kept)
+    radius = v[:, None] ** 2 + u**2
+    return {"square": radius >= 0, "round": radius <= 1, "ring": (radius <= 1) & (radius > 0.25)}[shape]
+
+
+def _opening(mask: Array, full: tuple[int, int]) -> np.ndarray:
+    """A mask of views (v, u), of any library."""
+    if not hasattr(mask, "shape") or tuple(mask.shape) != tuple(full):
+        raise GeometryError(
+            f"shape is of type {type(mask).__name__} and size {getattr(mask, 'shape', None)} but must be a "
+            f"name, or a mask of {full[0]} x {full[1]} views."
+        )
+    return np.asarray(to_numpy(mask)) != 0
 
 
 def views_mosaic(views: LightField) -> Array:

@@ -2,11 +2,11 @@
 
 - `sensor`: `Sensor`, pixels that count photons, with noise and bits
 - `pixels`: `integrate`, mean intensity over each pixel's area, and its adjoint
-- `colour`: `mosaic`, a Bayer filter
+- `colour`: `mosaic`, a Bayer filter; `demosaic`, the colour picture behind one
 """
 
-from lumigraph.sensor.colour import mosaic
+from lumigraph.sensor.colour import demosaic, mosaic
 from lumigraph.sensor.pixels import integrate, integrate_adjoint
 from lumigraph.sensor.sensor import Sensor
 
-__all__ = ["Sensor", "integrate", "integrate_adjoint", "mosaic"]
+__all__ = ["Sensor", "demosaic", "integrate", "integrate_adjoint", "mosaic"]

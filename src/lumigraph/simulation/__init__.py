@@ -5,6 +5,7 @@
 - `point_images`: what it repeats: the images of the points of one cell of the array
 - `camera`: `Camera`, what a simulation asks of an instrument
 - `coherence`: `Incoherent`, `Coherent`, `Snapshots`, `TiltedWaves`: how the scene's light interferes
+- `directions`: quasi-random directions of tilted waves, more of them where more light comes from
 """
 
 from lumigraph.simulation.camera import Camera

@@ -15,8 +15,31 @@ from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.elements import masks
 from lumigraph.errors import LumigraphError, SamplingError
+from lumigraph.simulation import directions
 
 Seed = int | np.random.Generator | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plane:
+    """A plane of the scene on its way to the main lens.
+
+    Parameters
+    ----------
+    amplitude
+        Square root of its intensity (y, x).
+    grid
+        Where its samples stand [m].
+    distance
+        To the main lens [m].
+    pupil_diameter
+        Of the main lens [m].
+    """
+
+    amplitude: np.ndarray
+    grid: Grid
+    distance: float
+    pupil_diameter: float
 
 
 class Coherence(Protocol):
@@ -32,7 +55,7 @@ class Coherence(Protocol):
         """Whether planes have independent phases in each shot, and may so share one propagation."""
         ...
 
-    def illuminations(self, grids: list[Grid], wavelength: float, distances: list[float]) -> Iterator[list]:
+    def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
         """Each shot's complex amplitude on each plane of the scene."""
         ...
 
@@ -60,9 +83,9 @@ class Coherent:
         """No: one wave lights all planes."""
         return False
 
-    def illuminations(self, grids: list[Grid], wavelength: float, distances: list[float]) -> Iterator[list]:
+    def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
         """Amplitude 1 everywhere."""
-        yield [np.ones((1, 1), np.complex64)] * len(grids)
+        yield [np.ones((1, 1), np.complex64)] * len(planes)
 
     def scale(self, sample_area: float, wavelength: float, pupil_area: float, distance: float) -> float:
         """A coherent image keeps the object's amplitude, divided by the magnification."""
@@ -83,7 +106,8 @@ class Snapshots:
     coherence_index
         None for white phases (one independent phase per sample). A number C for the thesis' masks of
         C × C random areas (thesis 3.4.3): light stays partially coherent, so that the image keeps a bias
-        of about 10 % rms at C/N = 0.14 however many snapshots are taken.
+        of about 10 % rms at C/N = 0.14 however many snapshots are taken, which its estimated error, made
+        from the spread between snapshots, does not see.
     rng
         Seed or generator; the same seed gives the same raw image, whatever the number of workers.
 
@@ -112,8 +136,9 @@ class Snapshots:
         """Yes: each plane has its own random phases."""
         return True
 
-    def illuminations(self, grids: list[Grid], wavelength: float, distances: list[float]) -> Iterator[list]:
+    def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
         """Random phases, independent from plane to plane and from snapshot to snapshot."""
+        grids = [plane.grid for plane in planes]
         for rng in np.random.default_rng(self.rng).spawn(self.count):
             if self.coherence_index is None:
                 yield [masks.white_phase(grid, rng) for grid in grids]
@@ -154,7 +179,10 @@ class TiltedWaves:
     """Mutually incoherent plane waves light the scene one after the other (Abbe's method).
 
     The illumination converges on the main lens (Köhler), so that a wave without tilt fills the pupil's
-    centre from every point of the scene. Tilts follow the R2 low-discrepancy sequence.
+    centre from every point of the scene. Directions follow the R2 low-discrepancy sequence, moved so that
+    more of them fall where the object sends more light through the pupil, with weights that make up for it.
+    Of a binary chart before a single lens 30, 75 and 260 waves give 5, 3 and 1 % rms, where random phases
+    take 375, 1040 and 9370. Behind lenslets they gain little over `Snapshots`.
 
     Parameters
     ----------
@@ -186,32 +214,35 @@ class TiltedWaves:
         """No: one wave lights all planes."""
         return False
 
-    def directions(self, grid: Grid, wavelength: float) -> np.ndarray:
-        """Direction sines (count, 2) as (y, x)."""
-        golden = 1.32471795724474602596  # root of x³ = x + 1: Roberts' R2 sequence
-        unit = np.mod(0.5 + np.arange(self.count)[:, None] / [golden, golden**2], 1.0)
+    def directions(self, plane: Plane, wavelength: float) -> tuple[np.ndarray, np.ndarray]:
+        """Direction sines (count, 2) as (y, x), and the weight of each wave's intensity (count,)."""
+        radius = plane.pupil_diameter / (2 * wavelength * plane.distance)
+        share, frequencies = directions.share_of_light(plane.amplitude, plane.grid, radius)
         if self.na is None:
-            return (unit - 0.5) * wavelength / np.asarray(grid.pitch)
-        if (limit := wavelength / (2 * max(grid.pitch))) < self.na:
+            found, weights = directions.over_the_band(share, frequencies, self.count)
+            return found * wavelength, weights
+        if (limit := wavelength / (2 * max(plane.grid.pitch))) < self.na:
             raise SamplingError(
-                f"na is {self.na:g} but the scene's pitch of {max(grid.pitch) * 1e6:.3g} um tells directions "
-                f"apart up to {limit:.3g}. Use a pitch of {wavelength / (2 * self.na) * 1e6:.3g} um or finer."
+                f"na is {self.na:g} but the scene's pitch of {max(plane.grid.pitch) * 1e6:.3g} um tells "
+                f"directions apart up to {limit:.3g}. Use a pitch of "
+                f"{wavelength / (2 * self.na) * 1e6:.3g} um or finer."
             )
-        radius, angle = self.na * np.sqrt(unit[:, 0]), 2 * math.pi * unit[:, 1]
-        return np.stack([radius * np.sin(angle), radius * np.cos(angle)], axis=1)
+        found, weights = directions.over_a_disc(share, frequencies, self.na / wavelength, self.count)
+        return found * wavelength, weights
 
-    def illuminations(self, grids: list[Grid], wavelength: float, distances: list[float]) -> Iterator[list]:
-        """Converging waves exp(-ikr²/2z) with a tilt."""
+    def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
+        """Converging waves exp(-ikr²/2z) with a tilt, each as bright as the directions it stands for."""
         k = 2 * math.pi / wavelength
-        tilts = [self.directions(grid, wavelength) for grid in grids]
+        tilts = [self.directions(plane, wavelength) for plane in planes]
         for number in range(self.count):
-            planes = []
-            for grid, distance, directions in zip(grids, distances, tilts, strict=True):
-                tilt_y, tilt_x = directions[number]
-                along_y = np.exp(1j * k * (tilt_y * grid.y - grid.y**2 / (2 * distance)))
-                along_x = np.exp(1j * k * (tilt_x * grid.x - grid.x**2 / (2 * distance)))
-                planes.append((along_y[:, None] * along_x).astype(np.complex64))
-            yield planes
+            waves = []
+            for plane, (sines, weights) in zip(planes, tilts, strict=True):
+                grid, curvature = plane.grid, 2 * plane.distance
+                along_y = np.exp(1j * k * (sines[number, 0] * grid.y - grid.y**2 / curvature))
+                along_x = np.exp(1j * k * (sines[number, 1] * grid.x - grid.x**2 / curvature))
+                along_x *= math.sqrt(weights[number])
+                waves.append((along_y[:, None] * along_x).astype(np.complex64))
+            yield waves
 
     def scale(self, sample_area: float, wavelength: float, pupil_area: float, distance: float) -> float:
         """Waves whose direction enters the pupil carry the image; the others are the dark field."""

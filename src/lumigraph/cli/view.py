@@ -1,0 +1,132 @@
+"""`lumigraph view`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from lumigraph.cli import files
+from lumigraph.cli.console import report, stages
+from lumigraph.cli.options import COMMON, Common
+from lumigraph.errors import FormatError
+
+_MOST_PORT = 65535
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Camera:
+    """What a raw image needs to become views or pictures.
+
+    Parameters
+    ----------
+    calibration
+        File made by 'lumigraph calibrate', or the camera maker's (.xml, .ini, .json).
+    white
+        White image: the raw image is divided by it, and calibrated from it without --calibration.
+    patch
+        Of a camera 2.0 [px]: pictures with patches about this size. Found in the raw image if left out.
+    """
+
+    calibration: Path | None = None
+    white: Path | None = None
+    patch: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Page:
+    """How the page is shown.
+
+    Parameters
+    ----------
+    port
+        Of this computer, for its own browser only; any free one if left out.
+    no_open
+        Do not open a browser.
+    export
+        Write the page into this file (.html) instead, which works from disk and can be sent to others.
+    quality
+        Of the exported views, 1 to 99; 100 keeps every number, in a file several times as large.
+    """
+
+    port: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0
+    no_open: Annotated[bool, Parameter(negative="")] = False
+    export: Path | None = None
+    quality: Annotated[int, Parameter(allow_leading_hyphen=True)] = 90
+
+    def check(self) -> None:
+        """Refuse what is wrong before anything is read."""
+        if not 0 <= self.port <= _MOST_PORT:
+            raise FormatError(
+                f"--port is {self.port} but must be from 1 to {_MOST_PORT}, or 0 for a free one."
+            )
+        if not 1 <= self.quality <= 100:
+            raise FormatError(f"--quality is {self.quality} but must be from 1 to 100.")
+        if self.export is not None:
+            files.check_output(self.export, (".html", ".htm"))
+
+
+def view(
+    file: Path,
+    beside: Path | None = None,
+    /,
+    *,
+    camera: Camera = Camera(),
+    page: Page = Page(),
+    common: Common = COMMON,
+) -> None:
+    """Look at a file in the browser: refocus by a click, move the viewpoint, see raw pixels, depth, volumes.
+
+    Prints the page's address and ends with Ctrl-C. Only this computer's browser is answered.
+
+    Example: `lumigraph view views.zarr`
+
+    Example: `lumigraph view raw.png --white white.png`
+
+    Example: `lumigraph view views.zarr --export page.html`
+
+    Parameters
+    ----------
+    file
+        Light field, folder of views, raw image, focal stack, volume, or a camera (TOML), which is simulated.
+    beside
+        A second file to show side by side.
+    """
+    from lumigraph import viewer
+
+    page.check()
+    exhibits = [_opened(path, camera) for path in (file, beside) if path is not None]
+    if page.export is not None:
+        with stages("export") as shown:
+            written = viewer.export(exhibits, page.export, quality=page.quality, progress=shown)
+        parts = ", ".join(f"{name.split('/')[1]} {_megabytes(size)}" for name, size in written.arrays.items())
+        text = f"written {written.path}: {_megabytes(written.size)} ({parts})"
+        report(common, text, {"output": str(written.path), "bytes": written.size, "arrays": written.arrays})
+        return
+    viewer.serve(viewer.site(exhibits), port=page.port, ready=lambda address: _ready(address, page, common))
+
+
+def _opened(path: Path, camera: Camera) -> Any:
+    from lumigraph import viewer
+
+    origin = viewer.Origin(camera.calibration, camera.white, camera.patch)
+    with stages(f"open {path.name}") as shown:
+        return viewer.open_exhibit(path, None if origin == viewer.Origin() else origin, shown)
+
+
+def _ready(address: str, page: Page, common: Common) -> None:
+    report(common, address, {"address": address})
+    import sys
+
+    sys.stdout.flush()
+    if not page.no_open:
+        import threading
+        import webbrowser
+
+        threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:.1f} MB" if size >= 100_000 else f"{size / 1e3:.1f} kB"

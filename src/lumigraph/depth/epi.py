@@ -1,0 +1,88 @@
+"""Depth from the lines of epipolar-plane images."""
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from lumigraph.core import checks
+from lumigraph.core.arrays import like
+from lumigraph.core.lightfield import LightField
+from lumigraph.depth.lines import refined
+from lumigraph.depth.pictures import Pictures
+from lumigraph.depth.result import DepthMap
+from lumigraph.depth.sweep import labels, span, swept
+from lumigraph.depth.volume import Progress, silent
+from lumigraph.errors import GeometryError
+
+_SURE = 0.05
+"""Standard deviation [px per view, or in the outermost view if that is less] with a confidence of 1/2."""
+
+
+def epi(
+    views: LightField, disparities: tuple[float, float] | None = None, *, progress: Progress = silent
+) -> DepthMap:
+    r"""Disparity of each lenslet of the middle view: slope of the line that its point draws through the views.
+
+    .. math:: L(u, x + d\, u) = L(0, x), \qquad d = (1 - \alpha') \Delta u / \Delta s
+
+    A plane sweep over the cross of views, the better half of each arm taken (occlusion), smoothed along the
+    picture's edges and by semi-global matching, finds each line to a fraction of a pixel. Least squares on
+    all views that see the point, joined by a surface that may be slanted, bent and torn, then finds its slope.
+
+    Parameters
+    ----------
+    views
+        Light field (v, u, t, s[, c]). More than nine views per axis are thinned evenly.
+    disparities
+        Least and most that may occur [lenslets per view]; found by a coarse sweep where None.
+    progress
+        Called with what is done and the total.
+
+    Returns
+    -------
+    DepthMap
+        Disparities (t, s): positive is nearer than the plane in focus. Confidence is 1/(1 + (σ/0.05 px)²),
+        σ being the standard deviation that noise and contrast give to a 7 x 7 window.
+
+    Raises
+    ------
+    GeometryError
+        One view, pictures of less than 8 x 8, NaN, a range that is empty or takes too many labels.
+    LumigraphError
+        It would not fit in memory.
+
+    References
+    ----------
+    Bolles, Baker, Marimont, "Epipolar-plane image analysis", Int. J. Comput. Vis. 1, 7 (1987); occlusion by
+    half apertures as in Chen et al., "Light field stereo matching using bilateral statistics", CVPR 2014,
+    and others.
+
+    Examples
+    --------
+    >>> from lumigraph.core.grid import Grid
+    >>> def texture(y, x):
+    ...     return 2 + np.sin(x) + np.sin(0.7 * y + 0.4 * x)
+    >>> v, u, y, x = np.meshgrid(*(np.arange(n) - n // 2 for n in (5, 5, 24, 24)), indexing="ij")
+    >>> data = texture(y - 0.3 * v, x - 0.3 * u)  # moves by 0.3 lenslets per view
+    >>> found = epi(LightField(data, Grid((5, 5), 1.0), Grid((24, 24), 1.0), 10.0), (-1, 1))
+    >>> round(float(np.median(found.values)), 2)
+    0.3
+    """
+    pictures = Pictures.of(views)
+    low, high = span(pictures) if disparities is None else _range(disparities, pictures.reach)
+    moves = labels(low, high)
+    total = len(moves) + 20
+    first = swept(pictures, moves, lambda done, _: progress(done, total))
+    first = np.clip(median_filter(first, 5), moves[0], moves[-1])
+    found, deviation = refined(
+        pictures, first, lambda done, of: progress(len(moves) + 20 * done // of, total)
+    )
+    found, deviation = found / pictures.reach, deviation / pictures.reach
+    trust = 1 / (1 + (deviation / min(_SURE, _SURE * 4 / pictures.reach)) ** 2)
+    return DepthMap(like(found, views.data), like(trust, views.data), "disparity")
+
+
+def _range(disparities: tuple[float, float], reach: float) -> tuple[float, float]:
+    low, high = checks.pair("disparities", disparities, "px")
+    if not low < high:
+        raise GeometryError(f"disparities are from {low:g} to {high:g} px but the first must be less.")
+    return low * reach, high * reach

@@ -1,0 +1,122 @@
+"""The views of a light field as depth estimation needs them: few, even, and on a common scale."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import convolve
+
+from lumigraph.core import checks, memory
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.lightfield import LightField
+from lumigraph.depth.result import disparity_per_alpha
+from lumigraph.errors import GeometryError
+
+MOST_VIEWS = 9
+"""Along one axis: views between these look much the same, and cost as much."""
+
+_LEAST_NOISE = 2e-3  # of a picture from 0 to 1: what rounding to eight bits leaves
+_DARK = 0.05  # views darker than this part of the middle one lie outside the aperture
+
+
+@dataclass(frozen=True, slots=True)
+class Pictures:
+    """Views on a scale of 0 to 1, even in noise: square roots, matched in brightness to the middle view.
+
+    Parameters
+    ----------
+    data
+        (v, u, c, y, x) float32.
+    down, right
+        Where the views stand: how far a point of disparity 1 moves along y (v,) and x (u,) from the middle
+        view to each, over `reach`; within -1 ... 1.
+    lit
+        Which views (v, u) are not dark.
+    noise
+        Standard deviation of the pixels' noise, estimated from the middle view.
+    reach
+        Views from the middle one to the outermost: disparities times reach are the engine's unit.
+    """
+
+    data: np.ndarray
+    down: np.ndarray
+    right: np.ndarray
+    lit: np.ndarray
+    noise: float
+    reach: float
+
+    @property
+    def middle(self) -> tuple[int, int]:
+        """Index (v, u) of the view that the map belongs to."""
+        return int(np.argmin(np.abs(self.down))), int(np.argmin(np.abs(self.right)))
+
+    @property
+    def center(self) -> np.ndarray:
+        """The middle view (c, y, x)."""
+        return self.data[self.middle]
+
+    @classmethod
+    def of(cls, views: LightField) -> "Pictures":
+        """At most `MOST_VIEWS` squared views of a light field, evenly chosen about the middle one.
+
+        Raises
+        ------
+        GeometryError
+            Not a light field, NaN, one view only, or pictures of less than 8 x 8.
+        """
+        checks.instance("views", views, LightField)
+        shape = views.lenslets.shape
+        if min(shape) < 8 or max(views.aperture.shape) < 2:
+            raise GeometryError(
+                f"the light field has {views.aperture.shape[0]} x {views.aperture.shape[1]} views of "
+                f"{shape[0]} x {shape[1]} lenslets but depth needs two views of 8 x 8 at least."
+            )
+        chosen = [_chosen(n) for n in views.aperture.shape]
+        channels = views.data.shape[4] if views.data.ndim == 5 else 1
+        memory.require(
+            12.0 * len(chosen[0]) * len(chosen[1]) * channels * shape[0] * shape[1],
+            f"depth from {len(chosen[0])} x {len(chosen[1])} views",
+            "Use {factor:.1f}x fewer pixels.",
+        )
+        data = to_numpy(views.data)[np.ix_(*chosen)].astype(np.float32)
+        checks.finite_array("the light field", data, GeometryError)
+        data = data[:, :, None] if data.ndim == 4 else np.moveaxis(data, 4, 2)
+        data, lit = _even(data, (len(chosen[0]) // 2, len(chosen[1]) // 2))
+        (per_t, per_s), middle = disparity_per_alpha(views), [n // 2 for n in views.aperture.shape]
+        down = (chosen[0] - middle[0]) * (per_t / per_s)
+        right = (chosen[1] - middle[1]).astype(float)
+        reach = float(max(np.abs(down).max(), np.abs(right).max()))
+        center = data[len(chosen[0]) // 2, len(chosen[1]) // 2]
+        return cls(data, down / reach, right / reach, lit, _noise(center), reach)
+
+
+def _chosen(count: int) -> np.ndarray:
+    """Indices, evenly spaced about count // 2."""
+    half = MOST_VIEWS // 2
+    step = max(1, math.ceil((count - 1 - count // 2) / half))
+    below, above = min(half, (count // 2) // step), min(half, (count - 1 - count // 2) // step)
+    return count // 2 + step * np.arange(-below, above + 1)
+
+
+def _even(data: np.ndarray, middle: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Square roots of the views (v, u, c, y, x), each as bright as the middle one; and which are lit."""
+    data = np.maximum(data, 0)
+    white = float(np.quantile(data[middle], 0.999)) or 1.0
+    level = data.mean((2, 3, 4))
+    lit = level > _DARK * level[middle]
+    if not level[middle] > 0:
+        raise GeometryError("the middle view is dark everywhere. Decode a lit raw image.")
+    gain = np.where(lit, level[middle] / np.where(lit, level, 1), 0) / white
+    return np.sqrt(data * gain[:, :, None, None, None].astype(np.float32)), lit
+
+
+def _noise(picture: np.ndarray) -> float:
+    """Standard deviation of the noise of a picture (c, y, x), the mean over its colours' included.
+
+    References
+    ----------
+    Immerkær, "Fast noise variance estimation", Comput. Vis. Image Underst. 64, 300 (1996), with a median.
+    """
+    kernel = np.array([[1.0, -2, 1], [-2, 4, -2], [1, -2, 1]])
+    rough = convolve(picture.mean(0), kernel)
+    return max(float(np.median(np.abs(rough))) / (6 * 0.6745), _LEAST_NOISE)

@@ -1,0 +1,148 @@
+"""What every estimate of depth returns."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from lumigraph.core import checks
+from lumigraph.core.arrays import Array, like, to_numpy
+from lumigraph.core.lightfield import LightField
+from lumigraph.errors import GeometryError
+
+QUANTITIES: Mapping[str, str] = MappingProxyType(
+    {"disparity": "px", "alpha": "1", "patch": "px", "virtual depth": "1", "depth": "m"}
+)
+"""What a map may hold, and its unit.
+
+- disparity: lenslets that a point moves from one view to the next; positive is nearer than the plane in focus
+- alpha: refocus factor α' = F/F'; above 1 is farther
+- patch: size of the piece of a plenoptic 2.0 micro-image that tiles the picture, as `render` takes it
+- virtual depth: a'/b, distance of the main lens' image from the lenslets over that of the sensor
+- depth: distance from the focused plane, positive farther from the camera
+"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DepthMap:
+    """A value for each place of a picture, and how much to trust it.
+
+    Parameters
+    ----------
+    values
+        (y, x), in the unit of the quantity; NaN where nothing can be said.
+    confidence
+        0 (a guess) to 1 (as sharp as the data can be) for each value.
+    quantity
+        One of `QUANTITIES`.
+
+    Raises
+    ------
+    GeometryError
+        Values that are not (y, x), a confidence of another shape, an unknown quantity.
+
+    Examples
+    --------
+    >>> found = DepthMap(np.array([[0.5, -1.0]]), np.array([[1.0, 0.2]]), "disparity")
+    >>> found.unit, found.trusted(0.5).tolist()
+    ('px', [[0.5, nan]])
+    """
+
+    values: Array
+    confidence: Array
+    quantity: str
+
+    def __post_init__(self) -> None:
+        checks.array("values", self.values)
+        checks.array("confidence", self.confidence)
+        checks.choice("quantity", self.quantity, QUANTITIES)
+        shape, other = tuple(self.values.shape), tuple(self.confidence.shape)
+        if len(shape) != 2 or other != shape:
+            raise GeometryError(
+                f"values have shape {shape} and confidence {other} but both must be (y, x), the same."
+            )
+
+    @property
+    def unit(self) -> str:
+        """Of the values: "px", "1" or "m"."""
+        return QUANTITIES[self.quantity]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns (y, x)."""
+        return int(self.values.shape[0]), int(self.values.shape[1])
+
+    @property
+    def alpha(self) -> Array:
+        """Refocus factors (y, x) of a map that holds them."""
+        self.check("alpha")
+        return self.values
+
+    def trusted(self, lowest: float) -> Array:
+        """The values (y, x), NaN where the confidence is below `lowest`."""
+        values, trust = to_numpy(self.values), to_numpy(self.confidence)
+        return like(np.where(trust >= lowest, values, np.nan), self.values)
+
+    def replaced(self, values: np.ndarray, quantity: str) -> "DepthMap":
+        """The map with other values; of what cannot be told, NaN, the confidence becomes 0."""
+        trust = np.where(np.isfinite(values), to_numpy(self.confidence), 0.0)
+        return replace(
+            self,
+            values=like(values, self.values),
+            confidence=like(trust, self.confidence),
+            quantity=quantity,
+        )
+
+    def check(self, *quantities: str) -> None:
+        """Refuse a map of another quantity.
+
+        Raises
+        ------
+        GeometryError
+            The message gives the one that it has and those that are needed.
+        """
+        if self.quantity not in quantities:
+            raise GeometryError(
+                f"the map holds {self.quantity} [{self.unit}] but {' or '.join(quantities)} is needed."
+            )
+
+
+def disparity_per_alpha(views: LightField) -> tuple[float, float]:
+    """Shift per view along t and s [lenslets] for 1 - α' = 1: aperture pitch over lenslet pitch.
+
+    x = α'x' + u (1 - α') moves by (1 - α') Δu from one view to the next, Δu apart on the main lens.
+    """
+    (dv, du), (dt, ds) = views.aperture.pitch, views.lenslets.pitch
+    return dv / dt, du / ds
+
+
+def alpha_of(found: DepthMap, views: LightField) -> DepthMap:
+    """Refocus factors α' = 1 - disparity Δs/Δu of a map of disparities.
+
+    Parameters
+    ----------
+    found
+        Disparities [px], along s; a map of refocus factors is returned as it is.
+    views
+        The light field that they were measured on: its pitches.
+
+    Examples
+    --------
+    >>> from lumigraph.core.grid import Grid
+    >>> views = LightField(np.zeros((3, 3, 1, 1)), Grid((3, 3), 2.0), Grid((1, 1), 1.0), 10.0)
+    >>> float(alpha_of(DepthMap(np.array([[0.1]]), np.ones((1, 1)), "disparity"), views).values[0, 0])
+    0.95
+    """
+    found.check("disparity", "alpha")
+    if found.quantity == "alpha":
+        return found
+    return found.replaced(1 - to_numpy(found.values) / disparity_per_alpha(views)[1], "alpha")
+
+
+def disparity_of(found: DepthMap, views: LightField) -> DepthMap:
+    """Disparities (1 - α') Δu/Δs [px] of a map of refocus factors; the inverse of `alpha_of`."""
+    found.check("disparity", "alpha")
+    if found.quantity == "disparity":
+        return found
+    return found.replaced((1 - to_numpy(found.values)) * disparity_per_alpha(views)[1], "disparity")

@@ -1,0 +1,114 @@
+"""Cost volumes (n, y, x): how badly each of n labels explains each place, and the best label of each."""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.ndimage import uniform_filter
+
+Progress = Callable[[int, int], None]
+"""Called with what is done and the total."""
+
+
+def silent(done: int, total: int) -> None:
+    """Progress that nobody looks at."""
+
+
+def box(image: np.ndarray, radius: int) -> np.ndarray:
+    """Mean over (2 radius + 1)² samples, edges repeated."""
+    return uniform_filter(image, 2 * radius + 1, mode="nearest")
+
+
+def guided(cost: np.ndarray, guide: np.ndarray, radius: int, edge: float = 1e-2) -> np.ndarray:
+    """Each cost (n, y, x) smoothed, but not across the edges of a picture (y, x).
+
+    Parameters
+    ----------
+    cost
+        Not changed.
+    guide
+        Picture of about 0 ... 1.
+    radius
+        Of the windows [px].
+    edge
+        Contrast [of the guide] above which an edge is kept.
+
+    References
+    ----------
+    He, Sun, Tang, "Guided image filtering", IEEE PAMI 35, 1397 (2013).
+    """
+    mean = box(guide, radius)
+    scatter = box(guide * guide, radius) - mean * mean + edge**2
+    out = np.empty_like(cost)
+    for k, plane in enumerate(cost):
+        level = box(plane, radius)
+        slope = (box(plane * guide, radius) - level * mean) / scatter
+        out[k] = box(slope, radius) * guide + box(level - slope * mean, radius)
+    return out
+
+
+def semi_global(cost: np.ndarray, guide: np.ndarray, step: float, jump: float) -> np.ndarray:
+    """Costs (n, y, x) plus those of the cheapest paths that lead to each place from eight sides.
+
+    Parameters
+    ----------
+    cost
+        Not changed.
+    guide
+        Picture (y, x) of about 0 ... 1: jumps are cheap where it has edges.
+    step, jump
+        What neighbours pay whose labels differ by one, and by more, in the unit of the cost.
+
+    References
+    ----------
+    Hirschmüller, "Stereo processing by semiglobal matching and mutual information", IEEE PAMI 30, 328 (2008).
+    """
+    rows = np.ascontiguousarray(np.moveaxis(cost, 0, -1))
+    total = np.zeros_like(rows)
+    for side in (1, -1):
+        for slant in (0, 1, -1):
+            _sweep(rows, total, guide, side, slant, (step, jump))
+    columns = np.ascontiguousarray(rows.swapaxes(0, 1))
+    across = np.zeros_like(columns)
+    for side in (1, -1):
+        _sweep(columns, across, guide.T, side, 0, (step, jump))
+    total += across.swapaxes(0, 1)
+    return np.moveaxis(total, -1, 0)
+
+
+_EDGE = 0.03  # contrast between neighbours across which a jump is cheap
+
+
+def _sweep(
+    cost: np.ndarray, total: np.ndarray, guide: np.ndarray, side: int, slant: int, price: tuple[float, float]
+) -> None:
+    """Add the paths that come from one side to `total` (y, x, n)."""
+    order = range(len(cost)) if side > 0 else range(len(cost) - 1, -1, -1)
+    before = None
+    for y in order:
+        path = cost[y]
+        if before is not None:
+            came, seen = np.roll(before, slant, 0), np.roll(guide[y - side], slant)
+            came = came - came.min(-1, keepdims=True)
+            jump = price[0] + price[1] * np.exp(-np.abs(guide[y] - seen) / _EDGE)
+            best = np.minimum(came, jump[:, None].astype(cost.dtype))
+            np.minimum(best[:, 1:], came[:, :-1] + price[0], out=best[:, 1:])
+            np.minimum(best[:, :-1], came[:, 1:] + price[0], out=best[:, :-1])
+            if slant:
+                best[0 if slant > 0 else -1] = 0  # nothing comes from outside
+            path = path + best
+        total[y] += path
+        before = path
+
+
+def cheapest(cost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Label (y, x) of the least cost, between the labels by a parabola; and how much it stands out, 0 to 1."""
+    n = len(cost)
+    best = cost.argmin(0)
+    middle = np.clip(best, 1, n - 2)
+    below, at, above = (np.take_along_axis(cost, (middle + k)[None], 0)[0] for k in (-1, 0, 1))
+    bend = below - 2 * at + above
+    safe = np.where(bend > 0, bend, 1)
+    move = np.where((bend > 0) & (middle == best), np.clip((below - above) / (2 * safe), -0.5, 0.5), 0)
+    usual = np.median(cost, axis=0)
+    contrast = (usual - cost.min(0)) / np.where(usual > 0, usual, 1)
+    return best + move, np.clip(contrast, 0, 1)

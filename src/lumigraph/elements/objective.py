@@ -1,0 +1,327 @@
+r"""What a point under a microscope objective sends to the plane of the native image.
+
+A point at depth dz lights the pupil; with q = n sin θ and the sine condition q = M q' the field in the image,
+in object-space coordinates, is the Debye integral
+
+.. math:: U(r, \psi) = \int A(q, \varphi)\, e^{i k \sqrt{n^2 - q^2}\, dz + i W(q, \varphi)}
+          e^{i k q r \cos(\varphi - \psi)}\, \frac{q\, dq\, d\varphi}{\cos\theta}
+
+An aplanatic objective turns an isotropic emitter into A = sqrt(cos θ). The azimuth is expanded in harmonics,
+so that only radial integrals remain; they are tabulated once and interpolated.
+
+B. Richards & E. Wolf, Proc. R. Soc. A 253, 358 (1959); M. Broxton et al., Opt. Express 21, 25418 (2013).
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal, get_args
+
+import numpy as np
+from scipy.special import j0, j1, jv
+
+from lumigraph.core import checks
+from lumigraph.elements.zernike import noll_to_nm, zernike
+from lumigraph.errors import GeometryError
+
+Model = Literal["scalar", "vector", "paraxial"]
+
+PER_NYQUIST = 40
+"""Steps of a radial table in half the smallest period of the field: linear interpolation errs by 1e-3."""
+
+AZIMUTHS = 64
+"""Directions in which aberrations are sampled; harmonics up to half of them."""
+
+_WEAK = 1e-5
+"""Harmonics below this part of the strongest are left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mismatch:
+    r"""Layers that an objective was not made for: Gibson and Lanni's aberration.
+
+    .. math:: \Phi = k \sum_j t_j \left(\sqrt{n_j^2 - q^2} - \frac{n_i}{n_j}\sqrt{n_i^2 - q^2}\right)
+
+    over the sample between coverslip and focus, the coverslip, and, subtracted, the coverslip of the design.
+    The second term is the immersion's share that refocusing takes away, so that no paraxial defocus is left.
+
+    Parameters
+    ----------
+    sample_index
+        n of the medium around the object.
+    focus_depth
+        Of the focused plane below the coverslip [m].
+    coverslip, design
+        (index, thickness [m]) of the coverslip in use and of the one in the design; both or neither.
+
+    References
+    ----------
+    S. F. Gibson & F. Lanni, J. Opt. Soc. Am. A 9, 154 (1992).
+    """
+
+    sample_index: float
+    focus_depth: float = 0.0
+    coverslip: tuple[float, float] | None = None
+    design: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        checks.positive("sample_index", self.sample_index, "1")
+        if checks.finite("focus_depth", self.focus_depth) < 0:
+            raise GeometryError(f"focus_depth is {self.focus_depth:g} m but must be at least 0 m.")
+        if (self.coverslip is None) != (self.design is None):
+            raise GeometryError("give both coverslip= and design=, or neither: their difference counts.")
+
+    def path(self, q: np.ndarray, index: float) -> np.ndarray:
+        """Optical path Φ/k [m] at q = n sin θ, for an immersion of this index."""
+        layers = [(self.sample_index, self.focus_depth)]
+        if self.coverslip is not None and self.design is not None:
+            layers += [self.coverslip, (self.design[0], -self.design[1])]
+        immersion = np.sqrt(index**2 - q**2)
+        return sum((t * (np.sqrt(n**2 - q**2) - index / n * immersion) for n, t in layers), np.zeros_like(q))
+
+
+@dataclass(frozen=True, slots=True)
+class Objective:
+    """A microscope objective, as seen from a point in its object space.
+
+    Parameters
+    ----------
+    wavelength
+        In vacuum [m].
+    numerical_aperture, index
+        NA and the immersion's refractive index n.
+    model
+        "scalar": Debye, good to NA 0.8; "vector": Richards and Wolf; "paraxial": for comparison.
+    axial_share
+        With "vector", mean square of the dipoles' axial component: 1/3 for dipoles of all directions, 1 for
+        dipoles along the axis, 0 for dipoles across it (of all azimuths).
+    aberrations
+        Zernike terms over the pupil: Noll index to waves rms.
+    mismatch
+        `Mismatch` of refractive indices; None for none.
+    image_defocus
+        Distance from the native image to the plane where the field is wanted, over M² [m]; above 0 behind
+        the image. In the paraxial image space of a microscope that is a depth of -a n/M² in front of it.
+
+    Raises
+    ------
+    GeometryError
+        NA not below the index, an unknown model, a share outside 0 to 1.
+
+    Examples
+    --------
+    >>> objective = Objective(525e-9, 0.5, 1.0)
+    >>> y = np.array([0.0, 0.634e-6])
+    >>> [round(float(v), 3) for v in objective.intensity(y, 0 * y, 0.0) / objective.intensity(0, 0, 0.0)]
+    [1.0, 0.0]
+    """
+
+    wavelength: float
+    numerical_aperture: float
+    index: float = 1.0
+    model: Model = "scalar"
+    axial_share: float = 1 / 3
+    aberrations: Mapping[int, float] | tuple[tuple[int, float], ...] = ()
+    mismatch: Mismatch | None = None
+    image_defocus: float = 0.0
+
+    def __post_init__(self) -> None:
+        checks.positive("wavelength", self.wavelength)
+        checks.choice("model", self.model, get_args(Model))
+        if not checks.positive("numerical_aperture", self.numerical_aperture, "1") < self.index:
+            raise GeometryError(
+                f"the numerical aperture {self.numerical_aperture:g} is not below the refractive index "
+                f"{self.index:g}. Check the immersion."
+            )
+        if not 0 <= checks.finite("axial_share", self.axial_share, "1") <= 1:
+            raise GeometryError(f"axial_share is {self.axial_share:g} but must be from 0 to 1.")
+        pairs = sorted(dict(self.aberrations).items())
+        for j, waves in pairs:
+            noll_to_nm(j)
+            checks.finite(f"aberration {j}", waves, "waves rms")
+        object.__setattr__(self, "aberrations", tuple((int(j), float(w)) for j, w in pairs))
+
+    @property
+    def medium(self) -> float:
+        """Refractive index around the object."""
+        return self.index if self.mismatch is None else self.mismatch.sample_index
+
+    @property
+    def aperture(self) -> float:
+        """Largest q = n sin θ that reaches the image: NA, or what the medium lets out."""
+        return min(self.numerical_aperture, 0.9999 * self.medium)
+
+    @property
+    def is_round(self) -> bool:
+        """Whether the point's image is the same in every direction."""
+        return all(noll_to_nm(j)[1] == 0 for j, _ in self.aberrations)
+
+    @property
+    def modes(self) -> int:
+        """Fields that do not interfere and together are the image."""
+        return 5 if self.model == "vector" else 1
+
+    def fields(self, y: np.ndarray | float, x: np.ndarray | float, dz: float) -> np.ndarray:
+        """Amplitudes (modes, ...) at positions (y, x) in object space [m] of a point on the axis at `dz`.
+
+        Together they carry the power 1 per unit area: ΣΣ|U|² dy dx = 1.
+        """
+        y, x = np.broadcast_arrays(np.asarray(y, np.float64), np.asarray(x, np.float64))
+        radius = np.hypot(y, x)
+        farthest = 2.0 ** math.ceil(math.log2(max(float(radius.max()), self.wavelength) * 1.0000001))
+        steps, tables = _tables(self, float(dz), farthest)
+        turn = np.where(radius > 0, (x + 1j * y) / np.where(radius > 0, radius, 1), 1)
+        found = np.zeros((self.modes, *radius.shape), np.complex128)
+        for mode, harmonics in enumerate(tables):
+            for order, table in harmonics:
+                part = np.interp(radius, steps, table)
+                found[mode] += part if order == 0 else part * turn**order
+        return found
+
+    def intensity(self, y: np.ndarray | float, x: np.ndarray | float, dz: float) -> np.ndarray:
+        """Intensity (...) at positions (y, x) in object space [m] of a point on the axis at `dz`."""
+        fields = self.fields(y, x, dz)
+        return (np.square(fields.real) + np.square(fields.imag)).sum(0)
+
+    def radius_of(self, part: float, dz: float) -> float:
+        """Radius that holds this part of the light [m], for a round image; from 0 to below 1."""
+        steps, density, reach = np.zeros(1), np.zeros(1), 4 * self.wavelength / self.numerical_aperture
+        reach += abs(dz) * self.aperture / math.sqrt(self.medium**2 - self.aperture**2)
+        for _ in range(12):
+            steps = np.linspace(
+                0, reach, max(256, math.ceil(reach * 24 * self.numerical_aperture / self.wavelength))
+            )
+            density = np.mean([self.intensity(steps * s, steps * c, dz) for s, c in _FOUR], axis=0)
+            inside = np.cumsum(2 * math.pi * steps * density) * steps[1]
+            if inside[-1] >= part:
+                return float(steps[np.searchsorted(inside, part)])
+            reach *= 1.6
+        return reach
+
+
+_FOUR = ((0.0, 1.0), (1.0, 0.0), (math.sqrt(0.5), math.sqrt(0.5)), (math.sqrt(0.5), -math.sqrt(0.5)))
+
+
+def focus_intensity(objective: Objective, y: np.ndarray, x: np.ndarray, dz: float) -> np.ndarray:
+    """Energy density (...) at (y, x, dz) where the objective focuses light polarised along x, 1 at the focus.
+
+    The inverse of imaging: Richards and Wolf's focus, |I0 + I2 cos 2φ|² + |I2 sin 2φ|² + 4 |I1 cos φ|².
+
+    References
+    ----------
+    B. Richards & E. Wolf, Proc. R. Soc. A 253, 358 (1959), equations 2.30 to 2.32.
+    """
+    sine, cosine, weight = _nodes(objective, float(np.max(np.hypot(y, x))), dz)
+    k = 2 * np.pi / objective.wavelength
+    radius, angle = np.hypot(y, x), np.arctan2(y, x)
+    wave = np.sqrt(cosine) * weight * np.exp(1j * k * objective.index * cosine * dz)
+    argument = k * objective.index * radius[..., None] * sine
+    first = (wave * (1 + cosine) * j0(argument)).sum(-1)
+    second = (wave * sine * j1(argument)).sum(-1)
+    third = (wave * (1 - cosine) * jv(2, argument)).sum(-1)
+    along, across = first + third * np.cos(2 * angle), third * np.sin(2 * angle)
+    peak = (np.sqrt(cosine) * weight * (1 + cosine)).sum() ** 2
+    return (np.abs(along) ** 2 + np.abs(across) ** 2 + 4 * np.abs(second * np.cos(angle)) ** 2) / peak
+
+
+def _nodes(objective: Objective, radius: float, dz: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sine and cosine of the angles, and weights that include sin θ dθ."""
+    half = math.asin(objective.aperture / objective.medium)
+    k = 2 * math.pi * objective.medium / objective.wavelength
+    phase = k * (radius * math.sin(half) + abs(dz) * (1 - math.cos(half)))
+    phase += k * abs(objective.image_defocus) * objective.numerical_aperture**2
+    if objective.mismatch is not None:
+        phase += k * float(np.ptp(_extra_path(objective, np.linspace(0, objective.aperture, 64))))
+    phase += 20 * sum(abs(w) for _, w in objective.aberrations)
+    at, weight = np.polynomial.legendre.leggauss(64 * math.ceil((48 + 0.6 * phase) / 64))
+    angle = half / 2 * (at + 1)
+    return np.sin(angle), np.cos(angle), weight * half / 2 * np.sin(angle)
+
+
+def _extra_path(objective: Objective, q: np.ndarray) -> np.ndarray:
+    """Optical path [m] at q of the layers and of the way behind the image."""
+    path = -objective.image_defocus * q**2 / 2
+    return path if objective.mismatch is None else path + objective.mismatch.path(q, objective.index)
+
+
+def _apodised(
+    objective: Objective, sine: np.ndarray, cosine: np.ndarray
+) -> list[tuple[int, int, np.ndarray]]:
+    """Harmonic (> 0 cosine, < 0 sine), its order and amplitude of each mode, normalised to the power 1."""
+    if objective.model == "paraxial":
+        # The integral's sin θ dθ is q dq / (n² cos θ): the paraxial pupil is even in q.
+        return [(0, 0, cosine)]
+    root = np.sqrt(cosine)
+    if objective.model == "scalar":
+        return [(0, 0, root)]
+    across = math.sqrt((1 - objective.axial_share) / 2 * 2)
+    axial = math.sqrt(objective.axial_share) * 2
+    return [
+        (0, 0, across * root * (1 + cosine)),
+        (2, 2, across * root * (1 - cosine)), (-2, 2, across * root * (1 - cosine)),
+        (1, 1, axial * root * sine), (-1, 1, axial * root * sine),
+    ]  # fmt: skip
+
+
+@lru_cache(maxsize=256)
+def _tables(
+    objective: Objective, dz: float, farthest: float
+) -> tuple[np.ndarray, list[list[tuple[int, np.ndarray]]]]:
+    """Radii [m], and for each mode the harmonics with their radial integrals."""
+    nyquist = objective.wavelength / (2 * objective.numerical_aperture)
+    steps = np.arange(math.ceil(farthest / nyquist * PER_NYQUIST) + 2) * (nyquist / PER_NYQUIST)
+    sine, cosine, weight = _nodes(objective, farthest, dz)
+    q, k = objective.medium * sine, 2 * np.pi / objective.wavelength
+    depth = (
+        -objective.medium * sine**2 / 2 if objective.model == "paraxial" else objective.medium * (cosine - 1)
+    )
+    wave = np.exp(1j * k * (depth * dz + _extra_path(objective, q)))
+    apodised = _apodised(objective, sine, cosine)
+    power = sum(
+        (2 if not h else 1) * np.pi * (a**2 / cosine**2 * cosine * weight).sum() for h, _, a in apodised
+    )
+    scale = k * objective.medium / math.sqrt(power)
+    angle = np.arange(AZIMUTHS) * (2 * np.pi / AZIMUTHS)
+    waves = _aberrated(objective, q / objective.numerical_aperture, angle)
+    tables = []
+    for harmonic, _, amplitude in apodised:
+        shape = np.cos(harmonic * angle) if harmonic >= 0 else np.sin(-harmonic * angle)
+        spectrum = np.fft.fft(shape[:, None] * waves, axis=0) / AZIMUTHS
+        tables.append(_harmonics(spectrum, amplitude * weight * wave * scale, k * q, steps))
+    return steps, tables
+
+
+def _aberrated(objective: Objective, rho: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Factor (azimuths, radii) of the Zernike terms over the pupil."""
+    phase = np.zeros((len(angle), len(rho)))
+    for j, waves in objective.aberrations:
+        phase += 2 * np.pi * waves * zernike(j, rho[None, :], angle[:, None])
+    return np.exp(1j * phase)
+
+
+def _harmonics(
+    spectrum: np.ndarray, amplitude: np.ndarray, q: np.ndarray, steps: np.ndarray
+) -> list[tuple[int, np.ndarray]]:
+    """Order and radial integral (radii,) of each azimuthal harmonic that counts."""
+    strength = np.abs(spectrum).max(1)
+    found = []
+    for row in np.flatnonzero(strength > _WEAK * strength.max()):
+        order = int(row) if row < AZIMUTHS // 2 else int(row) - AZIMUTHS
+        bessel = _bessel(abs(order), q, float(steps[1]), len(steps))
+        found.append((order, 1j ** abs(order) * (bessel @ (amplitude * spectrum[row]))))
+    return found
+
+
+_BESSEL: dict[tuple, np.ndarray] = {}
+
+
+def _bessel(order: int, q: np.ndarray, step: float, count: int) -> np.ndarray:
+    """J of this order at (radii, nodes); the last few are kept, for depths share them."""
+    key = order, len(q), float(q[-1]), float(q[0]), step, count
+    if key not in _BESSEL:
+        argument = np.arange(count)[:, None] * (step * q)
+        while len(_BESSEL) > 5:
+            _BESSEL.pop(next(iter(_BESSEL)))
+        _BESSEL[key] = j0(argument) if order == 0 else j1(argument) if order == 1 else jv(order, argument)
+    return _BESSEL[key]

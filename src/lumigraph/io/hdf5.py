@@ -1,0 +1,232 @@
+"""HDF5: what lumigraph writes, Heidelberg light fields (datasets LF, GT_DEPTH), and any array of numbers."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.lightfield import LightField
+from lumigraph.core.raw import RawImage
+from lumigraph.core.stack import Stack
+from lumigraph.core.volume import Volume
+from lumigraph.errors import FormatError
+from lumigraph.io import header, source, target
+from lumigraph.io.cameras import from_cameras
+
+_KEY, _DATA, _VALID = "lumigraph", "data", "valid"
+_FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
+_PACKING: dict[str, Any] = {"compression": "gzip", "shuffle": True, "fletcher32": True}
+_MOST = 10_000  # datasets listed
+_SMALL = 64 << 20  # bytes of one chunk that may be inflated without counting first
+Noun = RawImage | LightField | Volume | Stack
+
+
+def load(path: Path, *, what: str | None = None, max_pixels: int = source.MAX_PIXELS) -> Noun:
+    """What lumigraph wrote, a Heidelberg light field, or one array.
+
+    Parameters
+    ----------
+    path
+        An HDF5 file.
+    what
+        Name of a dataset, where the file is by another program and holds several. Its axes say what it is:
+        (y, x) or (y, x, 3) a raw image, (v, u, y, x[, c]) a light field of cameras, (n, y, x[, c]) a stack.
+    max_pixels
+        Larger ones are refused.
+
+    Raises
+    ------
+    FormatError
+        Not HDF5, damaged, too large, several datasets and no choice, or filters that are not read.
+    """
+    with _reading(path) as file:
+        text = file.attrs.get(_KEY)
+        if what is None and text is not None:
+            found = header.loads(text)
+            if found is None:
+                raise FormatError(f"{path} has a damaged lumigraph header. Copy or save it again.")
+            valid = _values(path, _dataset(path, file, _VALID), max_pixels) if _VALID in file else None
+            return _restored(_values(path, _dataset(path, file, _DATA), max_pixels), found, valid)
+        name = what if what is not None else _only(path, file)
+        dataset = _dataset(path, file, name)
+        return _guessed(_values(path, dataset, max_pixels), dict(_numbers(file)))
+
+
+def save(thing: RawImage | LightField | Volume, path: Path) -> None:
+    """Write a raw image, a light field or a volume; Deflate, with checksums, axes named and with units."""
+    data = to_numpy(thing.data)
+    if data.dtype.kind not in "iufb":
+        raise FormatError(f"HDF5 cannot hold {data.dtype} here. Save real numbers.")
+    scales: dict[str, np.ndarray] = {}
+    if isinstance(thing, RawImage):
+        fields, names = {"kind": "RawImage", **header.describe(thing)}, "yxc"
+    elif isinstance(thing, LightField):
+        fields, names = header.describe_views(thing), "vutsc"
+        a, b = thing.aperture, thing.lenslets
+        scales = {"v": a.y, "u": a.x, "t": b.y, "s": b.x}
+    else:
+        fields, names = header.describe_volume(thing), "zyxc"
+        scales = {"z": np.asarray(thing.depths), "y": thing.grid.y, "x": thing.grid.x}
+    with target.replacing(path) as temporary, h5py.File(temporary, "w", track_order=True) as file:
+        file.attrs[_KEY] = json.dumps(fields)
+        dataset = file.create_dataset(_DATA, data=data, chunks=_chunks(data), **_PACKING)
+        if isinstance(thing, LightField) and thing.valid is not None:
+            mask = to_numpy(thing.valid).astype(np.uint8)
+            file.create_dataset(_VALID, data=mask, chunks=_chunks(mask), **_PACKING)
+        for k, name in enumerate(names[: data.ndim]):
+            dataset.dims[k].label = name
+            if name in scales:
+                scale = file.create_dataset(name, data=scales[name])
+                scale.attrs["units"] = "m"
+                scale.make_scale(name)
+                dataset.dims[k].attach_scale(scale)
+
+
+def contents(path: Path) -> list[tuple[str, str, str]]:
+    """The datasets of a file: (name, noun, about) each."""
+    with _reading(path) as file:
+        text = file.attrs.get(_KEY)
+        found = None if text is None else header.loads(text)
+        if found is not None:
+            return [("", str(found.get("kind")), _about(_dataset(path, file, _DATA)))]
+        return [(name, _noun(each.ndim, each.shape), _about(each)) for name, each in _datasets(file)]
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[h5py.File]:
+    path = source.regular_file(path)
+    with path.open("rb") as file:
+        source.check_signature(path, file.read(8), "HDF5")
+    with source.decoding(path, "an HDF5 file"), h5py.File(path, "r", locking=False) as file:
+        yield file
+
+
+def _datasets(file: h5py.File) -> list[tuple[str, h5py.Dataset]]:
+    """Datasets of numbers of 2 to 5 axes in the file and its groups; soft and outer links are left."""
+    found: list[tuple[str, h5py.Dataset]] = []
+    groups: list[tuple[str, Any, int]] = [("", file, 0)]
+    while groups and len(found) < _MOST:
+        prefix, group, depth = groups.pop(0)
+        for name in list(group)[:_MOST]:
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                continue
+            each = group[name]
+            if isinstance(each, h5py.Dataset) and 2 <= each.ndim <= 5 and each.dtype.kind in "iufb":
+                found.append((prefix + name, each))
+            elif isinstance(each, h5py.Group) and depth < 8:
+                groups.append((f"{prefix}{name}/", each, depth + 1))
+    return found
+
+
+def _only(path: Path, file: h5py.File) -> str:
+    names = [name for name, _ in _datasets(file)]
+    if "LF" in names:
+        return "LF"
+    if len(names) == 1:
+        return names[0]
+    if not names:
+        raise FormatError(f"{path} holds no array of 2 to 5 axes. Check the file.")
+    raise FormatError(f"{path} holds {', '.join(names[:8])}. Choose one by what=.")
+
+
+def _dataset(path: Path, file: h5py.File, name: str) -> h5py.Dataset:
+    node: Any = file
+    for part in str(name).split("/"):
+        link = node.get(part, getlink=True) if isinstance(node, h5py.Group) and part else None
+        if not isinstance(link, h5py.HardLink):
+            near = ", ".join(each for each, _ in _datasets(file)[:8]) or "nothing that is read"
+            raise FormatError(f"{path} has no dataset {name!r}. It holds {near}.")
+        node = node[part]
+    if not isinstance(node, h5py.Dataset) or node.dtype.kind not in "iufb" or not 2 <= node.ndim <= 5:
+        raise FormatError(f"{path}: {name} is no array of numbers with 2 to 5 axes.")
+    return node
+
+
+def _values(path: Path, dataset: h5py.Dataset, max_pixels: int) -> np.ndarray:
+    """The array, after its size, its filters and what its chunks become have been checked."""
+    source.check_size(path, dataset.shape, max_pixels)
+    if dataset.is_virtual or dataset.external:
+        raise FormatError(f"{path} keeps its pixels in other files. Copy them into one.")
+    plist, needed = dataset.id.get_create_plist(), prod(dataset.shape) * dataset.dtype.itemsize
+    filters = {plist.get_filter(k)[0] for k in range(plist.get_nfilters())}
+    if not filters <= _FILTERS:
+        raise FormatError(f"{path} is packed by filters {sorted(filters)}; only Deflate is read.")
+    stored = min(dataset.id.get_storage_size(), path.stat().st_size)
+    source.check_stored(path, needed, stored, 1 if not filters else source.MOST_INFLATED)
+    if dataset.chunks is not None:
+        _check_chunks(path, dataset, dataset.chunks, deflated=h5py.h5z.FILTER_DEFLATE in filters)
+    return np.asarray(dataset[...])
+
+
+def _check_chunks(path: Path, dataset: h5py.Dataset, chunks: tuple[int, ...], *, deflated: bool) -> None:
+    limit = prod(chunks) * dataset.dtype.itemsize
+    source.check_size(path, chunks, max(1 << 24, 2 * prod(dataset.shape)))
+    wanted = prod(-(-n // c) for n, c in zip(dataset.shape, chunks, strict=True))
+    count = dataset.id.get_num_chunks()
+    if count != wanted:
+        raise FormatError(f"{path} is incomplete: {count} of {wanted} chunks are there. Copy it again.")
+    size, most = path.stat().st_size, max(limit + 1024, _SMALL)
+    for k in range(count):
+        chunk = dataset.id.get_chunk_info(k)
+        if chunk.byte_offset is None or chunk.byte_offset + chunk.size > size:
+            raise FormatError(f"{path} is cut short: a chunk ends behind its {size} bytes. Copy it again.")
+        if deflated and chunk.size * source.MOST_INFLATED > most:
+            with path.open("rb") as file:
+                file.seek(chunk.byte_offset)
+                source.check_inflated(path, file.read(chunk.size), most)
+
+
+def _restored(data: np.ndarray, found: dict[str, Any], valid: np.ndarray | None) -> Noun:
+    kind = found.get("kind")
+    if kind == "RawImage":
+        return header.restore(data, found, None)
+    if kind == "LightField":
+        grids = header.grid(found.get("aperture")), header.grid(found.get("lenslets"))
+        mask = None if valid is None else valid.astype(bool)
+        return LightField(data, *grids, found.get("separation", 0.0), mask)
+    return header.restore_planes(data, found)
+
+
+def _guessed(data: np.ndarray, known: dict[str, float]) -> Noun:
+    """What an array by another program is, by its axes."""
+    noun = _noun(data.ndim, data.shape)
+    depth = data.dtype.itemsize * 8 if data.dtype.kind in "iu" else None
+    if noun == "RawImage":
+        return RawImage(data, bit_depth=depth, metadata=known)
+    if noun == "Stack":
+        return Stack(data, bit_depth=depth, metadata=known)
+    return from_cameras(data, (known.get("dV", 1.0), known.get("dH", 1.0)))
+
+
+def _noun(axes: int, shape: tuple[int, ...]) -> str:
+    if axes == 2 or (axes == 3 and shape[2] in (3, 4)):
+        return "RawImage"
+    return "Stack" if axes == 3 or (axes == 4 and shape[3] in (3, 4)) else "LightField"
+
+
+def _numbers(file: h5py.File) -> Iterator[tuple[str, float]]:
+    for name, value in list(file.attrs.items())[:200]:
+        single = np.asarray(value)
+        if single.size == 1 and single.dtype.kind in "iuf" and np.isfinite(single).all():
+            yield name, float(single.ravel()[0])
+
+
+def _chunks(data: np.ndarray) -> tuple[int, ...]:
+    """About a MiB: whole rows of the last axes."""
+    sides, size = list(data.shape), data.dtype.itemsize
+    for k in range(len(sides)):
+        if prod(sides) * size <= 1 << 20:
+            break
+        rest = prod(sides[k + 1 :]) * size
+        sides[k] = max(1, min(sides[k], (1 << 20) // max(rest, 1)))
+    return tuple(sides)
+
+
+def _about(dataset: h5py.Dataset) -> str:
+    return f"{' x '.join(map(str, dataset.shape))}, {dataset.dtype}"

@@ -1,0 +1,200 @@
+"""Folders of views: one picture for each camera, named by its place in the grid.
+
+Read: the HCI 4D light field benchmark (`input_Cam000.png` ..., row by row from the top left; its
+`parameters.cfg` if there), the Stanford archive (`out_RR_CC_Y_X_.png`), and any names that end in two
+numbers, row and column (`view_03_05.png`). Written: `view_RR_CC.png` (`.tif` for floats) and `views.json`.
+Row 0, column 0 is the camera top left; `cameras` tells how that becomes (v, u).
+"""
+
+import configparser
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.lightfield import LightField
+from lumigraph.core.raw import RawImage
+from lumigraph.errors import FormatError
+from lumigraph.io import header, png, source, target, tiff
+from lumigraph.io.cameras import from_cameras, to_cameras
+
+_HCI = re.compile(r"input_Cam(\d{1,6})\.png", re.I)
+_POSITION = r"(-?\d{1,9}(?:\.\d{1,12})?)"
+_STANFORD = re.compile(rf"out_(\d{{1,4}})_(\d{{1,4}})_{_POSITION}_{_POSITION}_?\.png", re.I)
+_PLACED = re.compile(r".*?(\d{1,4})[_x\-](\d{1,4})\.(?:png|tiff?)", re.I)
+_MOST = 10_000  # views
+Files = dict[tuple[int, int], Path]
+
+
+def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> LightField:
+    """The light field in a folder of pictures.
+
+    Raises
+    ------
+    FormatError
+        No such names, a view that is missing, or pictures of several sizes.
+    """
+    files, spacing = _files(path)
+    rows, columns = (max(place[k] for place in files) + 1 for k in (0, 1))
+    missing = [(r, c) for r in range(rows) for c in range(columns) if (r, c) not in files]
+    if missing:
+        raise FormatError(
+            f"{path} holds {len(files)} of {rows} x {columns} views: row {missing[0][0]}, column "
+            f"{missing[0][1]} is missing. Copy the folder again."
+        )
+    data = None
+    for (row, column), file in sorted(files.items()):
+        picture = _picture(file, max_pixels)
+        if data is None:
+            whole = (rows, columns, *picture.shape)
+            source.check_size(path, (*whole, 1) if len(whole) == 4 else whole, max_pixels)
+            data = np.empty(whole, picture.dtype)
+        if picture.shape != data.shape[2:] or picture.dtype != data.dtype:
+            raise FormatError(
+                f"{file} has {picture.shape} {picture.dtype} but the first view has {data.shape[2:]} "
+                f"{data.dtype}: all views must be alike."
+            )
+        data[row, column] = picture
+    assert data is not None  # _files found at least one
+    return _restored(path, data, spacing)
+
+
+def save(views: LightField, path: Path, *, white: float | None = None) -> None:
+    """Write each view as a picture, and the light field's lengths into `views.json`.
+
+    Whole numbers of 8 bits, or 16 if grey, become PNG, everything else TIFF, both exactly; with `white`
+    all become PNG, 0 ... `white` scaled.
+    """
+    data = to_cameras(LightField(to_numpy(views.data), views.aperture, views.lenslets, views.separation))
+    exact = data.dtype == np.uint8 or (data.dtype == np.uint16 and data.ndim == 4)
+    as_png = white is not None or (exact and data.shape[4:] in ((), (3,)))
+    digits = len(str(max(data.shape[:2]) - 1)) if max(data.shape[:2]) > 100 else 2
+    with target.replacing(path, folder=True) as temporary:
+        temporary.mkdir()
+        for row in range(data.shape[0]):
+            for column in range(data.shape[1]):
+                name = f"view_{row:0{digits}}_{column:0{digits}}"
+                if as_png:
+                    png.save(RawImage(data[row, column]), temporary / f"{name}.png", white=white)
+                else:
+                    tiff.save(RawImage(data[row, column]), temporary / f"{name}.tif")
+        fields = json.dumps(header.describe_views(views), indent=1)
+        (temporary / target.VIEWS).write_text(fields + "\n", encoding="ascii")
+
+
+def parameters(path: str | Path) -> dict[str, float]:
+    """Numbers of the `parameters.cfg` beside HCI views, such as ``disp_min`` and ``baseline_mm``.
+
+    Empty where there is no such file.
+
+    Raises
+    ------
+    FormatError
+        A damaged or oversized file.
+    """
+    file = Path(path) / "parameters.cfg"
+    if not file.is_file():
+        return {}
+    return {name: value for name, value in numbers(file).items() if math.isfinite(value)}
+
+
+def numbers(file: Path) -> dict[str, float]:
+    """Every entry of an INI file that is a number, as "name" and "section.name".
+
+    Raises
+    ------
+    FormatError
+        No INI file, or an oversized one.
+    """
+    if file.stat().st_size > 1 << 20:
+        raise FormatError(f"{file} has {file.stat().st_size} bytes, too many for parameters. Check the path.")
+    parser = configparser.ConfigParser(interpolation=None, strict=False)
+    try:
+        parser.read_string(file.read_text(encoding="utf-8"))
+    except (configparser.Error, UnicodeDecodeError) as error:
+        raise FormatError(f"{file} is not an INI file: {str(error).splitlines()[0]}.") from error
+    found: dict[str, float] = {}
+    for section in parser.sections():
+        for name, text in parser.items(section):
+            try:
+                found[name] = found[f"{section}.{name}"] = float(text)
+            except ValueError:
+                continue
+    return found
+
+
+def contents(path: Path) -> list[tuple[str, str, str]]:
+    """One light field, with the number of its views and what `parameters.cfg` says of disparities."""
+    files, _ = _files(path)
+    rows, columns = (max(place[k] for place in files) + 1 for k in (0, 1))
+    known = parameters(path)
+    told = f", disparity {known['disp_min']:g} to {known['disp_max']:g} px" if "disp_min" in known else ""
+    return [("", "LightField", f"{rows} x {columns} views{told if 'disp_max' in known else ''}")]
+
+
+def _files(path: Path) -> tuple[Files, tuple[float, float]]:
+    """Picture of each camera (row, column), and the spacing of the cameras (down, right)."""
+    path = source.existing(path)
+    if not path.is_dir():
+        raise FormatError(f"{path} is no folder of views, and has no extension that tells what it is.")
+    names = sorted(child.name for child in path.iterdir())
+    if len(names) > 10 * _MOST:
+        raise FormatError(f"{path} holds {len(names)} files, too many for views. Check the path.")
+    if found := {m: path / m[0] for m in map(_HCI.fullmatch, names) if m}:
+        return _hci(path, found), (1.0, 1.0)
+    if found := [m for m in map(_STANFORD.fullmatch, names) if m]:
+        return _stanford(path, found)
+    placed = {(int(m[1]), int(m[2])): path / m[0] for m in map(_PLACED.fullmatch, names) if m}
+    if not placed or len(placed) > _MOST:
+        raise FormatError(
+            f"{path} holds no views: names such as input_Cam000.png, out_00_00_Y_X_.png or view_00_00.png."
+        )
+    first = min(place[0] for place in placed), min(place[1] for place in placed)
+    return {(r - first[0], c - first[1]): file for (r, c), file in placed.items()}, (1.0, 1.0)
+
+
+def _hci(path: Path, found: dict[re.Match[str], Path]) -> Files:
+    known = parameters(path)
+    count = len(found)
+    columns = int(known.get("num_cams_x", math.isqrt(count)))
+    if columns < 1 or count % columns or ("num_cams_x" not in known and columns**2 != count):
+        raise FormatError(
+            f"{path} holds {count} views input_CamNNN.png, which make no square. Copy it again."
+        )
+    return {divmod(int(match[1]), columns): file for match, file in found.items()}
+
+
+def _stanford(path: Path, found: list[re.Match[str]]) -> tuple[Files, tuple[float, float]]:
+    """Rows and columns as counted in the names; the positions tell the spacing of the cameras."""
+    files = {(int(m[1]), int(m[2])): path / m[0] for m in found}
+    rows, columns = (max(place[k] for place in files) for k in (0, 1))
+    table = np.array([[float(m[k]) for k in (1, 2, 3, 4)] for m in found])
+    design = np.c_[np.ones(len(table)), table[:, :2]]
+    slopes = np.linalg.lstsq(design, table[:, 2:], rcond=None)[0]
+    down = abs(float(slopes[1, 0])) if rows else 1.0
+    right = abs(float(slopes[2, 1])) if columns else 1.0
+    return files, (down or 1.0, right or 1.0)
+
+
+def _picture(file: Path, max_pixels: int) -> np.ndarray:
+    load_one = png.load if file.suffix.lower() == ".png" else tiff.load
+    raw = load_one(file, max_pixels=max_pixels)
+    if not isinstance(raw, RawImage):
+        raise FormatError(f"{file} holds several pages where one view is needed.")
+    return raw.data
+
+
+def _restored(path: Path, data: np.ndarray, spacing: tuple[float, float]) -> LightField:
+    file = path / target.VIEWS
+    if not file.is_file():
+        return from_cameras(data, spacing)
+    with source.decoding(file, "the views.json of a folder of views"):
+        found: Any = header.loads(file.read_text(encoding="ascii")) if file.stat().st_size < 1 << 20 else None
+        if found is None or found.get("kind") != "LightField":
+            raise FormatError("it was not written by lumigraph. Remove it to read the pictures alone.")
+        grids = header.grid(found.get("aperture")), header.grid(found.get("lenslets"))
+        return LightField(np.ascontiguousarray(data[::-1, ::-1]), *grids, found.get("separation", 0.0))

@@ -1,0 +1,296 @@
+"""Raw image of a volume by a light-field microscope, and the adjoint: matrix products over lenslets' cells.
+
+With s × s points in each lenslet's cell and N × N samples of the image, a plane's raw image is the sum over
+the offsets between the points' cell and the image's of (cells × s²) · (s² × N²). All offsets of a depth are
+one product: the points of the neighbouring cells are gathered first.
+"""
+
+import hashlib
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lumigraph.core import arrays, checks, memory
+from lumigraph.core.arrays import Array
+from lumigraph.core.cache import ByteCache
+from lumigraph.core.grid import Grid
+from lumigraph.elements.objective import Objective
+from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.simulation.microscope_kernels import (
+    DROPPED,
+    CellSampling,
+    Lenslet,
+    SliceKernel,
+    kernel_bytes,
+    slice_kernel,
+)
+from lumigraph.simulation.microscope_pixels import PixelPlacement
+
+GATHERED = 2**27
+"""Numbers that are gathered for one product."""
+
+_MATRICES = ByteCache(limit=3 * 2**29)
+
+Progress = Callable[[int, int], None]
+"""Called with the slices that are done and how many there are."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MicroscopeOperator:
+    """A volume (z, y, x) to a raw image (ny, nx), and back.
+
+    Parameters
+    ----------
+    kernels
+        Of each depth.
+    depths
+        From the focused plane (z,) [m].
+    cells
+        Lenslets (rows, columns).
+    object_grid
+        s samples per lenslet along each axis [m].
+    placement
+        Where the pixels stand; None where they are the N × N samples of each cell.
+    """
+
+    kernels: tuple[SliceKernel, ...]
+    depths: tuple[float, ...]
+    cells: tuple[int, int]
+    object_grid: Grid
+    placement: PixelPlacement | None = None
+
+    @property
+    def shape(self) -> tuple[tuple[int, int], tuple[int, int, int]]:
+        """Pixels (ny, nx) of the raw image, samples (z, y, x) of the volume."""
+        N = self.kernels[0].sampling.pixels
+        raw = (self.cells[0] * N, self.cells[1] * N) if self.placement is None else self.placement.shape
+        return raw, (len(self.depths), *self.object_grid.shape)
+
+    @property
+    def multiply_adds(self) -> int:
+        """Of one application of `forward` or `adjoint`."""
+        rows = sum(len(kernel.offsets) * kernel.sampling.classes for kernel in self.kernels)
+        return rows * self.kernels[0].sampling.pixels ** 2 * math.prod(self.cells)
+
+    @property
+    def nbytes(self) -> int:
+        """Of the stored kernels."""
+        return sum(kernel.blocks.nbytes for kernel in self.kernels)
+
+    def forward(self, volume: Array) -> Array:
+        """Raw image (ny, nx) of intensities (z, y, x); an even plane of 1 gives 1.
+
+        Raises
+        ------
+        GeometryError
+            Another shape than the operator's.
+        """
+        self._check("the volume", volume, self.shape[1])
+        xp, image = arrays.namespace(volume), 0.0
+        for k, kernel in enumerate(self.kernels):
+            s, reach = kernel.sampling.points, _reach(kernel)
+            points = _padded(_class_first(volume[k, ...], s), reach)
+            for rows, offsets, matrix in _products(kernel, volume, math.prod(self.cells)):
+                parts = [self._window(points, reach - dy, reach - dx) for dy, dx in offsets]
+                gathered = xp.reshape(xp.stack(parts), (rows, -1))
+                image = image + xp.matrix_transpose(matrix) @ gathered
+        N = self.kernels[0].sampling.pixels
+        plane = _plane(xp.reshape(image, (N * N, *self.cells)), N)
+        return plane if self.placement is None else self.placement.forward(plane)
+
+    def adjoint(self, raw: Array) -> Array:
+        """Transpose of `forward`: (z, y, x) from a raw image (ny, nx).
+
+        Raises
+        ------
+        GeometryError
+            Another shape than the operator's.
+        """
+        self._check("the raw image", raw, self.shape[0])
+        xp = arrays.namespace(raw)
+        plane = raw if self.placement is None else self.placement.adjoint(raw)
+        N = self.kernels[0].sampling.pixels
+        flat = xp.reshape(_class_first(plane, N), (N * N, -1))
+        return xp.stack([self._back(kernel, flat) for kernel in self.kernels])
+
+    def psf(self, index: tuple[int, ...]) -> Array:
+        """Raw image (ny, nx) of one sample (z, y, x) of intensity 1, float32 of NumPy."""
+        volume = np.zeros(self.shape[1], np.float32)
+        volume[index] = 1
+        return self.forward(volume)
+
+    def _back(self, kernel: SliceKernel, flat: Array) -> Array:
+        xp, s, reach = arrays.namespace(flat), kernel.sampling.points, _reach(kernel)
+        shape = (s * s, *(n + 2 * reach for n in self.cells))
+        points = xp.zeros(shape, dtype=flat.dtype, device=arrays.device(flat))
+        for _, offsets, matrix in _products(kernel, flat, math.prod(self.cells)):
+            parts = xp.reshape(matrix @ flat, (len(offsets), s * s, *self.cells))
+            for part, (dy, dx) in enumerate(offsets):
+                window = self._window(points, reach - dy, reach - dx)
+                window += parts[part, ...]
+        return _plane(points[:, reach : reach + self.cells[0], reach : reach + self.cells[1]], s)
+
+    def _window(self, points: Array, top: int, left: int) -> Array:
+        return points[:, top : top + self.cells[0], left : left + self.cells[1]]
+
+    @staticmethod
+    def _check(name: str, array: Array, shape: tuple[int, ...]) -> None:
+        checks.array(name, array)
+        if tuple(array.shape) != tuple(shape):
+            raise GeometryError(f"{name} has shape {tuple(array.shape)} but the operator's is {tuple(shape)}.")
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Lenslets that see the object, how finely they are sampled, and the pixels behind them.
+
+    Parameters
+    ----------
+    cells
+        Lenslets (rows, columns).
+    sampling
+        Of a cell.
+    placement
+        Of real pixels; None for N × N samples per cell.
+    center
+        Of the cells, in the object (y, x) [m].
+    """
+
+    cells: tuple[int, int]
+    sampling: CellSampling
+    placement: PixelPlacement | None = None
+    center: tuple[float, float] = (0.0, 0.0)
+
+
+def microscope_operator(
+    objectives: Sequence[Objective],
+    lenslet: Lenslet,
+    layout: Layout,
+    depths: Sequence[float],
+    *,
+    dropped: float = DROPPED,
+    folder: str | Path | None = None,
+    progress: Progress | None = None,
+) -> MicroscopeOperator:
+    """Operator from slices at `depths` to a raw image.
+
+    Parameters
+    ----------
+    objectives
+        One for each wavelength.
+    lenslet, layout
+        The array and the pixels.
+    depths
+        Of the slices from the focused plane [m], positive farther from the objective.
+    dropped
+        Part of each point's light that may be left out; see `slice_kernel`.
+    folder
+        Keeps the kernels in files that are mapped into memory, and finds again those that are there: for
+        volumes whose kernels do not fit in memory, and for the next run.
+    progress
+        Called after each slice.
+
+    Raises
+    ------
+    SamplingError
+        The kernels do not fit in memory and no folder is given.
+    GeometryError
+        No depths, or one that is not finite.
+    """
+    depths = tuple(checks.finite("a depth", dz) for dz in depths)
+    if not depths:
+        raise GeometryError("there are no depths. Give at least one, such as 0.0 for the focused plane.")
+    if not 0 < checks.finite("dropped", dropped, "1") < 0.5:
+        raise GeometryError(f"dropped is {dropped:g} but must be above 0 and below 0.5.")
+    sizes = [kernel_bytes(objectives[0], lenslet, layout.sampling, dz, dropped) for dz in depths]
+    stored = 1 if folder is None else 0
+    needed = max(sizes) * 2 + stored * sum(sizes) * (0.25 if objectives[0].is_round else 1)
+    remedy = "Use fewer slices or samples, or folder= to keep them on disk."
+    memory.require(needed, f"the images of points at {len(depths)} depths", remedy, SamplingError)
+    kernels = []
+    for done, dz in enumerate(depths):
+        kernels.append(_kept(objectives, lenslet, layout.sampling, dz, dropped, folder))
+        if progress is not None:
+            progress(done + 1, len(depths))
+    return MicroscopeOperator(tuple(kernels), depths, layout.cells, _object_grid(lenslet, layout), layout.placement)
+
+
+def _object_grid(lenslet: Lenslet, layout: Layout) -> Grid:
+    s = layout.sampling.points
+    shape = (layout.cells[0] * s, layout.cells[1] * s)
+    pitch = lenslet.pitch / lenslet.magnification / s
+    # Cells are centred as a whole: with an even number of samples the middle lies between two.
+    center = [c + (0.0 if n % 2 else pitch / 2) for c, n in zip(layout.center, shape, strict=True)]
+    return Grid(shape, (pitch, pitch), (center[0], center[1]))
+
+
+def _kept(
+    objectives: Sequence[Objective],
+    lenslet: Lenslet,
+    sampling: CellSampling,
+    dz: float,
+    dropped: float,
+    folder: str | Path | None,
+) -> SliceKernel:
+    """The kernel of a depth, mapped from its file if a folder is given."""
+    if folder is None:
+        return slice_kernel(objectives, lenslet, sampling, dz, dropped)
+    told = repr((tuple(objectives), lenslet, sampling, dz, dropped))
+    path = Path(folder) / f"slice-{hashlib.sha256(told.encode()).hexdigest()[:20]}"
+    places, blocks = path.with_suffix(".offsets.npy"), path.with_suffix(".npy")
+    if not blocks.exists():
+        kernel = slice_kernel(objectives, lenslet, sampling, dz, dropped)
+        blocks.parent.mkdir(parents=True, exist_ok=True)
+        for target, values in ((places, kernel.offsets), (blocks, kernel.blocks)):
+            partial = target.with_suffix(".part")
+            with partial.open("wb") as file:
+                np.save(file, values, allow_pickle=False)
+            partial.replace(target)
+    symmetric = all(one.is_round for one in objectives)
+    mapped = np.load(blocks, mmap_mode="r", allow_pickle=False)
+    return SliceKernel(np.load(places, allow_pickle=False), mapped, sampling, symmetric)
+
+
+def _products(
+    kernel: SliceKernel, like: Array, cells: int
+) -> Iterator[tuple[int, list[tuple[int, int]], Array]]:
+    """Groups of offsets that fit in memory: rows, the offsets, and their matrix (rows, N²)."""
+    matrix = _MATRICES.get((kernel, arrays.placement(like)), lambda: arrays.like(kernel.matrix(), like))
+    classes, offsets = kernel.sampling.classes, [(int(dy), int(dx)) for dy, dx in kernel.offsets]
+    step = max(1, GATHERED // (classes * cells))
+    for start in range(0, len(offsets), step):
+        chosen = offsets[start : start + step]
+        yield len(chosen) * classes, chosen, matrix[start * classes : (start + len(chosen)) * classes, ...]
+
+
+def _reach(kernel: SliceKernel) -> int:
+    return int(np.abs(kernel.offsets).max())
+
+
+def _class_first(plane: Array, n: int) -> Array:
+    """(rows n, columns n) to (n², rows, columns)."""
+    xp = arrays.namespace(plane)
+    rows, columns = plane.shape[0] // n, plane.shape[1] // n
+    cells = xp.permute_dims(xp.reshape(plane, (rows, n, columns, n)), (1, 3, 0, 2))
+    return xp.reshape(cells, (n * n, rows, columns))
+
+
+def _plane(cells: Array, n: int) -> Array:
+    """(n², rows, columns) to (rows n, columns n): the inverse of `_class_first`."""
+    xp, (rows, columns) = arrays.namespace(cells), cells.shape[1:]
+    plane = xp.permute_dims(xp.reshape(cells, (n, n, rows, columns)), (2, 0, 3, 1))
+    return xp.reshape(plane, (rows * n, columns * n))
+
+
+def _padded(points: Array, reach: int) -> Array:
+    """Zeros around cells (k, rows, columns)."""
+    xp = arrays.namespace(points)
+    like = {"dtype": points.dtype, "device": arrays.device(points)}
+    k, rows, columns = points.shape
+    side = xp.zeros((k, rows, reach), **like)
+    points = xp.concat([side, points, side], axis=2)
+    above = xp.zeros((k, reach, columns + 2 * reach), **like)
+    return xp.concat([above, points, above], axis=1)

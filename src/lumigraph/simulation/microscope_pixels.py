@@ -1,0 +1,115 @@
+"""Where the pixels of a real camera stand among the evenly spaced samples of the lenslets' cells."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.special import i0
+
+from lumigraph.core import arrays
+from lumigraph.core.arrays import Array
+from lumigraph.core.calibration import Calibration
+
+TAPS = 6
+"""Samples along each axis that a pixel's value is interpolated from."""
+
+BETA = 5.0
+"""Of the Kaiser window of the interpolation."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PixelPlacement:
+    """A sparse matrix from samples of the cells (rows, columns) to pixels (ny, nx), by windowed sincs.
+
+    Parameters
+    ----------
+    shape
+        Pixels (ny, nx).
+    samples
+        Samples (rows, columns).
+    matrix
+        (ny nx, rows columns), float32.
+    """
+
+    shape: tuple[int, int]
+    samples: tuple[int, int]
+    matrix: csr_array
+    _tables: dict = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, calibration: Calibration, pixels: int) -> "tuple[PixelPlacement, tuple[int, int], np.ndarray]":
+        """From the micro-images of a raw image, with N samples along each side of a cell.
+
+        Returns
+        -------
+        tuple
+            The placement, the cells (rows, columns), and the pixel (y, x) at the middle of them.
+        """
+        ny, nx = calibration.shape
+        y, x = calibration.straightened(np.arange(ny)[:, None] + 0.0, np.arange(nx)[None, :] + 0.0)
+        origin = calibration.lattice.origin
+        place = np.stack(np.broadcast_arrays(y - origin[0], x - origin[1]), -1)
+        place = place @ np.linalg.inv(calibration.lattice.matrix).T
+        first = np.floor(place.reshape(-1, 2).min(0) + 0.5).astype(int)
+        last = np.floor(place.reshape(-1, 2).max(0) + 0.5).astype(int)
+        cells = (int(last[0] - first[0]) + 1, int(last[1] - first[1]) + 1)
+        samples = (cells[0] * pixels, cells[1] * pixels)
+        at = ((place - first + 0.5) * pixels - 0.5).reshape(-1, 2)
+        middle = calibration.position((first + last) / 2)
+        return cls((ny, nx), samples, _interpolation(at, samples)), cells, middle
+
+    def forward(self, plane: Array) -> Array:
+        """Pixels (ny, nx) from samples (rows, columns)."""
+        return arrays.namespace(plane).reshape(self._applied(plane, transposed=False), self.shape)
+
+    def adjoint(self, raw: Array) -> Array:
+        """Transpose of `forward`."""
+        return arrays.namespace(raw).reshape(self._applied(raw, transposed=True), self.samples)
+
+    def _applied(self, values: Array, *, transposed: bool) -> Array:
+        xp = arrays.namespace(values)
+        flat = xp.reshape(values, (-1,))
+        if arrays.is_numpy(values):
+            matrix = self.matrix.T if transposed else self.matrix
+            return (matrix @ flat).astype(values.dtype, copy=False)
+        index, weight = self._table(values, transposed)
+        gathered = xp.reshape(xp.take(flat, xp.reshape(index, (-1,)), axis=0), weight.shape)
+        return xp.sum(gathered * weight, axis=1)
+
+    def _table(self, like: Array, transposed: bool) -> tuple[Array, Array]:
+        """Index and weight of each value's neighbours (n, k), padded with weight 0."""
+        key = arrays.placement(like), transposed
+        if key not in self._tables:
+            matrix = csr_array(self.matrix.T) if transposed else self.matrix
+            counts = np.diff(matrix.indptr)
+            column = np.arange(matrix.nnz) - np.repeat(matrix.indptr[:-1], counts)
+            row = np.repeat(np.arange(matrix.shape[0]), counts)
+            index = np.zeros((matrix.shape[0], max(1, int(counts.max()))), np.int64)
+            weight = np.zeros(index.shape)
+            index[row, column], weight[row, column] = matrix.indices, matrix.data
+            xp = arrays.namespace(like)
+            self._tables[key] = xp.asarray(index, device=arrays.device(like)), arrays.like(weight, like)
+        return self._tables[key]
+
+
+def _interpolation(at: np.ndarray, samples: tuple[int, int]) -> csr_array:
+    """Matrix of windowed sincs at places (pixels, 2) among samples; each row sums to 1."""
+    columns, weights = [], []
+    for axis in (0, 1):
+        start = np.floor(at[:, axis]).astype(int) - TAPS // 2 + 1
+        index = start[:, None] + np.arange(TAPS)
+        off = index - at[:, axis, None]
+        inside = np.clip(1 - (off / (TAPS / 2)) ** 2, 0, None)
+        weight = np.sinc(off) * i0(BETA * np.sqrt(inside)) / i0(BETA)
+        weight /= weight.sum(1, keepdims=True)
+        weight[(index < 0) | (index >= samples[axis])] = 0
+        columns.append(np.clip(index, 0, samples[axis] - 1))
+        weights.append(weight)
+    index = columns[0][:, :, None] * samples[1] + columns[1][:, None, :]
+    weight = weights[0][:, :, None] * weights[1][:, None, :]
+    row = np.repeat(np.arange(len(at)), TAPS * TAPS)
+    shape = (len(at), math.prod(samples))
+    matrix = csr_array((weight.ravel().astype(np.float32), (row, index.ravel())), shape=shape)
+    matrix.sum_duplicates()
+    return matrix

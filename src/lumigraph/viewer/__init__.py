@@ -1,0 +1,20 @@
+"""The viewer: a page in the browser, served on the loopback interface or written as one file.
+
+- `server`: what is served: a fixed table of resources behind a random token; knows nothing of light fields
+- `safety`: which requests are answered, and the headers of every answer
+- `exhibit`: what one page shows: views, raw image, focal stack, depth, volume
+- `opening`: a file, or a raw image with its calibration, as an exhibit
+- `parts`: an exhibit as a description (JSON) and arrays that are sent when they are asked for
+- `encoding`: arrays as bytes: as they are, losslessly smaller, or as pictures
+- `page`: the page's files, as a table to serve
+- `single_file`: the same page as one file that works from disk
+- `static/`: HTML, CSS, JavaScript modules and shaders, as they are
+"""
+
+from lumigraph.viewer.exhibit import Exhibit
+from lumigraph.viewer.opening import Origin, open_exhibit
+from lumigraph.viewer.page import site
+from lumigraph.viewer.server import Resource, Site, serve
+from lumigraph.viewer.single_file import export
+
+__all__ = ["Exhibit", "Origin", "Resource", "Site", "export", "open_exhibit", "serve", "site"]

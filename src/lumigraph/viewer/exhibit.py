@@ -1,0 +1,161 @@
+"""What one page shows of one file."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lumigraph.core import checks
+from lumigraph.core.arrays import Array
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.lightfield import LightField
+from lumigraph.core.raw import RawImage
+from lumigraph.core.volume import Volume
+from lumigraph.errors import LumigraphError
+
+_FEWEST_PIXELS = 200
+_MOST_DETAIL = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Planes:
+    """Pictures of one scene (n, y, x[, c]), each focused elsewhere.
+
+    Parameters
+    ----------
+    data
+        Pictures.
+    positions
+        One number each, ascending.
+    label, unit
+        What the numbers are, such as "Patch" and "px".
+    """
+
+    data: Array
+    positions: tuple[float, ...]
+    label: str = "Focus α′"
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        checks.array("the planes", self.data)
+        if len(self.data.shape) not in (3, 4) or len(self.positions) != self.data.shape[0]:
+            raise LumigraphError(
+                f"planes have shape {tuple(self.data.shape)} and {len(self.positions)} positions "
+                "but must be (n, y, x[, c]) with a position each."
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DepthMap:
+    """A depth for each place (t, s), with a confidence from 0 to 1.
+
+    Parameters
+    ----------
+    values
+        α' where the light field has a focus; NaN where nothing is known.
+    confidence
+        0 to 1.
+    label, unit
+        What the values are.
+    """
+
+    values: Array
+    confidence: Array
+    label: str = "Focus α′"
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Exhibit:
+    """What one page shows of one file; what is None is not shown.
+
+    Parameters
+    ----------
+    name
+        The file's name.
+    views
+        Light field: refocused, seen from other places, through other apertures.
+    raw, calibration
+        Raw image, and the lattice drawn over it.
+    planes
+        Focal stack, where there are no views.
+    depth
+        Depth map, or a function that computes it when somebody wants to see it.
+    volume
+        Planes of space.
+    facts
+        (what, value) to tell about the file.
+    """
+
+    name: str
+    views: LightField | None = None
+    raw: RawImage | None = None
+    calibration: Calibration | None = None
+    planes: Planes | None = None
+    depth: DepthMap | Callable[[], DepthMap] | None = None
+    volume: Volume | None = None
+    facts: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        if all(part is None for part in (self.views, self.raw, self.planes, self.volume)):
+            raise LumigraphError(f"{self.name} has nothing to show: no views, raw image, stack or volume.")
+        for part in (self.views, self.raw, self.volume):
+            if part is not None:
+                check_shown(self.name, part)
+
+
+def check_shown(name: str, part: Any) -> None:
+    """Refuse colours other than grey and RGB, and numbers that no screen shows."""
+    data, axes = part.data, {LightField: 4, RawImage: 2, Volume: 3}.get(type(part), 3)
+    channels = tuple(data.shape[axes:])
+    if channels not in ((), (1,), (3,)):
+        raise LumigraphError(f"{name} has {channels[0]} channels but grey or RGB can be shown. Choose three.")
+
+
+def focus_range(views: LightField) -> tuple[float, float]:
+    """Refocus factors (first, last) worth looking at: the outermost view moves by up to 14 lenslets.
+
+    In small pictures a tenth of the picture is enough, 3 lenslets at least.
+    """
+    reach = max(
+        max(abs(aperture)) / pitch
+        for aperture, pitch in zip(
+            (views.aperture.y, views.aperture.x), views.lenslets.pitch, strict=True
+        )
+    )  # fmt: skip
+    most = min(14.0, max(3.0, 0.1 * min(views.lenslets.shape)))
+    span = most / reach if reach > 0 else 0.5
+    return max(1 - span, 0.02), 1 + span
+
+
+def detail(views: LightField) -> int:
+    """Samples per lenslet that a small picture is shown with: a power of two, so that it has 200 pixels."""
+    times = 1
+    while times < _MOST_DETAIL and max(views.lenslets.shape) * times < _FEWEST_PIXELS:
+        times *= 2
+    return times
+
+
+def focal_stack(views: LightField, count: int = 33) -> Planes:
+    """Pictures focused through the whole range, by `lumigraph.refocus_stack`."""
+    from lumigraph.rendering import refocus_stack
+
+    alphas = np.linspace(*focus_range(views), count)
+    data = refocus_stack(grey_or_colour(views), alphas, oversample=detail(views))
+    return Planes(data, tuple(float(alpha) for alpha in alphas))
+
+
+def depth_map(views: LightField, count: int = 49) -> DepthMap:
+    """Depth by `lumigraph.depth.from_focus` over the whole range."""
+    from lumigraph.depth import from_focus
+
+    found = from_focus(grey_or_colour(views), np.linspace(*focus_range(views), count))
+    return DepthMap(found.alpha, found.confidence)
+
+
+def grey_or_colour(views: LightField) -> LightField:
+    """The light field without a colour axis of one channel."""
+    if len(views.data.shape) == 5 and views.data.shape[4] == 1:
+        return LightField(views.data[..., 0], views.aperture, views.lenslets, views.separation)
+    return views

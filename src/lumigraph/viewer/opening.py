@@ -1,0 +1,249 @@
+"""A file, or a raw image with its calibration, as an exhibit."""
+
+import tomllib
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lumigraph import io
+from lumigraph.core import checks
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.lightfield import LightField
+from lumigraph.core.raw import RawImage
+from lumigraph.core.stack import Stack
+from lumigraph.core.volume import Volume
+from lumigraph.errors import FormatError, SamplingWarning
+from lumigraph.viewer.exhibit import Exhibit, Planes, depth_map
+
+Progress = Callable[[str, float], None]
+
+_CAMERA_FILE = 1 << 20  # bytes; camera files have some hundred
+_PATCHES = 17
+_PATCH_SPAN = 0.35  # of the patch: 2.0 pictures from this much smaller to this much larger tiles
+_LABELS = {
+    "alpha": ("Focus α′", ""),
+    "dz [m]": ("Depth", "m"),
+    "lambda": ("Focus λ", ""),
+    "page": ("Page", ""),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """What a raw image needs to become views or pictures.
+
+    Parameters
+    ----------
+    calibration, white
+        File of a calibration, and of a white image, which a raw image is divided by.
+    patch
+        Of a camera 2.0 [px]: pictures with patches about this size.
+    """
+
+    calibration: Path | None = None
+    white: Path | None = None
+    patch: float | None = None
+
+
+def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | None = None) -> Exhibit:
+    """What a file, a folder of views or a camera's description shows.
+
+    Parameters
+    ----------
+    path
+        Anything `lumigraph.open` reads, a camera file (TOML) or the name of a bundled camera.
+    origin
+        Calibration or white image of a raw image.
+    progress
+        Called with what goes on and the fraction done.
+
+    Raises
+    ------
+    FormatError
+        Nothing there, or something that has no picture, such as a calibration.
+    LumigraphError
+        Whatever reading, decoding or simulating finds wrong.
+    """
+    tell = progress or (lambda what, done: None)
+    if is_camera(path):
+        return _simulated(path, tell)
+    tell("reading", 0.0)
+    found = io.open(path)
+    if isinstance(found, RawImage):
+        return _raw(path.name, found, origin or Origin(), tell)
+    if origin not in (None, Origin()):
+        raise FormatError(
+            f"{path} holds no raw image, so that --calibration, --white and --patch have no use."
+        )
+    match found:
+        case LightField():
+            return of_views(path.name, found)
+        case Stack():
+            return of_stack(path.name, found)
+        case Volume():
+            return of_volume(path.name, found)
+    raise FormatError(f"{path} holds a {type(found).__name__}, of which there is no picture.")
+
+
+def of_views(name: str, views: LightField) -> Exhibit:
+    """A light field, with depth when it is asked for."""
+    checks.finite_array(name, views.data, FormatError)
+    return Exhibit(name, views=views, depth=lambda: depth_map(views), facts=_about_views(views))
+
+
+def of_stack(name: str, stack: Stack) -> Exhibit:
+    """A stack of pictures, in ascending order of their positions."""
+    checks.finite_array(name, stack.data, FormatError)
+    positions = np.asarray(stack.positions or range(1, len(stack) + 1), float)
+    order = np.argsort(positions, kind="stable")
+    label, unit = _LABELS.get(stack.quantity, (stack.quantity, ""))
+    planes = Planes(to_numpy(stack.data)[order], tuple(positions[order].tolist()), label, unit)
+    facts = (("Pictures", f"{len(stack)} of {_size(stack.shape)}"), ("Numbers", _numbers(stack.data)))
+    return Exhibit(name, planes=planes, facts=facts)
+
+
+def of_volume(name: str, volume: Volume) -> Exhibit:
+    """Planes of space."""
+    checks.finite_array(name, volume.data, FormatError)
+    dz, dy, dx = (f"{step * 1e6:.4g} µm" for step in volume.spacing)
+    facts = (
+        ("Volume", " × ".join(map(str, volume.shape)) + " (z, y, x)"), ("Steps", f"{dz}, {dy}, {dx}"),
+        ("Numbers", _numbers(volume.data)),
+    )  # fmt: skip
+    return Exhibit(name, volume=volume, facts=facts)
+
+
+def of_raw(
+    name: str, raw: RawImage, calibration: Calibration | None = None, patch: float | None = None
+) -> Exhibit:
+    """A raw image; with a calibration also its views, or (camera 2.0) pictures with patches about `patch`."""
+    checks.finite_array(name, raw.data, FormatError)
+    facts = (
+        ("Raw image", f"{_size(raw.shape)}" + (f", Bayer {raw.bayer}" if raw.bayer else "")),
+        ("Numbers", _numbers(raw.data)),
+        *((("Pixels", f"{raw.pixel_pitch * 1e6:.4g} µm"),) if raw.pixel_pitch else ()),
+        *(tuple(_split(line) for line in calibration.report().splitlines()) if calibration else ()),
+    )  # fmt: skip
+    if calibration is None or raw.bayer is not None:
+        return Exhibit(name, raw=raw, calibration=calibration, facts=facts)
+    calibration.check_fits(raw.shape)
+    patch = patch if patch is not None else _own_patch(raw, calibration)
+    if patch is not None:
+        planes = rendered(raw, calibration, patch)
+        return Exhibit(name, raw=raw, calibration=calibration, planes=planes, facts=facts)
+    from lumigraph.rendering import decode
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SamplingWarning)  # of cameras 2.0, which have been looked for
+        views = decode(raw, calibration)
+    return Exhibit(
+        name, views=views, raw=raw, calibration=calibration, depth=lambda: depth_map(views),
+        facts=(*facts, *_about_views(views)),
+    )  # fmt: skip
+
+
+def rendered(raw: RawImage, calibration: Calibration, patch: float, count: int = _PATCHES) -> Planes:
+    """Pictures of a camera 2.0 with patches about `patch` [px], by `lumigraph.rendering.render_stack`."""
+    from lumigraph.rendering import render_stack
+
+    checks.finite("patch", patch, "px")
+    ends = patch * (1 - _PATCH_SPAN), patch * (1 + _PATCH_SPAN)
+    most = 0.98 * calibration.lattice.pitch
+    patches = np.clip(np.sort(np.linspace(*ends, count)), -most, most)
+    patches = np.unique(patches)
+    pictures = to_numpy(render_stack(raw, calibration, patches)).astype(np.float32, copy=False)
+    return Planes(pictures, tuple(patches.tolist()), "Patch", "px")
+
+
+def is_camera(path: Path) -> bool:
+    """Whether a path is a camera's description, or names a bundled camera."""
+    from lumigraph.instruments import catalogue
+
+    if not path.exists():
+        return len(path.parts) == 1 and str(path) in catalogue()
+    if path.suffix.lower() != ".toml" or not path.is_file() or path.stat().st_size > _CAMERA_FILE:
+        return False
+    try:
+        return "kind" in tomllib.loads(path.read_text("utf-8"))
+    except (ValueError, OSError):
+        return False  # `lumigraph.open` says what is wrong
+
+
+def _simulated(path: Path, tell: Progress) -> Exhibit:
+    """What a camera sees of a photograph, by wave optics."""
+    from lumigraph.instruments import load_camera
+    from lumigraph.scene import targets
+    from lumigraph.simulation import simulate
+
+    camera: Any = load_camera(path)
+    raw = simulate(
+        camera, targets.photo(camera.object_grid),
+        progress=lambda done, total: tell("simulating", done / max(total, 1)),
+    )  # fmt: skip
+    calibration, patch = getattr(camera, "calibration", None), getattr(camera, "patch", None)
+    return of_raw(path.name, raw, calibration, patch)
+
+
+def _raw(name: str, raw: RawImage, origin: Origin, tell: Progress) -> Exhibit:
+    from lumigraph import calibration as verbs
+
+    white = None if origin.white is None else _white(origin.white)
+    found = None
+    if origin.calibration is not None:
+        found = _calibration(origin.calibration, raw)
+    elif white is not None:
+        tell("calibrating", 0.3)
+        found = verbs.calibrate(white)
+    if white is not None and raw.bayer is None:
+        raw = verbs.devignette(raw, white)
+    tell("decoding", 0.6)
+    return of_raw(name, raw, found, origin.patch)
+
+
+def _white(path: Path) -> RawImage:
+    white = io.open(path)
+    if not isinstance(white, RawImage):
+        raise FormatError(f"{path} holds a {type(white).__name__} where a white image is needed.")
+    return white
+
+
+def _calibration(path: Path, raw: RawImage) -> Calibration:
+    """A calibration; makers' files do not say how large their raw images are."""
+    found: Any = io.open(path, shape=raw.shape if path.suffix.lower() in (".xml", ".ini") else None)
+    if not isinstance(found, Calibration):
+        raise FormatError(f"{path} holds a {type(found).__name__} where a calibration is needed.")
+    return found
+
+
+def _own_patch(raw: RawImage, calibration: Calibration) -> float | None:
+    """Patch of a camera 2.0 whose micro-images show the same sharp things; None of a camera 1.0."""
+    from lumigraph.rendering.kind_check import focused_shift
+
+    found = focused_shift(raw.data, calibration)
+    if found is None and calibration.lattice.kinds > 1:
+        return 0.3 * calibration.lattice.pitch  # lenslets of several kinds are those of a camera 2.0
+    return found
+
+
+def _about_views(views: LightField) -> tuple[tuple[str, str], ...]:
+    nv, nu, nt, ns = views.data.shape[:4]
+    colours = ", RGB" if len(views.data.shape) == 5 and views.data.shape[4] == 3 else ""
+    return ("Views", f"{nv} × {nu} of {_size((nt, ns))}{colours}"), ("Numbers", _numbers(views.data))
+
+
+def _size(shape: tuple[int, int]) -> str:
+    return f"{shape[1]} × {shape[0]} px"
+
+
+def _numbers(data: Any) -> str:
+    return f"{data.dtype} {float(data.min()):.4g} … {float(data.max()):.4g}"
+
+
+def _split(line: str) -> tuple[str, str]:
+    word, _, rest = line.strip().partition(" ")
+    return word.capitalize(), rest.strip()

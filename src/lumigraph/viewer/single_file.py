@@ -1,0 +1,158 @@
+"""The page as one file that works from disk, offline, and from any web server."""
+
+import base64
+import hashlib
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from lumigraph.errors import LumigraphError
+from lumigraph.io.target import check_target, write_bytes
+from lumigraph.viewer.encoding import Coded
+from lumigraph.viewer.exhibit import Exhibit
+from lumigraph.viewer.page import MODULES, about, static
+from lumigraph.viewer.parts import Parts
+
+LARGEST = 400 << 20
+"""Bytes: browsers hold a page's text in strings of little more than 512 MiB."""
+
+LOSSLESS = 100
+
+_EXACT_16 = 64 << 20  # bytes of 16-bit views that still go into a page without loss
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """What was written.
+
+    Parameters
+    ----------
+    path
+        The page.
+    size
+        Bytes of the page.
+    arrays
+        Bytes of each array in it, by name.
+    """
+
+    path: Path
+    size: int
+    arrays: dict[str, int]
+
+
+def export(
+    exhibits: Sequence[Exhibit], path: Path, *, quality: int = 90, progress: Progress | None = None
+) -> Exported:
+    """Write one self-contained page.
+
+    Parameters
+    ----------
+    exhibits
+        One, or two side by side.
+    path
+        HTML file.
+    quality
+        Of the views as WebP pictures, 1 to 99; 100 keeps every number.
+    progress
+        Called with what goes on and the fraction done.
+
+    Raises
+    ------
+    LumigraphError
+        The quality is not 1 to 100, or the page would be too large for a browser.
+    FormatError
+        The folder does not exist or the name does not end in .html.
+    """
+    path = check_target(path, (".html", ".htm"))
+    if not 1 <= quality <= LOSSLESS:
+        raise LumigraphError(f"quality is {quality} but must be from 1 to 100.")
+    parts = [Parts.of(exhibit) for exhibit in exhibits]
+    names = [(number, name) for number, part in enumerate(parts) for name in part.arrays]
+    blobs: dict[str, str] = {}
+    sizes: dict[str, int] = {}
+    for k, (number, name) in enumerate(names):
+        if progress is not None:
+            progress(name, k / len(names))
+        content = _blob(name, parts[number].arrays[name](), parts[number], quality)
+        sizes[f"{number}/{name}"] = len(content)
+        if sum(sizes.values()) * 4 / 3 > LARGEST:
+            raise LumigraphError(
+                f"the page would have more than {LARGEST >> 20} MiB, which browsers do not open. "
+                "Lower --quality, or export fewer views."
+            )
+        blobs[f"{number}/{name}"] = base64.b64encode(content).decode()
+    text = document(json.dumps(about(parts)), blobs).encode()
+    write_bytes(path, text)
+    return Exported(path, len(text), sizes)
+
+
+def document(description: str, blobs: dict[str, str]) -> str:
+    """The page with everything inside: styles and script allowed by their hashes alone, no connections."""
+    script, style = bundle(), static("style.css")
+    policy = (
+        f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; "
+        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
+    page = static("index.html")
+    data = [_inert("data-about", "application/json", description.replace("<", "\\u003c"))]
+    data += [_inert(f"data-{name}", "text/plain", blob) for name, blob in blobs.items()]
+    head = f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+    for old, new in (
+        ('<meta charset="utf-8">', f'<meta charset="utf-8">\n{head}'),
+        ('<link rel="stylesheet" href="app/style.css">', f"<style>{style}</style>"),
+        (
+            '<script type="module" src="app/main.js"></script>',
+            "\n".join(data) + f'\n<script type="module">{script}</script>',
+        ),
+    ):
+        if page.count(old) != 1:
+            raise LumigraphError(f"the page lacks {old!r}. Install lumigraph again.")
+        page = page.replace(old, new)
+    return page
+
+
+def bundle() -> str:
+    """All modules as one script: each in a function of its own, which gives what the module exports."""
+    return "\n" + "\n".join(_enclosed(static(name)) for name in MODULES)
+
+
+def _enclosed(text: str) -> str:
+    text = re.sub(r"^import\s[^;]*;\n", "", text, flags=re.MULTILINE)
+    start = r"^export (?=(?:async )?(?:function|class|const) (\w+))"
+    names = ", ".join(re.findall(start, text, flags=re.MULTILINE))
+    body = re.sub(start, "", text, flags=re.MULTILINE)
+    return f"const {{ {names} }} = (() => {{\n{body}return {{ {names} }};\n}})();"
+
+
+def _blob(name: str, coded: Coded, part: Parts, quality: int) -> bytes:
+    if name not in ("views", "stack") or (name == "stack" and "fallback" not in part.about["stack"]):
+        return coded.deflated()
+    numbers = coded.numbers.reshape(-1, *coded.numbers.shape[2:]) if name == "views" else coded.numbers
+    flat = Coded(numbers, coded.scale, coded.offset)
+    small = coded.bits == 16 and numbers.nbytes <= _EXACT_16 and name == "views"
+    if quality == LOSSLESS or small:
+        return flat.deflated()
+    return _eight_bits(flat, part.about[name]["white"]).pictures(quality)
+
+
+def _eight_bits(coded: Coded, white: float) -> Coded:
+    """Numbers of 8 bits, 0 to white; those that have 8 bits stay as they are."""
+    import numpy as np
+
+    if coded.bits == 8:
+        return coded
+    pictures = [np.clip(coded.offset + coded.scale * p.astype(np.float32), 0, white) for p in coded.numbers]
+    numbers = np.stack([np.rint(p / white * 255).astype(np.uint8) for p in pictures])
+    return Coded(numbers, white / 255, 0.0)
+
+
+def _inert(name: str, kind: str, text: str) -> str:
+    return f'<script type="{kind}" id="{name}">{text}</script>'
+
+
+def _hash(text: str) -> str:
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

@@ -1,0 +1,53 @@
+// Which views count, and how much: a window of the aperture, as lumigraph.reduce_aperture cuts it, moved.
+
+/** Rounds half to even, as Python does. */
+function roundEven(x) {
+  const low = Math.floor(x), rest = x - low;
+  return rest < 0.5 || (rest === 0.5 && low % 2 === 0) ? low : low + 1;
+}
+
+/** Views kept along each axis (v, u). */
+export function keptViews(views, fraction) {
+  return views.shape.slice(0, 2).map((n) => Math.max(1, roundEven(n * fraction)));
+}
+
+/** How far the middle (v, u) of the window can move: [[low, high], [low, high]] in views. */
+export function freedom(views, fraction) {
+  return keptViews(views, fraction).map((kept, axis) => {
+    const n = views.shape[axis], first = Math.floor(n / 2) - Math.floor(kept / 2);
+    const middle = Math.floor(n / 2);
+    return [middle - first, middle + n - kept - first];
+  });
+}
+
+/** The window's middle (v, u), inside what the fraction allows; the aperture's own middle for null. */
+export function middleView(views, fraction, view) {
+  return freedom(views, fraction).map(([low, high], axis) =>
+    view === null ? Math.floor(views.shape[axis] / 2) : Math.min(high, Math.max(low, view[axis])));
+}
+
+/** Weights (v, u): those of the kept views, shared linearly between neighbours where the middle is between. */
+export function viewWeights(views, { aperture, shape, view }) {
+  const [nv, nu] = views.shape, kept = keptViews(views, aperture), middle = middleView(views, aperture, view);
+  const weights = new Float32Array(nv * nu);
+  const start = middle.map((m, axis) => m - Math.floor(kept[axis] / 2));
+  const whole = start.map(Math.floor), rest = start.map((s, axis) => s - whole[axis]);
+  for (let j = 0; j < kept[0]; j++) for (let i = 0; i < kept[1]; i++) {
+    const y = (j - (kept[0] - 1) / 2) / (kept[0] / 2), x = (i - (kept[1] - 1) / 2) / (kept[1] / 2);
+    if (shape === "round" && y * y + x * x > 1) continue;
+    for (const [dv, wv] of [[0, 1 - rest[0]], [1, rest[0]]]) for (const [du, wu] of [[0, 1 - rest[1]], [1, rest[1]]]) {
+      const v = whole[0] + j + dv, u = whole[1] + i + du;
+      if (wv * wu > 0 && v >= 0 && v < nv && u >= 0 && u < nu && views.lit[v * nu + u] === "1") {
+        weights[v * nu + u] += wv * wu;
+      }
+    }
+  }
+  return weights;
+}
+
+/** How far each view is moved along an axis (0: t, 1: s) to focus on alpha: first view's, and the step [lenslets]. */
+export function viewShifts(views, alpha, axis) {
+  const { pitch, center, shape } = views.aperture, lenslet = views.lenslets.pitch[axis];
+  const step = (pitch[axis] * (1 - alpha)) / lenslet;
+  return { first: (center[axis] * (1 - alpha)) / lenslet - Math.floor(shape[axis] / 2) * step, step };
+}

@@ -1,0 +1,157 @@
+// The controls beside the picture, and what they say.
+
+import { freedom, keptViews, middleView, viewShifts } from "./aperture.js";
+import { MAPS } from "./colours.js";
+import { depthMap } from "./models.js";
+import { lengthText } from "./overlay.js";
+import { cachedMap } from "./tone.js";
+
+const by = (id) => document.getElementById(id);
+const SELECTS = { shape: String, detail: Number, projection: String, map: String, channel: String };
+const RANGES = ["focus", "trust", "plane", "ev", "gamma"];
+const CHECKS = ["epi", "lattice", "smooth"];
+
+export class Controls {
+  constructor(app) {
+    this.app = app;
+    for (const name of MAPS) by("map").append(new Option(name[0].toUpperCase() + name.slice(1), name));
+    for (const id of RANGES) by(id).addEventListener("input", (e) => app.set({ [id]: Number(e.target.value) }));
+    for (const [id, read] of Object.entries(SELECTS)) by(id).addEventListener("change", (e) => app.set({ [id]: read(e.target.value) }));
+    for (const id of CHECKS) by(id).addEventListener("change", (e) => app.set({ [id]: e.target.checked }));
+    by("aperture").addEventListener("input", (e) => app.set({ aperture: Math.max(0.001, Number(e.target.value) / 100) }));
+    by("open").addEventListener("click", () => app.set({ aperture: 1, view: null }));
+    by("close").addEventListener("click", () => app.set({ aperture: 0.001 }));
+    for (const button of by("modes").children) button.addEventListener("click", () => app.set({ mode: button.dataset.mode }));
+    by("modes").addEventListener("keydown", (event) => this.walk(event));
+    this.pad();
+  }
+
+  /** Arrow keys inside the row of modes, as radio buttons have them. */
+  walk(event) {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!step) return;
+    const shown = [...by("modes").children].filter((button) => !button.hidden);
+    const next = shown[(shown.indexOf(document.activeElement) + step + shown.length) % shown.length];
+    event.preventDefault(); event.stopPropagation();
+    next.focus(); next.click();
+  }
+
+  /** The aperture in small: drag in it to move the viewpoint. */
+  pad() {
+    const pad = by("pad"), move = (event) => {
+      if (!event.buttons) return;
+      const { views } = this.app.main.model, box = pad.getBoundingClientRect();
+      const place = [(event.clientY - box.top) / box.height, (event.clientX - box.left) / box.width];
+      const aperture = freedom(views, this.app.state.aperture).every(([low, high]) => low === high) ? 0.001 : this.app.state.aperture;
+      const range = freedom(views, aperture), even = keptViews(views, aperture).map((k) => (k % 2 ? 0 : 0.5));
+      this.app.set({ aperture, view: place.map((p, k) => Math.min(range[k][1], Math.max(range[k][0], p * views.shape[k] - 0.5 + even[k]))) });
+    };
+    pad.addEventListener("pointerdown", (event) => { pad.setPointerCapture(event.pointerId); move(event); });
+    pad.addEventListener("pointermove", move);
+  }
+
+  drawPad() {
+    const { views } = this.app.main.model, { state } = this.app, pad = by("pad"), ratio = Math.min(devicePixelRatio, 2), side = 120 * ratio;
+    if (pad.width !== side) pad.width = pad.height = side;
+    const context = pad.getContext("2d"), [nv, nu] = views.shape, kept = keptViews(views, state.aperture), middle = middleView(views, state.aperture, state.view);
+    const style = getComputedStyle(document.documentElement), cell = [side / nv, side / nu];
+    context.clearRect(0, 0, side, side);
+    context.fillStyle = style.getPropertyValue("--soft");
+    context.globalAlpha = 0.45;
+    const step = Math.max(1, Math.ceil(Math.max(nv, nu) / 24));
+    for (let v = 0; v < nv; v += step) for (let u = 0; u < nu; u += step) {
+      if (views.lit[v * nu + u] !== "1") continue;
+      context.beginPath(); context.arc((u + 0.5) * cell[1], (v + 0.5) * cell[0], 1.6 * ratio, 0, 7); context.fill();
+    }
+    const [top, left] = middle.map((m, k) => (m - Math.floor(kept[k] / 2)) * cell[k]), size = kept.map((k, i) => k * cell[i]);
+    context.fillStyle = context.strokeStyle = style.getPropertyValue("--mark");
+    context.lineWidth = 2 * ratio;
+    context.beginPath();
+    if (state.shape === "round") context.ellipse(left + size[1] / 2, top + size[0] / 2, size[1] / 2, size[0] / 2, 0, 0, 7);
+    else context.rect(left, top, size[1], size[0]);
+    context.globalAlpha = 0.28; context.fill();
+    context.globalAlpha = 1; context.stroke();
+    const text = `view ${middle.map((m) => m.toFixed(1)).join(", ")} of ${nv} × ${nu}`;
+    pad.setAttribute("aria-valuetext", text);
+    pad.setAttribute("aria-valuenow", String(Math.round(middle[1])));
+    pad.setAttribute("aria-valuemax", String(nu - 1));
+    const baseline = views.aperture.pitch[1];
+    const off = middle.map((m, k) => (m - Math.floor(views.shape[k] / 2)) * views.aperture.pitch[k]);
+    const place = views.metric ? ` (y ${lengthText(off[0])}, x ${lengthText(off[1])})` : "";
+    by("view-out").textContent = `Viewpoint ${text}${place}.${baseline ? " Drag the picture, or here." : ""}`;
+  }
+
+  refresh() {
+    const { state, main: { model } } = this.app, { about } = model;
+    for (const button of by("modes").children) {
+      const mode = button.dataset.mode, there = this.app.panes.some((pane) => pane.model.modes[mode]);
+      button.hidden = !there;
+      button.setAttribute("aria-checked", String(state.mode === mode));
+      button.tabIndex = state.mode === mode ? 0 : -1;
+    }
+    by("modes").hidden = [...by("modes").children].filter((button) => !button.hidden).length < 2;
+    for (const group of document.querySelectorAll("[data-modes]")) group.hidden = !group.dataset.modes.includes(state.mode);
+    for (const part of document.querySelectorAll('[data-part="views"]')) part.hidden ||= !model.views;
+    for (const part of document.querySelectorAll('[data-part="lattice"]')) part.hidden = !about.raw?.lattice;
+    this.focus(model, state);
+    if (model.views) this.aperture(model, state);
+    if (about.volume) this.volume(about.volume, state);
+    if (state.mode === "depth") this.depth(model, state);
+    const channels = this.app.main.image?.plain ? 3 : this.app.main.image?.channels ?? 1;
+    document.querySelector('[data-colour="channel"]').hidden = channels !== 3 || state.mode === "depth";
+    document.querySelector('[data-colour="map"]').hidden = channels === 3 && state.channel === "colour" && state.mode !== "depth";
+    for (const id of ["ev", "gamma"]) by(id).value = state[id];
+    by("ev-out").value = `${state.ev > 0 ? "+" : ""}${state.ev.toFixed(2)} EV`;
+    by("gamma-out").value = state.gamma.toFixed(2);
+    for (const id of ["shape", "projection", "map", "channel"]) by(id).value = state[id];
+    for (const id of CHECKS) by(id).checked = state[id];
+  }
+
+  focus(model, state) {
+    const [low, high] = model.focus, { stack } = model.about, input = by("focus");
+    Object.assign(input, { min: low, max: high, value: state.focus });
+    by("focus-label").textContent = model.views ? "Focus α′" : stack?.label ?? "Focus";
+    if (model.views) {
+      const shift = viewShifts(model.views, state.focus, 1).step, plane = model.views.metric ? ` · image at ${lengthText(model.views.separation / state.focus)}` : "";
+      by("focus-out").value = `${state.focus.toFixed(4)} · ${shift >= 0 ? "+" : "−"}${Math.abs(shift).toFixed(2)} px per view${plane}`;
+    } else by("focus-out").value = `${Number((this.app.main.image?.position ?? state.focus).toPrecision(5))} ${stack?.unit ?? ""}`;
+    input.setAttribute("aria-valuetext", by("focus-out").value);
+  }
+
+  aperture(model, state) {
+    const kept = keptViews(model.views, state.aperture), exact = model.refocuser && state.renderer !== "stack";
+    by("aperture").value = 100 * state.aperture;
+    by("aperture-out").value = `${kept[0]} × ${kept[1]} views`;
+    by("detail").value = state.detail ?? model.views.detail;
+    for (const id of ["shape", "detail"]) by(id).disabled = model.complete && !exact;
+    this.drawPad();
+  }
+
+  volume(volume, state) {
+    const input = by("plane"), last = volume.depths.length - 1, k = Math.min(last, state.plane ?? Math.floor((last + 1) / 2));
+    Object.assign(input, { max: last, value: k });
+    by("plane-out").value = `${k + 1} of ${last + 1} · z ${lengthText(volume.depths[k])}`;
+    input.setAttribute("aria-valuetext", by("plane-out").value);
+    input.disabled = state.projection !== "plane";
+    by("projection").value = state.projection;
+  }
+
+  depth(model, state) {
+    by("trust").value = state.trust;
+    by("trust-out").value = state.trust.toFixed(2);
+    const range = model.depthRange(), map = cachedMap(depthMap(state));
+    const colours = Array.from({ length: 17 }, (_, k) => { const i = 4 * Math.round((k * 255) / 16); return `rgb(${map[i]} ${map[i + 1]} ${map[i + 2]})`; });
+    by("legend-bar").style.background = `linear-gradient(to right, ${colours.join(", ")})`;
+    by("legend-low").textContent = range ? range[0].toFixed(3) : "";
+    by("legend-high").textContent = range ? range[1].toFixed(3) : "";
+    by("legend-label").textContent = `${model.about.depth.label} ${model.about.depth.unit}`.trim();
+  }
+
+  facts(exhibits) {
+    by("facts").replaceChildren(...exhibits.flatMap((about) => [["File", about.name], ...about.facts]).flatMap(([what, value]) => {
+      const [term, text] = [document.createElement("dt"), document.createElement("dd")];
+      term.textContent = what; text.textContent = value;
+      return [term, text];
+    }));
+  }
+}

@@ -1,0 +1,181 @@
+// The page: settings, panes, controls, the link.
+
+import { Controls } from "./controls.js";
+import { listenToKeys } from "./keys.js";
+import { Model } from "./models.js";
+import { Pane } from "./pane.js";
+import { isExported, loadAbout } from "./source.js";
+import { defaults, linkOf, parseLink } from "./state.js";
+
+class App {
+  changedAt = -1e9;
+  panes = [];
+
+  constructor(about) {
+    this.about = about;
+    const models = about.exhibits.map((exhibit, k) => new Model(k, exhibit, () => this.schedule()));
+    this.base = { ...defaults(), focus: models[0].startFocus, mode: Object.entries(models[0].modes).find(([, there]) => there)[0] };
+    this.state = { ...this.base };
+    this.read();
+    document.getElementById("panes").classList.toggle("two", models.length > 1);
+    for (const model of models) {
+      const root = document.createElement("section");
+      document.getElementById("panes").append(root);
+      this.panes.push(new Pane(root, model, this));
+    }
+    this.main = this.panes[0];
+    this.controls = new Controls(this);
+    this.controls.facts(about.exhibits);
+    this.colours();
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { this.colours(); this.schedule(); });
+    addEventListener("hashchange", () => { if (location.hash !== this.link) { this.state = { ...this.base }; this.read(); this.touched(); } });
+    document.title = `${models.map((model) => model.about.name).join(" and ")} – lumigraph`;
+    document.getElementById("title").textContent = models.map((model) => model.about.name).join(" and ");
+  }
+
+  /** Settings out of the link; a mode that is not there is left out. */
+  read() {
+    const found = parseLink(location.hash);
+    if (found.mode && !this.about.exhibits.some((exhibit) => new Model(0, exhibit).modes[found.mode])) delete found.mode;
+    Object.assign(this.state, found);
+  }
+
+  colours() {
+    const style = getComputedStyle(document.documentElement), text = style.getPropertyValue("--ground").trim();
+    this.ground = [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16) / 255);
+    this.line = style.getPropertyValue("--line").trim();
+  }
+
+  set = (changes) => {
+    if ("mode" in changes && changes.mode !== this.state.mode) Object.assign(changes, { at: null, zoom: 1 });
+    Object.assign(this.state, changes);
+    this.touched();
+  };
+
+  touched() {
+    this.changedAt = performance.now();
+    this.schedule();
+  }
+
+  schedule() {
+    if (this.frame) return;
+    this.frame = requestAnimationFrame((now) => { this.frame = 0; this.draw(Math.max(now, performance.now())); });
+  }
+
+  draw(now) {
+    const shown = this.panes.map((pane) => pane.draw(now));
+    if (shown[0] && !this.first) { this.first = performance.now(); performance.mark("first-picture"); }
+    this.controls.refresh();
+    this.say();
+    clearTimeout(this.linking);
+    this.linking = setTimeout(() => this.writeLink(), 250);
+    for (const wake of this.waiting?.splice(0) ?? []) wake();
+  }
+
+  writeLink() {
+    this.link = linkOf(this.state, this.base);
+    if (this.link === "#" && !location.hash) return;
+    history.replaceState(null, "", this.link === "#" ? location.pathname + location.search : this.link);
+  }
+
+  /** What is going on. */
+  say() {
+    if (this.told && performance.now() < this.told) return;
+    const { model } = this.main, failed = Object.values(model.errors)[0], status = document.getElementById("status");
+    const missing = [...model.wanted].filter((name) => !model.arrays[name] && !model.errors[name]);
+    let text = "";
+    if (failed) text = failed;
+    else if (model.views && !model.complete) text = "Loading views …";
+    else if (missing.some((name) => name === "depth" || name === "confidence")) text = "Measuring depth …";
+    else if (missing.includes("stack")) text = "Preparing the focal stack …";
+    else if (missing.length) text = "Loading …";
+    else if (model.views && !model.refocuser) text = "Without WebGL 2: focal stack";
+    else text = this.main.kept()?.every((n) => n === 1) && this.state.mode === "picture" ? "One view" : "";
+    status.textContent = text;
+    status.classList.toggle("wrong", Boolean(failed));
+  }
+
+  tell(text, wrong = false) {
+    const status = document.getElementById("status");
+    status.textContent = text;
+    status.classList.toggle("wrong", wrong);
+    this.told = performance.now() + 3500;
+    setTimeout(() => this.schedule(), 3600);
+  }
+
+  /** Draws and waits until the exact picture is there. */
+  async settled() {
+    this.changedAt = -1e9;
+    await new Promise((wake) => { (this.waiting ??= []).push(wake); this.schedule(); });
+  }
+}
+
+function fileName(app) {
+  const { state, main } = app, stem = main.model.about.name.replace(/\.[^.]*$/, "");
+  const what = { picture: `focus-${state.focus.toFixed(4)}`, raw: "raw", depth: "depth", volume: `plane-${(state.plane ?? 0) + 1}` }[state.mode];
+  return `${stem}-${what}.png`;
+}
+
+/** Every pane's picture side by side, in its own size, with square pixels. */
+export function pictureCanvas(app) {
+  const parts = app.panes.map((pane) => pane.pixels()).filter(Boolean), sheet = document.createElement("canvas");
+  const sizes = parts.map(({ width, height, aspect }) => [width, Math.max(1, Math.round(height * aspect))]);
+  sheet.width = sizes.reduce((sum, [w]) => sum + w, 0);
+  sheet.height = Math.max(...sizes.map(([, h]) => h));
+  let left = 0;
+  parts.forEach(({ width, height, data }, k) => {
+    const one = document.createElement("canvas");
+    Object.assign(one, { width, height });
+    one.getContext("2d").putImageData(new ImageData(data, width, height), 0, 0);
+    sheet.getContext("2d").drawImage(one, left, 0, ...sizes[k]);
+    left += sizes[k][0];
+  });
+  return sheet;
+}
+
+async function savePicture(app) {
+  await app.settled();
+  const blob = await new Promise((done) => pictureCanvas(app).toBlob(done, "image/png")), link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = fileName(app);
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  app.tell(`Saved ${link.download}`);
+}
+
+async function copyLink(app) {
+  app.writeLink();
+  try { await navigator.clipboard.writeText(location.href); app.tell("Link copied."); } catch { app.tell("The address bar holds the link."); }
+}
+
+function wire(app) {
+  const actions = {
+    s: () => savePicture(app), 0: () => app.set({ zoom: 1, at: null }), "?": () => document.getElementById("keys").showModal(),
+    "+": () => zoom(1.25), "=": () => zoom(1.25), "-": () => zoom(0.8),
+  };
+  const zoom = (factor) => { const box = app.main.stage.getBoundingClientRect(); app.main.zoomAt([box.width / 2, box.height / 2], factor); };
+  const on = (id, act) => document.getElementById(id).addEventListener("click", act);
+  on("save", actions.s); on("fit", actions[0]); on("help", actions["?"]); on("link", () => copyLink(app));
+  on("reset", () => { app.state = { ...app.base, mode: app.state.mode, renderer: app.state.renderer }; app.touched(); });
+  on("pixel", () => zoom(1 / ((app.main.scale[0] / app.main.image.detail) / app.main.ratio)));
+  listenToKeys(app, actions);
+}
+
+async function open() {
+  const status = document.getElementById("status");
+  try {
+    const app = new App(await loadAbout());
+    window.lumigraph = { app, set: async (changes) => { app.set(changes); await app.settled(); }, pixels: (k = 0) => app.panes[k].pixels(), picture: () => pictureCanvas(app) };
+    wire(app);
+    app.schedule();
+    await Promise.all(app.panes.filter(({ model }) => model.views).map((pane) => pane.model.loadViews(pane.device, isExported())));
+    window.lumigraph.ready = true;
+    app.schedule();
+  } catch (error) {
+    status.textContent = `This page cannot be shown: ${error.message}`;
+    status.classList.add("wrong");
+    throw error;
+  }
+}
+
+open();

@@ -1,0 +1,231 @@
+// One exhibit: its arrays as they come, and the image that the settings ask for.
+
+import { middleView, viewWeights } from "./aperture.js";
+import { Refocuser } from "./refocus.js";
+import { loadArray } from "./source.js";
+import { cachedMap } from "./tone.js";
+
+const SLOW = 45; // ms for one refocused picture, above which a focal stack is shown while the focus moves
+
+export class Model {
+  constructor(number, about, changed) {
+    Object.assign(this, { number, about, changed, arrays: {}, wanted: new Set(), errors: {}, slow: false, complete: false });
+    this.views = about.views ? { ...about.views } : null;
+  }
+
+  get modes() {
+    const { views, stack, raw, depth, volume } = this.about;
+    return { picture: Boolean(views || stack), raw: Boolean(raw), depth: Boolean(depth), volume: Boolean(volume) };
+  }
+
+  /** Range of the focus: of the views, or of a stack. */
+  get focus() {
+    const { views, stack } = this.about;
+    return views?.focus ?? (stack ? [stack.positions[0], stack.positions.at(-1)] : [0, 1]);
+  }
+
+  get startFocus() {
+    if (this.views) return 1;
+    return this.about.stack ? this.about.stack.positions[Math.floor(this.about.stack.positions.length / 2)] : 1;
+  }
+
+  /** An array when it is there; null, and asked for, when not yet. */
+  need(name) {
+    if (this.arrays[name] || this.wanted.has(name)) return this.arrays[name] ?? null;
+    this.wanted.add(name);
+    loadArray(`${this.number}/${name}`)
+      .then((array) => { this.arrays[name] = array; })
+      .catch((error) => { this.errors[name] = error.message; })
+      .finally(this.changed);
+    return null;
+  }
+
+  /** Loads the views: the middle one first, so that there is a picture at once. */
+  async loadViews(device, exported) {
+    const { views } = this, [nv, nu, nt, ns] = views.shape, size = nt * ns * views.channels;
+    const chunks = exported ? [[0, nv * nu]] : views.chunks;
+    const ask = (k) => loadArray(exported ? `${this.number}/views` : `${this.number}/views/${k}`);
+    let next = ask(0);
+    for (let k = 0; k < chunks.length; k++) {
+      const part = await next, [first, count] = chunks[k];
+      if (k + 1 < chunks.length) next = ask(k + 1);
+      if (!views.numbers) this.beginViews(part, nv * nu * size, device);
+      views.numbers.set(part.numbers, first * size);
+      this.refocuser?.add(first, count, part.numbers);
+      if (k === 0) this.changed();
+    }
+    this.complete = true;
+    if (this.refocuser) this.measure(device);
+    this.changed();
+  }
+
+  beginViews(part, length, device) {
+    const { views } = this;
+    Object.assign(views, { bits: part.bits, scale: part.scale, offset: part.offset, numbers: new part.numbers.constructor(length) });
+    if (device.kind !== "webgl") return;
+    try { this.refocuser = new Refocuser(device, views); } catch (error) { this.errors.webgl = error.message; }
+  }
+
+  /** Whether this machine refocuses in time; the first picture is drawn twice, because shaders are compiled late. */
+  measure(device) {
+    const weights = viewWeights(this.views, { aperture: 1, shape: "square", view: null });
+    for (let k = 0; k < 2; k++) {
+      const start = performance.now();
+      this.refocuser.picture(1 + 1e-3, weights, this.views.detail);
+      device.finish();
+      this.took = performance.now() - start;
+      if (this.took > 4 * SLOW) break;
+    }
+    this.slow = this.took > SLOW;
+  }
+
+  /** What to show: {nx, ny, channels, numbers or texture, ... , base: [ny, nx], detail, aspect}; null if not yet. */
+  image(state, device, settled) {
+    if (!this.modes[state.mode]) return null;
+    return { picture: this.picture, raw: this.rawImage, depth: this.depthImage, volume: this.volumeImage }[state.mode]
+      .call(this, state, device, settled);
+  }
+
+  picture(state, device, settled) {
+    const { views } = this;
+    if (!views) return this.plane(state.focus);
+    if (!views.numbers) return null;
+    const forced = state.renderer === "stack", whole = state.aperture === 1;
+    if (this.complete && this.refocuser && !forced && (settled || !this.slow || !whole || !this.arrays.stack)) {
+      if (this.slow) this.need("stack");
+      const weights = viewWeights(views, state), detail = state.detail ?? views.detail;
+      return this.seen({ ...this.refocuser.picture(state.focus, weights, detail), detail, exact: true });
+    }
+    if (this.complete && (!this.refocuser || forced || this.slow) && whole) {
+      const plane = this.plane(state.focus);
+      if (plane) return plane;
+    }
+    return this.oneView(middleView(views, state.aperture, state.view).map(Math.round));
+  }
+
+  seen(image) {
+    const { views } = this, [pt, ps] = views.lenslets.pitch;
+    return {
+      white: views.white, scale: views.scale, offset: views.offset, channels: views.channels, bits: views.bits,
+      base: views.shape.slice(2), aspect: pt / ps, detail: 1, ...image,
+    };
+  }
+
+  /** One view as it is. */
+  oneView([v, u]) {
+    const { views } = this, [, nu, nt, ns] = views.shape, size = nt * ns * views.channels, index = v * nu + u;
+    if (!this.complete) this.single ??= views.numbers.slice(index * size, (index + 1) * size);
+    else if (this.singleIndex !== index) { this.single = views.numbers.slice(index * size, (index + 1) * size); this.singleIndex = index; }
+    return this.seen({ nx: ns, ny: nt, numbers: this.single });
+  }
+
+  /** The plane of the focal stack nearest to a focus. */
+  plane(focus) {
+    const array = this.need("stack"), { stack } = this.about;
+    if (!array) return null;
+    let k = 0;
+    stack.positions.forEach((p, i) => { if (Math.abs(p - focus) < Math.abs(stack.positions[k] - focus)) k = i; });
+    const [, ny, nx] = array.shape, channels = array.shape[3] ?? 1, image = slice(array, k, [ny, nx, channels]);
+    const own = { white: stack.white, scale: array.scale, offset: array.offset, channels, bits: array.bits, position: stack.positions[k] };
+    if (!this.views) return { ...image, ...own, base: [ny, nx], aspect: 1, detail: 1 };
+    return this.seen({ ...image, ...own, detail: nx > 1 ? (nx - 1) / Math.max(this.views.shape[3] - 1, 1) : 1 });
+  }
+
+  rawImage() {
+    const array = this.need("raw");
+    if (!array) return null;
+    const [ny, nx] = array.shape;
+    return { nx, ny, channels: array.shape[2] ?? 1, numbers: array.numbers, ...coding(array), white: this.about.raw.white, base: [ny, nx], aspect: 1, detail: 1, unit: this.about.raw.pitch };
+  }
+
+  volumeImage(state) {
+    const array = this.need("volume"), { volume } = this.about;
+    if (!array) return null;
+    const [nz, ny, nx] = array.shape, channels = array.shape[3] ?? 1, [dz, dy, dx] = volume.spacing;
+    const common = { channels, ...coding(array), white: volume.white, detail: 1 };
+    if (state.projection === "plane") {
+      const k = Math.min(nz - 1, state.plane ?? Math.floor(nz / 2));
+      return { ...slice(array, k, [ny, nx, channels]), ...common, base: [ny, nx], aspect: dy / dx, unit: dx };
+    }
+    array.projections ??= {};
+    const image = (array.projections[state.projection] ??= projection(array.numbers, [nz, ny, nx, channels], state.projection));
+    const sizes = { "max-z": [dy, dx], "max-y": [dz || dx, dx], "max-x": [dy, dz || dy] }[state.projection];
+    return { ...image, ...common, base: [image.ny, image.nx], aspect: sizes[0] / sizes[1], unit: sizes[1] };
+  }
+
+  /** Depths in colours, hatched grey where the confidence is low. */
+  depthImage(state) {
+    const depth = this.need("depth"), confidence = this.need("confidence");
+    if (!depth || !confidence) return null;
+    const key = `${state.map}/${state.trust}`;
+    if (this.depthKey !== key) {
+      this.depthKey = key;
+      this.depthColours = coloured(depth, confidence, depthMap(state), state.trust);
+    }
+    const [ny, nx] = depth.shape, aspect = this.views ? this.views.lenslets.pitch[0] / this.views.lenslets.pitch[1] : 1;
+    return { nx, ny, channels: 3, bits: 8, scale: 1, offset: 0, white: 255, numbers: this.depthColours, base: [ny, nx], aspect, detail: 1, plain: true };
+  }
+
+  /** Least and largest depth. */
+  depthRange() {
+    const depth = this.arrays.depth;
+    if (!depth) return null;
+    if (!depth.range) {
+      let low = Infinity, high = -Infinity;
+      for (const x of depth.numbers) { if (x < low) low = x; if (x > high) high = x; }
+      depth.range = [low, high];
+    }
+    return depth.range.map((x) => depth.offset + depth.scale * x);
+  }
+
+  depthAt(y, x) {
+    const { depth, confidence } = this.arrays;
+    if (!depth || !confidence) return null;
+    const [ny, nx] = depth.shape, k = Math.round(y) * nx + Math.round(x);
+    if (y < -0.5 || x < -0.5 || y >= ny - 0.5 || x >= nx - 0.5) return null;
+    return { value: depth.offset + depth.scale * depth.numbers[k], confidence: confidence.numbers[k] / 255 };
+  }
+}
+
+export function depthMap(state) {
+  return state.map === "grey" ? "turbo" : state.map;
+}
+
+function coding({ bits, scale, offset }) {
+  return { bits, scale, offset };
+}
+
+/** Picture k of an array; always the same object for the same k, so that its texture is made once. */
+function slice(array, k, [ny, nx, channels]) {
+  array.slices ??= [];
+  array.slices[k] ??= { nx, ny, numbers: array.numbers.subarray(k * ny * nx * channels, (k + 1) * ny * nx * channels) };
+  return array.slices[k];
+}
+
+function projection(numbers, [nz, ny, nx, channels], kind) {
+  const [rows, columns, depth] = { "max-z": [ny, nx, nz], "max-y": [nz, nx, ny], "max-x": [ny, nz, nx] }[kind];
+  const at = { "max-z": (r, c, d) => (d * ny + r) * nx + c, "max-y": (r, c, d) => (r * ny + d) * nx + c, "max-x": (r, c, d) => (c * ny + r) * nx + d }[kind];
+  const out = new numbers.constructor(rows * columns * channels);
+  for (let r = 0; r < rows; r++) for (let c = 0; c < columns; c++) for (let k = 0; k < channels; k++) {
+    let most = 0;
+    for (let d = 0; d < depth; d++) { const x = numbers[at(r, c, d) * channels + k]; if (x > most) most = x; }
+    out[(r * columns + c) * channels + k] = most;
+  }
+  return { nx: columns, ny: rows, numbers: out };
+}
+
+function coloured(depth, confidence, name, trust) {
+  const map = cachedMap(name), n = depth.numbers.length, nx = depth.shape[1], out = new Uint8Array(3 * n);
+  let low = Infinity, high = -Infinity;
+  for (const x of depth.numbers) { if (x < low) low = x; if (x > high) high = x; }
+  for (let i = 0; i < n; i++) {
+    if (confidence.numbers[i] < 255 * trust) {
+      const grey = ((i % nx) + Math.floor(i / nx)) % 8 < 4 ? 116 : 134;
+      out[3 * i] = out[3 * i + 1] = out[3 * i + 2] = grey;
+      continue;
+    }
+    const k = 4 * Math.round((255 * (depth.numbers[i] - low)) / Math.max(high - low, 1));
+    for (let c = 0; c < 3; c++) out[3 * i + c] = map[k + c];
+  }
+  return out;
+}

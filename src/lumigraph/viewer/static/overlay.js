@@ -1,0 +1,89 @@
+// What is drawn over a picture: lattice, pointer lines, the last click, a scale bar.
+
+const KINDS = ["#ff5a36", "#2fd27a", "#47a3ff"];
+
+/** Prepares a canvas over the stage, in CSS pixels. */
+export function clearOverlay(canvas, ratio) {
+  const context = canvas.getContext("2d");
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, canvas.width / ratio, canvas.height / ratio);
+  return context;
+}
+
+/** Outlines of lenslets, coloured by kind, with their centres where they are large enough. */
+export function drawLattice(context, lattice, { toScreen, scale, width, height, bounds }) {
+  const [[y0, x0], [y1, x1]] = lattice.basis, [oy, ox] = lattice.origin, area = y1 * x0 - y0 * x1;
+  const radius = (lattice.pitch * scale) / 2;
+  if (radius < 2.5) return false;
+  const inverse = (y, x) => [((y - oy) * x0 - (x - ox) * y0) / area, ((x - ox) * y1 - (y - oy) * x1) / area];
+  const corners = [[bounds.top, bounds.left], [bounds.top, bounds.right], [bounds.bottom, bounds.left], [bounds.bottom, bounds.right]]
+    .map(([y, x]) => inverse(y, x));
+  const range = (k) => [Math.floor(Math.min(...corners.map((c) => c[k]))) - 1, Math.ceil(Math.max(...corners.map((c) => c[k]))) + 1];
+  const [i0, i1] = range(0), [j0, j1] = range(1), cell = outline(lattice, scale);
+  context.lineWidth = 1.25;
+  const paths = Array.from({ length: lattice.kinds }, () => new Path2D());
+  for (let i = i0; i <= i1; i++) for (let j = j0; j <= j1; j++) {
+    const [x, y] = toScreen(oy + i * y1 + j * y0, ox + i * x1 + j * x0);
+    if (x < -radius || y < -radius || x > width + radius || y > height + radius) continue;
+    const path = paths[(((j - i) % lattice.kinds) + lattice.kinds) % lattice.kinds];
+    cell.forEach(([dx, dy], k) => (k ? path.lineTo(x + dx, y + dy) : path.moveTo(x + dx, y + dy)));
+    path.closePath();
+    if (radius > 9) { path.moveTo(x - 3, y); path.lineTo(x + 3, y); path.moveTo(x, y - 3); path.lineTo(x, y + 3); }
+  }
+  paths.forEach((path, kind) => { context.strokeStyle = KINDS[kind]; context.stroke(path); });
+  return true;
+}
+
+/** Corners of a lenslet's cell around its centre [screen px]. */
+function outline({ basis: [[y0, x0], [y1, x1]], layout }, scale) {
+  if (layout !== "hex") return [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([a, b]) => [((a * x0 + b * x1) / 2) * scale, ((a * y0 + b * y1) / 2) * scale]);
+  const steps = [[1, 0], [0, 1], [-1, 1], [-1, 0], [0, -1], [1, -1]].map(([j, i]) => [j * x0 + i * x1, j * y0 + i * y1]);
+  return steps.map(([x, y], k) => [((x + steps[(k + 1) % 6][0]) / 3) * scale, ((y + steps[(k + 1) % 6][1]) / 3) * scale]);
+}
+
+export function drawCross(context, [x, y], { width, height }, colour) {
+  context.strokeStyle = colour;
+  context.lineWidth = 1;
+  context.setLineDash([5, 4]);
+  context.beginPath();
+  context.moveTo(0, y); context.lineTo(width, y);
+  context.moveTo(x, 0); context.lineTo(x, height);
+  context.stroke();
+  context.setLineDash([]);
+}
+
+export function drawMark(context, [x, y]) {
+  for (const [colour, width] of [["rgb(0 0 0 / .6)", 4], ["#ffffff", 2]]) {
+    context.strokeStyle = colour;
+    context.lineWidth = width;
+    context.beginPath();
+    for (const [a, b] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+      context.moveTo(x + 11 * a, y + 5 * b); context.lineTo(x + 11 * a, y + 11 * b); context.lineTo(x + 5 * a, y + 11 * b);
+    }
+    context.stroke();
+  }
+}
+
+/** A round length that fits, with its unit. */
+export function drawScaleBar(context, metresPerPixel, { width, height }) {
+  const most = Math.min(160, width / 3) * metresPerPixel, power = 10 ** Math.floor(Math.log10(most));
+  const length = [5, 2, 1].map((n) => n * power).find((n) => n <= most) ?? power, pixels = length / metresPerPixel;
+  const x = width - pixels - 14, y = height - 14;
+  context.font = "600 12px system-ui, sans-serif";
+  context.textAlign = "center";
+  for (const [colour, grow] of [["rgb(0 0 0 / .65)", 3], ["#ffffff", 0]]) {
+    context.strokeStyle = context.fillStyle = colour;
+    context.lineWidth = 3 + grow;
+    context.beginPath(); context.moveTo(x, y); context.lineTo(x + pixels, y); context.stroke();
+    context.lineWidth = grow;
+    if (grow) context.strokeText(lengthText(length), x + pixels / 2, y - 7); else context.fillText(lengthText(length), x + pixels / 2, y - 7);
+  }
+}
+
+/** A length [m] for people. */
+export function lengthText(metres) {
+  if (metres === 0) return "0 µm";
+  const size = Math.abs(metres);
+  const [unit, value] = size >= 1 ? ["m", 1] : size >= 1e-3 ? ["mm", 1e3] : size >= 1e-6 ? ["µm", 1e6] : ["nm", 1e9];
+  return `${Number((metres * value).toPrecision(4))} ${unit}`;
+}

@@ -1,0 +1,83 @@
+// Refocused pictures by WebGL: views moved and summed along u, then along v, as lumigraph.refocus does.
+
+import { viewShifts } from "./aperture.js";
+import { SHEAR_COLUMN, SHEAR_ROW } from "./shaders.js";
+
+/** Views in one layer of the texture (across, down): one, where there are layers enough. */
+function tiling(views, most) {
+  const [nv, nu, nt, ns] = views.shape, needed = Math.ceil((nv * nu) / most.layers);
+  const across = Math.min(needed, Math.floor(most.side / ns));
+  const down = Math.ceil(needed / Math.max(across, 1));
+  if (across < 1 || down * nt > most.side) throw new Error(`${nv} × ${nu} views of ${nt} × ${ns} are too many`);
+  return [across, down];
+}
+
+export class Refocuser {
+  constructor(device, views) {
+    Object.assign(this, { device, views, tiles: tiling(views, device.most) });
+    const [nv, nu, nt, ns] = views.shape, [across, down] = this.tiles;
+    const layers = Math.ceil((nv * nu) / (across * down));
+    this.array = device.layers(views.bits, views.channels, [across * ns, down * nt, layers]);
+  }
+
+  /** Adds views: `numbers` of `count` of them, from the first. */
+  add(first, count, numbers) {
+    const { device, tiles: [across, down] } = this, [, , nt, ns] = this.views.shape;
+    const size = nt * ns * this.views.channels;
+    for (let k = 0; k < count; k++) {
+      const index = first + k, tile = index % (across * down);
+      const corner = [(tile % across) * ns, Math.floor(tile / across) * nt, Math.floor(index / (across * down))];
+      device.fill(this.array, corner, [ns, nt], numbers.subarray(k * size, (k + 1) * size));
+    }
+  }
+
+  /** The picture focused on alpha: {nx, ny, channels, texture}. */
+  picture(alpha, weights, detail) {
+    const { device, views } = this, [nv, nu, nt, ns] = views.shape;
+    const nx = (ns - 1) * detail + 1, ny = (nt - 1) * detail + 1;
+    this.prepare(nx, ny);
+    const used = new Float32Array(nv);
+    for (let v = 0; v < nv; v++) used[v] = weights.subarray(v * nu, (v + 1) * nu).some((w) => w > 0) ? 1 : 0;
+    const all = this.weights(weights, nu, nv), rows = this.weights(used, nv, 1);
+    const across = viewShifts(views, alpha, 1), along = viewShifts(views, alpha, 0);
+    const shear = device.program("shear-row", SHEAR_ROW);
+    for (let v = 0; v < nv; v++) if (used[v]) device.draw(shear, [nx, nt], this.rows, (at, gl) => {
+      device.bind(0, gl.TEXTURE_2D_ARRAY, this.array.texture, at.views);
+      device.bind(1, gl.TEXTURE_2D, all, at.weights);
+      gl.uniform1i(at.row, v);
+      gl.uniform1i(at.count, nu);
+      gl.uniform2i(at.size, ns, nt);
+      gl.uniform2i(at.tiles, ...this.tiles);
+      gl.uniform1f(at.first, across.first);
+      gl.uniform1f(at.step_, across.step);
+      gl.uniform1f(at.detail, detail);
+    }, v);
+    device.draw(device.program("shear-column", SHEAR_COLUMN), [nx, ny], this.target, (at, gl) => {
+      device.bind(0, gl.TEXTURE_2D_ARRAY, this.rows, at.rows);
+      device.bind(1, gl.TEXTURE_2D, rows, at.weights);
+      gl.uniform1i(at.count, nv);
+      gl.uniform1i(at.height, nt);
+      gl.uniform1f(at.first, along.first);
+      gl.uniform1f(at.step_, along.step);
+      gl.uniform1f(at.detail, detail);
+    });
+    device.gl.deleteTexture(all);
+    device.gl.deleteTexture(rows);
+    return { nx, ny, channels: views.channels, texture: this.target };
+  }
+
+  prepare(nx, ny) {
+    if (this.width === nx && this.height === ny) return;
+    const { gl } = this.device, [nv, , nt] = this.views.shape;
+    for (const texture of [this.rows, this.target]) if (texture) gl.deleteTexture(texture);
+    Object.assign(this, { width: nx, height: ny });
+    this.rows = this.device.floats(nx, nt, nv);
+    this.target = this.device.floats(nx, ny);
+  }
+
+  weights(values, nx, ny) {
+    const { gl } = this.device, texture = this.device.texture(gl.TEXTURE_2D);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, nx, ny, 0, gl.RED, gl.FLOAT, values);
+    return texture;
+  }
+}

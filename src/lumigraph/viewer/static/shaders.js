@@ -1,0 +1,119 @@
+// Shaders. A picture's first row is row 0 of its texture.
+
+export const VERTEX = `#version 300 es
+void main() { // one triangle over everything
+  gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
+}`;
+
+const CUBIC = `
+// Keys' cubic convolution, a = -1/2: the weights of lumigraph.rendering.interpolate.taps.
+vec4 cubic(float f) {
+  return 0.5 * vec4(((2.0 - f) * f - 1.0) * f, (3.0 * f - 5.0) * f * f + 2.0,
+                    ((4.0 - 3.0 * f) * f + 1.0) * f, (f - 1.0) * f * f);
+}`;
+
+/** Sum over the views of one row v of the aperture, moved along s. Alpha: the weight that was seen. */
+export const SHEAR_ROW = `#version 300 es
+precision highp float; precision highp int; precision highp usampler2DArray;
+uniform usampler2DArray views;
+uniform sampler2D weights;
+uniform int row, count;   // row of the aperture, views in it
+uniform ivec2 size;       // of a view: columns, rows
+uniform ivec2 tiles;      // views in one layer: across, down
+uniform float first, step_, detail;
+out vec4 total;
+${CUBIC}
+void main() {
+  ivec2 place = ivec2(gl_FragCoord.xy);
+  float at = float(place.x) / detail + first;
+  total = vec4(0.0);
+  for (int u = 0; u < count; u++) {
+    float weight = texelFetch(weights, ivec2(u, row), 0).r;
+    if (weight == 0.0) continue;
+    float x = at + float(u) * step_, below = floor(x);
+    vec4 k = weight * cubic(x - below);
+    int index = row * count + u, tile = index % (tiles.x * tiles.y), left = int(below) - 1;
+    ivec2 corner = ivec2(tile % tiles.x, tile / tiles.x) * size;
+    for (int i = 0; i < 4; i++) {
+      int column = left + i;
+      if (column < 0 || column >= size.x || k[i] == 0.0) continue; // beyond the edge nothing is seen
+      vec3 value = vec3(texelFetch(views, ivec3(corner + ivec2(column, place.y), index / (tiles.x * tiles.y)), 0).rgb);
+      total += k[i] * vec4(value, 1.0);
+    }
+  }
+}`;
+
+/** Sum over the rows of the aperture, moved along t, divided by the weight that was seen. */
+export const SHEAR_COLUMN = `#version 300 es
+precision highp float; precision highp int; precision highp sampler2DArray;
+uniform sampler2DArray rows;
+uniform sampler2D weights;
+uniform int count;
+uniform int height;
+uniform float first, step_, detail;
+out vec4 picture;
+${CUBIC}
+void main() {
+  ivec2 place = ivec2(gl_FragCoord.xy);
+  float at = float(place.y) / detail + first;
+  vec4 total = vec4(0.0);
+  for (int v = 0; v < count; v++) {
+    if (texelFetch(weights, ivec2(v, 0), 0).r == 0.0) continue;
+    float y = at + float(v) * step_, below = floor(y);
+    vec4 k = cubic(y - below);
+    int top = int(below) - 1;
+    for (int i = 0; i < 4; i++) {
+      if (top + i < 0 || top + i >= height) continue;
+      total += k[i] * texelFetch(rows, ivec3(place.x, top + i, v), 0);
+    }
+  }
+  picture = total.a > 0.05 ? vec4(total.rgb / total.a, 1.0) : vec4(0.0);
+}`;
+
+/** A picture on the screen: zoomed, exposed, coloured. */
+export const SHOW = (whole) => `#version 300 es
+precision highp float; precision highp int;
+${whole ? "precision highp usampler2DArray; uniform usampler2DArray source;" : "uniform sampler2D source;"}
+uniform sampler2D colours;
+uniform ivec2 size;        // of the picture
+uniform int layer;
+uniform vec2 origin, scale; // of the picture's first sample on the target [px], and target px per sample
+uniform float height;      // of the target, to turn it over; 0 leaves it
+uniform bool smooth_, coloured;
+uniform vec3 ground, mixing;
+uniform float gain, lift, power;
+out vec4 colour;
+
+vec3 raw(ivec2 p) {
+  p = clamp(p, ivec2(0), size - 1);
+  return ${whole ? "vec3(texelFetch(source, ivec3(p, layer), 0).rgb)" : "texelFetch(source, p, 0).rgb"};
+}
+vec3 value(vec2 place) {
+  if (scale.x < 1.0 || scale.y < 1.0) { // made smaller: the mean of what falls into the target's pixel
+    vec2 reach = max(vec2(1.0), 1.0 / scale);
+    ivec2 n = ivec2(clamp(ceil(reach), vec2(1.0), vec2(8.0)));
+    vec3 total = vec3(0.0);
+    for (int j = 0; j < n.y; j++) for (int i = 0; i < n.x; i++)
+      total += raw(ivec2(floor(place + 0.5 + ((vec2(i, j) + 0.5) / vec2(n) - 0.5) * reach)));
+    return total / float(n.x * n.y);
+  }
+  if (!smooth_) return raw(ivec2(floor(place + 0.5)));
+  vec2 below = floor(place), f = place - below;
+  ivec2 p = ivec2(below);
+  return mix(mix(raw(p), raw(p + ivec2(1, 0)), f.x), mix(raw(p + ivec2(0, 1)), raw(p + ivec2(1, 1)), f.x), f.y);
+}
+void main() {
+  vec2 target = vec2(gl_FragCoord.x, height > 0.0 ? height - gl_FragCoord.y : gl_FragCoord.y);
+  vec2 place = (target - origin) / scale;
+  if (any(lessThan(place, vec2(-0.5))) || any(greaterThanEqual(place, vec2(size) - 0.5))) {
+    colour = vec4(ground, 1.0);
+    return;
+  }
+  vec3 x = value(place);
+  if (coloured) {
+    colour = vec4(pow(clamp(gain * x + lift, 0.0, 1.0), vec3(power)), 1.0);
+  } else {
+    float level = pow(clamp(gain * dot(x, mixing) + lift, 0.0, 1.0), power);
+    colour = vec4(texelFetch(colours, ivec2(int(floor(level * 255.0 + 0.5)), 0), 0).rgb, 1.0);
+  }
+}`;

@@ -1,0 +1,51 @@
+// From values to bytes on the screen: exposure, gamma, channel, colour map. The shader does the same.
+
+import { mapColours } from "./colours.js";
+
+export const CHANNELS = ["colour", "mono", "red", "green", "blue"];
+export const LUMINANCE = [0.2126, 0.7152, 0.0722]; // Rec. 709
+
+const mapCache = new Map();
+
+export function cachedMap(name) {
+  if (!mapCache.has(name)) mapCache.set(name, mapColours(name));
+  return mapCache.get(name);
+}
+
+/** What tone settings mean for numbers that stand for offset + scale * number. */
+export function toneOf(state, image) {
+  const gain = (2 ** state.ev) / (image.white || 1);
+  return {
+    gain: gain * image.scale, lift: gain * image.offset, power: 1 / state.gamma,
+    map: state.map, channel: image.channels === 3 ? state.channel : "mono",
+  };
+}
+
+/** Weights of red, green and blue in the one value that is shown; null where all three are. */
+export function channelWeights(channel) {
+  if (channel === "colour") return null;
+  const single = ["red", "green", "blue"].indexOf(channel);
+  return single < 0 ? LUMINANCE : [0, 1, 2].map((c) => (c === single ? 1 : 0));
+}
+
+/** Bytes r, g, b, a of numbers (n pixels, interleaved channels), as the shader would show them. */
+export function toneBytes(numbers, channels, tone) {
+  const n = numbers.length / channels, out = new Uint8ClampedArray(4 * n);
+  const { gain, lift, power } = tone, map = cachedMap(tone.map), weights = channelWeights(tone.channel);
+  const level = (x) => Math.min(1, Math.max(0, gain * x + lift)) ** power * 255;
+  const table = numbers.BYTES_PER_ELEMENT <= 2 && n > 65536 && !(numbers instanceof Float32Array)
+    ? Float32Array.from({ length: numbers.BYTES_PER_ELEMENT === 1 ? 256 : 65536 }, (_, x) => level(x)) : null;
+  const shown = table ? (x) => table[x] : level;
+  for (let i = 0, o = 0; i < n; i++, o += 4) {
+    out[o + 3] = 255;
+    if (channels === 3 && !weights) {
+      for (let c = 0; c < 3; c++) out[o + c] = shown(numbers[3 * i + c]);
+      continue;
+    }
+    const x = channels === 1 ? numbers[i]
+      : weights[0] * numbers[3 * i] + weights[1] * numbers[3 * i + 1] + weights[2] * numbers[3 * i + 2];
+    const k = 4 * Math.round(channels === 1 ? shown(x) : level(x));
+    out[o] = map[k]; out[o + 1] = map[k + 1]; out[o + 2] = map[k + 2];
+  }
+  return out;
+}

@@ -1,0 +1,58 @@
+"""Everything that a calibration knows survives its file."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.lattice import Lattice
+from lumigraph.core.warp import Warp
+from lumigraph.errors import FormatError
+from lumigraph.io.calibration import load_calibration, save_calibration
+
+
+def full(rng):
+    lattice = Lattice.hex(17.3, 0.02, (200, 300), kinds=3)
+    indices = lattice.indices((0, 99), (0, 120))
+    return Calibration(
+        lattice, (100, 121), indices, lattice.position(indices) + rng.normal(size=indices.shape), 0.123,
+        1e-6 / 3, 0.1, 0.02, Warp((50, 60), (1e-5 / 3, 2e-5), -1e-9 / 3), rng.random(len(indices)), 2 / 3,
+        np.array([[1, 2], [-3, 4]]), (1.1, 1.0, 0.9), ('a "quoted" note\nof µ two lines', "another"),
+    )  # fmt: skip
+
+
+def same(one, other):
+    for field in dataclasses.fields(Calibration):
+        a, b = getattr(one, field.name), getattr(other, field.name)
+        if isinstance(a, np.ndarray):
+            np.testing.assert_array_equal(a, b, err_msg=field.name)
+        else:
+            assert a == b, field.name
+
+
+def test_every_field_survives_its_file(tmp_path, rng):
+    for found in (full(rng), dataclasses.replace(full(rng), warp=None, light=None, notes=(), sharpness=())):
+        save_calibration(found, tmp_path / "c.toml")
+        same(load_calibration(tmp_path / "c.toml"), found)
+
+
+@pytest.mark.parametrize(
+    ("line", "other", "match"),
+    [
+        ("tilt = ", "tilt = [1]\n#", r"warp\.tilt must be 2 finite numbers"),
+        ("radial = ", "radial = nan\n#", r"warp\.radial must be a finite number"),
+        ("notes = ", "notes = 3\n#", "notes must be a list of texts"),
+        ("light = ", "light = [1, 2]\n#", r"light has shape \(2,\) but there are"),
+        ("fill = ", "fill = -1\n#", "fill is -1"),
+        ("missing = ", "missing = [1]\n#", r"lenslets\.missing must be k x 2 finite numbers"),
+    ],
+)
+def test_a_wrong_field_is_named(tmp_path, rng, line, other, match):
+    path = tmp_path / "c.toml"
+    save_calibration(full(rng), path)
+    text = path.read_text()
+    assert line in text
+    path.write_text(text.replace(line, other, 1))
+    with pytest.raises(FormatError, match=match):
+        load_calibration(path)

@@ -1,0 +1,178 @@
+"""Interruption, checkpoints, time series."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import lumigraph as lg
+from deconvolution.models import Matrix, Placed, blurred, disc
+from lumigraph.deconvolution import (
+    Checkpoint,
+    Exposure,
+    Interrupted,
+    LeastSquares,
+    LowPass,
+    RichardsonLucy,
+    TotalVariation,
+    Wavelets,
+)
+
+SHAPE = (14, 13)
+OPERATOR = blurred(SHAPE, 1.2)
+BRIGHTER = Matrix(OPERATOR.matrix * 1.01, SHAPE, SHAPE)
+METHODS = {
+    "plain": RichardsonLucy(),
+    "accelerated": RichardsonLucy(accelerated=True),
+    "total variation": RichardsonLucy(TotalVariation(0.02), LowPass(1.2), accelerated=True),
+    "wavelets": RichardsonLucy(Wavelets(0.02)),
+    "least squares": LeastSquares(TotalVariation(0.02)),
+}
+
+
+@pytest.fixture
+def raw(rng):
+    return rng.poisson(OPERATOR.forward(disc(SHAPE))).astype(np.float32)
+
+
+def killed_after(iterations):
+    def progress(step):
+        if step.iteration == iterations:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_killed_run_goes_on_to_the_same_bits(name, raw, tmp_path):
+    method, path = METHODS[name], tmp_path / "state.npz"
+    whole = lg.deconvolve(raw, OPERATOR, 12, method=method)
+    with pytest.raises(Interrupted):
+        lg.deconvolve(raw, OPERATOR, 12, method=method, progress=killed_after(5), checkpoint=path)
+    steps = []
+    found = lg.deconvolve(raw, OPERATOR, 12, method=method, progress=steps.append, checkpoint=path)
+    assert [step.iteration for step in steps] == list(range(6, 13))
+    np.testing.assert_array_equal(found, whole)
+    assert found.dtype == np.float32
+    again = lg.deconvolve(raw, OPERATOR, 12, method=method, progress=steps.append, checkpoint=path)
+    np.testing.assert_array_equal(again, whole)
+    assert len(steps) == 7
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_run_killed_without_a_warning_goes_on_from_what_was_written(raw, tmp_path):
+    """As by kill -9: the file of the last iteration that was written, here every one, is all there is."""
+
+    class Killed(BaseException):
+        pass
+
+    def progress(step):
+        if step.iteration == 7:
+            raise Killed
+
+    place = Checkpoint(tmp_path / "state.npz", every=0)
+    with pytest.raises(Killed):
+        lg.deconvolve(raw, OPERATOR, 12, progress=progress, checkpoint=place)
+    steps = []
+    found = lg.deconvolve(raw, OPERATOR, 12, progress=steps.append, checkpoint=place)
+    assert steps[0].iteration == 8
+    np.testing.assert_array_equal(found, lg.deconvolve(raw, OPERATOR, 12))
+
+
+def test_an_interrupted_run_hands_back_what_it_had(raw):
+    image = lg.RawImage(raw)
+    with pytest.raises(Interrupted, match="after 3 iterations") as stopped:
+        lg.deconvolve(image, OPERATOR, 12, progress=killed_after(3))
+    assert stopped.value.iterations == 3
+    np.testing.assert_array_equal(stopped.value.partial, lg.deconvolve(image, OPERATOR, 3))
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        (lambda raw: (raw + 1, OPERATOR, METHODS["plain"], None), "raw image or settings"),
+        (lambda raw: (raw, OPERATOR, METHODS["accelerated"], None), "raw image or settings"),
+        (lambda raw: (raw, OPERATOR, RichardsonLucy(start=np.ones(SHAPE)), None), "raw image or settings"),
+        (lambda raw: (raw, OPERATOR, METHODS["plain"], Exposure(1.0)), "raw image or settings"),
+        (lambda raw: (raw, OPERATOR, RichardsonLucy(filter=LowPass(2)), None), "raw image or settings"),
+        (lambda raw: (raw, BRIGHTER, METHODS["plain"], None), "camera or grid"),
+    ],
+)  # fmt: skip
+def test_the_checkpoint_of_another_run_is_refused(change, what, raw, tmp_path):
+    path = tmp_path / "state.npz"
+    lg.deconvolve(raw, OPERATOR, 2, checkpoint=path)
+    other, operator, method, exposure = change(raw)
+    with pytest.raises(lg.FormatError, match=f"belongs to another {what}"):
+        lg.deconvolve(other, operator, 2, method=method, exposure=exposure, checkpoint=path)
+
+
+@pytest.mark.parametrize("content", [b"", b"no zip", None])
+def test_a_damaged_checkpoint_is_refused(content, raw, tmp_path):
+    path = tmp_path / "state.npz"
+    if content is None:
+        np.savez(path, other=np.ones(3))
+    else:
+        path.write_bytes(content)
+    with pytest.raises(lg.FormatError, match=r"is damaged|no checkpoint"):
+        lg.deconvolve(raw, OPERATOR, 2, checkpoint=path)
+
+
+def test_a_truncated_checkpoint_is_refused(raw, tmp_path):
+    path = tmp_path / "state.npz"
+    lg.deconvolve(raw, OPERATOR, 2, checkpoint=path)
+    whole = path.read_bytes()
+    for part in range(1, len(whole), len(whole) // 7):
+        path.write_bytes(whole[:part])
+        with pytest.raises(lg.FormatError, match=r"is damaged|no checkpoint"):
+            lg.deconvolve(raw, OPERATOR, 2, checkpoint=path)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda path: Checkpoint(path / "none" / "x.npz"), "does not exist"),
+        (lambda path: Checkpoint(path / "x.tif"), r"must end in \.npz"),
+        (lambda path: Checkpoint(path / "x.npz", every=-1), "every is -1 s"),
+    ],
+)
+def test_a_checkpoint_that_could_not_be_written_is_refused(call, message, tmp_path):
+    with pytest.raises(lg.FormatError, match=message):
+        call(tmp_path)
+
+
+def test_checkpoints_take_any_array_library(xp, raw, tmp_path):
+    path = tmp_path / "state.npz"
+    given = xp.asarray(raw)
+    method = METHODS["total variation"]
+    lg.deconvolve(given, OPERATOR, 3, method=method, checkpoint=path)
+    found = lg.deconvolve(given, OPERATOR, 6, method=method, checkpoint=path)
+    whole = lg.deconvolve(given, OPERATOR, 6, method=method)
+    assert type(found) is type(given)
+    np.testing.assert_array_equal(np.asarray(found), np.asarray(whole))
+
+
+def test_a_series_needs_one_sensitivity_and_one_frame_at_a_time(rng):
+    """A hundred frames: Aᵀ1 once, each frame read only when its turn has come, results as of one by one."""
+    grid, calls, alive = lg.Grid.square(6, 1e-6), [], []
+
+    class Counting(Placed):
+        def adjoint(self, raw):
+            calls.append(1)
+            return super().adjoint(raw)
+
+    matrix = np.abs(rng.normal(size=(36, 72)))
+    operator = Counting(matrix, (6, 6), (2, 6, 6), grid, (0.0, 1e-6))
+    pictures = [lg.RawImage(rng.uniform(1, 2, (6, 6))) for _ in range(100)]
+
+    def frames():
+        for picture in pictures:
+            alive.append(1)
+            yield picture
+
+    volumes = lg.deconvolve_series(frames(), operator, 2)
+    first = list(itertools.islice(volumes, 3))
+    assert len(alive) == 3
+    assert len(calls) == 3 * 2 + 1
+    assert len(list(volumes)) == 97
+    assert len(calls) == 100 * 2 + 1
+    np.testing.assert_array_equal(first[2].data, lg.deconvolve(pictures[2], operator, 2).data)
