@@ -3,8 +3,7 @@
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from threading import Lock
-
-from lumigraph.core.arrays import Array
+from typing import Any
 
 
 class ByteCache:
@@ -26,11 +25,11 @@ class ByteCache:
     def __init__(self, limit: int) -> None:
         self.limit = limit
         self.used = 0
-        self._kept: OrderedDict[Hashable, tuple[Array, int]] = OrderedDict()
+        self._kept: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
         self._lock = Lock()
 
-    def get(self, key: Hashable, build: Callable[[], Array]) -> Array:
-        """The array kept under `key`, built and kept first where there is none. Never write into it."""
+    def get(self, key: Hashable, build: Callable[[], Any]) -> Any:
+        """The array, or what has ``nbytes``, kept under `key`, built and kept first where there is none. Never write into it."""
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
@@ -52,7 +51,9 @@ class ByteCache:
             self.used = 0
 
 
-def _bytes(array: Array) -> int:
+def _bytes(array: Any) -> int:
+    if (told := getattr(array, "nbytes", None)) is not None:
+        return int(told)
     size = 1
     for n in array.shape:
         size *= n

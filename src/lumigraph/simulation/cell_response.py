@@ -26,6 +26,9 @@ SLACK = 1.04
 STEP = 2
 """Points between those of the window: an amplitude has half the band of its intensity."""
 
+FAINTEST = 1e-5
+"""Weight of a line of light that is left out."""
+
 Limits = tuple[float, float]
 
 
@@ -149,10 +152,10 @@ def _spread(image: np.ndarray, light: np.ndarray, squared: float) -> np.ndarray:
 
 
 def nodes(half: float, focal_length: float, axis: Axis, optics: tuple[float, float]) -> int:
-    """Quadrature nodes across a lenslet: some three for each turn of the phase, and a few."""
+    """Quadrature nodes across a lenslet: two for each turn of the phase, and a few."""
     wavelength, distance = optics
     steepest = half / focal_length + (axis.neighbourhood + axis.size + half) / distance
-    return 24 + math.ceil(3 * 2 * half * steepest / wavelength)
+    return 24 + math.ceil(2 * 2 * half * steepest / wavelength)
 
 
 def legendre(low: float, high: float, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -181,16 +184,18 @@ def _dense(
     known: dict[Any, np.ndarray] = {}
     for row, members in _rows(axes, array, cell):
         for y, weight, chord in _lines(array, axes[0], (wavelength, distance)):
-            key = (y, chord, members)
-            if key not in known:
-                known[key] = _line(axes[1], array, (wavelength, distance), key, light_x)
             at = np.array([row + y])
             shade = weight * axes[0].fade(at, pitch)
+            if shade[0] < FAINTEST * weight:
+                continue
+            key = (y, chord, members)
+            if key not in known:
+                known[key] = _line(axes[1], array, (wavelength, distance), key, light_x).astype(np.complex64)
             along = _spread(axes[0].image, at, squared) * shade  # (n_y, 1)
-            lines_y.append((along * light_y(at)).ravel())  # (n_y m_y)
+            lines_y.append((along * light_y(at)).astype(np.complex64).ravel())  # (n_y m_y)
             lines_x.append(known[key].ravel())
     if not lines_y:
-        return Response(down, across, np.zeros((n_y * n_x, m_y * m_x), complex))
+        return Response(down, across, np.zeros((n_y * n_x, m_y * m_x), np.complex64))
     core = np.array(lines_y).T @ np.array(lines_x)  # (n_y m_y, n_x m_x)
     core = core.reshape(n_y, m_y, n_x, m_x).transpose(0, 2, 1, 3)
     return Response(down, across, core.reshape(n_y * n_x, m_y * m_x))

@@ -5,13 +5,19 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.elements import LensletArray, ThinLens
+from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.simulation.camera import Camera
 
 OVERSAMPLING = 1.5
 """How much closer than λL/(2D) the points of a cell stand, so that a short kernel interpolates them."""
+
+
+COARSEST, FINEST = 1e-2, 1e-5
+"""Accuracies that can be asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +65,21 @@ class Fineness:
     ----------
     accuracy
         Relative rms error of the raw image.
+
+    Raises
+    ------
+    SamplingError
+        An accuracy out of 1e-2 to 1e-5.
     """
 
     accuracy: float
+
+    def __post_init__(self) -> None:
+        accuracy = checks.finite("accuracy", self.accuracy, "1", SamplingError)
+        if not COARSEST >= accuracy >= FINEST:
+            raise SamplingError(
+                f"accuracy is {accuracy:g} but must lie between {FINEST:g} and {COARSEST:g}, relative rms."
+            )
 
     @property
     def oversampling(self) -> float:
@@ -120,9 +138,9 @@ def telecentric_distance(camera: Camera) -> float:
 def lenslet_array(camera: Camera) -> LensletArray:
     """The array of a camera that has lenslets, turned about the axis so that its rows lie along x."""
     train = camera.relay_train()
-    assert train is not None
-    array = train.elements[0]
-    assert isinstance(array, LensletArray)
+    array = train.elements[0] if train is not None and train.elements else None
+    if not isinstance(array, LensletArray):
+        raise GeometryError("the camera has no lenslets: the periodic operator is for lenslet arrays.")
     return replace(array, lattice=straight(array.lattice))
 
 

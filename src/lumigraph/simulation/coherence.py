@@ -154,10 +154,10 @@ class Snapshots:
 class Incoherent:
     """Spatially incoherent light, like every lit scene.
 
-    Points are exact: their intensities are added. Extended scenes before a lenslet array that is not
-    turned go through the lenslet-periodic operator (`simulation.periodic`), without speckle, to 1 to 3 %
-    rms. Single lenses, turned arrays and operators above 1 GiB take white-phase `Snapshots`, which carry
-    speckle of about 1/sqrt(snapshots) rms in a pixel that resolves it.
+    Points are propagated one by one and their intensities added. Extended scenes before a lenslet array go
+    through the lenslet-periodic operator (`simulation.periodic`), without speckle, to `accuracy`. Single
+    lenses, and arrays of lenslets so fast that the operator takes more than 1 GiB to build, take white-phase
+    `Snapshots`, which carry speckle of about 1/sqrt(snapshots) rms in a pixel that resolves it.
 
     Parameters
     ----------
@@ -165,10 +165,13 @@ class Incoherent:
         Number of snapshots, where they are needed.
     rng
         Seed or generator of the snapshots.
+    accuracy
+        Relative rms error of the operator, 1e-2 to 1e-5.
     """
 
     snapshots: int = 100
     rng: Seed = 0
+    accuracy: float = 1e-3
 
     def __post_init__(self) -> None:
         _positive_count(self.snapshots)

@@ -20,14 +20,15 @@ from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
 from lumigraph.sensor import integrate
 from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Plane, Snapshots, TiltedWaves
-from lumigraph.simulation.periodic import kernel_bytes, periodic_operator
-from lumigraph.simulation.point_images import fits
+from lumigraph.simulation.cells import fits
+from lumigraph.simulation.kernels import Optics
+from lumigraph.simulation.periodic import periodic_operator
 
 PUPIL_OVERSAMPLING = 1.1
 """How much denser than half of λL/p the points of the pupil stand that make a white image."""
 
 LARGEST_OPERATOR = 2.0**30
-"""Kernels of the lenslet-periodic operator above this [bytes] give way to snapshots."""
+"""A lenslet-periodic operator that takes more than this [bytes] to build gives way to snapshots."""
 
 Progress = Callable[[int, int], None]
 
@@ -98,14 +99,14 @@ def simulate(
     """
     coherence = Incoherent() if coherence is None else coherence
     _check(camera, scene, coherence)
-    exact = _periodic(camera, scene) if isinstance(coherence, Incoherent) else []
+    exact = _periodic(camera, scene, coherence) if isinstance(coherence, Incoherent) else []
     rest = Scene(part for part in scene.parts if part not in exact)
     shots, count = _shots(camera, rest, _drawn(coherence))
     light = _Light(np.zeros(camera.image_grid.shape), np.zeros(camera.sensor.shape))
     total = len(exact) + count
     try:
         for part in exact:
-            light.pixels += _exactly(camera, part.trimmed())
+            light.pixels += _exactly(camera, part.trimmed(), coherence)
             light.count(progress, total)
         for half, image in map(_Shot.arrive, shots):
             light.add(half, image)
@@ -155,17 +156,18 @@ def _drawn(coherence: Coherence | Incoherent) -> Coherence:
     return coherence
 
 
-def _exactly(camera: Camera, part: Slice) -> np.ndarray:
-    operator = periodic_operator(camera, part.grid, part.dz)
+def _exactly(camera: Camera, part: Slice, coherence: Incoherent) -> np.ndarray:
+    operator = periodic_operator(camera, part.grid, part.dz, accuracy=coherence.accuracy)
     return operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
 
 
-def _periodic(camera: Camera, scene: Scene) -> list[Slice]:
+def _periodic(camera: Camera, scene: Scene, coherence: Incoherent) -> list[Slice]:
     """Slices that the lenslet-periodic operator takes."""
     if not fits(camera):
         return []
     slices = [part for part in scene.parts if isinstance(part, Slice)]
-    return [part for part in slices if kernel_bytes(camera, part.dz) <= LARGEST_OPERATOR]
+    optics = [Optics.of(camera, camera.object_distance + s.dz, coherence.accuracy) for s in slices]
+    return [part for part, o in zip(slices, optics, strict=True) if o.build_bytes <= LARGEST_OPERATOR]
 
 
 def _read_out(camera: Camera, light: _Light, coherence: Coherence | Incoherent) -> RawImage:

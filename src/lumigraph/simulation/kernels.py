@@ -6,13 +6,17 @@ kept until the accuracy is reached; the light of what is left out is given back 
 object stays exact.
 """
 
+import hashlib
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from lumigraph.core import memory, store
+from lumigraph.core.cache import ByteCache
 from lumigraph.elements import LensletArray
+from lumigraph.errors import SamplingError
 from lumigraph.simulation import cells as _cells
 from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.cell_response import SLACK, Axis, Limits, response
@@ -23,6 +27,9 @@ from lumigraph.simulation.point_images import factors, images, mirrored, wave
 Progress = Callable[[float], None]
 
 INFINITE: Limits = (-math.inf, math.inf)
+
+VERSION = 1
+"""Of what is kept on disk: to be raised with every change of the numbers."""
 
 KEPT = 2**28
 """Blocks that are kept while the border's are computed [bytes]."""
@@ -79,6 +86,37 @@ class Optics:
         return cls(camera, array, _cells.cells_of(camera, array, fineness), fineness, distance)
 
     @property
+    def rotation(self) -> float:
+        """Of the array [rad]; the cells lie in a frame that turns with it."""
+        return 0.0 if self.camera.lattice is None else self.camera.lattice.rotation
+
+    @property
+    def key(self) -> str:
+        """Names all that the matrix depends on: not the array's rotation, nor the sensor."""
+        camera = self.camera
+        with np.printoptions(threshold=2**62, floatmode="unique"):
+            known = repr((
+                VERSION, camera.wavelength, camera.separation, camera.lenslet_distance, camera.pupil_diameter,
+                camera.lens_train(), self.array, self.cells, self.fineness, self.distance,
+            ))  # fmt: skip
+        return hashlib.sha256(known.encode()).hexdigest()[:32]
+
+    @property
+    def build_bytes(self) -> float:
+        """Memory that building the matrix takes at most [bytes], from its sizes."""
+        points, samples = (math.prod(n) for n in (self.cells.points, self.cells.samples))
+        block = 4.0 * points * samples
+        row = (2 * self.reach[1] + 1) * block
+        kept = min(KEPT, block * math.prod(2 * k + 1 for k in self.near))
+        dense = 8.0 * math.prod(axis.samples * len(axis.window) for axis in self.axes)
+        return 2 * row + kept + 6 * block + (0 if self.straight else dense)
+
+    @property
+    def straight(self) -> bool:
+        """Whether what the lenslets do along y does not depend on x."""
+        return self.array.shape == "square" and not isinstance(self.array.focal_length, tuple)
+
+    @property
     def axes(self) -> tuple[Axis, Axis]:
         """Sampling of a cell along y and along x."""
         band = SLACK / 2 / _cells.airy(self.camera)
@@ -111,23 +149,109 @@ class Optics:
         return 1 + _cells.lenslet_distance(self.camera) / self.camera.separation
 
 
-def parts(optics: Optics, progress: Progress | None = None) -> tuple[tuple[Part, ...], Glare]:
-    """All parts of the matrix of one depth: the periodic one, those at the array's border, and the glare."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Matrix:
+    """From the points of an object's cells to the samples of an image's.
+
+    Parameters
+    ----------
+    parts
+        The periodic one, then those at the array's border.
+    glare
+        The rest: faint, and far from the diagonal.
+    margin
+        Cells (y, x) beyond the ring around the array whose points reach into it.
+    """
+
+    parts: tuple[Part, ...]
+    glare: Glare
+    margin: tuple[int, int]
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes [bytes]."""
+        parts = sum(part.left.nbytes + part.right.nbytes for part in self.parts)
+        return parts + self.glare.spectra.nbytes + self.glare.pictures.nbytes
+
+
+_MATRICES = ByteCache(limit=2**31)
+
+
+def matrix(optics: Optics, progress: Progress | None = None) -> Matrix:
+    """Of one depth: from memory, from disk, or built.
+
+    Raises
+    ------
+    SamplingError
+        It does not fit in memory.
+    """
+    key = optics.key
+
+    def found() -> Matrix:
+        arrays = store.load(key)
+        if arrays is None:
+            memory.require(
+                optics.build_bytes,
+                "the periodic operator",
+                "Use slower lenslets, a lower accuracy, or Snapshots.",
+                SamplingError,
+            )
+            built = _build(optics, progress)
+            store.save(key, _packed(built))
+            return built
+        return _unpacked(arrays)
+
+    return _MATRICES.get(key, found)
+
+
+def _packed(matrix: Matrix) -> dict[str, np.ndarray]:
+    """The matrix as a few arrays."""
+    places = [(*part.rows, *part.columns, len(part.offsets)) for part in matrix.parts]
+    return {
+        "places": np.array(places),
+        "offsets": np.concatenate([np.array(part.offsets).reshape(-1, 3) for part in matrix.parts]),
+        "left": np.concatenate([part.left for part in matrix.parts], axis=1),
+        "right": np.concatenate([part.right for part in matrix.parts]),
+        "spectra": matrix.glare.spectra,
+        "pictures": matrix.glare.pictures,
+        "shape": np.array([*matrix.glare.image, *matrix.glare.margin, *matrix.margin]),
+    }
+
+
+def _unpacked(arrays: dict[str, np.ndarray]) -> Matrix:
+    """The inverse of `_packed`."""
+    parts, first, column = [], 0, 0
+    for top, bottom, left, right, count in arrays["places"].tolist():
+        offsets = [(int(dy), int(dx), int(rank)) for dy, dx, rank in arrays["offsets"][first : first + count]]
+        ranks = slice(column, column + sum(rank for _, _, rank in offsets))
+        parts.append(
+            Part((top, bottom), (left, right), tuple(offsets), arrays["left"][:, ranks], arrays["right"][ranks])
+        )
+        first, column = first + count, ranks.stop
+    rows, columns, *margins = arrays["shape"].tolist()
+    glare = Glare(arrays["spectra"], arrays["pictures"], (rows, columns), (margins[0], margins[1]))
+    return Matrix(tuple(parts), glare, (margins[2], margins[3]))
+
+
+def _build(optics: Optics, progress: Progress | None = None) -> Matrix:
     builder = _Builder(optics)
-    count = optics.cells.count
+    rows, columns = optics.cells.count
     inside, means = builder.periodic()
-    result = [_part((1, count[0] + 1), (1, count[1] + 1), inside)]
-    groups = [list(_groups(optics, axis)) for axis in (0, 1)]
-    pairs = [(y, x) for y in groups[0] for x in groups[1] if (y[1], x[1]) != (INFINITE, INFINITE)]
-    for done, ((rows, limits_y), (columns, limits_x)) in enumerate(pairs):
-        ring = rows[0] in (0, count[0] + 1) or columns[0] in (0, count[1] + 1)
-        blocks = builder.border(limits_y, limits_x, ring=ring)
+    parts = [_part((1, rows + 1), (1, columns + 1), inside)]
+    pairs = [
+        (y, x)
+        for y in _groups(optics, 0)
+        for x in _groups(optics, 1)
+        if (y[1], x[1]) != (INFINITE, INFINITE)
+    ]
+    for done, (y, x) in enumerate(pairs):
+        ring = y[0][0] in (0, rows + 1) or x[0][0] in (0, columns + 1)
+        blocks = builder.border(y[1], x[1], ring=ring)
         if any(left.shape[1] for left, _ in blocks.values()):
-            result.append(_part(rows, columns, blocks))
+            parts.append(_part(y[0], x[0], blocks))
         if progress is not None:
             progress((done + 1) / len(pairs))
-    rows, columns = count
-    return tuple(result), glare(means, optics.cells.size, (rows + 2, columns + 2))
+    return Matrix(tuple(parts), glare(means, optics.cells.size, (rows + 2, columns + 2)), optics.reach)
 
 
 def _part(rows: tuple[int, int], columns: tuple[int, int], blocks: Blocks) -> Part:
@@ -266,7 +390,7 @@ class _Builder:
     ) -> Iterator[tuple[tuple[int, int], np.ndarray]]:
         """Offset and block; folded, only offsets that are not negative, which the others mirror."""
         optics, cells = self.optics, self.optics.cells
-        middle = [
+        middle = [  # of any cell: only the border, as it is told, makes a difference
             e + (n // 2 + 0.5) * s for e, n, s in zip(cells.edge, cells.count, cells.size, strict=True)
         ]
         lenslets = response(

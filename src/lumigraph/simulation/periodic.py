@@ -16,97 +16,145 @@ neighbouring cells of (cells × points) · (points × samples of a cell), each m
 M. Broxton et al., Opt. Express 21, 25418 (2013) use the same periodicity in a light-field microscope.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
 
-from lumigraph.core import arrays
+from lumigraph.core import arrays, checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
+from lumigraph.errors import GeometryError
 from lumigraph.sensor import Sensor
 from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.cells import Cells
-from lumigraph.simulation.glare import Glare
-from lumigraph.simulation.kernels import Optics, Part, parts
-from lumigraph.simulation.resampling import Resampling, averaged, represented
+from lumigraph.simulation.kernels import Matrix, Optics, Part, Progress, matrix
+from lumigraph.simulation.resampling import averaged, represented
+from lumigraph.simulation.turning import Chain, Crop, Linear, Turn, turn_margin
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plane:
+    """One depth of an object.
+
+    Parameters
+    ----------
+    matrix
+        From the points of the object's cells to the image's.
+    spread
+        From the object's samples to those points.
+    """
+
+    matrix: Matrix
+    spread: Linear
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PeriodicOperator:
-    """Raw image of an incoherent plane at one depth, and its adjoint.
+    """Raw image of an incoherent object, and the adjoint; see `periodic_operator`.
 
     Parameters
     ----------
     cells
         Of the lenslet array.
-    parts
-        Of the matrix between an object's cells and an image's.
-    glare
-        The rest of that matrix: faint, and far from the diagonal.
+    planes
+        One for each depth.
+    readout
+        From the image's samples to pixels.
     object_grid
-        Samples of the object.
+        Samples of the object at every depth.
+    depths
+        Of an object (z, y, x) from the focused plane (z,) [m]; None for one plane (y, x).
     sensor
         Pixels.
     """
 
     cells: Cells
-    parts: tuple[Part, ...]
-    glare: Glare
+    planes: tuple[Plane, ...]
+    readout: Linear
     object_grid: Grid
+    depths: tuple[float, ...] | None
     sensor: Sensor
-    spread: Resampling
-    readout: Resampling
 
     @property
-    def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Pixels (ny, nx) of the raw image, samples (y, x) of the object."""
-        return self.sensor.shape, self.object_grid.shape
+    def shape(self) -> tuple[tuple[int, int], tuple[int, ...]]:
+        """Pixels (ny, nx) of the raw image, samples (y, x) or (z, y, x) of the object."""
+        volume = () if self.depths is None else (len(self.depths),)
+        return self.sensor.shape, (*volume, *self.object_grid.shape)
 
-    def forward(self, intensity: Array) -> Array:
-        """Raw image (ny, nx), turned by 180°, of an object's intensity (y, x) on `object_grid`."""
-        xp = arrays.namespace(intensity)
-        points = _by_cell(self.spread.forward(intensity), self.cells.points)
+    def forward(self, intensity: Array, /) -> Array:
+        """Raw image (ny, nx), turned by 180°, of an object's intensity (y, x) or (z, y, x).
+
+        Raises
+        ------
+        GeometryError
+            Another shape than the object's.
+        """
+        _check("an object", intensity, self.shape[1])
+        xp, layers = arrays.namespace(intensity), intensity if self.depths is not None else intensity[None, ...]
         rows, columns = (n + 2 for n in self.cells.count)
-        image = xp.zeros((rows, columns, int(np.prod(self.cells.samples))), dtype=points.dtype, device=points.device)
-        for part in self.parts:
-            (top, bottom), (first, last) = part.rows, part.columns
-            for group in self._groups(part):
-                seen = group.seen(points)
-                image[top:bottom, first:last, :] += seen @ arrays.like(group.right, intensity)
-        image += self.glare.forward(xp.sum(points, axis=2))
+        like = {"dtype": intensity.dtype, "device": intensity.device}
+        image = xp.zeros((rows, columns, math.prod(self.cells.samples)), **like)
+        for k, plane in enumerate(self.planes):
+            points = _by_cell(plane.spread.forward(layers[k, ...]), self.cells.points)
+            for part in plane.matrix.parts:
+                (top, bottom), (first, last) = part.rows, part.columns
+                for group in _groups(part, plane.matrix.margin):
+                    image[top:bottom, first:last, :] += group.seen(points) @ arrays.like(group.right, image)
+            image += plane.matrix.glare.forward(xp.sum(points, axis=2))
         return self.readout.forward(_as_plane(image, self.cells.samples))
 
-    def adjoint(self, raw: Array) -> Array:
-        """Transpose of `forward`: (y, x) on `object_grid` from a raw image (ny, nx)."""
+    def adjoint(self, raw: Array, /) -> Array:
+        """Transpose of `forward`: (y, x) or (z, y, x) from a raw image (ny, nx).
+
+        Raises
+        ------
+        GeometryError
+            Another shape than the raw image's.
+        """
+        _check("a raw image", raw, self.shape[0])
         xp = arrays.namespace(raw)
         image = _by_cell(self.readout.adjoint(raw), self.cells.samples)
-        margin, count = margin_of(self.parts), self.cells.count
-        shape = (*(n + 2 + 2 * m for n, m in zip(count, margin, strict=True)), int(np.prod(self.cells.points)))
-        points = xp.zeros(shape, dtype=raw.dtype, device=raw.device)
-        for part in self.parts:
-            mine = image[part.rows[0] : part.rows[1], part.columns[0] : part.columns[1], :]
-            for group in self._groups(part):
-                group.return_to(points, mine @ xp.matrix_transpose(arrays.like(group.right, raw)))
-        points += xp.expand_dims(self.glare.adjoint(image), axis=2)
-        return self.spread.adjoint(_as_plane(points, self.cells.points))
+        layers = [self._returned(plane, image) for plane in self.planes]
+        return layers[0] if self.depths is None else xp.stack(layers, axis=0)
 
-    def psf(self, index: tuple[int, int]) -> np.ndarray:
-        """Raw image (ny, nx), float32, of one object sample (iy, ix) of intensity 1."""
-        point = np.zeros(self.object_grid.shape, np.float32)
+    def _returned(self, plane: Plane, image: Array) -> Array:
+        xp, margin = arrays.namespace(image), plane.matrix.margin
+        shape = [n + 2 + 2 * m for n, m in zip(self.cells.count, margin, strict=True)]
+        size = (*shape, math.prod(self.cells.points))
+        points = xp.zeros(size, dtype=image.dtype, device=image.device)
+        for part in plane.matrix.parts:
+            mine = image[part.rows[0] : part.rows[1], part.columns[0] : part.columns[1], :]
+            for group in _groups(part, margin):
+                group.return_to(points, mine @ xp.matrix_transpose(arrays.like(group.right, image)))
+        points += xp.expand_dims(plane.matrix.glare.adjoint(image), axis=2)
+        return plane.spread.adjoint(_as_plane(points, self.cells.points))
+
+    def psf(self, index: tuple[int, ...], /) -> np.ndarray:
+        """Raw image (ny, nx), float32, of one object sample of intensity 1."""
+        point = np.zeros(self.shape[1], np.float32)
         point[index] = 1
         return self.forward(point)
 
-    def _groups(self, part: Part) -> "Iterator[_Group]":
-        margin, start = margin_of(self.parts), 0
-        for dy, offsets in groupby(part.offsets, key=lambda offset: offset[0]):
-            across = tuple((dx, rank) for _, dx, rank in offsets)
-            ranks = slice(start, start + sum(rank for _, rank in across))
-            start = ranks.stop
-            rows = slice(part.rows[0] + margin[0] + dy, part.rows[1] + margin[0] + dy)
-            first, last = part.columns[0] + margin[1], part.columns[1] + margin[1]
-            yield _Group(rows, (first, last), across, part.left[:, ranks], part.right[ranks])
+
+def _check(name: str, array: Array, shape: tuple[int, ...]) -> None:
+    checks.array(name, array)
+    if tuple(array.shape) != shape:
+        raise GeometryError(f"{name} has shape {tuple(array.shape)} but the operator takes {shape}.")
+
+
+def _groups(part: Part, margin: tuple[int, int]) -> "Iterator[_Group]":
+    """The part's offsets, row by row."""
+    start = 0
+    for dy, offsets in groupby(part.offsets, key=lambda offset: offset[0]):
+        across = tuple((dx, rank) for _, dx, rank in offsets)
+        ranks = slice(start, start + sum(rank for _, rank in across))
+        start = ranks.stop
+        rows = slice(part.rows[0] + margin[0] + dy, part.rows[1] + margin[0] + dy)
+        columns = part.columns[0] + margin[1], part.columns[1] + margin[1]
+        yield _Group(rows, columns, across, part.left[:, ranks], part.right[ranks])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,27 +196,95 @@ class _Group:
 
 
 def periodic_operator(
-    camera: Camera, grid: Grid, dz: float = 0.0, *, accuracy: float = 1e-3
+    camera: Camera,
+    grid: Grid,
+    dz: float | Sequence[float] = 0.0,
+    *,
+    accuracy: float = 1e-3,
+    progress: Progress | None = None,
 ) -> PeriodicOperator:
-    optics = Optics.of(camera, camera.object_distance + dz, accuracy)
-    return assembled(optics, *parts(optics), grid)
+    """Operator from planes sampled on `grid` to the raw image of a camera with lenslets.
 
+    What it takes to compute is kept, in memory and on disk (see `core.store`), for the same camera and
+    depth, whatever the grid and the sensor.
 
-def assembled(optics: Optics, matrix: tuple[Part, ...], glare: Glare, grid: Grid) -> PeriodicOperator:
-    cells, camera = optics.cells, optics.camera
-    ring = tuple(1 + m for m in margin_of(matrix))
-    scale = -optics.distance / camera.separation
-    points = cells.grid(cells.points, scale, (ring[0], ring[1]))
-    plane = cells.grid(cells.samples, optics.image_scale, (1, 1))
+    Parameters
+    ----------
+    camera
+        With any lenslet array.
+    grid
+        Samples of the object, all depths.
+    dz
+        Depth of the plane from the focused one [m], positive farther; or several, for a volume (z, y, x).
+    accuracy
+        Relative rms error of the raw image, 1e-2 to 1e-5, of objects inside the array's field; near its
+        border the error may be three times as large.
+    progress
+        Called as ``progress(fraction)``.
+
+    Raises
+    ------
+    GeometryError
+        A camera without lenslets, or a depth inside the focal length.
+    SamplingError
+        An accuracy out of range, or matrices that do not fit in memory.
+
+    Examples
+    --------
+    ``periodic_operator(camera, camera.object_grid).forward(picture)``
+    """
+    depths = tuple(float(d) for d in np.ravel(np.asarray(dz, np.float64)))
+    planes, optics = [], None
+    for k, depth in enumerate(depths):
+        optics = Optics.of(camera, camera.object_distance + depth, accuracy)
+
+        def report(fraction: float, k: int = k) -> None:
+            if progress is not None:
+                progress((k + fraction) / len(depths))
+
+        planes.append(_plane(optics, matrix(optics, report), grid))
+    assert optics is not None
+    several = np.ndim(dz) > 0
     return PeriodicOperator(
-        cells, matrix, glare, grid, camera.sensor, represented(grid, points, True), averaged(plane, camera.sensor.grid)
+        optics.cells, tuple(planes), _readout(optics), grid, depths if several else None, camera.sensor
     )
 
 
-def margin_of(matrix: tuple[Part, ...]) -> tuple[int, int]:
-    """Cells beyond the ring around the array whose points reach into it."""
-    offsets = [offset for part in matrix for offset in part.offsets]
-    return max(abs(dy) for dy, _, _ in offsets), max(abs(dx) for _, dx, _ in offsets)
+def _plane(optics: Optics, matrix: Matrix, grid: Grid) -> Plane:
+    """The spread of an object's samples onto the points of the cells, turned with the array."""
+    cells, camera = optics.cells, optics.camera
+    ring = (1 + matrix.margin[0], 1 + matrix.margin[1])
+    scale = -optics.distance / camera.separation
+    if not optics.rotation:
+        return Plane(matrix, represented(grid, cells.grid(cells.points, scale, ring)))
+    wide = _widened(cells.grid(cells.points, 1.0, ring), optics)
+    margin = tuple((w - m) * n for w, m, n in zip(wide, ring, cells.points, strict=True))
+    turn = Turn(cells.grid(cells.points, 1.0, wide), optics.rotation)
+    spread = represented(grid, cells.grid(cells.points, scale, wide))
+    return Plane(matrix, Chain((spread, turn, Crop((margin[0], margin[1])))))
+
+
+def _readout(optics: Optics) -> Linear:
+    """Means over the pixels of the image's samples, turned back."""
+    cells, pixels = optics.cells, optics.camera.sensor.grid
+    if not optics.rotation:
+        return averaged(cells.grid(cells.samples, optics.image_scale, (1, 1)), pixels)
+    wide = _widened(cells.grid(cells.samples, 1.0, (1, 1)), optics)
+    margin = tuple((w - 1) * n for w, n in zip(wide, cells.samples, strict=True))
+    turn = Turn(cells.grid(cells.samples, 1.0, wide), -optics.rotation)
+    mean = averaged(cells.grid(cells.samples, optics.image_scale, wide), pixels)
+    return Chain((Crop((margin[0], margin[1]), outward=True), turn, mean))
+
+
+def _widened(grid: Grid, optics: Optics) -> tuple[int, int]:
+    """Cells around the array that hold the grid's plane when it is turned."""
+    size, cells = grid.size, optics.cells
+    extra = turn_margin((size[0], size[1]), optics.rotation)
+    wide = []
+    for k in (0, 1):
+        ring = (grid.size[k] / cells.size[k] - cells.count[k]) / 2
+        wide.append(math.ceil(ring + extra[k] / cells.size[k]))
+    return wide[0], wide[1]
 
 
 def _by_cell(plane: Array, per_cell: tuple[int, int]) -> Array:

@@ -18,7 +18,6 @@ KAISER_BETA = 10.5
 """Of the kernel's window: 104 dB."""
 
 _ROWS = 64
-_ZERO = np.zeros((0, 0))
 
 
 def kernel(offset: np.ndarray) -> np.ndarray:
@@ -80,22 +79,12 @@ class Resampling:
         return self.y.adjoint(xp.matrix_transpose(self.x.adjoint(xp.matrix_transpose(picture))))
 
 
-def represented(source: Grid, points: Grid, turned: bool) -> Resampling:
-    """Samples of an object as band-limited light on points; the sum times the area is kept.
-
-    Parameters
-    ----------
-    source
-        Samples of any pitch.
-    points
-        Where the light is wanted; turned by 180°: from the largest coordinate down.
-    turned
-        Whether the points are so ordered.
-    """
+def represented(source: Grid, points: Grid) -> Resampling:
+    """Samples of an object as band-limited light on points turned by 180°; what they sum up to is kept."""
     matrices = []
     for axis in (0, 1):
         pitch = points.pitch[axis]
-        at = _ordered(points, axis, turned) / pitch
+        at = _descending(points, axis) / pitch
         samples = (source.y, source.x)[axis] / pitch
         scale = source.pitch[axis] / pitch
         matrices.append(banded(at, samples, lambda d, s=scale: kernel(d) * s, KERNEL))
@@ -112,7 +101,7 @@ def averaged(plane: Grid, pixels: Grid) -> Resampling:
         def mean(d: np.ndarray, nodes: Any = nodes * width / 2, weights: Any = weights / 2) -> np.ndarray:
             return sum(w * kernel(d + n) for n, w in zip(nodes, weights, strict=True))
 
-        at = _ordered(pixels, axis, True) / pitch
+        at = -(pixels.y, pixels.x)[axis] / pitch
         matrices.append(banded(at, (plane.y, plane.x)[axis] / pitch, mean, KERNEL + width / 2))
     return Resampling(matrices[0], matrices[1])
 
@@ -131,8 +120,7 @@ def banded(
     return Banded(len(columns), tuple(blocks))
 
 
-def _ordered(grid: Grid, axis: int, turned: bool) -> np.ndarray:
-    """Positions along an axis; of a plane turned by 180°, those of its counterpart: from the largest down."""
+def _descending(grid: Grid, axis: int) -> np.ndarray:
+    """Positions along an axis of a plane turned by 180°: from the largest down."""
     n, pitch, center = grid.shape[axis], grid.pitch[axis], grid.center[axis]
-    steps = (np.arange(n) - n // 2) * pitch
-    return center - steps if turned else center + steps
+    return center - (np.arange(n) - n // 2) * pitch
