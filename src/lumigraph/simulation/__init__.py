@@ -3,6 +3,8 @@
 - `imaging`: `simulate`
 - `periodic`: `periodic_operator`, incoherent planes before a lenslet array, and its adjoint
 - `point_images`: what it repeats: the images of the points of one cell of the array
+- `single_lens`: `single_lens_operator`, incoherent planes and points before a camera without lenslets
+- `band`: band-limited samples along an axis, to and from points and pixels
 - `camera`: `Camera`, what a simulation asks of an instrument
 - `coherence`: `Incoherent`, `Coherent`, `Snapshots`, `TiltedWaves`: how the scene's light interferes
 - `directions`: quasi-random directions of tilted waves, more of them where more light comes from
@@ -12,6 +14,7 @@ from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Snapshots, TiltedWaves
 from lumigraph.simulation.imaging import Interrupted, simulate
 from lumigraph.simulation.periodic import PeriodicOperator, periodic_operator
+from lumigraph.simulation.single_lens import SingleLensOperator, single_lens_operator
 
 __all__ = [
     "Camera",
@@ -20,8 +23,10 @@ __all__ = [
     "Incoherent",
     "Interrupted",
     "PeriodicOperator",
+    "SingleLensOperator",
     "Snapshots",
     "TiltedWaves",
     "periodic_operator",
     "simulate",
+    "single_lens_operator",
 ]

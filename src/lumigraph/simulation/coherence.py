@@ -154,10 +154,11 @@ class Snapshots:
 class Incoherent:
     """Spatially incoherent light, like every lit scene.
 
-    Points are exact: their intensities are added. Extended scenes before a lenslet array that is not
-    turned go through the lenslet-periodic operator (`simulation.periodic`), without speckle, to 1 to 3 %
-    rms. Single lenses, turned arrays and operators above 1 GiB take white-phase `Snapshots`, which carry
-    speckle of about 1/sqrt(snapshots) rms in a pixel that resolves it.
+    A camera without lenslets has its exact image, to 1e-4 rms: the object convolved with the image of a point
+    (`simulation.single_lens`). Before a lenslet array points are exact, their intensities are added, and
+    extended scenes go through the lenslet-periodic operator (`simulation.periodic`), without speckle, to 1 to
+    3 % rms, where the array is not turned. Turned arrays and operators above 1 GiB take white-phase
+    `Snapshots`, which carry speckle of about 1/sqrt(snapshots) rms in a pixel that resolves it.
 
     Parameters
     ----------

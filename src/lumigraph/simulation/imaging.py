@@ -18,6 +18,7 @@ from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
 from lumigraph.propagation import propagate
 from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
 from lumigraph.sensor import integrate
+from lumigraph.simulation import single_lens
 from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Plane, Snapshots, TiltedWaves
 from lumigraph.simulation.periodic import kernel_bytes, periodic_operator
@@ -98,14 +99,14 @@ def simulate(
     """
     coherence = Incoherent() if coherence is None else coherence
     _check(camera, scene, coherence)
-    exact = _periodic(camera, scene) if isinstance(coherence, Incoherent) else []
+    exact = _exact(camera, scene) if isinstance(coherence, Incoherent) else []
     rest = Scene(part for part in scene.parts if part not in exact)
     shots, count = _shots(camera, rest, _drawn(coherence))
     light = _Light(np.zeros(camera.image_grid.shape), np.zeros(camera.sensor.shape))
     total = len(exact) + count
     try:
         for part in exact:
-            light.pixels += _exactly(camera, part.trimmed())
+            light.pixels += _exactly(camera, part)
             light.count(progress, total)
         for half, image in map(_Shot.arrive, shots):
             light.add(half, image)
@@ -155,13 +156,20 @@ def _drawn(coherence: Coherence | Incoherent) -> Coherence:
     return coherence
 
 
-def _exactly(camera: Camera, part: Slice) -> np.ndarray:
+def _exactly(camera: Camera, part: Slice | Points) -> np.ndarray:
+    if isinstance(part, Points):
+        return single_lens.points_image(camera, part)
+    if single_lens.fits(camera):
+        return single_lens.slice_image(camera, part.trimmed())
+    part = part.trimmed()
     operator = periodic_operator(camera, part.grid, part.dz)
     return operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
 
 
-def _periodic(camera: Camera, scene: Scene) -> list[Slice]:
-    """Slices that the lenslet-periodic operator takes."""
+def _exact(camera: Camera, scene: Scene) -> list[Slice | Points]:
+    """Parts that a camera without lenslets, or the lenslet-periodic operator, images without snapshots."""
+    if single_lens.fits(camera):
+        return [part for part in scene.parts if isinstance(part, Slice | Points)]
     if not fits(camera):
         return []
     slices = [part for part in scene.parts if isinstance(part, Slice)]
