@@ -15,7 +15,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.raw import RawImage
 from lumigraph.elements import CircularAperture, Train
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
-from lumigraph.propagation import propagate
+from lumigraph.propagation import Propagate, propagate
 from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
 from lumigraph.sensor import integrate
 from lumigraph.simulation import single_lens
@@ -55,7 +55,10 @@ class _Shot:
     """Of two halves of a random or quasi-random sample, the one that this shot belongs to."""
 
     def arrive(self) -> tuple[int | None, np.ndarray]:
-        return self.half, self.weight * self.train(self.field).intensity
+        *elements, last = self.train.elements or (Train(()),)
+        before = Train(elements)(self.field)
+        intensity = last.intensity(before) if isinstance(last, Propagate) else last(before).intensity
+        return self.half, intensity if self.weight == 1 else self.weight * intensity
 
 
 def simulate(
