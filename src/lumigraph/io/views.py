@@ -51,7 +51,7 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> LightField:
         picture = _picture(file, max_pixels)
         if data is None:
             whole = (rows, columns, *picture.shape)
-            source.check_size(path, (*whole, 1) if len(whole) == 4 else whole, max_pixels)
+            source.check_size(path, whole, max_pixels)
             data = np.empty(whole, picture.dtype)
         if picture.shape != data.shape[2:] or picture.dtype != data.dtype:
             raise FormatError(
