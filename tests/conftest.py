@@ -1,10 +1,25 @@
 """Array libraries for the array rule: NumPy, array-api-strict (always), PyTorch (where installed)."""
 
 import importlib
+import os
+import shutil
+import tempfile
 import warnings
 
 import numpy as np
 import pytest
+
+
+def pytest_configure(config):
+    """What operators keep on disk goes to a folder of this run, which its workers share."""
+    if not hasattr(config, "workerinput"):
+        config.kept = tempfile.mkdtemp(prefix="lumigraph-tests-")
+        os.environ["LUMIGRAPH_CACHE"] = config.kept
+
+
+def pytest_unconfigure(config):
+    if hasattr(config, "kept"):
+        shutil.rmtree(config.kept, ignore_errors=True)
 
 
 @pytest.fixture(params=["numpy", "array_api_strict", "torch"])

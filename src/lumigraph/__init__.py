@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     )
     from lumigraph.instruments import (
         FocusedPlenopticCamera,
+        LightFieldMicroscope,
         PlenopticCamera,
         SingleLensCamera,
         catalogue,
@@ -102,6 +103,7 @@ _HOMES = {
     ),
     "lumigraph.instruments": (
         "FocusedPlenopticCamera",
+        "LightFieldMicroscope",
         "PlenopticCamera",
         "SingleLensCamera",
         "catalogue",
@@ -145,6 +147,7 @@ __all__ = [
     "Lattice",
     "LensletArray",
     "LightField",
+    "LightFieldMicroscope",
     "LumigraphError",
     "PlenopticCamera",
     "PointCloud",

@@ -8,7 +8,7 @@ import pytest
 
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
-from lumigraph.propagation import propagate
+from lumigraph.propagation import Propagate, propagate
 
 
 def wave(n=700):
@@ -32,3 +32,14 @@ def test_a_forked_process_makes_its_own_threads():
     expected = total()
     with multiprocessing.get_context("fork").Pool(1) as pool:
         assert pool.apply_async(total).get(timeout=60) == expected
+
+
+@pytest.mark.parametrize("method", ["band_limited", "angular_spectrum", "fresnel"])
+def test_the_intensity_without_the_field_is_the_fields(method, xp):
+    grid, rng = Grid((40, 30), 5e-6), np.random.default_rng(1)
+    data = (rng.random((2, 40, 30)) + 1j * rng.random((2, 40, 30))).astype(np.complex64)
+    step = Propagate(2e-3, method)
+    wave = Field(xp.asarray(data), grid, 633e-9)
+    found = step.intensity(wave)
+    assert str(found.dtype).endswith("float32")
+    np.testing.assert_array_equal(np.asarray(found), np.asarray(step(wave).intensity))

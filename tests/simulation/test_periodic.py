@@ -11,10 +11,10 @@ from lumigraph.scene import Scene, Slice, targets
 from lumigraph.simulation import (
     Incoherent,
     Snapshots,
+    band,
+    cells,
     imaging,
-    periodic,
     periodic_operator,
-    point_images,
     simulate,
 )
 from lumigraph.units import mm, nm, um
@@ -46,7 +46,11 @@ CAMERAS = {
     "2.0, even count, moved": focused(count=(10, 8), offset=(20 * um, -30 * um)),
     "2.0, round lenslets": focused(shape="round", fill_factor=0.9),
     "2.0, Galilean": focused(magnification=-0.4, focal_length=8 * mm),
-    "2.0, hexagonal": focused(layout="hex", count=(10, 8)),
+    "2.0, hexagonal": focused(layout="hex", count=(6, 5)),
+    "2.0, turned": focused(rotation=0.1, count=(7, 7)),
+    "2.0, three kinds": focused(
+        layout="hex", count=(6, 6), focal_length=(5.2 * mm, 5.0 * mm, 5.4 * mm), shape="round", rotation=-0.02
+    ),
     "1.0": plenoptic(),
 }
 PATCH = np.array([[1.0, 0, 3, 0], [0, 2, 0, 0], [4, 0, 0, 1], [0, 0, 2, 5]])
@@ -56,8 +60,10 @@ def relative(image, reference):
     return np.linalg.norm(image - reference) / np.linalg.norm(reference)
 
 
-@pytest.mark.parametrize("name", CAMERAS)
-@pytest.mark.parametrize("dz", [0.0, 3 * mm])
+@pytest.mark.parametrize(
+    ("name", "dz"),
+    [(name, dz) for name in CAMERAS for dz in (0.0, 3 * mm) if dz or name in ("2.0", "1.0")],
+)
 def test_an_object_is_the_sum_of_its_points(name, dz, monkeypatch):
     """Against exact spherical waves through the whole train, sampled twice as finely as usual.
 
@@ -72,7 +78,7 @@ def test_an_object_is_the_sum_of_its_points(name, dz, monkeypatch):
     points = [(y, x, dz) for y in grid.y for x in grid.x]
     share = np.prod(grid.pitch) / np.prod(camera.object_grid.pitch)
     reference = simulate(camera, targets.points(points, PATCH.ravel())).data * share
-    image = periodic_operator(camera, grid, dz).forward(PATCH)
+    image = periodic_operator(camera, grid, dz, accuracy=1e-2).forward(PATCH)
     assert relative(image, reference) < 0.03
     assert image.sum() == pytest.approx(reference.sum(), rel=0.02)
 
@@ -118,7 +124,7 @@ def test_moving_the_object_by_one_lenslet_moves_the_image_by_one_micro_image():
     step = camera.lenslets.pitch * camera.object_distance / camera.separation
     moved = Grid(grid.shape, grid.pitch, (grid.center[0], grid.center[1] + step))
     here, there = (periodic_operator(camera, g).forward(PATCH) for g in (grid, moved))
-    assert relative(here[:, 17:-34], there[:, 34:-17]) < 1e-5
+    assert relative(here[:, 17:-34], there[:, 34:-17]) < 5e-4  # the border is elsewhere
 
 
 def test_the_adjoint_is_the_transpose(xp, rng):
@@ -136,19 +142,10 @@ def test_the_adjoint_is_the_transpose(xp, rng):
 def test_the_kernel_interpolates_what_the_main_lens_passes():
     """A cosine at the lens' cut-off, sampled at the points, comes back between them to 1e-5."""
     points = np.arange(-40, 41)
-    for frequency in (0.1, 0.5 / point_images.OVERSAMPLING):
+    for frequency in (0.1, 0.5 / cells.OVERSAMPLING):
         for place in (0.0, 0.3, 0.5):
-            value = (periodic.kernel(place - points) * np.cos(2 * np.pi * frequency * points)).sum()
+            value = (band.kernel(place - points) * np.cos(2 * np.pi * frequency * points)).sum()
             assert value == pytest.approx(np.cos(2 * np.pi * frequency * place), abs=2e-5)
-
-
-def test_turned_arrays_take_snapshots():
-    camera = focused(rotation=0.01)
-    scene = Scene([Slice(PATCH, Grid((4, 4), 30 * um))])
-    with pytest.raises(SamplingError, match="turned against the axes"):
-        periodic_operator(camera, Grid((4, 4), 30 * um))
-    raw = simulate(camera, scene, Incoherent(3, rng=1))
-    assert raw.metadata["shots"] == 3
 
 
 def test_a_large_operator_gives_way_to_snapshots(monkeypatch):
@@ -162,4 +159,4 @@ def test_an_operator_that_cannot_fit_is_refused(monkeypatch):
 
     monkeypatch.setattr(memory, "available", lambda: 1000)
     with pytest.raises(SamplingError, match="the periodic operator needs"):
-        periodic_operator(CAMERAS["2.0"], Grid((4, 4), 30 * um))
+        periodic_operator(CAMERAS["2.0"], Grid((4, 4), 30 * um), 1.234 * mm)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lumigraph.errors import CalibrationError, FormatError
+from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
     from lumigraph.core.calibration import Calibration
@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from lumigraph.core.raw import RawImage
 
 PICTURES = (".png", ".tif", ".tiff", ".zarr", ".zarr.zip")
-VIEWS = (".zarr", ".zarr.zip")
+VIEWS = (".zarr", ".zarr.zip", ".h5", ".hdf5", "_eslf.png")
+MOVIES = (".gif", ".mp4")
 FIGURES = (".png", ".svg", ".pdf")
 
 
@@ -26,7 +27,10 @@ def check_output(path: Path, endings: Sequence[str]) -> None:
     """
     from lumigraph.io.target import check_target
 
-    check_target(path, endings)
+    if endings == VIEWS and not path.suffix:
+        check_target(path, folder=True)
+    else:
+        check_target(path, endings)
 
 
 def read_raw(path: Path) -> "RawImage":
@@ -67,54 +71,21 @@ def read_views(path: Path) -> "LightField | RawImage":
     return found
 
 
-def read_calibration(path: Path) -> "Calibration":
-    """A calibration.
+def read_calibration(path: Path, shape: tuple[int, int] | None = None) -> "Calibration":
+    """A calibration: our own, or one by a camera's maker, which needs the raw images' shape.
 
     Raises
     ------
     FormatError
         Another kind of file.
     """
-    from lumigraph.io import load_calibration
+    if path.suffix.lower() not in (".xml", ".ini"):
+        from lumigraph.io import load_calibration
 
-    return load_calibration(path)
+        return load_calibration(path)
+    import lumigraph.io as io
 
-
-def calibration_for(
-    raw: "RawImage", calibration: Path | None, white: Path | None, *, devignette: bool | None = None
-) -> "tuple[RawImage, Calibration]":
-    """The raw image, devignetted if there is a white image, and its calibration.
-
-    Parameters
-    ----------
-    raw
-        Of the camera.
-    calibration
-        File made by `lumigraph calibrate`; None calibrates from the white image.
-    white
-        Taken with the same settings.
-    devignette
-        Whether to divide by the white image; None does where there is one.
-
-    Raises
-    ------
-    CalibrationError
-        Neither is given, or they do not belong together.
-    """
-    from lumigraph import calibration as verbs
-
-    if calibration is None and white is None:
-        raise CalibrationError(
-            "where the micro-images stand is not known. Give --calibration FILE or --white FILE."
-        )
-    if devignette and white is None:
-        raise CalibrationError("--devignette needs the white image. Give --white FILE.")
-    picture = None if white is None else read_raw(white)
-    found = read_calibration(calibration) if calibration is not None else verbs.calibrate(_given(picture))
-    found.check_fits(raw.shape)
-    if picture is not None and devignette is not False:
-        raw = verbs.devignette(raw, picture)
-    return raw, found
+    return io.open(path, shape=shape)
 
 
 def save_figure(figure: Any, path: Path) -> None:
@@ -123,8 +94,3 @@ def save_figure(figure: Any, path: Path) -> None:
 
     with replacing(path) as temporary:
         figure.savefig(temporary, format=path.suffix[1:].lower(), dpi=130)
-
-
-def _given(picture: "RawImage | None") -> "RawImage":
-    assert picture is not None  # the caller has seen to it
-    return picture

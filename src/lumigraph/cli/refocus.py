@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import progress, report
-from lumigraph.cli.options import COMMON, Common, Output
+from lumigraph.cli.console import Count, progress, report
+from lumigraph.cli.options import COMMON, Common, Output, length
+from lumigraph.cli.origin import NO_ORIGIN, PLENOPTIC, Origin
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -31,37 +32,27 @@ class Focus:
         One or more numbers.
     alphas
         A range 'first:last:count', such as 0.9:1.1:9.
+    depth
+        One or more depths from the focused plane, such as '5 mm' (farther) or '-5 mm'; needs --camera.
     """
 
     alpha: Annotated[list[float] | None, Parameter(consume_multiple=True)] = None
     alphas: str | None = None
+    depth: Annotated[list[str] | None, Parameter(consume_multiple=True, allow_leading_hyphen=True)] = None
 
-    def chosen(self) -> list[float]:
+    def chosen(self, camera: Any) -> list[float]:
         """All factors, as given."""
-        found = [*(self.alpha or []), *(_range(self.alphas) if self.alphas else [])]
+        found = [*(self.alpha or []), *(range_of("--alphas", self.alphas) if self.alphas else [])]
+        if self.depth:
+            if camera is None:
+                raise FormatError("--depth needs the camera's geometry. Give --camera FILE, or --alpha.")
+            found += [camera.alpha(length("--depth", text) or 0.0) for text in self.depth]
         if not found:
             raise FormatError("where to focus is not known. Give --alpha 0.95 or --alphas 0.9:1.1:9.")
         for alpha in found:
             if not math.isfinite(alpha) or alpha <= 0:
                 raise FormatError(f"--alpha is {alpha:g} but must be a finite number above 0.")
         return found
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Origin:
-    """What a raw image needs to become views.
-
-    Parameters
-    ----------
-    calibration
-        File made by 'lumigraph calibrate', for a raw image.
-    white
-        White image, for a raw image: it is divided by it, and calibrated from it without --calibration.
-    """
-
-    calibration: Path | None = None
-    white: Path | None = None
 
 
 @Parameter(name="*")
@@ -75,13 +66,19 @@ class Quality:
         shear: sums sheared views; fourier: slices their spectrum.
     aperture
         Part of the aperture's width that is used: smaller is sharper in depth, and noisier.
+    shape
+        Of the aperture: all views, those inside a circle, or those in a ring.
     oversample
         Pixels per lenslet: out of the lenslets' plane, views fill in between; for shear.
+    interpolation
+        Between lenslets; for shear.
     """
 
     method: Literal["shear", "fourier"] = "shear"
     aperture: float = 1.0
+    shape: Literal["square", "round", "ring"] = "square"
     oversample: Annotated[int, Parameter(allow_leading_hyphen=True)] = 1
+    interpolation: Literal["linear", "cubic", "band_limited"] = "cubic"
 
     def check(self) -> None:
         """Refuse what no picture can be made with."""
@@ -92,13 +89,25 @@ class Quality:
         if self.method == "fourier" and self.oversample != 1:
             raise FormatError("--oversample has no meaning with --method fourier. Use --method shear.")
 
-    def picture(self, views: "LightField", alpha: float) -> "Array":
-        """The picture focused by `alpha`."""
+    def pictures(self, views: "LightField", alphas: list[float], shown: Count) -> "list[Array]":
+        """The pictures focused by each factor."""
         from lumigraph import rendering
 
-        if self.method == "fourier":
-            return rendering.refocus_fourier(views, alpha)
-        return rendering.refocus(views, alpha, oversample=self.oversample)
+        views = rendering.reduce_aperture(views, self.aperture, shape=self.shape)
+        if self.method == "shear":
+            stack = rendering.refocus_stack(
+                views,
+                alphas,
+                interpolation=self.interpolation,
+                oversample=self.oversample,
+                progress=shown,
+            )
+            return list(stack)
+        images = []
+        for alpha in alphas:
+            images.append(rendering.refocus_fourier(views, alpha))
+            shown(len(images), len(alphas))
+        return images
 
 
 def refocus(
@@ -107,7 +116,7 @@ def refocus(
     *,
     output: Output,
     focus: Focus = Focus(),
-    origin: Origin = Origin(),
+    origin: Origin = NO_ORIGIN,
     quality: Quality = Quality(),
     common: Common = COMMON,
 ) -> None:
@@ -117,24 +126,21 @@ def refocus(
 
     Example: `lumigraph refocus raw.png --white white.png --alphas 0.9:1.1:9 -o stack.tiff`
 
+    Example: `lumigraph refocus views.zarr --camera camera.toml --depth "-5 mm" "5 mm" -o sweep.gif`
+
     Parameters
     ----------
     views
-        Views (.zarr) made by 'lumigraph decode', or a raw image.
+        Views (.zarr, .h5, a folder) made by 'lumigraph decode' or by others, or a raw image.
     output
-        One focus: a picture (.png, .tiff, .zarr). Several: a stack (.tiff) or a folder for PNG files.
+        One focus: a picture (.png, .tiff, .zarr). Several: a stack (.tiff), a film (.gif, .mp4) or a folder
+        for PNG files.
     """
-    from lumigraph import rendering
-
-    alphas = focus.chosen()
     quality.check()
+    alphas = focus.chosen(origin.described(PLENOPTIC) if focus.depth else None)
     _check_output(output, alphas)
     with progress("refocus") as shown:
-        light_field = rendering.reduce_aperture(_light_field(views, origin), quality.aperture)
-        images = []
-        for alpha in alphas:
-            images.append(quality.picture(light_field, alpha))
-            shown(len(images), len(alphas))
+        images = quality.pictures(light_field(views, origin), alphas, shown)
     written = _write(images, alphas, output)
     shape = images[0].shape[:2]
     lines = [f"alpha {alpha:g}: {shape[0]} x {shape[1]} px" for alpha in alphas]
@@ -142,21 +148,28 @@ def refocus(
     report(common, text, {"alphas": alphas, "shape": shape, "output": [str(path) for path in written]})
 
 
-def _light_field(path: Path, origin: Origin) -> "LightField":
+def light_field(path: Path, origin: Origin) -> "LightField":
+    """The views in a file, or those of the raw image in it.
+
+    Raises
+    ------
+    FormatError
+        Views, with something that only a raw image needs.
+    """
     from lumigraph import rendering
     from lumigraph.core.lightfield import LightField
 
     found = files.read_views(path)
     if isinstance(found, LightField):
-        if origin.calibration is not None or origin.white is not None:
+        if origin.is_given:
             raise FormatError(f"{path} holds views, which need no --calibration or --white. Leave them out.")
         return found
-    return rendering.decode(*files.calibration_for(found, origin.calibration, origin.white))
+    return rendering.decode(*origin.prepared(found, kind=PLENOPTIC))
 
 
 def _check_output(output: Path, alphas: list[float]) -> None:
     if output.suffix or len(alphas) == 1:
-        files.check_output(output, files.PICTURES if len(alphas) == 1 else (".tif", ".tiff"))
+        files.check_output(output, files.PICTURES if len(alphas) == 1 else (".tif", ".tiff", *files.MOVIES))
     elif output.exists() and not output.is_dir():
         raise FormatError(f"{output} is a file. Give a folder, or a stack that ends in .tiff.")
     elif not output.parent.is_dir():
@@ -164,13 +177,16 @@ def _check_output(output: Path, alphas: list[float]) -> None:
 
 
 def _write(images: list[Any], alphas: list[float], output: Path) -> list[Path]:
+    import numpy as np
+
     from lumigraph import io
+    from lumigraph.core.stack import Stack
 
     if len(images) == 1:
         io.save(images[0], output)
         return [output]
     if output.suffix:
-        io.save(images, output)
+        io.save(Stack(np.stack(images), tuple(alphas), "alpha"), output)
         return [output]
     output.mkdir(exist_ok=True)
     # One white for all, so that the pictures of a folder can be compared.
@@ -181,12 +197,19 @@ def _write(images: list[Any], alphas: list[float], output: Path) -> list[Path]:
     return paths
 
 
-def _range(text: str) -> list[float]:
+def range_of(option: str, text: str) -> list[float]:
+    """The numbers of a range 'first:last:count' after an option.
+
+    Raises
+    ------
+    FormatError
+        Another form, or a count that is too large.
+    """
     try:
         words = text.split(":")
         first, last, count = float(words[0]), float(words[1]), int(":".join(words[2:]))
     except (IndexError, ValueError):
-        raise FormatError(f"--alphas is {text!r} but must be first:last:count, such as 0.9:1.1:9.") from None
+        raise FormatError(f"{option} is {text!r} but must be first:last:count, such as 0.9:1.1:9.") from None
     if not 2 <= count <= _MOST or not math.isfinite(first) or not math.isfinite(last):
-        raise FormatError(f"--alphas is {text!r} but needs finite numbers and a count from 2 to {_MOST}.")
+        raise FormatError(f"{option} is {text!r} but needs finite numbers and a count from 2 to {_MOST}.")
     return [first + (last - first) * k / (count - 1) for k in range(count)]

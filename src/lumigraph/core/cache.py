@@ -29,7 +29,7 @@ class ByteCache:
         self._lock = Lock()
 
     def get(self, key: Hashable, build: Callable[[], Any]) -> Any:
-        """The array, or what has ``nbytes``, kept under `key`, built and kept first where there is none. Never write into it."""
+        """The array, or what has ``nbytes``, kept under `key`; built where there is none. To be read only."""
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)

@@ -29,7 +29,7 @@ def folder() -> Path | None:
 
 
 def load(key: str) -> dict[str, np.ndarray] | None:
-    """The arrays kept under a key, memory-mapped and read-only; None where there are none, or damaged ones."""
+    """The arrays kept under a key, memory-mapped and read-only; None where there are none, or damaged."""
     where = folder()
     if where is None or not (where / key).is_dir():
         return None
@@ -64,7 +64,9 @@ def save(key: str, arrays: dict[str, np.ndarray]) -> None:
 
 def _tidy(where: Path) -> None:
     """Remove the folders that were not used for longest, until the rest fits."""
-    folders = sorted((p for p in where.iterdir() if p.is_dir()), key=lambda p: p.stat().st_mtime, reverse=True)
+    folders = sorted(
+        (p for p in where.iterdir() if p.is_dir()), key=lambda p: p.stat().st_mtime, reverse=True
+    )
     total = 0
     for path in folders:
         total += sum(file.stat().st_size for file in path.glob("*.npy"))

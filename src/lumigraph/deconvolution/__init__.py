@@ -16,7 +16,7 @@ from lumigraph.deconvolution.checkpoint import Checkpoint
 from lumigraph.deconvolution.deconvolve import Interrupted, Step, deconvolve, deconvolve_series
 from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.filters import LowPass
-from lumigraph.deconvolution.forward import ForwardModel, PlacedModel
+from lumigraph.deconvolution.forward import ForwardModel
 from lumigraph.deconvolution.least_squares import LeastSquares
 from lumigraph.deconvolution.methods import Stop
 from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
@@ -30,7 +30,6 @@ __all__ = [
     "Interrupted",
     "LeastSquares",
     "LowPass",
-    "PlacedModel",
     "RichardsonLucy",
     "Step",
     "Stop",

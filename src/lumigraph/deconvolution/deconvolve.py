@@ -15,7 +15,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.deconvolution.checkpoint import Checkpoint, fingerprint
 from lumigraph.deconvolution.exposure import Exposure
-from lumigraph.deconvolution.forward import ForwardModel, PlacedModel, depths_of
+from lumigraph.deconvolution.forward import ForwardModel, depths_of, grid_of
 from lumigraph.deconvolution.methods import Method, State, Stop
 from lumigraph.deconvolution.problem import Problem, Scale, values
 from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
@@ -228,9 +228,9 @@ def _finished(run: _Run, raw: RawImage | Array) -> Any:
 
 def _placed(estimate: Array, raw: RawImage | Array, operator: ForwardModel) -> Any:
     """The estimate with its place in space, where the raw image is one and the operator knows it."""
-    if not isinstance(raw, RawImage) or not isinstance(operator, PlacedModel):
+    grid = grid_of(operator)
+    if not isinstance(raw, RawImage) or grid is None:
         return estimate
-    grid = operator.object_grid
     if len(estimate.shape) == 3:
         depths = depths_of(operator)
         return estimate if depths is None else Volume(estimate, grid, depths)

@@ -15,7 +15,7 @@ class ForwardModel(Protocol):
     and ringing that an operator states.
 
     An operator that also knows where its object stands has ``object_grid`` (`Grid`) and, for an object of
-    several planes, ``depths`` [m]: see `PlacedModel`.
+    several planes, ``depths`` (z,) [m].
     """
 
     @property
@@ -36,14 +36,10 @@ class ForwardModel(Protocol):
         ...
 
 
-@runtime_checkable
-class PlacedModel(ForwardModel, Protocol):
-    """A forward model that knows where its object stands."""
-
-    @property
-    def object_grid(self) -> Grid:
-        """Samples of every plane [m]."""
-        ...
+def grid_of(operator: ForwardModel) -> Grid | None:
+    """Samples of every plane of the object [m]; None for an operator that has no ``object_grid``."""
+    grid = getattr(operator, "object_grid", None)
+    return grid if isinstance(grid, Grid) else None
 
 
 def depths_of(operator: ForwardModel) -> tuple[float, ...] | None:

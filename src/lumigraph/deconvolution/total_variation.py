@@ -20,7 +20,7 @@ import numpy as np
 
 from lumigraph.core import arrays, checks
 from lumigraph.core.arrays import Array
-from lumigraph.deconvolution.forward import PlacedModel, depths_of
+from lumigraph.deconvolution.forward import depths_of, grid_of
 from lumigraph.deconvolution.methods import State
 from lumigraph.deconvolution.problem import Problem
 from lumigraph.errors import GeometryError
@@ -158,9 +158,10 @@ def _cut(image: Array, axis: int, part: slice) -> Array:
 
 def _spacing_of(problem: Problem, axes: int) -> tuple[float, ...]:
     operator = problem.scale.operator
-    if not isinstance(operator, PlacedModel):
+    grid = grid_of(operator)
+    if grid is None:
         return (1.0,) * axes
-    pitch = operator.object_grid.pitch
+    pitch = grid.pitch
     if axes == 2:
         return pitch
     depths = depths_of(operator)

@@ -4,11 +4,12 @@
 - `resolution`: f-number, numerical aperture, cut-offs, Airy pattern, depth of field
 - `plenoptic1`: the plenoptic camera 1.0, lenslets at the main-lens image
 - `plenoptic2`: the focused plenoptic camera 2.0, lenslets relay the main-lens image
+- `microscope`: the light-field microscope, by depth
 
 Distances are positive along the light unless a function says otherwise. "The thesis" in a source is the
 PhD thesis that this project started from; equations that are misprinted there are given corrected here.
 """
 
-from lumigraph.design import plenoptic1, plenoptic2, resolution, thin_lens
+from lumigraph.design import microscope, plenoptic1, plenoptic2, resolution, thin_lens
 
-__all__ = ["plenoptic1", "plenoptic2", "resolution", "thin_lens"]
+__all__ = ["microscope", "plenoptic1", "plenoptic2", "resolution", "thin_lens"]

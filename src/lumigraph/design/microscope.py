@@ -291,12 +291,14 @@ def fourier_field(relay: float, magnification: float, pitch: float, focal_length
     250
     """
     size = checks.positive("relay", relay) * checks.positive("pitch", pitch)
-    shrunk = checks.positive("magnification", magnification, "1") * checks.positive("focal_length", focal_length)
+    shrunk = checks.positive("magnification", magnification, "1") * checks.positive(
+        "focal_length", focal_length
+    )
     return size / shrunk
 
 
 def fourier_resolution(wavelength: float, relay: float, magnification: float, pitch: float) -> float:
-    """Lateral resolution of a Fourier light-field microscope, λ f_F / (d M) [m]: a lenslet's share of the pupil.
+    """Lateral resolution of a Fourier light-field microscope, λ f_F / (d M) [m].
 
     References
     ----------

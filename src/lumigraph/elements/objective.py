@@ -143,6 +143,11 @@ class Objective:
         object.__setattr__(self, "aberrations", tuple((int(j), float(w)) for j, w in pairs))
 
     @property
+    def terms(self) -> tuple[tuple[int, float], ...]:
+        """Noll index and waves rms of each aberration."""
+        return tuple(dict(self.aberrations).items())
+
+    @property
     def medium(self) -> float:
         """Refractive index around the object."""
         return self.index if self.mismatch is None else self.mismatch.sample_index
@@ -155,7 +160,7 @@ class Objective:
     @property
     def is_round(self) -> bool:
         """Whether the point's image is the same in every direction."""
-        return all(noll_to_nm(j)[1] == 0 for j, _ in self.aberrations)
+        return all(noll_to_nm(j)[1] == 0 for j, _ in self.terms)
 
     @property
     def modes(self) -> int:
@@ -182,7 +187,7 @@ class Objective:
     def intensity(self, y: np.ndarray | float, x: np.ndarray | float, dz: float) -> np.ndarray:
         """Intensity (...) at positions (y, x) in object space [m] of a point on the axis at `dz`."""
         fields = self.fields(y, x, dz)
-        return (np.square(fields.real) + np.square(fields.imag)).sum(0)
+        return np.asarray(np.square(np.abs(fields)).sum(0))
 
     def radius_of(self, part: float, dz: float) -> float:
         """Radius that holds this part of the light [m], for a round image; from 0 to below 1."""
@@ -193,9 +198,10 @@ class Objective:
                 0, reach, max(256, math.ceil(reach * 24 * self.numerical_aperture / self.wavelength))
             )
             density = np.mean([self.intensity(steps * s, steps * c, dz) for s, c in _FOUR], axis=0)
-            inside = np.cumsum(2 * math.pi * steps * density) * steps[1]
+            rings = 2 * math.pi * steps * density * steps[1]
+            inside = np.cumsum(rings) - rings / 2
             if inside[-1] >= part:
-                return float(steps[np.searchsorted(inside, part)])
+                return float(np.interp(part, inside, steps))
             reach *= 1.6
         return reach
 
@@ -233,7 +239,7 @@ def _nodes(objective: Objective, radius: float, dz: float) -> tuple[np.ndarray, 
     phase += k * abs(objective.image_defocus) * objective.numerical_aperture**2
     if objective.mismatch is not None:
         phase += k * float(np.ptp(_extra_path(objective, np.linspace(0, objective.aperture, 64))))
-    phase += 20 * sum(abs(w) for _, w in objective.aberrations)
+    phase += 20 * sum(abs(w) for _, w in objective.terms)
     at, weight = np.polynomial.legendre.leggauss(64 * math.ceil((48 + 0.6 * phase) / 64))
     angle = half / 2 * (at + 1)
     return np.sin(angle), np.cos(angle), weight * half / 2 * np.sin(angle)
@@ -295,7 +301,7 @@ def _tables(
 def _aberrated(objective: Objective, rho: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Factor (azimuths, radii) of the Zernike terms over the pupil."""
     phase = np.zeros((len(angle), len(rho)))
-    for j, waves in objective.aberrations:
+    for j, waves in objective.terms:
         phase += 2 * np.pi * waves * zernike(j, rho[None, :], angle[:, None])
     return np.exp(1j * phase)
 

@@ -4,6 +4,7 @@
 - `run`: runs experiments, resumes what was interrupted
 - `pages`: the report of a run
 - `thesis`: one table or figure, one file, one function
+- `beyond`: what the thesis does not have, such as deconvolution
 """
 
 from lumigraph.experiments.registry import (

@@ -241,10 +241,11 @@ def experiment(
 
 @cache
 def _discover() -> None:
-    from lumigraph.experiments import thesis
+    from lumigraph.experiments import beyond, thesis
 
-    for module in iter_modules(thesis.__path__):
-        import_module(f"{thesis.__name__}.{module.name}")
+    for package in (thesis, beyond):
+        for module in iter_modules(package.__path__):
+            import_module(f"{package.__name__}.{module.name}")
 
 
 def experiments() -> tuple[Experiment, ...]:

@@ -3,11 +3,12 @@
 - `single_lens`: `SingleLensCamera`
 - `plenoptic1`: `PlenopticCamera`, lenslets at the main-lens image
 - `plenoptic2`: `FocusedPlenopticCamera`, lenslets that relay the main-lens image
+- `microscope`: `LightFieldMicroscope`, its objective and its operator
 - `parts`: `MainLens`, `Lenslets`, `Pixels`: the tables of a camera file
 - `loading`: `load_camera` for every kind
-- `camera`, `lenslet_camera`: what the kinds share
+- `instrument`, `camera`, `lenslet_camera`: what the kinds share
 - `grids`: how finely and widely planes are sampled
-- `describe`: the table of everything that follows from a description
+- `describe`, `describe_microscope`: the table of everything that follows from a description
 - `quantities`, `problems`, `files`: numbers with units, errors in one line, TOML and the `catalogue`
 """
 
@@ -16,6 +17,7 @@ from lumigraph.instruments.describe import Description, Row
 from lumigraph.instruments.files import catalogue
 from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.loading import load_camera
+from lumigraph.instruments.microscope import LightFieldMicroscope, MicroscopeObjective
 from lumigraph.instruments.parts import Lenslets, MainLens, Pixels
 from lumigraph.instruments.plenoptic1 import PlenopticCamera
 from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
@@ -27,7 +29,9 @@ __all__ = [
     "FocusedPlenopticCamera",
     "LensletCamera",
     "Lenslets",
+    "LightFieldMicroscope",
     "MainLens",
+    "MicroscopeObjective",
     "Pixels",
     "PlenopticCamera",
     "Row",

@@ -1,95 +1,32 @@
-"""What all cameras have in common: reading, checking, changing and writing their description."""
+"""What all cameras have in common: distances, grids and trains."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from functools import cached_property
-from os import PathLike
-from typing import Any, ClassVar, Self
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.design import plenoptic1, resolution, thin_lens
 from lumigraph.elements import ThinLens, Train, ZernikePlate
-from lumigraph.errors import FormatError, GeometryError
-from lumigraph.instruments import files
+from lumigraph.errors import GeometryError
 from lumigraph.instruments.grids import Sampling
-from lumigraph.instruments.parts import MainLens, Part, Pixels, check_pixels
-from lumigraph.instruments.problems import readable
-from lumigraph.instruments.quantities import FROM_FILE, Length, Wavelength
+from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.parts import MainLens, Pixels, check_pixels
+from lumigraph.instruments.quantities import Length, Wavelength
 from lumigraph.propagation import Propagate
 from lumigraph.sensor import Sensor
 
 
-class Camera(Part):
+class Camera(Instrument):
     """A camera focused at `object_distance`; see its children."""
-
-    KIND: ClassVar[str]
 
     wavelength: Wavelength
     object_distance: Length
     main_lens: MainLens
     pixels: Pixels = Field(alias="sensor")
-
-    @classmethod
-    def from_toml(cls, path: str | PathLike[str]) -> Self:
-        """The camera that a TOML file describes.
-
-        Raises
-        ------
-        FormatError
-            No such file, damaged TOML, another kind of camera, an unknown or missing key, or a wrong unit.
-        GeometryError
-            Values that no camera can have.
-        """
-        return cls.from_table(files.read(path), str(path))
-
-    @classmethod
-    def from_catalogue(cls, name: str) -> Self:
-        """A camera that comes with lumigraph; `lumigraph.catalogue` lists them.
-
-        Raises
-        ------
-        FormatError
-            No such name, or another kind of camera.
-        """
-        return cls.from_table(files.read_catalogue(name), name)
-
-    @classmethod
-    def from_table(cls, table: Mapping[str, Any], origin: str = "the camera file") -> Self:
-        """The camera of a parsed TOML file, whose lengths carry a unit; `origin` is named in errors."""
-        kind = files.kind(table, origin)
-        if kind != cls.KIND:
-            raise FormatError(
-                f"{origin} describes a {kind!r} camera, not a {cls.KIND!r}. Use lumigraph.load_camera, which "
-                "takes every kind."
-            )
-        values = {key: value for key, value in table.items() if key != "kind"}
-        try:
-            return cls.model_validate(values, context=FROM_FILE)
-        except ValidationError as error:
-            problem = readable(error, cls)
-            raise type(problem)(f"{origin}: {problem}") from None
-
-    def to_toml(self) -> str:
-        """The description as the text of a camera file; what is computed is left out."""
-        return files.write({"kind": self.KIND, **self.model_dump(by_alias=True, exclude_defaults=True)})
-
-    def replace(self, **changes: Any) -> Self:
-        """The camera with other values; a mapping changes only the keys it has.
-
-        Examples
-        --------
-        ``camera.replace(object_distance="130 mm", lenslets={"magnification": 0.3})``
-        """
-        values = self.model_dump(by_alias=True)
-        for key, change in changes.items():
-            table = values.get(key)
-            merge = isinstance(change, Mapping) and isinstance(table, dict)
-            values[key] = {**table, **change} if merge else change  # type: ignore[dict-item]
-        return type(self)(**values)
 
     @property
     def image_distance(self) -> float:
@@ -208,6 +145,15 @@ class Camera(Part):
                 f"{(focal_length - self.object_distance) * 1e3:.6g} mm."
             )
         return distance
+
+    def _depths(self, depths: Sequence[float] | None) -> list[float]:
+        """Depths [m], none of them inside the focal length; None is the focused plane."""
+        planes = [0.0] if depths is None else [checks.finite("a depth", dz) for dz in depths]
+        if not planes:
+            raise GeometryError("depths is empty. Give at least one depth, or None for the focused plane.")
+        for dz in planes:
+            self.defocused(dz)
+        return planes
 
     def alpha(self, dz: float) -> float:
         """Refocus factor α' = F/F' that brings an object at depth `dz` into focus."""

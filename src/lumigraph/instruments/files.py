@@ -13,7 +13,7 @@ from lumigraph.errors import FormatError
 MOST_BYTES = 2**20
 """A camera file has some 20 lines; whatever is larger than 1 MiB is something else."""
 
-KINDS = ("single-lens", "plenoptic", "focused-plenoptic")
+KINDS = ("single-lens", "plenoptic", "focused-plenoptic", "light-field-microscope")
 
 
 def read(path: str | PathLike[str]) -> dict[str, Any]:
@@ -104,7 +104,10 @@ def write(table: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-_LENGTHS = ("wavelength", "object_distance", "focal_length", "diameter", "pitch", "pixel_pitch", "offset")
+_LENGTHS = (
+    "wavelength", "object_distance", "focal_length", "diameter", "pitch", "pixel_pitch", "offset",
+    "bandwidth", "tube_lens", "focus_depth", "lenslet_offset", "sensor_distance", "fourier_lens",
+)  # fmt: skip
 
 
 def _table(name: str, values: Mapping[str, Any]) -> list[str]:

@@ -4,15 +4,20 @@ from os import PathLike
 from pathlib import Path
 
 from lumigraph.instruments import files
-from lumigraph.instruments.camera import Camera
+from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.microscope import LightFieldMicroscope
 from lumigraph.instruments.plenoptic1 import PlenopticCamera
 from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
 from lumigraph.instruments.single_lens import SingleLensCamera
 
-_CLASSES: tuple[type[Camera], ...] = (SingleLensCamera, PlenopticCamera, FocusedPlenopticCamera)
+_CLASSES: tuple[type[Instrument], ...] = (
+    SingleLensCamera, PlenopticCamera, FocusedPlenopticCamera, LightFieldMicroscope
+)  # fmt: skip
+
+AnyCamera = SingleLensCamera | PlenopticCamera | FocusedPlenopticCamera | LightFieldMicroscope
 
 
-def load_camera(path: str | PathLike[str]) -> SingleLensCamera | PlenopticCamera | FocusedPlenopticCamera:
+def load_camera(path: str | PathLike[str]) -> AnyCamera:
     """The camera that a TOML file describes, or one of the catalogue by its name.
 
     Parameters
@@ -38,7 +43,7 @@ def load_camera(path: str | PathLike[str]) -> SingleLensCamera | PlenopticCamera
     return _load(files.read(path), name)
 
 
-def _load(table: dict, origin: str) -> SingleLensCamera | PlenopticCamera | FocusedPlenopticCamera:
+def _load(table: dict, origin: str) -> AnyCamera:
     kind = files.kind(table, origin)
     camera_class = next(each for each in _CLASSES if kind == each.KIND)
     return camera_class.from_table(table, origin)  # type: ignore[return-value]

@@ -118,6 +118,17 @@ class FocusedPlenopticCamera(LensletCamera):
         width = closed_forms.patch(self.lenslets.pitch, self.magnification_at(dz), image, self.separation)
         return width / self.pixels.pixel_pitch
 
+    @property
+    def sharp_patches(self) -> tuple[float, ...]:
+        """Patch [px] at which each focal length of the lenslets is sharp, in their order; signed."""
+        sizes = []
+        for focal_length in self.lenslets.focal_length:
+            m = self.lenslet_distance / focal_length - 1
+            image_distance = self.separation - self.lenslet_distance / m
+            width = closed_forms.patch(self.lenslets.pitch, m, image_distance, self.separation)
+            sizes.append(width / self.pixels.pixel_pitch)
+        return tuple(sizes)
+
     def describe(self) -> describe.Description:
         """Distances, f-numbers, cut-offs, views and sampling, each with its equation."""
         return describe.plenoptic2(self)

@@ -146,6 +146,8 @@ def _aberrations(value: Any) -> dict[int, float]:
 
 Length = Annotated[float, BeforeValidator(_length)]
 """A length above zero [m]."""
+Displacement = Annotated[float, BeforeValidator(_displacement)]
+"""A length of either sign [m]."""
 Wavelength = Annotated[float, BeforeValidator(_wavelength)]
 """In vacuum [m]."""
 Angle = Annotated[float, BeforeValidator(_angle)]

@@ -1,16 +1,19 @@
 """A camera without lenslets."""
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import ClassVar
 
 from pydantic import model_validator
 
+from lumigraph.core.grid import Grid
 from lumigraph.design import resolution
 from lumigraph.elements import Train
 from lumigraph.errors import FormatError
 from lumigraph.instruments import describe, grids
 from lumigraph.instruments.camera import Camera
 from lumigraph.propagation import Propagate
+from lumigraph.simulation import SingleLensOperator, Slices, single_lens_operator
 
 
 class SingleLensCamera(Camera):
@@ -95,6 +98,31 @@ class SingleLensCamera(Camera):
         return Train(
             (self.lens_train(), Propagate(self.image_distance, "band_limited", grid=self.image_grid))
         )
+
+    def operator(
+        self, depths: Sequence[float] | None = None, *, grid: Grid | None = None
+    ) -> SingleLensOperator | Slices:
+        """The exact model of how this camera sees incoherent planes, for `lumigraph.deconvolve`.
+
+        Parameters
+        ----------
+        depths
+            From the focused plane [m], positive farther, for an object (z, y, x); None for the focused
+            plane alone, an object (y, x).
+        grid
+            Samples of the object; None for what the sensor sees, `object_grid`.
+
+        Raises
+        ------
+        GeometryError
+            No depths, or one inside the focal length.
+        SamplingError
+            The image's samples do not fit in memory.
+        """
+        grid = self.object_grid if grid is None else grid
+        planes = self._depths(depths)
+        operators = [single_lens_operator(self, grid, dz) for dz in planes]
+        return operators[0] if depths is None else Slices(operators, grid, tuple(planes))
 
     def describe(self) -> describe.Description:
         """Distances, f-numbers, cut-offs and sampling, each with its equation."""

@@ -11,15 +11,17 @@ import numpy as np
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 
-SEPARATION = 20.0
-"""Of a light field of cameras without lengths, in widths of the camera grid: the scale of α'."""
+PIXELS = 100
+"""Pixels that count as one camera spacing where lengths are not known: the scale of α'."""
+
+_SEPARATION = 20.0  # in camera spacings; as for a raw image without lengths
 
 
 def from_cameras(data: np.ndarray, spacing: tuple[float, float] = (1.0, 1.0)) -> LightField:
     """The light field of pictures (row, column, y, x[, c]), the first camera top left.
 
-    Pixels count as lenslets one spacing apart where lengths are not known, so that a disparity of d pixels
-    per view is 1 - α' = d.
+    A hundred pixels count as one camera spacing, so that a disparity of d pixels per view is focused by
+    α' = 1 - d/100, whatever the cameras' real distances.
 
     Parameters
     ----------
@@ -31,9 +33,10 @@ def from_cameras(data: np.ndarray, spacing: tuple[float, float] = (1.0, 1.0)) ->
     rows, columns = data.shape[:2]
     down, right = (abs(step) or 1.0 for step in spacing)
     unit = (down + right) / 2
+    pixels = Grid((data.shape[2], data.shape[3]), (unit / PIXELS, unit / PIXELS))
     aperture = Grid((rows, columns), (down, right))
     views = np.ascontiguousarray(data[::-1, ::-1])
-    return LightField(views, aperture, Grid((data.shape[2], data.shape[3]), (unit, unit)), SEPARATION * unit)
+    return LightField(views, aperture, pixels, _SEPARATION * unit)
 
 
 def to_cameras(views: LightField) -> np.ndarray:

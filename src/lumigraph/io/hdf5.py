@@ -46,11 +46,8 @@ def load(path: Path, *, what: str | None = None, max_pixels: int = source.MAX_PI
         Not HDF5, damaged, too large, several datasets and no choice, or filters that are not read.
     """
     with _reading(path) as file:
-        text = file.attrs.get(_KEY)
-        if what is None and text is not None:
-            found = header.loads(text)
-            if found is None:
-                raise FormatError(f"{path} has a damaged lumigraph header. Copy or save it again.")
+        found = _header(path, file)
+        if what is None and found is not None:
             valid = _values(path, _dataset(path, file, _VALID), max_pixels) if _VALID in file else None
             return _restored(_values(path, _dataset(path, file, _DATA), max_pixels), found, valid)
         name = what if what is not None else _only(path, file)
@@ -74,7 +71,8 @@ def save(thing: RawImage | LightField | Volume, path: Path) -> None:
         fields, names = header.describe_volume(thing), "zyxc"
         scales = {"z": np.asarray(thing.depths), "y": thing.grid.y, "x": thing.grid.x}
     with target.replacing(path) as temporary, h5py.File(temporary, "w", track_order=True) as file:
-        file.attrs[_KEY] = json.dumps(fields)
+        # Bytes, not a string attribute: libhdf5 keeps those in heaps, which it follows for ever when damaged.
+        file[_KEY] = np.frombuffer(json.dumps(fields).encode("ascii"), np.uint8)
         dataset = file.create_dataset(_DATA, data=data, chunks=_chunks(data), **_PACKING)
         if isinstance(thing, LightField) and thing.valid is not None:
             mask = to_numpy(thing.valid).astype(np.uint8)
@@ -83,7 +81,7 @@ def save(thing: RawImage | LightField | Volume, path: Path) -> None:
             dataset.dims[k].label = name
             if name in scales:
                 scale = file.create_dataset(name, data=scales[name])
-                scale.attrs["units"] = "m"
+                scale.attrs["units"] = np.bytes_("m")
                 scale.make_scale(name)
                 dataset.dims[k].attach_scale(scale)
 
@@ -91,8 +89,7 @@ def save(thing: RawImage | LightField | Volume, path: Path) -> None:
 def contents(path: Path) -> list[tuple[str, str, str]]:
     """The datasets of a file: (name, noun, about) each."""
     with _reading(path) as file:
-        text = file.attrs.get(_KEY)
-        found = None if text is None else header.loads(text)
+        found = _header(path, file)
         if found is not None:
             return [("", str(found.get("kind")), _about(_dataset(path, file, _DATA)))]
         return [(name, _noun(each.ndim, each.shape), _about(each)) for name, each in _datasets(file)]
@@ -105,6 +102,20 @@ def _reading(path: Path) -> Iterator[h5py.File]:
         source.check_signature(path, file.read(8), "HDF5")
     with source.decoding(path, "an HDF5 file"), h5py.File(path, "r", locking=False) as file:
         yield file
+
+
+def _header(path: Path, file: h5py.File) -> dict[str, Any] | None:
+    """What lumigraph wrote beside the pixels, None in files by others."""
+    if not isinstance(file.get(_KEY, getlink=True), h5py.HardLink):
+        return None
+    text = file[_KEY]
+    if not isinstance(text, h5py.Dataset) or text.dtype != np.uint8 or text.ndim != 1 or len(text) > 1 << 24:
+        raise FormatError(f"{path} has a damaged lumigraph header. Copy or save it again.")
+    source.check_stored(path, len(text), min(text.id.get_storage_size(), path.stat().st_size), 1)
+    found = header.loads(bytes(text[...]))
+    if found is None:
+        raise FormatError(f"{path} has a damaged lumigraph header. Copy or save it again.")
+    return found
 
 
 def _datasets(file: h5py.File) -> list[tuple[str, h5py.Dataset]]:
@@ -211,10 +222,13 @@ def _noun(axes: int, shape: tuple[int, ...]) -> str:
 
 
 def _numbers(file: h5py.File) -> Iterator[tuple[str, float]]:
-    for name, value in list(file.attrs.items())[:200]:
-        single = np.asarray(value)
-        if single.size == 1 and single.dtype.kind in "iuf" and np.isfinite(single).all():
-            yield name, float(single.ravel()[0])
+    """Attributes that are one number; strings are not read, see `save`."""
+    for name in list(file.attrs)[:200]:
+        stored = file.attrs.get_id(name)
+        if stored.dtype.kind in "iuf" and stored.shape in ((), (1,)):
+            value = float(np.asarray(file.attrs[name]).ravel()[0])
+            if np.isfinite(value):
+                yield name, value
 
 
 def _chunks(data: np.ndarray) -> tuple[int, ...]:

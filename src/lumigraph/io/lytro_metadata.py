@@ -136,9 +136,7 @@ def calibration(found: dict[str, Any]) -> Calibration:
             (n - 1) / 2 + o / stored.pixel_pitch for n, o in zip(stored.shape, offset, strict=True)
         )
         lattice = Lattice((basis[0], basis[1]), (origin[0], origin[1]), "hex")
-        if not 2 <= lattice.pitch <= max(stored.shape):
-            raise FormatError(f"its lenslets would be {lattice.pitch:g} px wide.")
-        indices = lattice.indices((0, stored.shape[0] - 1), (0, stored.shape[1] - 1))
+        indices = source.nominal_indices(Path("its metadata"), lattice, stored.shape)
         return Calibration(
             lattice, stored.shape, indices, lattice.position(indices), 0.0, stored.pixel_pitch, separation,
             distance, notes=(_NOTE,),

@@ -54,9 +54,7 @@ def load(
     lattice = Lattice.square(
         pitch * (1 + distance / separation) / pixel, 0.0, ((shape[0] - 1) / 2, (shape[1] - 1) / 2)
     )
-    if not 2 <= lattice.pitch <= max(shape):
-        raise FormatError(f"{path} gives a pitch of {lattice.pitch:g} px in {shape[0]} x {shape[1]} px.")
-    indices = lattice.indices((0, shape[0] - 1), (0, shape[1] - 1))
+    indices = source.nominal_indices(path, lattice, shape)
     return Calibration(
         lattice, shape, indices, lattice.position(indices), 0.0, pixel, separation, distance, notes=(_NOTE,)
     )

@@ -40,6 +40,7 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> RawImage:
     path = source.regular_file(path)
     shape, depth, colour = _read_header(path)
     source.check_size(path, shape, max_pixels)
+    _check_chunks(path)
     needed = ceil(shape[0] * shape[1] * _SAMPLES.get(colour, 1) * depth / 8)
     source.check_stored(path, needed, path.stat().st_size)
     if depth == 16 and colour in _WIDE:
@@ -131,6 +132,20 @@ def _encoded(data: np.ndarray, fields: RawImage | None) -> bytes:
     buffer = io.BytesIO()
     Image.fromarray(np.ascontiguousarray(data)).save(buffer, "PNG", pnginfo=info, **resolution)
     return buffer.getvalue()
+
+
+def _check_chunks(path: Path) -> None:
+    """Refuse chunks that end behind the file: Pillow would allocate what they declare."""
+    size, at = path.stat().st_size, 8
+    with path.open("rb") as file:
+        while at < size:
+            file.seek(at)
+            start = file.read(8)
+            at += 12 + int.from_bytes(start[:4], "big")
+            if at > size or len(start) < 8:
+                raise FormatError(f"{path} is cut short: a chunk ends at byte {at} of {size}. Copy it again.")
+            if start[4:] == b"IEND":
+                break
 
 
 def _read_header(path: Path) -> tuple[tuple[int, int], int, int]:

@@ -51,14 +51,19 @@ def load(
     source.check_size(path, shape, max_pixels)
     root = _root(path)
     diameter = checks.positive("diameter", _number(path, root, "diameter"), "px", FormatError)
-    if not 2 <= diameter <= max(shape):
-        raise FormatError(f"{path} gives a diameter of {diameter:g} px in {shape[0]} x {shape[1]} px.")
     rotation = _number(path, root, "rotation")
     y, x = (_number(path, root, f"offset/{axis}") for axis in "yx")
     origin = (shape[0] - 1) / 2 - y, (shape[1] - 1) / 2 + x
-    lattice = Lattice(_basis(path, root, diameter, rotation), origin, "hex", _kinds(root))
-    indices = lattice.indices((0, shape[0] - 1), (0, shape[1] - 1))
+    with source.decoding(path, "a Raytrix calibration"):
+        lattice = Lattice(_basis(path, root, diameter, rotation), origin, "hex", _kinds(root))
+    indices = source.nominal_indices(path, lattice, shape)
     return Calibration(lattice, shape, indices, lattice.position(indices), 0.0, notes=(_NOTE,))
+
+
+def contents(path: Path) -> list[tuple[str, str, str]]:
+    """One calibration; `open` needs the shape of the raw image."""
+    kinds = len(lens_types(path))
+    return [("", "Calibration", f"hexagonal, {kinds} lens types; open it with shape=")]
 
 
 def lens_types(path: str | Path) -> tuple[tuple[float, float], ...]:

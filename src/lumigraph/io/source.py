@@ -8,6 +8,9 @@ from contextlib import contextmanager
 from math import ceil, prod
 from pathlib import Path
 
+import numpy as np
+
+from lumigraph.core.lattice import Lattice
 from lumigraph.errors import FormatError, LumigraphError
 
 MAX_PIXELS = 178_956_970
@@ -29,6 +32,8 @@ _SIGNATURES = (
     (b"\x89HDF\r\n\x1a\n", "HDF5", ".h5"),
     (b"\x89LFP", "Lytro", ".lfp"),
 )
+
+_MOST_LENSLETS = 1_000_000
 
 MOST_INFLATED = 1032
 """Bytes that one byte of Deflate can become at most (P. Deutsch, RFC 1951: 258 bytes from two bits)."""
@@ -111,6 +116,23 @@ def check_size(path: Path, shape: tuple[int, ...], max_pixels: int) -> None:
             f"{path} declares {_times(shape)} = {pixels:.3g} pixels but at most {max_pixels:.3g} are read. "
             f"If that is right, call lumigraph.io.open(path, max_pixels={pixels})."
         )
+
+
+def nominal_indices(path: Path, lattice: Lattice, shape: tuple[int, int]) -> np.ndarray:
+    """Indices (k, 2) of all lattice points on a picture, for calibrations that were computed, not measured.
+
+    Raises
+    ------
+    FormatError
+        A pitch below 2 px or wider than the picture, or more than a million lenslets.
+    """
+    count = shape[0] * shape[1] / lattice.cell_area
+    if not 2 <= lattice.pitch <= max(shape) or count > _MOST_LENSLETS:
+        raise FormatError(
+            f"{path} gives lenslets {lattice.pitch:g} px wide on {shape[0]} x {shape[1]} px: from 2 px to "
+            f"the picture's width and up to {_MOST_LENSLETS} lenslets are read. Check the file."
+        )
+    return lattice.indices((0, shape[0] - 1), (0, shape[1] - 1))
 
 
 def check_stored(path: Path, needed: float, stored: int, most: float = MOST_INFLATED) -> None:

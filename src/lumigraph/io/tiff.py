@@ -139,7 +139,7 @@ def _pages(
                 f"page {k} has another size or type than the first. Choose one by page=0 ... {count - 1}."
             )
         _check_page(path, image, max_pixels)
-        plane = pixels(path, image, transparent=False)
+        plane = pixels(path, image, transparent=planes is not None and bool(planes.note))
         data = np.empty((count, *plane.shape), plane.dtype) if data is None else data
         data[k] = plane
     assert data is not None  # count is at least 1

@@ -51,7 +51,7 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> LightField:
         picture = _picture(file, max_pixels)
         if data is None:
             whole = (rows, columns, *picture.shape)
-            source.check_size(path, (*whole, 1) if len(whole) == 4 else whole, max_pixels)
+            source.check_size(path, whole, max_pixels)
             data = np.empty(whole, picture.dtype)
         if picture.shape != data.shape[2:] or picture.dtype != data.dtype:
             raise FormatError(
@@ -132,8 +132,10 @@ def contents(path: Path) -> list[tuple[str, str, str]]:
     files, _ = _files(path)
     rows, columns = (max(place[k] for place in files) + 1 for k in (0, 1))
     known = parameters(path)
-    told = f", disparity {known['disp_min']:g} to {known['disp_max']:g} px" if "disp_min" in known else ""
-    return [("", "LightField", f"{rows} x {columns} views{told if 'disp_max' in known else ''}")]
+    told = ""
+    if {"disp_min", "disp_max"} <= known.keys():
+        told = f", disparity {known['disp_min']:g} to {known['disp_max']:g} px"
+    return [("", "LightField", f"{rows} x {columns} views{told}")]
 
 
 def _files(path: Path) -> tuple[Files, tuple[float, float]]:

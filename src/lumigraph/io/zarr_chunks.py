@@ -24,6 +24,10 @@ def check_entries(path: Path, limit: int) -> None:
         return
     with zipfile.ZipFile(path) as file:
         for entry in file.infolist():
+            if not 0 <= entry.compress_size <= path.stat().st_size:
+                raise FormatError(
+                    f"{path} is cut short: {entry.filename[:60]!r} is not all there. Copy it again."
+                )
             source.check_stored(path, entry.file_size, entry.compress_size)
             if entry.file_size > limit:
                 raise FormatError(

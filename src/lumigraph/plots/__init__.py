@@ -5,6 +5,7 @@
 - `lattices`: `lattice`, a calibration over its white image
 - `layout`: rays through a camera
 - `curves`: `curves` over one axis, several `images` side by side
+- `volumes`: `projections` and `slices` of a volume
 - `axes`: axes with lengths in readable units, colour bars
 """
 
@@ -13,5 +14,6 @@ from lumigraph.plots.lattices import lattice
 from lumigraph.plots.layout import layout
 from lumigraph.plots.pictures import show
 from lumigraph.plots.trains import planes
+from lumigraph.plots.volumes import projections, slices
 
-__all__ = ["curves", "images", "lattice", "layout", "planes", "show"]
+__all__ = ["curves", "images", "lattice", "layout", "planes", "projections", "show", "slices"]

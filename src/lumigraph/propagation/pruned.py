@@ -71,6 +71,17 @@ def convolve(data: Array, transfer: Transfer, shape: tuple[int, int]) -> Array:
     return result.reshape(data.shape[:-2] + shape)
 
 
+def convolved_intensity(data: Array, transfer: Transfer, shape: tuple[int, int]) -> Array:
+    """Squared modulus of `convolve`, real; on NumPy arrays made block by block, without the field itself."""
+    if not arrays.is_numpy(data):
+        return arrays.intensity(_functional(data, transfer, shape))
+    planes = data.reshape(-1, *data.shape[-2:])
+    result = np.empty((len(planes), *shape), data.real.dtype)
+    for plane, out in zip(planes, result, strict=True):
+        _blocked(plane, transfer, out)
+    return result.reshape(data.shape[:-2] + shape)
+
+
 def _functional(data: Array, transfer: Transfer, shape: tuple[int, int]) -> Array:
     xp, rows, columns = arrays.namespace(data), transfer.rows, transfer.columns
     spectrum = _only(arrays.fft(data, columns.n), columns)
@@ -97,7 +108,7 @@ def _spread(values: Array, band: Band) -> Array:
 
 
 def _blocked(data: np.ndarray, transfer: Transfer, out: np.ndarray) -> None:
-    """The pruned convolution of one plane (y, x) into `out`."""
+    """The pruned convolution of one plane (y, x) into `out`: the field, or its intensity if `out` is real."""
     rows, columns, H = transfer.rows, transfer.columns, transfer.values
     top, bottom = nonzero_rows(data)
     spectrum = np.empty((columns.count, max(bottom - top, out.shape[0])), data.dtype)
@@ -120,7 +131,8 @@ def _blocked(data: np.ndarray, transfer: Transfer, out: np.ndarray) -> None:
         line = np.zeros((stop - start, columns.n), data.dtype)
         line[:, : columns.positive] = spectrum[: columns.positive, start:stop].T
         line[:, columns.n - columns.negative :] = spectrum[columns.positive :, start:stop].T
-        out[start:stop] = _ifft(line, overwrite_x=True)[:, : out.shape[1]]
+        line = _ifft(line, overwrite_x=True)[:, : out.shape[1]]
+        out[start:stop] = line if np.iscomplexobj(out) else arrays.intensity(line)
 
     _in_blocks(forward, bottom - top, columns.n * data.itemsize)
     _in_blocks(across, columns.count, rows.n * data.itemsize)

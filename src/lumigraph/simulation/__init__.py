@@ -2,7 +2,12 @@
 
 - `imaging`: `simulate`
 - `periodic`: `periodic_operator`, incoherent planes before a lenslet array, and its adjoint
-- `point_images`: what it repeats: the images of the points of one cell of the array
+- `kernels`: its matrices, in factors; `cells`, what they are matrices between; `point_images`, where they
+  come from; `cell_response`, what lenslets do to light; `glare`, what falls far from a point's image
+- `resampling`, `turning`: from an object's samples to points and from the image's samples to pixels
+- `slices`: `Slices`, operators of several depths as one
+- `single_lens`: `single_lens_operator`, incoherent planes and points before a camera without lenslets
+- `band`: band-limited samples along an axis, to and from points and pixels
 - `camera`: `Camera`, what a simulation asks of an instrument
 - `coherence`: `Incoherent`, `Coherent`, `Snapshots`, `TiltedWaves`: how the scene's light interferes
 - `directions`: quasi-random directions of tilted waves, more of them where more light comes from
@@ -12,6 +17,8 @@ from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Snapshots, TiltedWaves
 from lumigraph.simulation.imaging import Interrupted, simulate
 from lumigraph.simulation.periodic import PeriodicOperator, periodic_operator
+from lumigraph.simulation.single_lens import SingleLensOperator, single_lens_operator
+from lumigraph.simulation.slices import Slices
 
 __all__ = [
     "Camera",
@@ -20,8 +27,11 @@ __all__ = [
     "Incoherent",
     "Interrupted",
     "PeriodicOperator",
+    "SingleLensOperator",
+    "Slices",
     "Snapshots",
     "TiltedWaves",
     "periodic_operator",
     "simulate",
+    "single_lens_operator",
 ]

@@ -114,9 +114,7 @@ def response(
     """
     center, limits = cell[:2], cell[2:]
     if array.shape == "square" and isinstance(array.focal_length, float):
-        pieces = [
-            _straight(axes[k], array, wavelength, distance, (k, center[k], limits[k])) for k in (0, 1)
-        ]
+        pieces = [_straight(axes[k], array, wavelength, distance, (k, center[k], limits[k])) for k in (0, 1)]
         return Response(pieces[0], pieces[1], None)
     return _dense(axes, array, wavelength, distance, cell)
 
@@ -128,14 +126,15 @@ def _straight(
     which, center, limits = place
     step = abs(array.lattice.basis[1 - which][which])
     coefficients, light = axis.basis()
-    half, total = array.fill_factor * step / 2, 0.0
+    half, total = array.fill_factor * step / 2, np.zeros((axis.samples, len(coefficients)))
     count = nodes(half, min(map(abs, _focal(array))), axis, (wavelength, distance))
-    for middle in _row(array.lattice.origin[which] - center, step, axis.size / 2 + axis.neighbourhood, limits):
+    reach = axis.size / 2 + axis.neighbourhood
+    for middle in _row(array.lattice.origin[which] - center, step, reach, limits):
         at, weight = legendre(middle - half, middle + half, count)
         phase = np.exp(-1j * np.pi * (at - middle) ** 2 / (wavelength * _focal(array)[0]))
         weight = weight * axis.fade(at, step)
         total = total + (_spread(axis.image, at, wavelength * distance) * (weight * phase)) @ light(at)
-    return total @ coefficients if isinstance(total, np.ndarray) else np.zeros((axis.samples, 1)) * coefficients[:1]
+    return total @ coefficients
 
 
 def _row(origin: float, step: float, reach: float, limits: Limits) -> Iterator[float]:
@@ -217,7 +216,9 @@ def _rows(axes: tuple[Axis, Axis], array: LensletArray, cell: Any) -> Iterator[t
     places = lattice.position(pairs)
     for row in np.unique(pairs[:, 0]):
         mine = pairs[:, 0] == row
-        members = tuple((round(float(c), 12), float(f)) for c, f in zip(places[mine, 1], focal[mine], strict=True))
+        members = tuple(
+            (round(float(c), 12), float(f)) for c, f in zip(places[mine, 1], focal[mine], strict=True)
+        )
         yield float(places[mine, 0][0]), members
 
 

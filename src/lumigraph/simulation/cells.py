@@ -115,7 +115,7 @@ class Fineness:
         airy
             Width λL/D of the diffraction at the main lens, in the same unit as `blur` and the result.
         """
-        return blur + 16 * airy * (1e-3 / self.accuracy) ** 0.45
+        return blur + 12 * airy * (1e-3 / self.accuracy) ** 0.45
 
 
 def fits(camera: Camera) -> bool:

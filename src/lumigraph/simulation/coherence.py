@@ -154,9 +154,10 @@ class Snapshots:
 class Incoherent:
     """Spatially incoherent light, like every lit scene.
 
-    Points are propagated one by one and their intensities added. Extended scenes before a lenslet array go
-    through the lenslet-periodic operator (`simulation.periodic`), without speckle, to `accuracy`. Single
-    lenses, and arrays of lenslets so fast that the operator takes more than 1 GiB to build, take white-phase
+    A camera without lenslets has its exact image, to 1e-4 rms: the object convolved with the image of a point
+    (`simulation.single_lens`). Before a lenslet array points are propagated one by one and their intensities
+    added, and extended scenes go through the lenslet-periodic operator (`simulation.periodic`), without
+    speckle, to `accuracy`. Lenslets so fast that the operator takes more than 1 GiB to build take white-phase
     `Snapshots`, which carry speckle of about 1/sqrt(snapshots) rms in a pixel that resolves it.
 
     Parameters

@@ -70,7 +70,7 @@ def follow(density: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 def _inverse(density: np.ndarray, at: np.ndarray | float) -> np.ndarray:
     cumulated = np.concatenate([[0.0], np.cumsum(density, dtype=float)])
-    return np.interp(at, cumulated / cumulated[-1], np.linspace(0, 1, len(cumulated)))
+    return np.asarray(np.interp(at, cumulated / cumulated[-1], np.linspace(0, 1, len(cumulated))))
 
 
 def share_of_light(amplitude: np.ndarray, grid: Grid, radius: float) -> tuple[np.ndarray, Grid]:

@@ -90,7 +90,9 @@ def glare(means: dict[Offset, np.ndarray], size: tuple[float, float], image: Off
             out = max(abs(dy) / reach[0], abs(dx) / reach[1])
             if out > 1:
                 near = (round(dy / out), round(dx / out))
-                law = math.hypot(near[0] * size[0], near[1] * size[1]) / math.hypot(dy * size[0], dx * size[1])
+                law = math.hypot(near[0] * size[0], near[1] * size[1]) / math.hypot(
+                    dy * size[0], dx * size[1]
+                )
                 weights[number[near], dy % shape[0], dx % shape[1]] = law**3
     spectra = np.conj(np.fft.fft2(weights)).astype(np.complex64)
     pictures = np.array([means[key] for key in ring], np.float32)

@@ -15,12 +15,13 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.raw import RawImage
 from lumigraph.elements import CircularAperture, Train
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
-from lumigraph.propagation import propagate
+from lumigraph.propagation import Propagate, propagate
 from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
 from lumigraph.sensor import integrate
+from lumigraph.simulation import single_lens
 from lumigraph.simulation.camera import Camera
-from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Plane, Snapshots, TiltedWaves
 from lumigraph.simulation.cells import fits
+from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Plane, Snapshots, TiltedWaves
 from lumigraph.simulation.kernels import Optics
 from lumigraph.simulation.periodic import periodic_operator
 
@@ -55,7 +56,10 @@ class _Shot:
     """Of two halves of a random or quasi-random sample, the one that this shot belongs to."""
 
     def arrive(self) -> tuple[int | None, np.ndarray]:
-        return self.half, self.weight * self.train(self.field).intensity
+        *elements, last = self.train.elements or (Train(()),)
+        before = Train(elements)(self.field)
+        intensity = last.intensity(before) if isinstance(last, Propagate) else last(before).intensity
+        return self.half, intensity if self.weight == 1 else self.weight * intensity
 
 
 def simulate(
@@ -99,14 +103,15 @@ def simulate(
     """
     coherence = Incoherent() if coherence is None else coherence
     _check(camera, scene, coherence)
-    exact = _periodic(camera, scene, coherence) if isinstance(coherence, Incoherent) else []
+    accuracy = coherence.accuracy if isinstance(coherence, Incoherent) else None
+    exact = _exact(camera, scene, accuracy)
     rest = Scene(part for part in scene.parts if part not in exact)
     shots, count = _shots(camera, rest, _drawn(coherence))
     light = _Light(np.zeros(camera.image_grid.shape), np.zeros(camera.sensor.shape))
     total = len(exact) + count
     try:
         for part in exact:
-            light.pixels += _exactly(camera, part.trimmed(), coherence)
+            light.pixels += _exactly(camera, part, accuracy)
             light.count(progress, total)
         for half, image in map(_Shot.arrive, shots):
             light.add(half, image)
@@ -156,17 +161,29 @@ def _drawn(coherence: Coherence | Incoherent) -> Coherence:
     return coherence
 
 
-def _exactly(camera: Camera, part: Slice, coherence: Incoherent) -> np.ndarray:
-    operator = periodic_operator(camera, part.grid, part.dz, accuracy=coherence.accuracy)
+def _exactly(camera: Camera, part: Slice | Points, accuracy: float | None) -> np.ndarray:
+    if isinstance(part, Points):
+        return single_lens.points_image(camera, part)
+    if single_lens.fits(camera):
+        return single_lens.slice_image(camera, part.trimmed())
+    part = part.trimmed()
+    operator = periodic_operator(camera, part.grid, part.dz, accuracy=accuracy or 1e-3)
     return operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
 
 
-def _periodic(camera: Camera, scene: Scene, coherence: Incoherent) -> list[Slice]:
-    """Slices that the lenslet-periodic operator takes."""
+def _exact(camera: Camera, scene: Scene, accuracy: float | None) -> list[Slice | Points]:
+    """Parts that a camera without lenslets, or the lenslet-periodic operator, images without snapshots.
+
+    None of them where no accuracy is asked for: the light is not incoherent.
+    """
+    if accuracy is None:
+        return []
+    if single_lens.fits(camera):
+        return [part for part in scene.parts if isinstance(part, Slice | Points)]
     if not fits(camera):
         return []
     slices = [part for part in scene.parts if isinstance(part, Slice)]
-    optics = [Optics.of(camera, camera.object_distance + s.dz, coherence.accuracy) for s in slices]
+    optics = [Optics.of(camera, camera.object_distance + s.dz, accuracy) for s in slices]
     return [part for part, o in zip(slices, optics, strict=True) if o.build_bytes <= LARGEST_OPERATOR]
 
 

@@ -225,7 +225,9 @@ def _unpacked(arrays: dict[str, np.ndarray]) -> Matrix:
         offsets = [(int(dy), int(dx), int(rank)) for dy, dx, rank in arrays["offsets"][first : first + count]]
         ranks = slice(column, column + sum(rank for _, _, rank in offsets))
         parts.append(
-            Part((top, bottom), (left, right), tuple(offsets), arrays["left"][:, ranks], arrays["right"][ranks])
+            Part(
+                (top, bottom), (left, right), tuple(offsets), arrays["left"][:, ranks], arrays["right"][ranks]
+            )
         )
         first, column = first + count, ranks.stop
     rows, columns, *margins = arrays["shape"].tolist()
@@ -239,10 +241,7 @@ def _build(optics: Optics, progress: Progress | None = None) -> Matrix:
     inside, means = builder.periodic()
     parts = [_part((1, rows + 1), (1, columns + 1), inside)]
     pairs = [
-        (y, x)
-        for y in _groups(optics, 0)
-        for x in _groups(optics, 1)
-        if (y[1], x[1]) != (INFINITE, INFINITE)
+        (y, x) for y in _groups(optics, 0) for x in _groups(optics, 1) if (y[1], x[1]) != (INFINITE, INFINITE)
     ]
     for done, (y, x) in enumerate(pairs):
         ring = y[0][0] in (0, rows + 1) or x[0][0] in (0, columns + 1)

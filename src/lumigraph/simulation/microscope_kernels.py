@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import scipy.fft
 
-from lumigraph.core.arrays import WORKERS
+from lumigraph.core import arrays
 from lumigraph.elements.objective import Objective
 
 MARGIN = 1.15
@@ -129,7 +128,7 @@ def octant(s: int) -> list[tuple[int, int]]:
 
 @lru_cache(maxsize=16)
 def _expansion(s: int) -> list[tuple[int, tuple[bool, bool, bool], int]]:
-    """For each point of a cell: its place, (flip y, flip x, transpose first), the stored point it follows from."""
+    """For each point of a cell: place, (flip y, flip x, transpose first), stored point."""
     rows = {point: row for row, point in enumerate(octant(s))}
     found = []
     for ky in range(s):
@@ -147,7 +146,11 @@ def reach_of(objective: Objective, lenslet: Lenslet, dz: float, dropped: float) 
 
 
 def slice_kernel(
-    objectives: Sequence[Objective], lenslet: Lenslet, sampling: CellSampling, dz: float, dropped: float = DROPPED
+    objectives: Sequence[Objective],
+    lenslet: Lenslet,
+    sampling: CellSampling,
+    dz: float,
+    dropped: float = DROPPED,
 ) -> SliceKernel:
     """Images of a cell's points at depth dz, so that an even plane of intensity 1 gives an image of 1.
 
@@ -227,7 +230,7 @@ class _Bench:
         n = self.cells * self.fine
         self.at = (np.arange(n) - (n - 1) / 2) * self.step
         self.phase, self.mask = self._lenslets(wave)
-        f2 = scipy.fft.fftfreq(n, self.step) ** 2
+        f2 = np.fft.fftfreq(n, self.step) ** 2
         self.transfer = np.exp(-1j * np.pi * wave * lenslet.distance * f2).astype(np.complex64)
         self.open = 1.0
 
@@ -251,10 +254,10 @@ class _Bench:
             whole += float(np.square(np.abs(field)).sum(dtype=np.float64))
             field = field * self.phase[:, None] * self.phase * self.mask
             passed += float(np.square(np.abs(field)).sum(dtype=np.float64))
-            spectrum = scipy.fft.fft2(field, overwrite_x=True, workers=WORKERS)
+            spectrum = arrays.fft2(field, overwrite=True)
             spectrum *= self.transfer[:, None]
             spectrum *= self.transfer
-            field = scipy.fft.ifft2(spectrum, overwrite_x=True, workers=WORKERS)
+            field = arrays.ifft2(spectrum, overwrite=True)
             image += np.square(field.real) + np.square(field.imag)
         self.open = passed / whole
         return self._pixels(image)
@@ -266,12 +269,12 @@ class _Bench:
             shape = (n // self.over, self.over, n // self.over, self.over)
             image = image.reshape(shape).mean((1, 3))
         else:
-            f = scipy.fft.fftfreq(n)
+            f = np.fft.fftfreq(n)
             # Half a fine sample: the middle of an even number of them lies between two.
             shift = np.exp(-1j * np.pi * f) if self.over % 2 == 0 else np.ones(n)
             spread = (np.sinc(f * self.sampling.width * self.fine) * shift).astype(np.complex64)
-            spectrum = scipy.fft.fft2(image, workers=WORKERS) * spread[:, None] * spread
-            image = scipy.fft.ifft2(spectrum, workers=WORKERS).real
+            spectrum = arrays.fft2(image) * spread[:, None] * spread
+            image = arrays.ifft2(spectrum, overwrite=True).real
             start = self.over // 2
             image = np.maximum(image[start :: self.over, start :: self.over], 0)
         return image[edge:-edge, edge:-edge]

@@ -140,7 +140,9 @@ class MicroscopeOperator:
     def _check(name: str, array: Array, shape: tuple[int, ...]) -> None:
         checks.array(name, array)
         if tuple(array.shape) != tuple(shape):
-            raise GeometryError(f"{name} has shape {tuple(array.shape)} but the operator's is {tuple(shape)}.")
+            raise GeometryError(
+                f"{name} has shape {tuple(array.shape)} but the operator's is {tuple(shape)}."
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,7 +217,9 @@ def microscope_operator(
         kernels.append(_kept(objectives, lenslet, layout.sampling, dz, dropped, folder))
         if progress is not None:
             progress(done + 1, len(depths))
-    return MicroscopeOperator(tuple(kernels), depths, layout.cells, _object_grid(lenslet, layout), layout.placement)
+    return MicroscopeOperator(
+        tuple(kernels), depths, layout.cells, _object_grid(lenslet, layout), layout.placement
+    )
 
 
 def _object_grid(lenslet: Lenslet, layout: Layout) -> Grid:

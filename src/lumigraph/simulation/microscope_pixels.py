@@ -38,7 +38,9 @@ class PixelPlacement:
     _tables: dict = field(default_factory=dict, repr=False)
 
     @classmethod
-    def of(cls, calibration: Calibration, pixels: int) -> "tuple[PixelPlacement, tuple[int, int], np.ndarray]":
+    def of(
+        cls, calibration: Calibration, pixels: int
+    ) -> "tuple[PixelPlacement, tuple[int, int], np.ndarray]":
         """From the micro-images of a raw image, with N samples along each side of a cell.
 
         Returns
@@ -82,12 +84,13 @@ class PixelPlacement:
         key = arrays.placement(like), transposed
         if key not in self._tables:
             matrix = csr_array(self.matrix.T) if transposed else self.matrix
-            counts = np.diff(matrix.indptr)
-            column = np.arange(matrix.nnz) - np.repeat(matrix.indptr[:-1], counts)
-            row = np.repeat(np.arange(matrix.shape[0]), counts)
-            index = np.zeros((matrix.shape[0], max(1, int(counts.max()))), np.int64)
+            start = np.asarray(matrix.indptr)
+            counts = np.diff(start)
+            column = np.arange(len(matrix.data)) - np.repeat(start[:-1], counts)
+            row = np.repeat(np.arange(len(counts)), counts)
+            index = np.zeros((len(counts), max(1, int(counts.max()))), np.int64)
             weight = np.zeros(index.shape)
-            index[row, column], weight[row, column] = matrix.indices, matrix.data
+            index[row, column], weight[row, column] = np.asarray(matrix.indices), matrix.data
             xp = arrays.namespace(like)
             self._tables[key] = xp.asarray(index, device=arrays.device(like)), arrays.like(weight, like)
         return self._tables[key]

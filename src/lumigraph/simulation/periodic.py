@@ -93,7 +93,10 @@ class PeriodicOperator:
             Another shape than the object's.
         """
         _check("an object", intensity, self.shape[1])
-        xp, layers = arrays.namespace(intensity), intensity if self.depths is not None else intensity[None, ...]
+        xp, layers = (
+            arrays.namespace(intensity),
+            intensity if self.depths is not None else intensity[None, ...],
+        )
         rows, columns = (n + 2 for n in self.cells.count)
         like = {"dtype": intensity.dtype, "device": intensity.device}
         image = xp.zeros((rows, columns, math.prod(self.cells.samples)), **like)

@@ -1,7 +1,7 @@
 """Images of the points of a cell of a lenslet array: what the lenslet-periodic operator repeats."""
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,7 +64,7 @@ def wave(camera: Camera, distance: float, axes: tuple[Axis, Axis], reach: Sequen
 
 
 def _round(camera: Camera, distance: float, radius: np.ndarray) -> np.ndarray:
-    """Amplitude behind a round lens at a radius [m], for light of 1 in all: a Hankel transform of its pupil."""
+    """Amplitude behind a round lens at a radius [m], for light of 1 in all: a Hankel transform."""
     (lens,) = camera.lens_train().elements
     assert isinstance(lens, ThinLens)
     half, squared = camera.pupil_diameter / 2, camera.wavelength * camera.separation
@@ -93,9 +93,7 @@ def _sampled(camera: Camera, distance: float, y: np.ndarray, x: np.ndarray) -> n
     return down @ pupil @ across / np.sqrt(light)
 
 
-def images(
-    light: Wave, lenslets: Response, axes: tuple[Axis, Axis], row: int, columns: range
-) -> np.ndarray:
+def images(light: Wave, lenslets: Response, axes: tuple[Axis, Axis], row: int, columns: range) -> np.ndarray:
     """Intensity (columns, points, samples) in a cell of the points of the cells (row, columns) beside it."""
     y, x = axes
     down, across = lenslets.down.astype(np.complex64), lenslets.across.astype(np.complex64).T

@@ -2,29 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.special import i0
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
-
-KERNEL = 10
-"""Half width [samples] of the interpolation kernel: exact to 1e-5 up to two thirds of the band."""
-
-KAISER_BETA = 10.5
-"""Of the kernel's window: 104 dB."""
+from lumigraph.simulation.band import HALF_WIDTH, integral, kernel
 
 _ROWS = 64
-
-
-def kernel(offset: np.ndarray) -> np.ndarray:
-    """Interpolation kernel at offsets [samples]: a sinc in a Kaiser window of half width `KERNEL`."""
-    inside = np.clip(1 - (offset / KERNEL) ** 2, 0, None)
-    window = np.where(np.abs(offset) <= KERNEL, i0(KAISER_BETA * np.sqrt(inside)) / i0(KAISER_BETA), 0)
-    return np.sinc(offset) * window
+"""Of a block."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,15 +55,15 @@ class Resampling:
     y: Banded
     x: Banded
 
-    def forward(self, picture: Array) -> Array:
+    def forward(self, plane: Array) -> Array:
         """(y, x) to (rows of `y`, rows of `x`)."""
-        xp = arrays.namespace(picture)
-        return xp.matrix_transpose(self.x.forward(xp.matrix_transpose(self.y.forward(picture))))
+        xp = arrays.namespace(plane)
+        return xp.matrix_transpose(self.x.forward(xp.matrix_transpose(self.y.forward(plane))))
 
-    def adjoint(self, picture: Array) -> Array:
+    def adjoint(self, plane: Array) -> Array:
         """The transpose of `forward`."""
-        xp = arrays.namespace(picture)
-        return self.y.adjoint(xp.matrix_transpose(self.x.adjoint(xp.matrix_transpose(picture))))
+        xp = arrays.namespace(plane)
+        return self.y.adjoint(xp.matrix_transpose(self.x.adjoint(xp.matrix_transpose(plane))))
 
 
 def represented(source: Grid, points: Grid) -> Resampling:
@@ -87,7 +74,7 @@ def represented(source: Grid, points: Grid) -> Resampling:
         at = _descending(points, axis) / pitch
         samples = (source.y, source.x)[axis] / pitch
         scale = source.pitch[axis] / pitch
-        matrices.append(banded(at, samples, lambda d, s=scale: kernel(d) * s, KERNEL))
+        matrices.append(banded(at, samples, lambda d, s=scale: kernel(d) * s, HALF_WIDTH))
     return Resampling(matrices[0], matrices[1])
 
 
@@ -96,13 +83,12 @@ def averaged(plane: Grid, pixels: Grid) -> Resampling:
     matrices = []
     for axis in (0, 1):
         pitch, width = plane.pitch[axis], pixels.pitch[axis] / plane.pitch[axis]
-        nodes, weights = np.polynomial.legendre.leggauss(6 + 2 * int(np.ceil(width)))
 
-        def mean(d: np.ndarray, nodes: Any = nodes * width / 2, weights: Any = weights / 2) -> np.ndarray:
-            return sum(w * kernel(d + n) for n, w in zip(nodes, weights, strict=True))
+        def mean(d: np.ndarray, width: float = width) -> np.ndarray:
+            return (integral(d + width / 2) - integral(d - width / 2)) / width
 
         at = -(pixels.y, pixels.x)[axis] / pitch
-        matrices.append(banded(at, (plane.y, plane.x)[axis] / pitch, mean, KERNEL + width / 2))
+        matrices.append(banded(at, (plane.y, plane.x)[axis] / pitch, mean, HALF_WIDTH + width / 2))
     return Resampling(matrices[0], matrices[1])
 
 

@@ -1,4 +1,4 @@
-"""Planes turned about the axis by three shears, each a shift of rows or columns: exact for band-limited planes.
+"""Planes turned about the axis by three shears: shifts of rows or columns, exact for band-limited planes.
 
 M. Unser, P. Thévenaz and L. Yaroslavsky, "Convolution-based interpolation for fast, high-quality rotation
 of images", IEEE Trans. Image Process. 4, 1371 (1995).
@@ -121,7 +121,9 @@ def turn_margin(size: tuple[float, float], angle: float) -> tuple[float, float]:
 def _shifted(plane: Array, shifts: np.ndarray, axis: int) -> Array:
     """Rows (axis 1) or columns (axis 0) moved by so many samples towards larger coordinates."""
     xp, n = arrays.namespace(plane), plane.shape[axis]
-    angles = np.multiply.outer(shifts, np.fft.fftfreq(n)) if axis else np.multiply.outer(np.fft.fftfreq(n), shifts)
+    angles = (
+        np.multiply.outer(shifts, np.fft.fftfreq(n)) if axis else np.multiply.outer(np.fft.fftfreq(n), shifts)
+    )
     spectrum = arrays.fft(arrays.as_complex(plane), axis=axis)
     phase = arrays.like(np.exp(-2j * np.pi * angles), spectrum)
     return xp.real(arrays.ifft(spectrum * phase, axis=axis))

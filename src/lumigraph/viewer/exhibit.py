@@ -9,6 +9,7 @@ import numpy as np
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
@@ -16,6 +17,7 @@ from lumigraph.errors import LumigraphError
 
 _FEWEST_PIXELS = 200
 _MOST_DETAIL = 8
+_WIDEST, _COMFORTABLE, _NEAREST = 0.8, 0.5, 0.02  # spans of refocus factors about 1, and the least factor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,6 +88,8 @@ class Exhibit:
         Planes of space.
     facts
         (what, value) to tell about the file.
+    relative
+        Whether the refocus factors have no meaning but the shift per view; see `comfortable`.
     """
 
     name: str
@@ -96,6 +100,7 @@ class Exhibit:
     depth: DepthMap | Callable[[], DepthMap] | None = None
     volume: Volume | None = None
     facts: tuple[tuple[str, str], ...] = ()
+    relative: bool = False
 
     def __post_init__(self) -> None:
         if all(part is None for part in (self.views, self.raw, self.planes, self.volume)):
@@ -113,11 +118,35 @@ def check_shown(name: str, part: Any) -> None:
         raise LumigraphError(f"{name} has {channels[0]} channels but grey or RGB can be shown. Choose three.")
 
 
+def comfortable(views: LightField) -> tuple[LightField, bool]:
+    """The light field with refocus factors well above 0, and whether its lengths were changed for it.
+
+    Cameras side by side see disparities of several pixels per view: refocus factors about one spacing of
+    cameras for one pixel would fall below 0, which no lens can do. Counting pixels as smaller keeps every
+    picture and brings the factors of all of them near 1.
+    """
+    span = _span(views)
+    if span <= _WIDEST:
+        return views, False
+    times, grid = span / _COMFORTABLE, views.lenslets
+    smaller = Grid(
+        grid.shape, (grid.pitch[0] / times, grid.pitch[1] / times),
+        (grid.center[0] / times, grid.center[1] / times),
+    )  # fmt: skip
+    return LightField(views.data, views.aperture, smaller, views.separation, views.valid), True
+
+
 def focus_range(views: LightField) -> tuple[float, float]:
     """Refocus factors (first, last) worth looking at: the outermost view moves by up to 14 lenslets.
 
     In small pictures a tenth of the picture is enough, 3 lenslets at least.
     """
+    span = _span(views)
+    return max(1 - span, _NEAREST), 1 + span
+
+
+def _span(views: LightField) -> float:
+    """Refocus factors worth looking at lie this far from 1."""
     reach = max(
         max(abs(aperture)) / pitch
         for aperture, pitch in zip(
@@ -125,8 +154,7 @@ def focus_range(views: LightField) -> tuple[float, float]:
         )
     )  # fmt: skip
     most = min(14.0, max(3.0, 0.1 * min(views.lenslets.shape)))
-    span = most / reach if reach > 0 else 0.5
-    return max(1 - span, 0.02), 1 + span
+    return most / reach if reach > 0 else _COMFORTABLE
 
 
 def detail(views: LightField) -> int:
@@ -157,5 +185,7 @@ def depth_map(views: LightField, count: int = 49) -> DepthMap:
 def grey_or_colour(views: LightField) -> LightField:
     """The light field without a colour axis of one channel."""
     if len(views.data.shape) == 5 and views.data.shape[4] == 1:
-        return LightField(views.data[..., 0], views.aperture, views.lenslets, views.separation)
+        return LightField(
+            views.data[..., 0], views.aperture, views.lenslets, views.separation, views.valid
+        )  # fmt: skip
     return views

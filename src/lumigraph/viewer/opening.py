@@ -18,13 +18,13 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError, SamplingWarning
-from lumigraph.viewer.exhibit import Exhibit, Planes, depth_map
+from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_map
 
 Progress = Callable[[str, float], None]
 
 _CAMERA_FILE = 1 << 20  # bytes; camera files have some hundred
-_PATCHES = 17
-_PATCH_SPAN = 0.35  # of the patch: 2.0 pictures from this much smaller to this much larger tiles
+_PATCHES = 25
+_PATCH_SPAN = 1.8  # 2.0 pictures from tiles so many times smaller to so many times larger
 _LABELS = {
     "alpha": ("Focus α′", ""),
     "dz [m]": ("Depth", "m"),
@@ -93,7 +93,10 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
 def of_views(name: str, views: LightField) -> Exhibit:
     """A light field, with depth when it is asked for."""
     checks.finite_array(name, views.data, FormatError)
-    return Exhibit(name, views=views, depth=lambda: depth_map(views), facts=_about_views(views))
+    views, relative = comfortable(views)
+    return Exhibit(
+        name, views=views, depth=lambda: depth_map(views), facts=_about_views(views), relative=relative
+    )  # fmt: skip
 
 
 def of_stack(name: str, stack: Stack) -> Exhibit:
@@ -140,10 +143,10 @@ def of_raw(
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SamplingWarning)  # of cameras 2.0, which have been looked for
-        views = decode(raw, calibration)
+        views, relative = comfortable(decode(raw, calibration))
     return Exhibit(
         name, views=views, raw=raw, calibration=calibration, depth=lambda: depth_map(views),
-        facts=(*facts, *_about_views(views)),
+        facts=(*facts, *_about_views(views)), relative=relative,
     )  # fmt: skip
 
 
@@ -152,19 +155,18 @@ def rendered(raw: RawImage, calibration: Calibration, patch: float, count: int =
     from lumigraph.rendering import render_stack
 
     checks.finite("patch", patch, "px")
-    ends = patch * (1 - _PATCH_SPAN), patch * (1 + _PATCH_SPAN)
     most = 0.98 * calibration.lattice.pitch
-    patches = np.clip(np.sort(np.linspace(*ends, count)), -most, most)
-    patches = np.unique(patches)
+    sizes = np.linspace(abs(patch) / _PATCH_SPAN, min(abs(patch) * _PATCH_SPAN, most), count)
+    patches = np.unique(np.copysign(sizes, patch))
     pictures = to_numpy(render_stack(raw, calibration, patches)).astype(np.float32, copy=False)
     return Planes(pictures, tuple(patches.tolist()), "Patch", "px")
 
 
 def is_camera(path: Path) -> bool:
     """Whether a path is a camera's description, or names a bundled camera."""
-    from lumigraph.instruments import catalogue
-
     if not path.exists():
+        from lumigraph.instruments import catalogue
+
         return len(path.parts) == 1 and str(path) in catalogue()
     if path.suffix.lower() != ".toml" or not path.is_file() or path.stat().st_size > _CAMERA_FILE:
         return False

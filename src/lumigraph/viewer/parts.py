@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from lumigraph.core.arrays import to_numpy
+from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.rendering.geometry import lit
 from lumigraph.viewer.encoding import Coded, white_level
@@ -14,6 +15,10 @@ from lumigraph.viewer.exhibit import Exhibit, Planes, detail, focal_stack, focus
 
 CHUNK = 8 << 20
 """Bytes of views sent at a time, so that a picture can be shown before all have come."""
+
+_LARGEST_LENSLET = 0.01  # [m]: light fields whose lengths are not known count in lenslets of 1
+
+_MOST_CENTERS = 20_000
 
 
 @dataclass(slots=True)
@@ -56,6 +61,8 @@ class Parts:
             "aperture": _grid(views.aperture),
             "lenslets": _grid(views.lenslets),
             "separation": views.separation,
+            "relative": exhibit.relative,
+            "metric": not exhibit.relative and max(views.lenslets.pitch) < _LARGEST_LENSLET,
             "lit": "".join("1" if on else "0" for on in lit(views.data).ravel()),
             "focus": [low, high],
             "detail": detail(views),
@@ -80,6 +87,7 @@ class Parts:
                 "basis": [list(vector) for vector in lattice.basis], "origin": list(lattice.origin),
                 "layout": lattice.layout, "kinds": lattice.kinds, "pitch": lattice.pitch,
             }  # fmt: skip
+            self.about["raw"]["lattice"] |= _bent(exhibit.calibration)
         self.arrays["raw"] = lambda: Coded.of(data)
 
     def _add_planes(self, exhibit: Exhibit) -> None:
@@ -137,6 +145,16 @@ def _finite(values: np.ndarray) -> np.ndarray:
     """Values with those not known set to the median, so that they do not stretch the range."""
     known = values[np.isfinite(values)]
     return np.where(np.isfinite(values), values, np.median(known) if known.size else 0.0)
+
+
+def _bent(calibration: Calibration) -> dict[str, Any]:
+    """Centres and kinds of a lattice that is not straight, which the page cannot work out itself."""
+    if calibration.warp is None:
+        return {}
+    ny, nx = calibration.shape
+    indices = calibration.indices_within((0, ny - 1), (0, nx - 1))[:_MOST_CENTERS]
+    kinds = calibration.lattice.kind(*indices.T)
+    return {"centers": np.round(calibration.position(indices), 2).tolist(), "kindOf": kinds.tolist()}
 
 
 def _grid(grid: Grid) -> dict[str, list[float]]:

@@ -2,13 +2,15 @@
 
 import { toneBytes } from "./tone.js";
 
+const MOST_KEPT = 64;
+
 export class CanvasDevice {
   kind = "canvas";
 
   constructor(canvas) {
     this.canvas = canvas;
     this.context = canvas.getContext("2d", { alpha: false });
-    this.buffer = document.createElement("canvas");
+    this.buffers = new Map();
   }
 
   fits() { return true; }
@@ -16,24 +18,28 @@ export class CanvasDevice {
   forget() {}
 
   show(image, { origin, scale, smooth, ground }, tone) {
-    this.prepare(image, tone);
+    const buffer = this.buffer(image, tone);
     const { context, canvas } = this, byte = (x) => Math.round(255 * x);
     context.fillStyle = `rgb(${(ground ?? [0, 0, 0]).map(byte).join(" ")})`;
     context.fillRect(0, 0, canvas.width, canvas.height);
     context.imageSmoothingEnabled = smooth || scale[0] < 1;
-    context.imageSmoothingQuality = "medium";
+    context.imageSmoothingQuality = "low";
     const [left, top] = origin.map((o, k) => o - scale[k] / 2);
-    context.drawImage(this.buffer, left, top, image.nx * scale[0], image.ny * scale[1]);
+    context.drawImage(buffer, left, top, image.nx * scale[0], image.ny * scale[1]);
   }
 
-  /** The image's colours in a canvas of its own size; kept while neither changes. */
-  prepare(image, tone) {
+  /** The image's colours in a canvas of its own size; those of a focal stack are kept. */
+  buffer(image, tone) {
     const key = JSON.stringify(tone);
-    if (this.shown === image.numbers && this.key === key) return;
-    Object.assign(this.buffer, { width: image.nx, height: image.ny });
-    const data = new ImageData(this.pixels(image, tone), image.nx, image.ny);
-    this.buffer.getContext("2d").putImageData(data, 0, 0);
-    Object.assign(this, { shown: image.numbers, key });
+    if (this.key !== key || this.buffers.size > MOST_KEPT) this.buffers.clear();
+    this.key = key;
+    if (!this.buffers.has(image.numbers)) {
+      const buffer = document.createElement("canvas");
+      Object.assign(buffer, { width: image.nx, height: image.ny });
+      buffer.getContext("2d").putImageData(new ImageData(this.pixels(image, tone), image.nx, image.ny), 0, 0);
+      this.buffers.set(image.numbers, buffer);
+    }
+    return this.buffers.get(image.numbers);
   }
 
   pixels(image, tone) {

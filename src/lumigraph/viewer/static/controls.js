@@ -11,6 +11,12 @@ const SELECTS = { shape: String, detail: Number, projection: String, map: String
 const RANGES = ["focus", "trust", "plane", "ev", "gamma"];
 const CHECKS = ["epi", "lattice", "smooth"];
 
+/** Writes into an output only what is new: the browser lays a page out afresh after every write. */
+function tell(id, text) {
+  const output = by(id), name = output.tagName === "OUTPUT" ? "value" : "textContent";
+  if (output[name] !== text) output[name] = text;
+}
+
 export class Controls {
   constructor(app) {
     this.app = app;
@@ -51,6 +57,9 @@ export class Controls {
   }
 
   drawPad() {
+    const key = JSON.stringify([this.app.state.aperture, this.app.state.view, this.app.state.shape, this.app.line, devicePixelRatio]);
+    if (key === this.padKey) return;
+    this.padKey = key;
     const { views } = this.app.main.model, { state } = this.app, pad = by("pad"), ratio = Math.min(devicePixelRatio, 2), side = 120 * ratio;
     if (pad.width !== side) pad.width = pad.height = side;
     const context = pad.getContext("2d"), [nv, nu] = views.shape, kept = keptViews(views, state.aperture), middle = middleView(views, state.aperture, state.view);
@@ -78,7 +87,7 @@ export class Controls {
     const baseline = views.aperture.pitch[1];
     const off = middle.map((m, k) => (m - Math.floor(views.shape[k] / 2)) * views.aperture.pitch[k]);
     const place = views.metric ? ` (y ${lengthText(off[0])}, x ${lengthText(off[1])})` : "";
-    by("view-out").textContent = `Viewpoint ${text}${place}.${baseline ? " Drag the picture, or here." : ""}`;
+    tell("view-out", `Viewpoint ${text}${place}.${baseline ? " Drag the picture, or here." : ""}`);
   }
 
   refresh() {
@@ -100,28 +109,31 @@ export class Controls {
     const channels = this.app.main.image?.plain ? 3 : this.app.main.image?.channels ?? 1;
     document.querySelector('[data-colour="channel"]').hidden = channels !== 3 || state.mode === "depth";
     document.querySelector('[data-colour="map"]').hidden = channels === 3 && state.channel === "colour" && state.mode !== "depth";
+    for (const part of document.querySelectorAll("[data-light]")) part.hidden = state.mode === "depth";
     for (const id of ["ev", "gamma"]) by(id).value = state[id];
-    by("ev-out").value = `${state.ev > 0 ? "+" : ""}${state.ev.toFixed(2)} EV`;
-    by("gamma-out").value = state.gamma.toFixed(2);
-    for (const id of ["shape", "projection", "map", "channel"]) by(id).value = state[id];
+    tell("ev-out", `${state.ev > 0 ? "+" : ""}${state.ev.toFixed(2)} EV`);
+    tell("gamma-out", state.gamma.toFixed(2));
+    for (const id of ["shape", "projection", "channel"]) by(id).value = state[id];
+    by("map").value = state.mode === "depth" ? depthMap(state) : state.map;
     for (const id of CHECKS) by(id).checked = state[id];
   }
 
   focus(model, state) {
     const [low, high] = model.focus, { stack } = model.about, input = by("focus");
     Object.assign(input, { min: low, max: high, value: state.focus });
-    by("focus-label").textContent = model.views ? "Focus α′" : stack?.label ?? "Focus";
+    by("focus-label").textContent = model.views ? (model.views.relative ? "Disparity" : "Focus α′") : stack?.label ?? "Focus";
     if (model.views) {
       const shift = viewShifts(model.views, state.focus, 1).step, plane = model.views.metric ? ` · image at ${lengthText(model.views.separation / state.focus)}` : "";
-      by("focus-out").value = `${state.focus.toFixed(4)} · ${shift >= 0 ? "+" : "−"}${Math.abs(shift).toFixed(2)} px per view${plane}`;
-    } else by("focus-out").value = `${Number((this.app.main.image?.position ?? state.focus).toPrecision(5))} ${stack?.unit ?? ""}`;
+      const factor = model.views.relative ? "" : `${state.focus.toFixed(4)} · `;
+      tell("focus-out", `${factor}${shift >= 0 ? "+" : "−"}${Math.abs(shift).toFixed(2)} px per view${plane}`);
+    } else tell("focus-out", `${Number((this.app.main.image?.position ?? state.focus).toPrecision(5))} ${stack?.unit ?? ""}`);
     input.setAttribute("aria-valuetext", by("focus-out").value);
   }
 
   aperture(model, state) {
     const kept = keptViews(model.views, state.aperture), exact = model.refocuser && state.renderer !== "stack";
     by("aperture").value = 100 * state.aperture;
-    by("aperture-out").value = `${kept[0]} × ${kept[1]} views`;
+    tell("aperture-out", `${kept[0]} × ${kept[1]} views`);
     by("detail").value = state.detail ?? model.views.detail;
     for (const id of ["shape", "detail"]) by(id).disabled = model.complete && !exact;
     this.drawPad();
@@ -130,7 +142,7 @@ export class Controls {
   volume(volume, state) {
     const input = by("plane"), last = volume.depths.length - 1, k = Math.min(last, state.plane ?? Math.floor((last + 1) / 2));
     Object.assign(input, { max: last, value: k });
-    by("plane-out").value = `${k + 1} of ${last + 1} · z ${lengthText(volume.depths[k])}`;
+    tell("plane-out", `${k + 1} of ${last + 1} · z ${lengthText(volume.depths[k])}`);
     input.setAttribute("aria-valuetext", by("plane-out").value);
     input.disabled = state.projection !== "plane";
     by("projection").value = state.projection;
@@ -138,7 +150,7 @@ export class Controls {
 
   depth(model, state) {
     by("trust").value = state.trust;
-    by("trust-out").value = state.trust.toFixed(2);
+    tell("trust-out", state.trust.toFixed(2));
     const range = model.depthRange(), map = cachedMap(depthMap(state));
     const colours = Array.from({ length: 17 }, (_, k) => { const i = 4 * Math.round((k * 255) / 16); return `rgb(${map[i]} ${map[i + 1]} ${map[i + 2]})`; });
     by("legend-bar").style.background = `linear-gradient(to right, ${colours.join(", ")})`;

@@ -91,7 +91,7 @@ class App {
     else if (missing.length) text = "Loading …";
     else if (model.views && !model.refocuser) text = "Without WebGL 2: focal stack";
     else text = this.main.kept()?.every((n) => n === 1) && this.state.mode === "picture" ? "One view" : "";
-    status.textContent = text;
+    if (status.textContent !== text) status.textContent = text;
     status.classList.toggle("wrong", Boolean(failed));
   }
 

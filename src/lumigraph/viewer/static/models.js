@@ -163,7 +163,7 @@ export class Model {
       this.depthColours = coloured(depth, confidence, depthMap(state), state.trust);
     }
     const [ny, nx] = depth.shape, aspect = this.views ? this.views.lenslets.pitch[0] / this.views.lenslets.pitch[1] : 1;
-    return { nx, ny, channels: 3, bits: 8, scale: 1, offset: 0, white: 255, numbers: this.depthColours, base: [ny, nx], aspect, detail: 1, plain: true };
+    return { nx, ny, channels: 3, bits: 8, scale: 1, offset: 0, white: 255, numbers: this.depthColours, base: [ny, nx], aspect, detail: 1, plain: true, sharp: true };
   }
 
   /** Least and largest depth. */

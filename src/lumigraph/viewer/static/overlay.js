@@ -19,19 +19,23 @@ export function drawLattice(context, lattice, { toScreen, scale, width, height, 
   const corners = [[bounds.top, bounds.left], [bounds.top, bounds.right], [bounds.bottom, bounds.left], [bounds.bottom, bounds.right]]
     .map(([y, x]) => inverse(y, x));
   const range = (k) => [Math.floor(Math.min(...corners.map((c) => c[k]))) - 1, Math.ceil(Math.max(...corners.map((c) => c[k]))) + 1];
-  const [i0, i1] = range(0), [j0, j1] = range(1), cell = outline(lattice, scale);
+  const [i0, i1] = range(0), [j0, j1] = range(1), cell = outline(lattice, scale * (lattice.kinds > 1 ? 0.94 : 1));
   context.lineWidth = 1.25;
   const paths = Array.from({ length: lattice.kinds }, () => new Path2D());
-  for (let i = i0; i <= i1; i++) for (let j = j0; j <= j1; j++) {
-    const [x, y] = toScreen(oy + i * y1 + j * y0, ox + i * x1 + j * x0);
-    if (x < -radius || y < -radius || x > width + radius || y > height + radius) continue;
-    const path = paths[(((j - i) % lattice.kinds) + lattice.kinds) % lattice.kinds];
+  if (lattice.centers) lattice.centers.forEach(([y, x], k) => add(toScreen(y, x), lattice.kindOf[k]));
+  else for (let i = i0; i <= i1; i++) for (let j = j0; j <= j1; j++) {
+    add(toScreen(oy + i * y1 + j * y0, ox + i * x1 + j * x0), (((j - i) % lattice.kinds) + lattice.kinds) % lattice.kinds);
+  }
+  paths.forEach((path, kind) => { context.strokeStyle = KINDS[kind]; context.stroke(path); });
+  return true;
+
+  function add([x, y], kind) {
+    if (x < -radius || y < -radius || x > width + radius || y > height + radius) return;
+    const path = paths[kind];
     cell.forEach(([dx, dy], k) => (k ? path.lineTo(x + dx, y + dy) : path.moveTo(x + dx, y + dy)));
     path.closePath();
     if (radius > 9) { path.moveTo(x - 3, y); path.lineTo(x + 3, y); path.moveTo(x, y - 3); path.lineTo(x, y + 3); }
   }
-  paths.forEach((path, kind) => { context.strokeStyle = KINDS[kind]; context.stroke(path); });
-  return true;
 }
 
 /** Corners of a lenslet's cell around its centre [screen px]. */
@@ -68,16 +72,14 @@ export function drawMark(context, [x, y]) {
 export function drawScaleBar(context, metresPerPixel, { width, height }) {
   const most = Math.min(160, width / 3) * metresPerPixel, power = 10 ** Math.floor(Math.log10(most));
   const length = [5, 2, 1].map((n) => n * power).find((n) => n <= most) ?? power, pixels = length / metresPerPixel;
-  const x = width - pixels - 14, y = height - 14;
+  const x = width - pixels - 20, y = height - 18;
   context.font = "600 12px system-ui, sans-serif";
   context.textAlign = "center";
-  for (const [colour, grow] of [["rgb(0 0 0 / .65)", 3], ["#ffffff", 0]]) {
-    context.strokeStyle = context.fillStyle = colour;
-    context.lineWidth = 3 + grow;
-    context.beginPath(); context.moveTo(x, y); context.lineTo(x + pixels, y); context.stroke();
-    context.lineWidth = grow;
-    if (grow) context.strokeText(lengthText(length), x + pixels / 2, y - 7); else context.fillText(lengthText(length), x + pixels / 2, y - 7);
-  }
+  context.fillStyle = "rgb(0 0 0 / .6)";
+  context.beginPath(); context.roundRect(x - 10, y - 22, pixels + 20, 32, 6); context.fill();
+  context.fillStyle = "#ffffff";
+  context.fillRect(x, y - 1, pixels, 3);
+  context.fillText(lengthText(length), x + pixels / 2, y - 7);
 }
 
 /** A length [m] for people. */

@@ -11,16 +11,17 @@ import { toneOf } from "./tone.js";
 const STILL = 4; // CSS px that a click may move
 const SETTLED = 180; // ms without a change, after which a slow machine draws the exact picture
 const MOST_PIXELS = 4e6;
+const HEAVY = 12, FEWER_PIXELS = 2.4e5; // ms for one picture on the screen, above which those of a movement are coarser
 
 export class Pane {
   constructor(root, model, app) {
     Object.assign(this, { model, app, root, pointers: new Map(), hover: null });
     root.className = "pane";
-    root.innerHTML = `<div class="stage" tabindex="0" role="img"><canvas></canvas><canvas></canvas><div class="name"></div><div class="readout"></div></div>
+    root.innerHTML = `<div class="stage" tabindex="0" role="img"><canvas></canvas><canvas hidden></canvas><canvas></canvas><div class="name"></div><div class="readout"></div></div>
       <canvas class="strip right" aria-label="Epipolar-plane image along the column"></canvas>
       <canvas class="strip bottom" aria-label="Epipolar-plane image along the row"></canvas>`;
     this.stage = root.querySelector(".stage");
-    [this.canvas, this.overlay] = this.stage.querySelectorAll("canvas");
+    [this.canvas, this.quick, this.overlay] = this.stage.querySelectorAll("canvas");
     this.strips = { right: root.querySelector(".right"), bottom: root.querySelector(".bottom") };
     this.name = root.querySelector(".name");
     this.readout = root.querySelector(".readout");
@@ -50,22 +51,40 @@ export class Pane {
     const { state } = this.app, box = this.stage.getBoundingClientRect();
     this.root.classList.toggle("epi", Boolean(state.epi && state.mode === "picture" && this.model.views));
     this.stage.classList.toggle("grab", state.mode === "raw" || state.mode === "volume");
-    this.ratio = Math.min(window.devicePixelRatio, 2, Math.sqrt(MOST_PIXELS / Math.max(box.width * box.height, 1)));
-    for (const canvas of [this.canvas, this.overlay]) {
+    const settled = now - this.app.changedAt > SETTLED && !this.pointers.size, most = this.heavy && !settled ? FEWER_PIXELS : MOST_PIXELS;
+    this.ratio = Math.min(window.devicePixelRatio, 2, Math.sqrt(most / Math.max(box.width * box.height, 1)));
+    for (const canvas of [this.canvas, this.quick, this.overlay]) {
       const size = [box.width, box.height].map((n) => Math.max(1, Math.round(n * this.ratio)));
       if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
     }
-    const settled = now - this.app.changedAt > SETTLED && !this.pointers.size;
     const image = this.model.image(state, this.device, settled);
     if (!image) return this.blank();
     if (!this.device.fits(image)) return this.app.tell(`${image.nx} × ${image.ny} pixels are too many for this graphics processor.`, true);
-    const view = { ...this.layout(image), smooth: state.smooth && this.scale[0] / image.detail < 24, ground: this.app.ground };
+    const view = { ...this.layout(image), smooth: state.smooth && !image.sharp && this.scale[0] / image.detail < 24, ground: this.app.ground };
     this.tone = image.plain ? { gain: 1 / 255, lift: 0, power: 1, map: "grey", channel: "colour" } : toneOf(state, image);
-    this.device.show(image, view, this.tone);
+    this.deviceFor(image, settled).show(image, view, this.tone);
+    if (this.image && this.heavy === undefined) this.weigh(image, view);
     this.image = image;
     this.over(state, image);
-    if (this.model.slow && !image.exact && !settled) setTimeout(() => this.app.schedule(), SETTLED + 20);
+    if ((this.heavy || (this.model.slow && !image.exact)) && !settled) setTimeout(() => this.app.schedule(), SETTLED + 20);
     return true;
+  }
+
+  /** Where WebGL is software, the browser's own canvas shows the planes of a stack twice as fast. */
+  deviceFor(image, settled) {
+    const quick = Boolean(this.heavy && !settled && image.numbers && this.device.kind === "webgl");
+    this.quick.hidden = !quick;
+    this.canvas.hidden = quick;
+    return quick ? (this.quickDevice ??= new CanvasDevice(this.quick)) : this.device;
+  }
+
+  /** Whether pictures reach the screen too slowly for a movement. */
+  weigh(image, view) {
+    this.device.finish();
+    const start = performance.now();
+    this.device.show(image, view, this.tone);
+    this.device.finish();
+    this.heavy = performance.now() - start > HEAVY;
   }
 
   blank() {
@@ -77,8 +96,13 @@ export class Pane {
   }
 
   over(state, image) {
+    const lattice = this.model.about.raw?.lattice, drawn = image.unit || (state.mode === "raw" ? lattice && state.lattice : state.point) || this.root.classList.contains("epi");
+    this.overlay.hidden = !drawn;
+    this.tellPlace(image);
+    const label = this.describe(state);
+    if (label !== this.label) this.stage.setAttribute("aria-label", (this.label = label));
+    if (!drawn) return;
     const context = clearOverlay(this.overlay, this.ratio), size = { width: this.overlay.width / this.ratio, height: this.overlay.height / this.ratio };
-    const lattice = this.model.about.raw?.lattice;
     if (state.mode === "raw" && lattice && state.lattice) {
       const [top, left] = this.toPicture(0, 0), [bottom, right] = this.toPicture(size.width, size.height);
       drawLattice(context, lattice, { ...size, scale: this.scale[0] / this.ratio, toScreen: (y, x) => this.toScreen(y, x), bounds: { top, left, bottom, right } });
@@ -90,8 +114,6 @@ export class Pane {
     }
     if (state.point && state.mode !== "raw" && state.mode !== "volume") drawMark(context, this.toScreen(...state.point));
     if (image.unit) drawScaleBar(context, image.unit / (this.scale[0] / this.ratio), size);
-    this.tellPlace(image);
-    this.stage.setAttribute("aria-label", this.describe(state));
   }
 
   describe(state) {
@@ -101,7 +123,7 @@ export class Pane {
 
   /** Position and value under the pointer. */
   tellPlace(image) {
-    if (!this.hover) { this.readout.textContent = ""; return; }
+    if (!this.hover) { if (this.readout.textContent) this.readout.textContent = ""; return; }
     const [y, x] = this.hover, parts = [`y ${y.toFixed(1)}  x ${x.toFixed(1)} px`];
     const row = Math.round(y * image.detail), column = Math.round(x * image.detail);
     if (row < 0 || column < 0 || row >= image.ny || column >= image.nx) { this.readout.textContent = ""; return; }

@@ -1,0 +1,336 @@
+"""The light-field microscope."""
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from os import PathLike
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.grid import Grid
+from lumigraph.core.lattice import Lattice
+from lumigraph.design import microscope as closed_forms
+from lumigraph.elements.objective import Mismatch, Model, Objective
+from lumigraph.errors import GeometryError
+from lumigraph.instruments import describe, describe_microscope
+from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.parts import Lenslets, Part, Pixels, check_pixels
+from lumigraph.instruments.quantities import Aberrations, Displacement, Fraction, Length, Positive, Wavelength
+from lumigraph.sensor import Sensor
+from lumigraph.simulation.fourier_microscope import FourierMicroscopeOperator, Mosaic, fourier_operator
+from lumigraph.simulation.microscope_kernels import DROPPED, CellSampling, Lenslet
+from lumigraph.simulation.microscope_operator import Layout, MicroscopeOperator, Progress, microscope_operator
+from lumigraph.simulation.microscope_pixels import PixelPlacement
+
+FINENESS = 1.4
+"""Samples of a lenslet's image over what its cut-off asks for, where pixels are interpolated from them."""
+
+Operator = MicroscopeOperator | FourierMicroscopeOperator
+
+
+class MicroscopeObjective(Part):
+    """Table ``[objective]``.
+
+    Parameters
+    ----------
+    magnification
+        As engraved.
+    numerical_aperture, immersion_index
+        NA and n.
+    maker
+        Whose tube lens the engraved magnification is for, such as "Nikon": `design.microscope.TUBE_LENSES`.
+    tube_lens
+        Focal length of the tube lens in use; with a maker it changes the magnification.
+    model
+        "scalar", "vector" or "paraxial"; left out, vector from NA 0.8 on.
+    axial_share
+        Of dipoles, with "vector"; 1/3 for all directions.
+    aberrations
+        Zernike terms: Noll index to waves rms.
+    sample_index, focus_depth
+        Of the medium around the object, and how deep in it the focused plane lies; left out, the immersion.
+    """
+
+    magnification: Positive
+    numerical_aperture: Positive
+    immersion_index: Positive = 1.0
+    maker: str | None = None
+    tube_lens: Length | None = None
+    model: Literal["scalar", "vector", "paraxial"] | None = None
+    axial_share: Fraction = 1 / 3
+    aberrations: Aberrations = Field(default_factory=dict)
+    sample_index: Positive | None = None
+    focus_depth: Length | None = None
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        closed_forms.sine(self.numerical_aperture, self.immersion_index)
+        if self.maker is not None:
+            closed_forms.tube_lens(self.maker)
+        if self.focus_depth is not None and self.sample_index is None:
+            raise GeometryError("focus_depth says how deep in the sample; give sample_index too.")
+        return self
+
+    @property
+    def actual_magnification(self) -> float:
+        """From the object to the native image: the engraved one, times the tube lens over the maker's."""
+        if self.maker is None or self.tube_lens is None:
+            return self.magnification
+        return self.magnification * self.tube_lens / closed_forms.tube_lens(self.maker)
+
+
+class LightFieldMicroscope(Instrument):
+    """A microscope with lenslets in front of its sensor.
+
+    Parameters
+    ----------
+    wavelength
+        Of the emission, its middle [m] or text with a unit.
+    objective
+        `MicroscopeObjective`.
+    lenslets
+        `Lenslets`, square.
+    sensor
+        `Pixels`; without a shape all micro-images fit.
+    configuration
+        "1.0": lenslets at the native image, sensor in their focal plane. "2.0": lenslets `lenslet_offset`
+        behind the native image, sensor at `sensor_distance`. "fourier": lenslets in the pupil that
+        `fourier_lens` images.
+    bandwidth
+        Full width of the emission band [m]; left out, one wavelength.
+    relay_magnification
+        Of the lenses between the lenslets' images and the sensor.
+    lenslet_offset
+        Native image to lenslets [m], positive behind it ("2.0").
+    sensor_distance
+        Lenslets to the plane that the sensor sees, b [m]; left out, their focal length.
+    fourier_lens
+        Focal length of the lens between native image and lenslets [m] ("fourier").
+
+    Raises
+    ------
+    FormatError
+        A wrong or missing key, a wrong unit.
+    GeometryError
+        Values that no microscope can have.
+
+    Examples
+    --------
+    >>> scope = LightFieldMicroscope.from_catalogue("lfm-guv")
+    >>> round(scope.micro_image_pitch / scope.pixels.pixel_pitch, 2)
+    15.38
+    """
+
+    KIND: ClassVar[str] = "light-field-microscope"
+
+    wavelength: Wavelength
+    objective: MicroscopeObjective
+    lenslets: Lenslets
+    pixels: Pixels = Field(alias="sensor")
+    configuration: Literal["1.0", "2.0", "fourier"] = "1.0"
+    bandwidth: Length | None = None
+    relay_magnification: Positive = 1.0
+    lenslet_offset: Displacement | None = None
+    sensor_distance: Length | None = None
+    fourier_lens: Length | None = None
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        if self.lenslets.layout != "square" or self.lenslets.magnification is not None:
+            raise GeometryError(
+                "lenslets of a light-field microscope need layout 'square' and no magnification. "
+                "Use lenslet_offset and sensor_distance for configuration '2.0'."
+            )
+        wanted = {"2.0": "lenslet_offset", "fourier": "fourier_lens"}
+        for configuration, key in wanted.items():
+            given = getattr(self, key) is not None
+            if given != (self.configuration == configuration):
+                verb = "needs" if self.configuration == configuration else "has no use for"
+                raise GeometryError(f"configuration {self.configuration!r} {verb} {key}. Change one of them.")
+        if self.bandwidth is not None and self.bandwidth >= self.wavelength:
+            raise GeometryError(
+                f"bandwidth {self.bandwidth * 1e9:.4g} nm is not below the wavelength "
+                f"{self.wavelength * 1e9:.4g} nm. Give the band's full width."
+            )
+        return self
+
+    @property
+    def magnification(self) -> float:
+        """From the object to the native image, M."""
+        return self.objective.actual_magnification
+
+    @property
+    def lenslet_distance(self) -> float:
+        """Lenslets to the plane that the sensor sees, b [m]."""
+        return self.sensor_distance or self.lenslets.focal_length[0]
+
+    @property
+    def lenslet_size(self) -> float:
+        """Pitch of the lenslets in object space, d/M [m]."""
+        return self.lenslets.pitch / self.magnification
+
+    @property
+    def micro_image_pitch(self) -> float:
+        """Between micro-images on the sensor [m]."""
+        return self.lenslets.pitch * self.relay_magnification
+
+    @property
+    def pupil_diameter(self) -> float:
+        """Of the pupil's image on the lenslets of a Fourier microscope, 2 f_F NA/M [m]; else the exit pupil's
+        per unit of distance from the native image, 2 NA/M.
+        """
+        return 2 * self.objective.numerical_aperture / self.magnification * (self.fourier_lens or 1.0)
+
+    @property
+    def optics(self) -> tuple[Objective, ...]:
+        """The objective at each wavelength that is summed: three over a band."""
+        part, band = self.objective, self.bandwidth or 0.0
+        steps = (-band / 3, 0.0, band / 3) if band else (0.0,)
+        model: Model = part.model or ("vector" if part.numerical_aperture >= 0.8 else "scalar")
+        mismatch = None
+        if part.sample_index is not None:
+            mismatch = Mismatch(part.sample_index, part.focus_depth or 0.0)
+        return tuple(
+            Objective(
+                self.wavelength + step, part.numerical_aperture, part.immersion_index, model,
+                part.axial_share, tuple(part.aberrations.items()), mismatch,
+                (self.lenslet_offset or 0.0) / self.magnification**2,
+            )
+            for step in steps
+        )  # fmt: skip
+
+    @property
+    def lenslet(self) -> Lenslet:
+        """One lenslet and what stands behind it."""
+        part = self.lenslets
+        return Lenslet(
+            part.pitch, part.focal_length[0], self.lenslet_distance, self.magnification,
+            part.pitch * part.fill_factor, part.shape == "round",
+        )  # fmt: skip
+
+    @property
+    def lattice(self) -> Lattice:
+        """Where the lenslets stand [m]."""
+        return self.lenslets.lattice()
+
+    @property
+    def sensor(self) -> Sensor:
+        """The pixels; without a shape given, as many as all micro-images need."""
+        given = self.pixels
+        size = self.relay_magnification / given.pixel_pitch
+        shape = given.shape or tuple(2 * math.ceil(reach * size - 0.5) + 1 for reach in self.lenslets.reach)
+        check_pixels((shape[0], shape[1]))
+        return Sensor((shape[0], shape[1]), given.pixel_pitch, given.full_well, given.read_noise, given.bits)
+
+    @cached_property
+    def calibration(self) -> Calibration:
+        """Where the micro-images stand on the raw image [px], by geometry; only those inside the sensor."""
+        sensor, pitch = self.sensor, self.sensor.pixel_pitch
+        # Raw images are turned by 180°, which turns the lattice about the axis.
+        lattice = self.lattice.scaled(-self.relay_magnification / pitch)
+        lattice = lattice.moved(sensor.shape[0] // 2, sensor.shape[1] // 2)
+        indices = -self.lenslets.indices()[::-1]
+        centers = lattice.position(indices)
+        inside = ((centers >= -0.5) & (centers <= [n - 0.5 for n in sensor.shape])).all(axis=1)
+        return Calibration(
+            lattice, sensor.shape, indices[inside], centers[inside], 0.0,
+            pixel_pitch=pitch, lenslet_distance=self.lenslet_distance,
+        )  # fmt: skip
+
+    @property
+    def object_grid(self) -> Grid:
+        """The focused plane that the lenslets see, five samples per lenslet along each axis."""
+        ny, nx = (5 * n for n in self.lenslets.count)
+        pitch = self.lenslet_size / 5
+        return Grid((ny, nx), (pitch, pitch), tuple(0.0 if n % 2 else pitch / 2 for n in (ny, nx)))  # type: ignore[arg-type]
+
+    def sampling_distances(self, depths: Sequence[float]) -> tuple[float, ...]:
+        """Distance between the samples that the lenslets take of each depth [m]: finer is not measured.
+
+        Over the object's pitch these are the widths of `deconvolution.filters.LowPass`.
+        """
+        aperture = (self.objective.numerical_aperture, self.objective.immersion_index)
+        return tuple(
+            closed_forms.sampling_distance(self.wavelength, aperture, self.lenslet_size, dz) for dz in depths
+        )
+
+    def operator(
+        self,
+        depths: Sequence[float] | None = None,
+        samples_per_lenslet: int | None = None,
+        *,
+        pixels: int | Calibration | None = None,
+        dropped: float = DROPPED,
+        folder: str | PathLike[str] | None = None,
+        progress: Progress | None = None,
+    ) -> Operator:
+        """The model of how this microscope sees slices at `depths`, for `lumigraph.deconvolve`.
+
+        Parameters
+        ----------
+        depths
+            From the focused plane [m], positive farther from the objective; None for the focused plane.
+        samples_per_lenslet
+            s: object samples along a lenslet; an odd number has one on its axis. None for 5. A Fourier
+            microscope samples the object as its pixels do.
+        pixels
+            What the raw image's pixels are: None, those of this description; a `Calibration`, those of a real
+            camera, wherever its lenslets stand; a whole number N, N × N for each lenslet, as `rectify` gives.
+        dropped
+            Part of the light that may be left out for speed.
+        folder
+            Keeps what is computed in files, mapped into memory when it is used.
+        progress
+            Called with the slices done and their number.
+
+        Raises
+        ------
+        SamplingError
+            What is computed does not fit in memory, and there is no folder.
+        GeometryError
+            No depths, or samples below 1.
+        """
+        depths = (0.0,) if depths is None else tuple(float(dz) for dz in depths)
+        if self.configuration == "fourier":
+            return fourier_operator(self.optics, self._mosaic(), depths)
+        samples = 5 if samples_per_lenslet is None else samples_per_lenslet
+        if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 1:
+            raise GeometryError(f"samples_per_lenslet is {samples!r} but must be a whole number from 1.")
+        layout = self._layout(int(samples), pixels)
+        options = {
+            "dropped": dropped,
+            "folder": None if folder is None else str(folder),
+            "progress": progress,
+        }
+        return microscope_operator(self.optics, self.lenslet, layout, depths, **options)  # type: ignore[arg-type]
+
+    def _layout(self, samples: int, pixels: int | Calibration | None) -> Layout:
+        if isinstance(pixels, int) and not isinstance(pixels, bool):
+            if pixels < 2:
+                raise GeometryError(f"pixels is {pixels} but a lenslet needs at least 2 along each side.")
+            return Layout(self.lenslets.count, CellSampling(samples, pixels, 1 / pixels))
+        calibration = self.calibration if pixels is None else pixels
+        if not isinstance(calibration, Calibration):
+            raise GeometryError(f"pixels is {pixels!r} but must be a whole number, a Calibration or None.")
+        pitch = calibration.lattice.pitch
+        cutoff = 2 * self.lenslets.pitch**2 / (min(o.wavelength for o in self.optics) * self.lenslet_distance)
+        N = max(2, math.ceil(FINENESS * cutoff), math.ceil(pitch))
+        placement, cells, middle = PixelPlacement.of(calibration, N)
+        step = self.lenslet_size / pitch
+        center = tuple((middle[k] - calibration.shape[k] // 2) * step for k in (0, 1))
+        return Layout(cells, CellSampling(samples, N, 1 / pitch), placement, (center[0], center[1]))
+
+    def _mosaic(self) -> Mosaic:
+        assert self.fourier_lens is not None  # checked above
+        part, pitch = self.lenslets, self.pixels.pixel_pitch / self.relay_magnification
+        return Mosaic(
+            self.lattice.position(part.indices()), part.pitch * part.fill_factor, part.focal_length[0],
+            self.fourier_lens, self.magnification, pitch, self.sensor.shape, part.pitch,
+        )  # fmt: skip
+
+    def describe(self) -> describe.Description:
+        """Magnification, resolution, depth of field, directions and band limits, each with its equation."""
+        return describe_microscope.microscope(self)

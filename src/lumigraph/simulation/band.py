@@ -1,0 +1,145 @@
+"""Band-limited samples along one axis: points brought onto them, and their integrals over pixels.
+
+The image of a lens has no frequency above D/(λL). Samples `OVERSAMPLING` times closer than that asks for
+leave room for a short kernel, a sinc in a Kaiser window, that is 1 up to there and 0 where the spectrum
+repeats, to 1e-5. A point anywhere becomes that kernel's values on the samples around it; what stands between
+the samples is the sum of their kernels, whose integrals over pixels are differences of one function.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.interpolate import CubicSpline, PPoly
+from scipy.sparse import csr_array
+from scipy.special import i0
+
+from lumigraph.core import arrays
+from lumigraph.core.arrays import Array
+
+OVERSAMPLING = 1.5
+"""How much closer samples stand than the band asks for."""
+
+HALF_WIDTH = 10
+"""Of the kernel [samples]."""
+
+KAISER_BETA = 10.5
+"""Of its window: 104 dB."""
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Samples ``pitch * k`` [m] for k from `first`, `count` of them."""
+
+    first: int
+    count: int
+    pitch: float
+
+    @classmethod
+    def around(cls, low: float, high: float, pitch: float) -> "Span":
+        """All samples whose kernels reach between two places [m]."""
+        first = math.floor(low / pitch) - HALF_WIDTH
+        return cls(first, math.ceil(high / pitch) + HALF_WIDTH + 1 - first, pitch)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Of the samples (count,) [m]."""
+        return (self.first + np.arange(self.count)) * self.pitch
+
+    @property
+    def last(self) -> int:
+        """Number of the last sample."""
+        return self.first + self.count - 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sparse:
+    """A matrix of few entries per row or column, for arrays of any library."""
+
+    matrix: csr_array
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        rows, columns = (int(n) for n in self.matrix.shape or ())
+        return rows, columns
+
+    def along(self, array: Array) -> Array:
+        """The product with the first axis of an array."""
+        if arrays.is_numpy(array):
+            return self.matrix.astype(array.dtype, copy=False) @ array
+        return arrays.like(self.matrix.toarray(), array) @ array
+
+    @property
+    def T(self) -> "Sparse":
+        """The transpose."""
+        return Sparse(self.matrix.T.tocsr())
+
+
+def both(matrices: tuple[Sparse, Sparse], plane: Array) -> Array:
+    """One matrix along y and one along x of (y, x), those first that leave less to do."""
+    turn = arrays.namespace(plane).matrix_transpose
+    along_y, along_x = matrices
+    if along_y.shape[0] * along_x.shape[1] <= along_y.shape[1] * along_x.shape[0]:
+        return turn(along_x.along(turn(along_y.along(plane))))
+    return along_y.along(turn(along_x.along(turn(plane))))
+
+
+def both_adjoint(matrices: tuple[Sparse, Sparse], plane: Array) -> Array:
+    """Transpose of `both`."""
+    return both((matrices[0].T, matrices[1].T), plane)
+
+
+def placed(positions: np.ndarray, span: Span) -> Sparse:
+    """Matrix (samples, points) of points as band-limited points: a sum of sinc functions, cut short.
+
+    Parameters
+    ----------
+    positions
+        (points,) [m], all of them between those that `span` was made around.
+    """
+    at = positions / span.pitch - span.first
+    nearest = np.floor(at).astype(int)
+    rows = nearest[:, None] + np.arange(1 - HALF_WIDTH, HALF_WIDTH + 1)
+    values = kernel(at[:, None] - rows)
+    columns = np.broadcast_to(np.arange(len(positions))[:, None], rows.shape)
+    entries = (values.ravel(), (rows.ravel(), columns.ravel()))
+    return Sparse(csr_array(entries, shape=(span.count, len(positions))))
+
+
+def integrated(centers: np.ndarray, width: float, span: Span) -> Sparse:
+    """Matrix (pixels, samples) of the mean over each pixel of what the samples stand for.
+
+    Parameters
+    ----------
+    centers, width
+        Of the pixels [m].
+    """
+    low = (centers - width / 2) / span.pitch - span.first
+    reach = math.ceil(width / span.pitch) + 2 * HALF_WIDTH + 1
+    columns = np.floor(low).astype(int)[:, None] - HALF_WIDTH + np.arange(reach)
+    offset = low[:, None] - columns
+    values = integral(offset + width / span.pitch) - integral(offset)
+    inside = (columns >= 0) & (columns < span.count)
+    rows = np.broadcast_to(np.arange(len(centers))[:, None], columns.shape)
+    entries = (values[inside] * (span.pitch / width), (rows[inside], columns[inside]))
+    return Sparse(csr_array(entries, shape=(len(centers), span.count)))
+
+
+def kernel(offset: np.ndarray) -> np.ndarray:
+    """Interpolation kernel at offsets [samples]: a sinc in a Kaiser window of half width `HALF_WIDTH`."""
+    inside = np.clip(1 - (offset / HALF_WIDTH) ** 2, 0, None)
+    window = np.where(np.abs(offset) <= HALF_WIDTH, i0(KAISER_BETA * np.sqrt(inside)) / i0(KAISER_BETA), 0)
+    return np.sinc(offset) * window
+
+
+def integral(offset: np.ndarray) -> np.ndarray:
+    """Integral of the kernel from far below up to an offset [samples]."""
+    return _antiderivative()(np.clip(offset, -HALF_WIDTH, HALF_WIDTH))
+
+
+@cache
+def _antiderivative() -> PPoly:
+    places = np.linspace(-HALF_WIDTH, HALF_WIDTH, 200 * HALF_WIDTH + 1)
+    return CubicSpline(places, kernel(places)).antiderivative()

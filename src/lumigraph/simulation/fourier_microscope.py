@@ -1,0 +1,261 @@
+r"""Raw image of a volume by a Fourier light-field microscope, and the adjoint.
+
+Each lenslet stands in the image of the pupil and images the whole field by its share of the light. Moving a
+point moves its image behind every lenslet by the same amount, so that each depth is a plain convolution for
+each lenslet:
+
+.. math:: h_j(x) = \left| \int_{lenslet\ j} A(q)\, e^{i k \sqrt{n^2 - q^2}\, dz}
+          e^{-2\pi i (u - P_j) x / (\lambda f_\mu)}\, du \right|^2, \qquad q = u M / f_F
+
+C. Guo et al., "Fourier light-field microscopy", Opt. Express 27, 25573 (2019).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.fft
+
+from lumigraph.core import arrays, checks, memory
+from lumigraph.core.arrays import Array
+from lumigraph.core.grid import Grid
+from lumigraph.elements.objective import Objective
+from lumigraph.errors import GeometryError, SamplingError
+
+TAIL = 4.0
+"""Half width of the window of a point's image beyond its displacement, in λ f_µ/d."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mosaic:
+    """Lenslets in the pupil and the pixels behind them, in lengths at the lenslets.
+
+    Parameters
+    ----------
+    centers
+        Of the lenslets (k, 2) as (y, x) [m], the pupil's middle at (0, 0).
+    width, focal_length
+        Of a lenslet, d and f_µ [m].
+    fourier_lens
+        f_F [m].
+    magnification
+        M, from the object to the native image.
+    pixel_pitch, shape
+        Of the sensor, whose middle stands behind the pupil's.
+    pitch
+        Of the lenslets [m].
+    """
+
+    centers: np.ndarray
+    width: float
+    focal_length: float
+    fourier_lens: float
+    magnification: float
+    pixel_pitch: float
+    shape: tuple[int, int]
+    pitch: float
+
+    @property
+    def total_magnification(self) -> float:
+        """From the object to the sensor, M f_µ/f_F."""
+        return self.magnification * self.focal_length / self.fourier_lens
+
+    @property
+    def field(self) -> int:
+        """Pixels across a lenslet's image."""
+        return max(1, math.floor(self.pitch / self.pixel_pitch))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FourierMicroscopeOperator:
+    """A volume (z, y, x) to a raw image (ny, nx) of a Fourier light-field microscope, and back.
+
+    Parameters
+    ----------
+    images
+        Images of a point on the axis (z, lenslets, w, w), float32, about each lenslet's pixel.
+    corners
+        Pixel (row, column) (lenslets, 2) where a lenslet's convolution begins.
+    depths
+        From the focused plane (z,) [m].
+    object_grid
+        As fine as the pixels.
+    raw_shape
+        Pixels (ny, nx).
+    """
+
+    images: np.ndarray
+    corners: np.ndarray
+    depths: tuple[float, ...]
+    object_grid: Grid
+    raw_shape: tuple[int, int]
+    _spectra: dict = field(default_factory=dict, repr=False)
+
+    @property
+    def shape(self) -> tuple[tuple[int, int], tuple[int, int, int]]:
+        """Pixels (ny, nx) of the raw image, samples (z, y, x) of the volume."""
+        return self.raw_shape, (len(self.depths), *self.object_grid.shape)
+
+    def forward(self, volume: Array) -> Array:
+        """Raw image (ny, nx) of intensities (z, y, x); an even plane of 1 gives 1 behind an open lenslet."""
+        self._check("the volume", volume, self.shape[1])
+        xp, spectra = arrays.namespace(volume), self._of(volume)
+        spectrum = 0.0
+        for k in range(len(self.depths)):
+            spectrum = spectrum + spectra[k, ...] * arrays.fft2(self._wide(volume[k, ...]))
+        pieces = xp.real(arrays.ifft2(spectrum))
+        raw = xp.zeros(self.raw_shape, dtype=volume.dtype, device=arrays.device(volume))
+        for j, (inside, own) in enumerate(self._windows()):
+            window = raw[inside]
+            window += pieces[(j, *own)]
+        return raw
+
+    def adjoint(self, raw: Array) -> Array:
+        """Transpose of `forward`: (z, y, x) from a raw image (ny, nx)."""
+        self._check("the raw image", raw, self.raw_shape)
+        xp, spectra = arrays.namespace(raw), self._of(raw)
+        size, shape = self._size, self.object_grid.shape
+        pieces = xp.zeros((len(self.corners), *size), dtype=raw.dtype, device=arrays.device(raw))
+        for j, (inside, own) in enumerate(self._windows()):
+            pieces[(j, *own)] = raw[inside]
+        given = arrays.fft2(pieces)
+        planes = []
+        for k in range(len(self.depths)):
+            spectrum = xp.sum(xp.conj(spectra[k, ...]) * given, axis=0)
+            planes.append(xp.real(arrays.ifft2(spectrum))[: shape[0], : shape[1]])
+        return xp.stack(planes)
+
+    def psf(self, index: tuple[int, ...]) -> Array:
+        """Raw image (ny, nx) of one sample (z, y, x) of intensity 1, float32 of NumPy."""
+        volume = np.zeros(self.shape[1], np.float32)
+        volume[index] = 1
+        return self.forward(volume)
+
+    @property
+    def _size(self) -> tuple[int, int]:
+        """Of the convolutions: field and image together, rounded up to a smooth number."""
+        w = self.images.shape[-1]
+        ny, nx = (scipy.fft.next_fast_len(n + w - 1) or n + w - 1 for n in self.object_grid.shape)
+        return ny, nx
+
+    def _of(self, like: Array) -> Array:
+        key = arrays.placement(like)
+        if key not in self._spectra:
+            size, (nz, nj, w, _) = self._size, self.images.shape
+            padded = np.zeros((nz, nj, *size))
+            padded[:, :, :w, :w] = self.images
+            self._spectra[key] = arrays.like(arrays.fft2(padded), like)
+        return self._spectra[key]
+
+    def _wide(self, plane: Array) -> Array:
+        xp, (ny, nx) = arrays.namespace(plane), self._size
+        like = {"dtype": plane.dtype, "device": arrays.device(plane)}
+        plane = xp.concat([plane, xp.zeros((ny - plane.shape[0], plane.shape[1]), **like)], axis=0)
+        plane = xp.concat([plane, xp.zeros((ny, nx - plane.shape[1]), **like)], axis=1)
+        return arrays.as_complex(plane)
+
+    def _windows(self) -> list[tuple[tuple[slice, slice], tuple[slice, slice]]]:
+        """For each lenslet the pixels of the raw image, and which of its convolution fall on them."""
+        found, w = [], self.images.shape[-1]
+        for corner in self.corners:
+            raw, own = [], []
+            for axis in (0, 1):
+                length = self.object_grid.shape[axis] + w - 1
+                start, stop = max(0, int(corner[axis])), min(self.raw_shape[axis], int(corner[axis]) + length)
+                raw.append(slice(start, max(start, stop)))
+                own.append(slice(start - int(corner[axis]), max(start, stop) - int(corner[axis])))
+            found.append(((raw[0], raw[1]), (own[0], own[1])))
+        return found
+
+    @staticmethod
+    def _check(name: str, array: Array, shape: tuple[int, ...]) -> None:
+        checks.array(name, array)
+        if tuple(array.shape) != tuple(shape):
+            raise GeometryError(
+                f"{name} has shape {tuple(array.shape)} but the operator's is {tuple(shape)}."
+            )
+
+
+def fourier_operator(
+    objectives: Sequence[Objective], mosaic: Mosaic, depths: Sequence[float]
+) -> FourierMicroscopeOperator:
+    """Operator from slices at `depths` to the raw image of a Fourier light-field microscope.
+
+    Light is scalar here: each lenslet accepts a small cone.
+
+    Raises
+    ------
+    SamplingError
+        The images of points do not fit in memory.
+    GeometryError
+        No depths, or none of the lenslets stands in the pupil.
+    """
+    depths = tuple(checks.finite("a depth", dz) for dz in depths)
+    if not depths:
+        raise GeometryError("there are no depths. Give at least one, such as 0.0 for the focused plane.")
+    half = _half_window(objectives[0], mosaic, depths)
+    lit = _lit(objectives[0], mosaic)
+    # Three times: as complex spectra of a window that holds the field too.
+    needed = 24.0 * len(depths) * len(lit) * (2 * half + 1 + mosaic.field) ** 2
+    memory.require(needed, "the images of points", "Use fewer slices or larger pixels.", SamplingError)
+    images = np.zeros((len(depths), len(lit), 2 * half + 1, 2 * half + 1), np.float32)
+    middle = np.asarray(mosaic.shape) // 2
+    # Two images one after the other: upright on the sensor, which is not turned.
+    places = lit / mosaic.pixel_pitch + middle
+    nearest = np.round(places).astype(int)
+    for objective in objectives:
+        for j, center in enumerate(lit):
+            for k, dz in enumerate(depths):
+                image = _image(objective, mosaic, (center, places[j] - nearest[j]), dz, half)
+                images[k, j] += image / len(objectives)
+    n = mosaic.field
+    pitch = mosaic.pixel_pitch / mosaic.total_magnification
+    # Sample n // 2 of the object stands on the axis, and its image on the lenslet's pixel.
+    corners = nearest - half - n // 2
+    return FourierMicroscopeOperator(images, corners, depths, Grid((n, n), (pitch, pitch)), mosaic.shape)
+
+
+def _lit(objective: Objective, mosaic: Mosaic) -> np.ndarray:
+    """Centres of the lenslets that the pupil lights at least in part."""
+    radius = mosaic.fourier_lens * objective.aperture / mosaic.magnification
+    nearest = np.maximum(np.abs(mosaic.centers) - mosaic.width / 2, 0)
+    lit = mosaic.centers[np.hypot(*nearest.T) < radius]
+    if not len(lit):
+        raise GeometryError(
+            f"no lenslet stands in the pupil, which is {2 * radius * 1e3:.4g} mm wide. "
+            "Check fourier_lens and count."
+        )
+    return lit
+
+
+def _half_window(objective: Objective, mosaic: Mosaic, depths: Sequence[float]) -> int:
+    """Pixels to each side that hold a point's images at all depths."""
+    tangent = objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
+    moved = max(abs(dz) for dz in depths) * tangent * mosaic.total_magnification
+    spread = TAIL * objective.wavelength * mosaic.focal_length / mosaic.width
+    return math.ceil((moved + spread) / mosaic.pixel_pitch)
+
+
+def _image(
+    objective: Objective, mosaic: Mosaic, place: tuple[np.ndarray, np.ndarray], dz: float, half: int
+) -> np.ndarray:
+    """Image (2 half + 1)² behind a lenslet, of a point that sends 1 through a whole one on the axis."""
+    center, rest = place
+    wave, f, scale = objective.wavelength, mosaic.focal_length, mosaic.magnification / mosaic.fourier_lens
+    window = (2 * half + 1) * mosaic.pixel_pitch
+    n = math.ceil(2.2 * window * mosaic.width / (wave * f)) + 8
+    u = ((np.arange(n) - (n - 1) / 2) / n) * mosaic.width
+    q = np.hypot(center[0] + u[:, None], center[1] + u) * scale
+    step = mosaic.width / n * scale
+    inside = np.clip((objective.aperture - q) / step + 0.5, 0, 1)
+    cosine = np.sqrt(np.clip(1 - (q / objective.medium) ** 2, 1e-6, None))
+    phase = 2 * np.pi / wave * objective.medium * (cosine - 1) * dz
+    pupil = inside / np.sqrt(cosine) * np.exp(1j * phase)
+    over = max(1, math.ceil(2.2 * mosaic.pixel_pitch * mosaic.width / (wave * f)))
+    fine = (np.arange((2 * half + 1) * over) + 0.5) / over - 0.5 - half
+    waves = [np.exp(-2j * np.pi * np.outer((fine - r) * mosaic.pixel_pitch, u) / (wave * f)) for r in rest]
+    image = np.square(np.abs(waves[0] @ pupil @ waves[1].T))
+    pixels = image.reshape(2 * half + 1, over, 2 * half + 1, over).sum((1, 3))
+    # Parseval: a lenslet that is open all over, with cos θ = 1, gives 1 in all.
+    return pixels * (mosaic.pixel_pitch * mosaic.width / (over * wave * f * n**2)) ** 2

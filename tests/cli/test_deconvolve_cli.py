@@ -1,0 +1,169 @@
+"""`lumigraph deconvolve`."""
+
+import json
+
+import numpy as np
+import pytest
+
+import lumigraph as lg
+from lumigraph.cli.deconvolve import depths, vignetting
+
+FOCUSED = """
+kind = "focused-plenoptic"
+wavelength = "550 nm"
+object_distance = "100 mm"
+[main_lens]
+focal_length = "50 mm"
+[lenslets]
+pitch = "80 um"
+focal_length = "2.4 mm"
+count = [3, 3]
+magnification = 0.5
+[sensor]
+pixel_pitch = "5 um"
+"""
+SCOPE = """
+kind = "light-field-microscope"
+wavelength = "550 nm"
+[objective]
+magnification = 20
+numerical_aperture = 0.4
+[lenslets]
+pitch = "100 um"
+focal_length = "2 mm"
+count = [5, 5]
+[sensor]
+pixel_pitch = "12.5 um"
+"""
+
+
+@pytest.fixture
+def focused(lumigraph, tmp_path):
+    """A camera file and a noisy raw image of it."""
+    (tmp_path / "camera.toml").write_text(FOCUSED)
+    found = lumigraph("simulate", "camera.toml", "--scene", "siemens_star", "--noise", "-o", "raw.tiff")
+    assert found.code == 0, found.err
+    return lumigraph
+
+
+def test_a_focused_camera_gives_its_picture_and_a_report(focused, tmp_path):
+    found = focused(
+        "deconvolve", "raw.tiff", "--camera", "camera.toml", "--iterations", 3, "-o", "picture.tiff",
+        "--report", "page.html", "--prior", "tv", "--strength", 0.01, "--accelerated", "--json",
+    )  # fmt: skip
+    assert found.code == 0, found.err
+    values = json.loads(found.out)
+    picture = lg.open(tmp_path / "picture.tiff")
+    camera = lg.FocusedPlenopticCamera.from_toml(tmp_path / "camera.toml")
+    assert values["iterations"] == 3
+    assert values["pixel_pitch"] == pytest.approx(camera.object_grid.pitch[0])
+    assert picture.shape == tuple(values["shape"])
+    assert picture.pixel_pitch == pytest.approx(camera.object_grid.pitch[0])
+    assert float(picture.data.min()) >= 0
+    page = (tmp_path / "page.html").read_text()
+    assert "deviance" in page
+    assert page.count("<img") == 3
+
+
+def test_a_run_goes_on_from_its_checkpoint(focused, tmp_path):
+    said = ("deconvolve", "raw.tiff", "--camera", "camera.toml", "--checkpoint", "state.npz")
+    assert focused(*said, "--iterations", 2, "-o", "two.tiff").code == 0
+    assert focused(*said, "--iterations", 3, "-o", "three.tiff").code == 0
+    found = focused(*said[:-2], "--iterations", 3, "-o", "whole.tiff")
+    assert "3 iterations, deviance" in found.out
+    three, whole = (lg.open(tmp_path / f"{name}.tiff").data for name in ("three", "whole"))
+    np.testing.assert_array_equal(three, whole)
+    assert "finished already" in focused(*said, "--iterations", 3, "-o", "again.tiff").out
+
+
+def test_ctrl_c_keeps_what_was_reached(focused, tmp_path, monkeypatch):
+    from lumigraph import deconvolution
+
+    real = deconvolution.deconvolve
+
+    def interrupted(*arguments, progress, **options):
+        def stop(step):
+            if step.iteration == 2:
+                raise KeyboardInterrupt
+
+        return real(*arguments, progress=stop, **options)
+
+    monkeypatch.setattr(deconvolution, "deconvolve", interrupted)
+    found = focused("deconvolve", "raw.tiff", "--camera", "camera.toml", "-o", "picture.tiff")
+    assert found.code == 130
+    assert "2 iterations are in picture.partial.tiff" in found.err
+    assert not (tmp_path / "picture.tiff").exists()
+    assert float(lg.open(tmp_path / "picture.partial.tiff").data.max()) > 0
+
+
+def test_a_microscope_gives_a_volume_with_its_places(lumigraph, tmp_path):
+    """White and dark images, as a microscopist takes them; the bead comes back where it was."""
+    (tmp_path / "scope.toml").write_text(SCOPE)
+    scope = lg.load_camera(tmp_path / "scope.toml")
+    operator = scope.operator((-10e-6, 0.0, 10e-6), 5)
+    scene = np.zeros(operator.shape[1], np.float32)
+    ny, nx = operator.object_grid.shape
+    scene[2, ny // 2 + 3, nx // 2 - 4] = 1e5
+    light = np.maximum(operator.forward(scene), 0)
+    lg.save(lg.RawImage((light + 10).astype(np.float32)), tmp_path / "raw.tif")
+    lg.save(lg.RawImage(np.full(light.shape, 10, np.float32)), tmp_path / "dark.tif")
+    found = lumigraph(
+        "deconvolve", "raw.tif", "--dark", "dark.tif", "--camera", "scope.toml", "--iterations", 15,
+        "--z", "-10 um:10 um:10 um", "-o", "volume.ome.tif", "--report", "page.html", "--raw-lattice",
+    )  # fmt: skip
+    assert found.code == 0, found.err
+    volume = lg.open(tmp_path / "volume.ome.tif")
+    assert isinstance(volume, lg.Volume)
+    assert volume.depths == pytest.approx((-10e-6, 0.0, 10e-6))
+    assert volume.grid.pitch == pytest.approx(operator.object_grid.pitch)
+    assert np.unravel_index(np.argmax(volume.data), volume.shape) == (2, ny // 2 + 3, nx // 2 - 4)
+    assert (tmp_path / "page.html").read_text().count("<img") == 4
+
+
+def test_depths_are_read_with_their_ends():
+    assert depths("--z", "-20 um:20 um:2 um") == pytest.approx(np.arange(-20e-6, 21e-6, 2e-6))
+    assert depths("--z", "5 um") == pytest.approx((5e-6,))
+    assert depths("--z", "5 um, -1 um") == pytest.approx((-1e-6, 5e-6))
+
+
+def test_vignetting_is_what_a_white_image_shows_over_many_lenslets():
+    y, x = np.indices((120, 140))
+    slow = 1 - 0.4 * (x / 140)
+    white = 900 * slow * (1 + 0.5 * np.cos(2 * np.pi * x / 10) * np.cos(2 * np.pi * y / 10))
+    found = vignetting(white, 10.0)
+    inner = (slice(30, 90), slice(30, 110))
+    np.testing.assert_allclose(found[inner] / slow[inner], np.mean(found[inner] / slow[inner]), rtol=0.03)
+    assert found.max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--z", "1 um:2 um"), "'first:last:step'"),
+        (("--z", "2 um:1 um:1 um"), "must ascend"),
+        (("--z", "0 um:1 m:1 nm"), "at most 1000"),
+        (("--z", "1 um, 1 um"), "names a depth twice"),
+        (("--z", "3"), "--z"),
+        (("--samples", "0"), "--samples is 0"),
+        (("--iterations", "0"), "--iterations is 0"),
+        (("--strength", "0.1"), "--strength is that of a prior"),
+        (("--strength", "nan", "--prior", "tv"), "--strength is nan"),
+        (("--deviance", "-1"), "--deviance is -1"),
+        (("--background", "-1"), "--background is -1"),
+        (("--background", "1", "--dark", "raw.tiff"), "say the same"),
+        (("--dark", "small.tiff"), "--dark small.tiff has shape (4, 4)"),
+        (("--report", "page.txt"), "wrong extension"),
+        (("--checkpoint", "state.txt"), "must end in .npz"),
+        (("--camera", "thesis-2f"), "error:"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(arguments, message, lumigraph, tmp_path):
+    (tmp_path / "camera.toml").write_text(FOCUSED)
+    lg.save(np.ones((51, 51), np.float32), tmp_path / "raw.tiff")
+    lg.save(np.ones((4, 4), np.float32), tmp_path / "small.tiff")
+    camera = () if "--camera" in arguments else ("--camera", "camera.toml")
+    found = lumigraph("deconvolve", "raw.tiff", *camera, *arguments, "-o", "out.tiff")
+    assert found.code == 1, found
+    assert message in found.err
+    assert found.err.count("\n") == 1
+    assert not (tmp_path / "out.tiff").exists()
