@@ -132,7 +132,7 @@ def run(snapshots: int = 20) -> list[dict[str, Any]]:
 
 
 def user_seconds() -> float:
-    """Processor time that this process has used for itself [s]."""
+    """Processor time that this process has used for itself, without the system's for it [s]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_utime
 
 
