@@ -15,7 +15,12 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 
 @pytest.mark.parametrize(
     ("name", "written"),
-    [("new_camera", ("rays.png", "raw.tiff", "picture.png")), ("only_waves", ("planes.png",))],
+    [
+        ("new_camera", ("rays.png", "raw.tiff", "picture.png")),
+        ("only_waves", ("planes.png",)),
+        ("kinds_of_light", ("coherent.tiff", "partially_coherent.tiff", "incoherent.tiff")),
+        ("deconvolve_focused", ("deconvolved.png", "deconvolved.tiff")),
+    ],
 )
 def test_an_example_runs(name, written, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +118,14 @@ def test_simulate_passes_the_light_and_the_scene_on(lumigraph, bench, monkeypatc
     photo, _, points = seen["scene"].parts
     assert photo.dz == pytest.approx(-3e-3)
     np.testing.assert_allclose(points.positions, [[-1e-3, 0, 5e-3]])
+
+
+def test_simulate_tells_the_estimated_error(lumigraph, bench, monkeypatch):
+    raw = replace(io.open(bench / "raw.tiff"), metadata={"estimated_error": 0.0523})
+    monkeypatch.setattr("lumigraph.simulation.simulate", lambda *_, **__: raw)
+    words = ("simulate", "camera.toml", "--scene", "white", "-o", "out.tiff")
+    assert "estimated error 5.2 % rms" in lumigraph(*words).out
+    assert json.loads(lumigraph(*words, "--json").out)["estimated_error"] == 0.0523
 
 
 @pytest.mark.parametrize(

@@ -193,6 +193,7 @@ def seeds() -> dict[str, tuple[list[Tree], Callable[[Tree], Tree] | None]]:
     return {
         "tiff": (tiffs, None),
         "png": (pngs, mend_png),
+        "jpeg": ([{"a.jpg": jpeg(colour)}, {"a.jpg": jpeg(colour[..., 0])}], None),
         "zarr": (zarrs, None),
         "zarr.zip": ([{"a.zarr.zip": zipped(strip(tree, "a.zarr/"))} for tree in zarrs], None),
         "hdf5": (

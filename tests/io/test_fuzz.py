@@ -5,8 +5,8 @@ import pytest
 from fuzz import run, seeds
 
 READERS = (
-    "tiff", "png", "zarr", "zarr.zip", "hdf5", "pfm", "ply", "lytro", "lytro raw", "lytro json", "toml",
-    "xml", "ini", "views", "eslf",
+    "tiff", "png", "jpeg", "zarr", "zarr.zip", "hdf5", "pfm", "ply", "lytro", "lytro raw", "lytro json",
+    "toml", "xml", "ini", "views", "eslf",
 )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ import lumigraph.io as io
 from lumigraph.errors import FormatError
 from lumigraph.io import target
 
-NAMES = ["a.png", "a.tiff", "a.zarr", "a.zarr.zip"]
+NAMES = ["a.png", "a.tiff", "a.zarr", "a.zarr.zip", "a.h5", "a.pfm"]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -131,6 +131,29 @@ def test_pngs_of_few_bits_are_read(tmp_path, bits):
     np.testing.assert_array_equal(io.open(tmp_path / "a.png").data[0], values * (255 // (2**bits - 1)))
 
 
+def test_jpegs_are_read_as_the_sensor_lies(tmp_path):
+    picture = np.zeros((24, 40, 3), np.uint8)
+    picture[:12, :20] = 200, 100, 50
+    exif = Image.Exif()
+    exif[274] = 6  # turn by 90 degrees to show
+    Image.fromarray(picture).save(tmp_path / "a.jpg", quality=95, subsampling=0, exif=exif)
+    np.testing.assert_allclose(io.open(tmp_path / "a.jpg").data.astype(float), picture, atol=40)
+    assert np.abs(io.open(tmp_path / "a.jpg").data.astype(float) - picture).mean() < 2
+    Image.fromarray(picture[..., 0]).save(tmp_path / "g.jpeg")
+    assert io.open(tmp_path / "g.jpeg").data.shape == (24, 40)
+    Image.fromarray(picture).convert("CMYK").save(tmp_path / "c.jpg")
+    with pytest.raises(FormatError, match="has the colours CMYK"):
+        io.open(tmp_path / "c.jpg")
+    content = bytearray((tmp_path / "g.jpeg").read_bytes())
+    at = content.index(b"\xff\xc0")
+    content[at + 5 : at + 9] = struct.pack(">HH", 12_000, 12_000)
+    (tmp_path / "g.jpeg").write_bytes(content)
+    with pytest.raises(FormatError, match="declares 144000000 bytes of pixels"):
+        io.open(tmp_path / "g.jpeg")
+    with pytest.raises(FormatError, match="wrong extension"):
+        io.save(picture, tmp_path / "b.jpg")
+
+
 def test_a_volume_is_an_ome_zarr_for_others(tmp_path, rng):
     volume = Volume(rng.random((3, 5, 6, 2)), GRID, (-3e-6, 0.0, 3e-6))
     io.save(volume, tmp_path / "v.ome.zarr")

@@ -4,7 +4,7 @@
 - `options`: what verbs share: `--json`, `--debug`, quantities with units
 - `files`: reading inputs, checking outputs before a computation, writing them
 - `console`: results on standard output, progress on standard error
-- `demo`, `design`, `simulate`, `calibrate`, `decode`, `render`, `refocus`, `deconvolve`, `view`,
+- `demo`, `design`, `simulate`, `calibrate`, `decode`, `render`, `refocus`, `depth`, `deconvolve`, `view`,
   `reproduce`: the verbs
 
 Modules of verbs import what is slow inside their functions, so that `--help` answers at once.

@@ -13,6 +13,7 @@ from cyclopts.exceptions import CycloptsError
 from lumigraph.cli.calibrate import calibrate
 from lumigraph.cli.decode import decode
 from lumigraph.cli.deconvolve import deconvolve
+from lumigraph.cli.depth import depth
 from lumigraph.cli.demo import demo
 from lumigraph.cli.design import design
 from lumigraph.cli.refocus import refocus
@@ -25,7 +26,7 @@ from lumigraph.errors import LumigraphError
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
 """Exit codes: something went wrong, the command was written wrongly, Ctrl-C."""
 
-VERBS = (demo, design, simulate, calibrate, decode, render, refocus, deconvolve, view, reproduce)
+VERBS = (demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, view, reproduce)
 """In the order of their use."""
 
 

@@ -33,12 +33,12 @@ class Focus:
     alphas
         A range 'first:last:count', such as 0.9:1.1:9.
     depth
-        One or more depths from the focused plane, such as '5 mm' (farther) or '-5 mm'; needs --camera.
+        From the focused plane, such as '5 mm' (farther) or '-5 mm'; may be repeated; needs --camera.
     """
 
     alpha: Annotated[list[float] | None, Parameter(consume_multiple=True)] = None
     alphas: str | None = None
-    depth: Annotated[list[str] | None, Parameter(consume_multiple=True, allow_leading_hyphen=True)] = None
+    depth: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True)] = None
 
     def chosen(self, camera: Any) -> list[float]:
         """All factors, as given."""
@@ -126,7 +126,7 @@ def refocus(
 
     Example: `lumigraph refocus raw.png --white white.png --alphas 0.9:1.1:9 -o stack.tiff`
 
-    Example: `lumigraph refocus views.zarr --camera camera.toml --depth "-5 mm" "5 mm" -o sweep.gif`
+    Example: `lumigraph refocus views.zarr --camera camera.toml --depth "-5 mm" --depth "5 mm" -o two.tiff`
 
     Parameters
     ----------

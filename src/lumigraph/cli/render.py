@@ -43,7 +43,8 @@ class Tiles:
     finer
         Times as fine as the pixels of a patch, from all micro-images that show a place: 2 or more.
     focus
-        For three kinds of lenslets without --camera: the patch at which each is sharp, in pixels.
+        For three kinds of lenslets without --camera: the patch at which each is sharp, in pixels,
+        such as '-13.5,-10.5,-7.5'.
     """
 
     patch: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
@@ -52,7 +53,7 @@ class Tiles:
     blend: bool = False
     samples: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
     finer: Annotated[int, Parameter(allow_leading_hyphen=True)] = 1
-    focus: Annotated[list[float] | None, Parameter(consume_multiple=True, allow_leading_hyphen=True)] = None
+    focus: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
 
     @property
     def is_given(self) -> bool:
@@ -77,12 +78,26 @@ class Tiles:
                 raise FormatError("--depth says the patch of a camera. Give --camera FILE, and no --patch.")
         if sum(x is not None for x in (self.patch, self.patches, self.depth)) > 1:
             raise FormatError("--patch, --patches and --depth say the same. Give one of them.")
+        self.chosen_focus()
+        if self.patches is not None:
+            range_of("--patches", self.patches)
         if not 1 <= self.finer <= _MOST_FINER:
             raise FormatError(f"--finer is {self.finer} but must be from 1 to {_MOST_FINER}.")
         if self.finer > 1 and (self.patches is not None or self.samples is not None or self.blend):
             raise FormatError(
                 "--finer has no meaning with --patches, --samples or --blend. Leave out the others."
             )
+
+    def chosen_focus(self) -> list[float] | None:
+        """The patches after --focus."""
+        if self.focus is None:
+            return None
+        try:
+            return [float(word) for word in self.focus.split(",")]
+        except ValueError:
+            raise FormatError(
+                f"--focus is {self.focus!r} but must be three sizes in pixels, such as -13.5,-10.5,-7.5."
+            ) from None
 
     def known(self, camera: Any) -> float | None:
         """The one patch [px] that is given, or that the camera has at the depth; None where it is found."""
@@ -93,7 +108,7 @@ class Tiles:
     def sharp(self, camera: Any, calibration: "Calibration", origin: Origin) -> list[float] | None:
         """The patch at which each kind of lenslets is sharp, where there are three and it is known."""
         if self.focus is not None or calibration.lattice.kinds == 1:
-            return self.focus
+            return self.chosen_focus()
         if camera is not None and len(camera.lenslets.focal_length) == 3:
             first, second, third = camera.sharp_patches
             return [first, third, second]  # the raw image is turned: the second and third kind trade places

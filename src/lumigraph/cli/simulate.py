@@ -33,7 +33,7 @@ class Light:
         times; tilted: plane waves from many directions.
     count
         Snapshots (100 if left out) or tilted waves (64) to add up: more of them, less speckle.
-        Incoherent light needs none where the camera has lenslets along the axes.
+        Incoherent light needs none where the camera has no lenslets, or lenslets along the axes.
     na
         Numerical aperture of the tilted waves; all directions if left out.
     """

@@ -4,22 +4,33 @@
 - `epi`: disparities from the slopes of the lines of epipolar-plane images
 - `from_focus`: refocus factors from the sharpness of a focal stack; `point_alpha` for a picture of one
   point, and `BiasCurve`, which corrects what diffraction does to either
+- `correlation`: patch sizes of a plenoptic 2.0 camera's lenslets, from neighbouring micro-images
+- `fuse`: several maps as one, smooth but for kinks and jumps
+- `metric`: distances through the camera's geometry: metres, virtual depths, points in space
 - `pictures`, `sweep`, `lines`: the steps of `epi`: even views, a plane sweep, least squares on all views
 - `volume`: costs of many labels: guided filter, semi-global matching, the best label
 - `smooth`: surfaces through uncertain values that may be slanted, bent and torn
 """
 
+from lumigraph.depth.correlation import correlation
 from lumigraph.depth.epi import epi
 from lumigraph.depth.from_focus import BiasCurve, from_focus, point_alpha, sharpness
+from lumigraph.depth.fuse import fuse
+from lumigraph.depth.metric import cloud, metric, virtual_depth
 from lumigraph.depth.result import DepthMap, alpha_of, disparity_of
 
 __all__ = [
     "BiasCurve",
     "DepthMap",
     "alpha_of",
+    "cloud",
+    "correlation",
     "disparity_of",
     "epi",
     "from_focus",
+    "fuse",
+    "metric",
     "point_alpha",
     "sharpness",
+    "virtual_depth",
 ]

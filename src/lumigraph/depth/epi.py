@@ -20,13 +20,13 @@ _SURE = 0.05
 def epi(
     views: LightField, disparities: tuple[float, float] | None = None, *, progress: Progress = silent
 ) -> DepthMap:
-    r"""Disparity of each lenslet of the middle view: slope of the line that its point draws through the views.
+    r"""Disparity of each lenslet of the middle view: slope of the line its point draws through the views.
 
     .. math:: L(u, x + d\, u) = L(0, x), \qquad d = (1 - \alpha') \Delta u / \Delta s
 
     A plane sweep over the cross of views, the better half of each arm taken (occlusion), smoothed along the
     picture's edges and by semi-global matching, finds each line to a fraction of a pixel. Least squares on
-    all views that see the point, joined by a surface that may be slanted, bent and torn, then finds its slope.
+    all views that see the point, joined by a surface that may be slanted, bent and torn, then finds slopes.
 
     Parameters
     ----------

@@ -166,7 +166,8 @@ def from_focus(
     Returns
     -------
     DepthMap
-        Refocus factors (t, s), of the light field's library and precision. Even surfaces have no contrast: their confidence is low.
+        Refocus factors (t, s), of the light field's library and precision. Even surfaces have no contrast:
+        their confidence is low.
 
     Raises
     ------

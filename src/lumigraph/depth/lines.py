@@ -1,6 +1,7 @@
 """Slopes of the lines of all epipolar-plane images at once, by least squares about a first estimate."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import map_coordinates, maximum_filter, spline_filter
@@ -8,6 +9,8 @@ from scipy.ndimage import map_coordinates, maximum_filter, spline_filter
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.smooth import Stiffness, update
 from lumigraph.depth.volume import Progress, box
+
+_spline: Any = spline_filter
 
 _ROUNDS = (2.0, 1.2)
 """Second difference that counts as an edge, round by round [px in the outermost view]."""
@@ -26,7 +29,7 @@ def refined(pictures: Pictures, moves: np.ndarray, progress: Progress) -> tuple[
     they say, are joined by a smooth surface.
     """
     grey = pictures.data.mean(2)
-    lines = np.stack([[spline_filter(view, 3, output=np.float32) for view in row] for row in grey])
+    lines = np.stack([[_spline(view, 3, output=np.float32) for view in row] for row in grey])
     moves = moves.astype(np.float32)
     information = np.zeros_like(moves)
     for k, jump in enumerate(_ROUNDS):

@@ -25,19 +25,25 @@ class Stiffness:
     Parameters
     ----------
     weight
-        λ, in the unit of the information.
+        λ, in the unit of the information; one, or one for each place (y, x).
     kink
         Second difference above which a bend costs its amount and no longer its square [unit of the map].
     jump
         Second difference above which it is an edge and costs little [unit of the map].
     """
 
-    weight: float
+    weight: float | np.ndarray
     kink: float
     jump: float
 
 
-def update(values: np.ndarray, information: np.ndarray, pull: np.ndarray, how: Stiffness) -> np.ndarray:
+def update(
+    values: np.ndarray,
+    information: np.ndarray,
+    pull: np.ndarray,
+    how: Stiffness,
+    edges: np.ndarray | None = None,
+) -> np.ndarray:
     """The map (y, x) moved by what the data pull at, as far as smoothness lets them.
 
     Parameters
@@ -50,15 +56,19 @@ def update(values: np.ndarray, information: np.ndarray, pull: np.ndarray, how: S
         Information times the change that the data ask for.
     how
         Of the smoothness.
+    edges
+        Part (y, x) of the stiffness that is kept at each place, such as less at a picture's edges.
     """
+    edges = np.ones_like(values) if edges is None else edges
     shape, pad = values.shape, [(0, -n % _LEVELS[0]) for n in values.shape]
-    values, (information, pull) = np.pad(values, pad, "edge"), (np.pad(a, pad) for a in (information, pull))
+    values, edges = (np.pad(a, pad, "edge") for a in (values, edges))
+    information, pull = (np.pad(a, pad) for a in (information, pull))
     least = 1e-8 * float(information.max()) + 1e-30
     for size in _LEVELS:
         if min(values.shape) < 3 * size:
             continue
         mean = _pooled(values, size) / size**2
-        level = Stiffness(how.weight / size**2, how.kink * size**2, how.jump)
+        level = Stiffness(_pooled(edges, size) * how.weight / size**4, how.kink * size**2, how.jump)
         change = _solve(mean, _pooled(information, size) + least * size**2, _pooled(pull, size), level)
         change = _spread(change, size)
         values = values + change

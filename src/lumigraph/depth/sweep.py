@@ -128,7 +128,7 @@ def span(pictures: Pictures) -> tuple[float, float]:
     size = _COARSE if min(pictures.center.shape[1:]) >= 16 * _COARSE else 1
     small = _shrunk(pictures, size)
     most = max(2.0, _FAR * max(pictures.center.shape[1:]))
-    moves = np.arange(-most, most + 0.5, 0.5, np.float32) / np.float32(size)
+    moves = np.arange(-most, most + 0.5, 0.5).astype(np.float32) / np.float32(size)
     limit = 3 * max(_MOST_DIFFERENCE, 3 * pictures.noise / size)
     guide = small.center.mean(0)
     cost = guided(costs(small, moves, limit, silent), guide, 2)

@@ -101,7 +101,7 @@ def _sweep(
 
 
 def cheapest(cost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Label (y, x) of the least cost, between the labels by a parabola; and how much it stands out, 0 to 1."""
+    """Label (y, x) of the least cost, between labels by a parabola; and how much it stands out, 0 to 1."""
     n = len(cost)
     best = cost.argmin(0)
     middle = np.clip(best, 1, n - 2)

@@ -2,7 +2,7 @@
 
 - `formats`: `open`, `save`, `contents` and the table of formats
 - `tiff`, `tiff_pixels`, `ome`: TIFF of any bit depth; OME-TIFF for stacks and volumes
-- `png`: PNG, 1 to 16 bits
+- `png`: PNG, 1 to 16 bits; `jpeg`: photos, read only
 - `zarr`, `zarr_chunks`, `ngff`: Zarr v3 stores, a folder or one `.zarr.zip`; OME-Zarr for volumes
 - `hdf5`: HDF5, our own, Heidelberg light fields, arrays by others
 - `lytro`, `lytro_metadata`, `bits`: Lytro containers, packed raw frames, what the camera recorded

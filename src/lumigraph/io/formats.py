@@ -74,6 +74,7 @@ FORMATS = (
     Format("TIFF", (".tif", ".tiff"), "tiff", _PLANES, _PLANES, ("page",)),
     Format("Lytro ESLF", ("_eslf.png",), "eslf", ("LightField",), ("LightField",), ("views",)),
     Format("PNG", (".png",), "png", ("RawImage",), ("RawImage",), ("views",)),
+    Format("JPEG", (".jpg", ".jpeg"), "jpeg", (), ("RawImage",)),
     Format("Zarr", (".zarr", ".zarr.zip"), "zarr", _ALL, _ALL),
     Format("HDF5", (".h5", ".hdf5"), "hdf5", _ALL, (*_ALL, "Stack"), ("what",)),
     Format("PFM", (".pfm",), "pfm", ("RawImage",), ("RawImage",)),

@@ -25,6 +25,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.errors import FormatError
 from lumigraph.io import bits, lytro_metadata, source
+from lumigraph.io.jpeg import MOST_PIXELS
 from lumigraph.io.lytro_metadata import field, parse, whole
 
 _MAGIC = re.compile(rb"\x89LF[PMC]\r\n\x1a\n")
@@ -270,6 +271,7 @@ def _jpeg(container: Container, row: Any, size: tuple[int, int]) -> np.ndarray:
         if image.size != (size[1], size[0]) or size[0] * size[1] > _LARGEST_PICTURE:
             found = f"{image.size[1]} x {image.size[0]}"
             raise FormatError(f"its picture has {found} pixels, not {size[0]} x {size[1]}.")
+        source.check_stored(container.path, size[0] * size[1], len(content), MOST_PIXELS)
         return np.array(image.convert("RGB"))
 
 

@@ -119,7 +119,7 @@ class FourierMicroscopeOperator:
         pieces = xp.zeros((len(self.corners), *size), dtype=raw.dtype, device=arrays.device(raw))
         for j, (inside, own) in enumerate(self._windows()):
             pieces[(j, *own)] = raw[inside]
-        given = arrays.fft2(pieces)
+        given = arrays.fft2(arrays.as_complex(pieces))
         planes = []
         for k in range(len(self.depths)):
             spectrum = xp.sum(xp.conj(spectra[k, ...]) * given, axis=0)

@@ -117,7 +117,8 @@ def white_level(array: Array, bit_depth: int | None = None) -> float:
     every = max(1, data.size // 1_000_000)
     sample = data.reshape(-1)[::every]
     sample = sample[np.isfinite(sample)]
-    return (float(np.quantile(sample, 0.999)) or float(sample.max())) if len(sample) else 1.0
+    level = (float(np.quantile(sample, 0.999)) or float(sample.max())) if len(sample) else 0.0
+    return level if level > 0 else 1.0
 
 
 def _range(data: np.ndarray) -> tuple[float, float]:

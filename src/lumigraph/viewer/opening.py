@@ -171,7 +171,7 @@ def is_camera(path: Path) -> bool:
     if path.suffix.lower() != ".toml" or not path.is_file() or path.stat().st_size > _CAMERA_FILE:
         return False
     try:
-        return "kind" in tomllib.loads(path.read_text("utf-8"))
+        return tomllib.loads(path.read_text("utf-8")).get("kind") not in (None, "calibration")
     except (ValueError, OSError):
         return False  # `lumigraph.open` says what is wrong
 

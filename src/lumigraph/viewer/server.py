@@ -49,15 +49,14 @@ class Resource:
         with self._lock:
             if self._future is not None:
                 return self._future
-            future: Future[Content] = Future()
+            if callable(self._content):
+                future = _started(self._content)
+            else:
+                future = Future[Content]()
+                future.set_result(self._content)
             if self._keep or not callable(self._content):
                 self._future = future
-        if callable(self._content):
-            # A daemon, so that Ctrl-C ends the command in the middle of a computation.
-            threading.Thread(target=_run, args=(self._content, future), daemon=True).start()
-        else:
-            future.set_result(self._content)
-        return future
+            return future
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,60 +87,69 @@ def application(site: Site, token: str, known: frozenset[str]) -> Any:
     known
         Hosts under which it answers, see `safety.hosts`; empty: any.
     """
-    from starlette.applications import Starlette
     from starlette.requests import Request
+
+    async def app(scope: Any, receive: Any, send: Any) -> None:
+        if scope["type"] == "http":
+            response = await _answered(Request(scope, receive), site, token, known)
+            await response(scope, receive, send)
+
+    return app
+
+
+async def _answered(request: Any, site: Site, token: str, known: frozenset[str]) -> Any:
+    """The answer to one request; what is wrong with it is looked for before its name."""
+    why = safety.refusal(request.scope["headers"], known)
+    if why is not None:
+        return _response(f"refused: {why}\n", 403)
+    name = safety.inside(request.scope["path"], token)
+    if name is None:
+        return _response("refused: open the address that lumigraph printed\n", 403)
+    if request.method not in ("GET", "POST"):
+        return _response("refused: only GET and POST\n", 405)
+    size = safety.body_size(request.headers)
+    if size is None or size > (safety.LARGEST_CALL if request.method == "POST" else 0):
+        return _response("refused: the request is too large\n", 413)
+    if request.method == "POST":
+        return await _called(request, site, name)
+    resource = site.resources.get(name)
+    if resource is None:
+        return _response("nothing here\n", 404)
+    return await _finished(resource.future(), lambda content: _response(content, media=resource.media_type))
+
+
+async def _called(request: Any, site: Site, name: str) -> Any:
+    """The answer to a call: one JSON object in, one out."""
+    function = site.calls.get(name.removeprefix("call/")) if name.startswith("call/") else None
+    if function is None:
+        return _response("nothing here\n", 404)
+    if request.headers.get("content-type", "").split(";")[0].strip() != "application/json":
+        return _response("refused: a call is application/json\n", 415)
+    try:
+        given = json.loads(await request.body())
+    except (ValueError, RecursionError):
+        given = None
+    if not isinstance(given, dict):
+        return _response({"error": "a call is one JSON object"}, 400)
+    return await _finished(_started(lambda: function(given)), lambda result: _response({"result": result}))
+
+
+async def _finished(future: "Future[Any]", shown: Callable[[Any], Any]) -> Any:
+    """The answer when a computation has ended; one line where it failed."""
+    try:
+        return shown(await asyncio.wrap_future(future))
+    except LumigraphError as error:
+        return _response({"error": str(error)}, 422)
+    except Exception as error:
+        return _response({"error": f"unexpected {type(error).__name__}"}, 500)
+
+
+def _response(content: Any, status: int = 200, media: str = "text/plain; charset=utf-8") -> Any:
     from starlette.responses import JSONResponse, Response
-    from starlette.routing import Route
 
-    def answer(content: Any, status: int = 200, media: str = "text/plain; charset=utf-8") -> Response:
-        kind = JSONResponse if isinstance(content, dict) else Response
-        return kind(content, status, safety.HEADERS, None if isinstance(content, dict) else media)
-
-    async def handle(request: Request) -> Response:
-        why = safety.refusal(request.scope["headers"], known)
-        if why is not None:
-            return answer(f"refused: {why}\n", 403)
-        name = safety.inside(request.scope["path"], token)
-        if name is None:
-            return answer("refused: open the address that lumigraph printed\n", 403)
-        size = safety.body_size(request.headers)
-        if size is None or size > (safety.LARGEST_CALL if request.method == "POST" else 0):
-            return answer("refused: the request is too large\n", 413)
-        if request.method == "POST":
-            return await call(request, name)
-        resource = site.resources.get(name)
-        if resource is None:
-            return answer("nothing here\n", 404)
-        try:
-            content = await asyncio.wrap_future(resource.future())
-        except LumigraphError as error:
-            return answer({"error": str(error)}, 422)
-        except Exception as error:
-            return answer({"error": f"unexpected {type(error).__name__}"}, 500)
-        return answer(content, media=resource.media_type)
-
-    async def call(request: Request, name: str) -> Response:
-        function = site.calls.get(name.removeprefix("call/")) if name.startswith("call/") else None
-        if function is None:
-            return answer("nothing here\n", 404)
-        if request.headers.get("content-type", "").split(";")[0].strip() != "application/json":
-            return answer("refused: a call is application/json\n", 415)
-        try:
-            given = json.loads(await request.body())
-            if not isinstance(given, dict):
-                raise ValueError
-        except (ValueError, RecursionError):
-            return answer({"error": "a call is one JSON object"}, 400)
-        try:
-            future: Future[Any] = Future()
-            threading.Thread(target=_run, args=(lambda: function(given), future), daemon=True).start()
-            return answer({"result": await asyncio.wrap_future(future)})
-        except LumigraphError as error:
-            return answer({"error": str(error)}, 422)
-        except Exception as error:
-            return answer({"error": f"unexpected {type(error).__name__}"}, 500)
-
-    return Starlette(routes=[Route("/{path:path}", handle, methods=["GET", "POST"])])
+    if isinstance(content, dict):
+        return JSONResponse(content, status, safety.HEADERS)
+    return Response(content, status, safety.HEADERS, media)
 
 
 def serve(site: Site, *, port: int = 0, host: str = LOOPBACK, ready: Callable[[str], None] = print) -> None:
@@ -199,8 +207,15 @@ def _listener(host: str, port: int) -> socket.socket:
     return listener
 
 
-def _run(work: Callable[[], Any], future: "Future[Any]") -> None:
-    try:
-        future.set_result(work())
-    except BaseException as error:
-        future.set_exception(error)
+def _started(work: Callable[[], Any]) -> "Future[Any]":
+    """What `work` will give, from a thread that ends with the command, even in the middle of its work."""
+    future: Future[Any] = Future()
+
+    def run() -> None:
+        try:
+            future.set_result(work())
+        except BaseException as error:
+            future.set_exception(error)
+
+    threading.Thread(target=run, daemon=True).start()
+    return future

@@ -1,0 +1,252 @@
+"""`lumigraph depth`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from lumigraph.cli import files
+from lumigraph.cli.console import Count, progress, report
+from lumigraph.cli.options import COMMON, Common, Output, above_zero, length
+from lumigraph.cli.origin import FOCUSED, NO_ORIGIN, Origin
+from lumigraph.cli.refocus import range_of
+from lumigraph.errors import FormatError
+
+if TYPE_CHECKING:
+    from lumigraph.core.calibration import Calibration
+    from lumigraph.core.lightfield import LightField
+    from lumigraph.core.raw import RawImage
+    from lumigraph.depth import DepthMap
+
+MAPS = (".pfm", ".tif", ".tiff", ".png", ".zarr", ".ply")
+_PLANES = "0.9:1.1:21"
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Search:
+    """How depth is measured.
+
+    Parameters
+    ----------
+    method
+        auto: epi for cameras 1.0 and views, correlation for cameras 2.0; epi: lines of epipolar-plane images;
+        focus: the sharpest picture of a focal stack; fused: both; correlation: neighbouring micro-images.
+    between
+        Least and most that may occur, 'least:most': disparities [px per view] for epi, patches [px] for
+        correlation; found by itself if left out.
+    alphas
+        Refocus factors 'first:last:count' of the focal stack; for focus and fused.
+    smooth
+        Smooth the map where it is not sure, along the picture's edges; 1 is usual.
+    """
+
+    method: Literal["auto", "epi", "focus", "fused", "correlation"] = "auto"
+    between: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    alphas: str = _PLANES
+    smooth: float = 0.0
+
+    def ends(self) -> tuple[float, float] | None:
+        """The least and the most."""
+        if self.between is None:
+            return None
+        try:
+            low, high = map(float, self.between.split(":"))
+        except ValueError:
+            raise FormatError(
+                f"--between is {self.between!r} but must be least:most, such as -2:3."
+            ) from None
+        return low, high
+
+    def of_views(self, views: "LightField", shown: Count) -> "DepthMap":
+        """Disparities or refocus factors of the middle view."""
+        from lumigraph import depth
+
+        if self.method == "correlation":
+            raise FormatError("--method correlation is for raw images of cameras 2.0. Use --method epi.")
+        found: list[DepthMap] = []
+        if self.method != "focus":
+            found.append(depth.epi(views, self.ends(), progress=shown))
+        if self.method in ("focus", "fused"):
+            sharp = depth.from_focus(views, range_of("--alphas", self.alphas))
+            found.append(sharp if self.method == "focus" else depth.disparity_of(sharp, views))
+        if self.method != "fused" and not self.smooth:
+            return found[0]
+        v, u = (n // 2 for n in views.aperture.shape)
+        return depth.fuse(found, views.view(v, u), smoothness=self.smooth or 1.0)
+
+    def of_raw(self, raw: "RawImage", calibration: "Calibration", shown: Count) -> "DepthMap":
+        """Patches of the lenslets."""
+        from lumigraph import depth
+
+        found = depth.correlation(raw, calibration, self.ends(), progress=shown)
+        return depth.fuse(found, smoothness=self.smooth) if self.smooth else found
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Lengths:
+    """What takes a map to metres, if there is no camera file.
+
+    Parameters
+    ----------
+    focal_length
+        Of the main lens, such as '200 mm'.
+    object_distance
+        From the main lens to the plane in focus, such as '400 mm'; views of a camera 1.0 know it.
+    """
+
+    focal_length: str | None = None
+    object_distance: str | None = None
+
+    def known(self, camera: Any, views: "LightField | None") -> tuple[float, float | None] | None:
+        """Focal length and distance [m], or None where the lens is not known."""
+        from lumigraph.design import thin_lens
+
+        focal = above_zero("--focal-length", length("--focal-length", self.focal_length), "m")
+        distance = above_zero("--object-distance", length("--object-distance", self.object_distance), "m")
+        if camera is not None:
+            focal, distance = focal or camera.main_lens.focal_length, distance or camera.object_distance
+        if focal is None:
+            return None
+        if distance is None and views is not None:
+            distance = thin_lens.object_distance(focal, views.separation)
+        return focal, distance
+
+
+def depth(
+    source: Path,
+    /,
+    *,
+    output: Output,
+    confidence: Path | None = None,
+    lowest: float = 0.5,
+    origin: Origin = NO_ORIGIN,
+    search: Search = Search(),
+    lengths: Lengths = Lengths(),
+    common: Common = COMMON,
+) -> None:
+    """Measure the depth of what views or a raw image show.
+
+    Example: `lumigraph depth views.zarr -o disparity.pfm`
+
+    Example: `lumigraph depth raw.png --calibration maker.xml --method correlation -o patches.tiff`
+
+    Example: `lumigraph depth raw.tiff --camera camera.toml -o points.ply`
+
+    Parameters
+    ----------
+    source
+        Views (.zarr, .h5, a folder), or a raw image.
+    output
+        Map (.pfm, .tiff, .zarr), its picture, near to far as white to black (.png), or points in space
+        (.ply). With a camera file or --focal-length depths from the focused plane [m], positive farther;
+        else disparities [px per view], positive nearer, refocus factors, or patches [px].
+    confidence
+        Where to write the confidence of each place, from 0 to 1.
+    lowest
+        Confidence below which a point is left out of .ply.
+    """
+    files.check_output(output, MAPS)
+    if confidence is not None:
+        files.check_output(confidence, MAPS[:-1])
+    if output.suffix.lower() == ".ply" and origin.camera is None and lengths.focal_length is None:
+        raise FormatError("points need the camera's lengths. Give --camera FILE, or --focal-length.")
+    with progress("depth") as shown:
+        found, grounds, picture = _measured(source, (origin, search), shown)
+    found, distance = _in_metres(found, grounds, lengths, origin.described())
+    _save(found, output, (grounds, picture), (distance, lowest))
+    if confidence is not None:
+        from lumigraph import io
+
+        io.save(found.confidence, confidence)
+    text, values = _told(found)
+    written = [str(path) for path in (output, confidence) if path is not None]
+    report(common, "\n".join([text, *(f"written {path}" for path in written)]), {**values, "output": written})
+
+
+def _measured(source: Path, how: tuple[Origin, Search], shown: Count) -> "tuple[DepthMap, Any, Any]":
+    """The map, what it was measured on, and the picture of the same places or None."""
+    from lumigraph import rendering
+    from lumigraph.core.lightfield import LightField
+
+    origin, search = how
+    found = files.read_views(source)
+    if isinstance(found, LightField):
+        if origin.is_given:
+            raise FormatError(
+                f"{source} holds views, which need no --calibration or --white. Leave them out."
+            )
+        views = found
+    else:
+        camera = origin.described()
+        raw, calibration = origin.prepared(found)
+        if search.method == "correlation" or (search.method == "auto" and _is_focused(camera, calibration)):
+            return search.of_raw(raw, calibration, shown), calibration, None
+        views = rendering.decode(raw, calibration)
+    v, u = (n // 2 for n in views.aperture.shape)
+    return search.of_views(views, shown), views, views.view(v, u)
+
+
+def _is_focused(camera: Any, calibration: "Calibration") -> bool:
+    return calibration.lattice.kinds > 1 if camera is None else camera.KIND == FOCUSED
+
+
+def _in_metres(
+    found: "DepthMap", grounds: Any, lengths: Lengths, camera: Any
+) -> "tuple[DepthMap, float | None]":
+    """The map in metres where the lens is known, and the distance of the plane in focus."""
+    from lumigraph import depth as verbs
+    from lumigraph.core.lightfield import LightField
+
+    lens = lengths.known(camera, grounds if isinstance(grounds, LightField) else None)
+    if lens is None:
+        return found, None
+    return verbs.metric(found, grounds, focal_length=lens[0], object_distance=lens[1]), lens[1]
+
+
+def _save(
+    found: "DepthMap", output: Path, shown: tuple[Any, Any], points: tuple[float | None, float]
+) -> None:
+    import numpy as np
+
+    from lumigraph import depth as verbs
+    from lumigraph import io
+    from lumigraph.core.arrays import to_numpy
+
+    name = output.name.lower()
+    if name.endswith(".ply") and points[0] is not None:
+        picture = None if shown[1] is None else to_numpy(shown[1]).astype(float)
+        picture = None if picture is None else np.clip(picture / (np.quantile(picture, 0.999) or 1), 0, 1)
+        io.save(
+            verbs.cloud(found, shown[0], object_distance=points[0], colours=picture, lowest=points[1]), output
+        )
+    elif name.endswith(".png"):
+        values = to_numpy(found.values).astype(float)
+        low, high = np.nanquantile(values, (0.01, 0.99)) if np.isfinite(values).any() else (0.0, 1.0)
+        part = np.nan_to_num((values - low) / ((high - low) or 1))
+        nearer_is_more = found.quantity in ("disparity", "patch")
+        io.save(np.clip(part if nearer_is_more else 1 - part, 0, 1), output, white=1.0)
+    else:
+        io.save(found, output)
+
+
+def _told(found: "DepthMap") -> tuple[str, dict[str, Any]]:
+    import numpy as np
+
+    values, trust = np.asarray(found.values, float), np.asarray(found.confidence, float)
+    ends = np.nanquantile(values, (0.01, 0.5, 0.99)) if np.isfinite(values).any() else np.full(3, np.nan)
+    unit = "" if found.unit == "1" else f" {found.unit}"
+    rows, columns = found.shape
+    text = (
+        f"{found.quantity} of {rows} x {columns} places: {ends[0]:.4g} to {ends[2]:.4g}{unit}, "
+        f"median {ends[1]:.4g}{unit}; half of them with a confidence above {np.median(trust):.2f}"
+    )
+    told = {
+        "quantity": found.quantity,
+        "unit": found.unit,
+        "shape": found.shape,
+        "confidence": np.median(trust),
+    }
+    return text, {**told, "low": ends[0], "median": ends[1], "high": ends[2]}

@@ -1,0 +1,203 @@
+"""Disparities of scenes in closed form, of a benchmark's rendered scene, and what is refused."""
+
+import time
+
+import numpy as np
+import pytest
+from scenes import texture, views_of
+
+from data_folder import real
+from lumigraph.core.arrays import namespace, to_numpy
+from lumigraph.core.grid import Grid
+from lumigraph.core.lightfield import LightField
+from lumigraph.depth import alpha_of, disparity_of, epi
+from lumigraph.depth.pictures import Pictures
+from lumigraph.depth.sweep import moved, span
+from lumigraph.errors import GeometryError
+
+
+def flat(disparity):
+    return lambda y, x: disparity + 0 * y + 0 * x
+
+
+@pytest.fixture
+def paint():
+    rng = np.random.default_rng(1)
+    return [texture(rng) for _ in range(2)]
+
+
+def noisy(views, deviation, rng):
+    data = views.data + deviation * rng.standard_normal(views.data.shape)
+    return LightField(data, views.aperture, views.lenslets, views.separation)
+
+
+@pytest.mark.parametrize("disparity", [0.37, -1.6, 2.5])
+def test_a_plane_is_found_to_a_hundredth_with_no_range_given(paint, disparity):
+    views, truth = views_of([(paint[0], flat(disparity), None)])
+    # A sweep alone is off by up to 0.05: half of what a parabola cannot tell between its labels.
+    assert np.abs(epi(views).values - truth)[4:-4, 4:-4].max() < 0.012
+
+
+def test_a_slanted_plane_is_not_a_staircase(paint):
+    views, truth = views_of([(paint[0], lambda y, x: 0.02 * x + 0.01 * y, None)])
+    found = np.asarray(epi(views).values)[4:-4, 4:-4]
+    assert np.abs(found - truth[4:-4, 4:-4]).max() < 0.012
+    # Steps from lenslet to lenslet: 0.02 everywhere, where a staircase has 0 and 0.13.
+    np.testing.assert_allclose(np.diff(found, axis=1), 0.02, atol=0.006)
+
+
+def test_an_edge_of_depth_stays_where_it_is(paint):
+    near = (paint[1], flat(1.2), lambda y, x: (np.abs(y) < 14) & (np.abs(x + 4) < 12))
+    views, truth = views_of([near, (paint[0], lambda y, x: -0.8 + 0.01 * x, None)])
+    error = np.abs(epi(views).values - truth)
+    # The outline of the square is 104 places long, 2.3 % of all: less than one place beside it is wrong.
+    assert (error > 0.07).mean() < 0.02
+    assert np.median(error) < 0.004
+
+
+def test_noise_costs_confidence_and_little_else(paint, rng):
+    views, truth = views_of([(paint[0], lambda y, x: 0.4 + 0.01 * x, None)])
+    clear, rough = epi(views), epi(noisy(views, 0.1, rng))
+    assert np.abs(rough.values - truth).mean() < 0.01
+    assert np.median(rough.confidence) < np.median(clear.confidence) - 0.05
+
+
+def test_sure_places_have_smaller_errors(paint, rng):
+    def fades(y, x):
+        return 1 + (paint[0](y, x) - 1) * 0.5 ** (np.abs(x) / 5)
+
+    views, truth = views_of([(fades, flat(0.6), None)])
+    found = epi(noisy(views, 0.03, rng), (-2, 2))
+    error, trust = np.abs(found.values - truth), np.asarray(found.confidence)
+    sure = trust > np.median(trust)
+    assert error[sure].mean() < 0.5 * error[~sure].mean()
+    assert trust[:, :8].max() < 0.5 < trust[:, 34:38].min()
+
+
+def test_nearer_is_positive_and_alpha_below_one(paint):
+    views, _ = views_of([(paint[0], flat(0.5), None)])
+    views = LightField(views.data, Grid((7, 7), 2.0), Grid((64, 72), 0.1), 20.0)
+    found = epi(views)
+    assert np.median(found.values) == pytest.approx(0.5, abs=0.005)
+    alpha = alpha_of(found, views)
+    # x moves by (1 - α') Δu: 0.5 lenslets of 0.1 are (1 - α') 2.
+    assert np.median(alpha.values) == pytest.approx(1 - 0.025, abs=5e-4)
+    np.testing.assert_allclose(disparity_of(alpha, views).values, found.values, atol=1e-9)
+
+
+def test_lenslets_that_are_not_square_move_less_along_y(paint):
+    views, _ = views_of([(paint[0], flat(0.8), None)])
+    y = np.linspace(0, 63, 32)  # every other row or so: 63/31 rows apart
+    rows = np.floor(y).astype(int)
+    part = (y - rows)[:, None]
+    data = views.data[:, :, rows] * (1 - part) + views.data[:, :, np.minimum(rows + 1, 63)] * part
+    stretched = LightField(data, Grid((7, 7), 1.0), Grid((32, 72), (63 / 31, 1.0)), 20.0)
+    assert np.median(epi(stretched).values) == pytest.approx(0.8, abs=0.01)
+
+
+def test_every_library_and_precision_comes_back(xp, paint):
+    views, truth = views_of([(paint[0], flat(0.4), None)], shape=(24, 28), views=(3, 5))
+    data = xp.asarray(views.data.astype(np.float32))
+    found = epi(LightField(data, views.aperture, views.lenslets, 20.0), (-1, 1))
+    assert namespace(found.values) is namespace(data)
+    assert found.values.dtype == found.confidence.dtype == data.dtype
+    assert np.median(np.abs(to_numpy(found.values) - truth)) < 0.01
+
+
+def test_colours_dark_views_and_brightness_do_no_harm(paint):
+    views, _ = views_of([(paint[0], flat(0.4), None)])
+    data = views.data[..., None] * [0.3, 1.0, 0.6] * 7.0
+    data = data * np.linspace(0.8, 1.1, 7)[:, None, None, None, None]
+    data[0, 0] = data[6, 0] = data[0, 6] = data[6, 6] = 0  # outside a round aperture
+    found = epi(LightField(data, views.aperture, views.lenslets, 20.0))
+    assert np.median(np.abs(found.values - 0.4)) < 0.01
+
+
+def test_views_of_one_row_are_enough(paint):
+    views, _ = views_of([(paint[0], flat(-0.7), None)], views=(1, 9))
+    assert np.median(np.abs(epi(views).values + 0.7)) < 0.01
+
+
+def test_many_views_are_thinned_about_the_middle(paint):
+    views, _ = views_of([(paint[0], flat(0.1), None)], shape=(24, 24), views=(1, 34))
+    pictures = Pictures.of(views)
+    assert pictures.data.shape[:2] == (1, 9)
+    np.testing.assert_allclose(pictures.right * pictures.reach, np.arange(-16, 17, 4))
+
+
+def test_the_range_is_found_before_the_sweep(paint):
+    near = (paint[1], flat(1.5), lambda y, x: np.abs(y) < 14)
+    views, _ = views_of([near, (paint[0], flat(-1.0), None)], shape=(128, 128))
+    low, high = (end / 3 for end in span(Pictures.of(views)))  # 3 views to the outermost
+    assert -2.3 < low < -1.0
+    assert 1.5 < high < 2.8
+
+
+def test_pictures_are_moved_towards_smaller_indices():
+    ramp = np.arange(6.0, dtype=np.float32)[None, None]
+    np.testing.assert_allclose(moved(ramp, 1.25, 2)[0, 0, :4], [1.25, 2.25, 3.25, 4.25])
+    np.testing.assert_allclose(moved(ramp, -2.0, 2)[0, 0], [0, 0, 0, 1, 2, 3])
+
+
+def test_progress_reaches_the_total_and_can_interrupt(paint):
+    views, _ = views_of([(paint[0], flat(0.1), None)], shape=(24, 24), views=(3, 3))
+    seen = []
+    epi(views, (-1, 1), progress=lambda done, total: seen.append((done, total)))
+    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
+    assert seen[-1][0] == seen[-1][1]
+
+    def stop(done, total):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        epi(views, (-1, 1), progress=stop)
+
+
+def test_light_fields_that_hold_no_depth_are_refused(monkeypatch):
+    def field(shape=(3, 3, 16, 16), value=1.0):
+        return LightField(np.full(shape, value), Grid(shape[:2], 1.0), Grid(shape[2:4], 1.0), 1.0)
+
+    with pytest.raises(GeometryError, match="views is of type list"):
+        epi([1])
+    with pytest.raises(GeometryError, match="has 1 x 1 views of 16 x 16 lenslets but depth needs two"):
+        epi(field((1, 1, 16, 16)))
+    with pytest.raises(GeometryError, match="two views of 8 x 8 at least"):
+        epi(field((3, 3, 4, 16)))
+    with pytest.raises(GeometryError, match="NaN"):
+        epi(field(value=np.nan))
+    with pytest.raises(GeometryError, match="dark everywhere"):
+        epi(field(value=0.0))
+    with pytest.raises(GeometryError, match="from 1 to -1 px but the first must be less"):
+        epi(field(), (1, -1))
+    with pytest.raises(GeometryError, match="takes 25001 labels where 2000 are the most"):
+        epi(field(), (-5000, 5000))
+    with pytest.raises(GeometryError, match=r"disparities has 3 numbers"):
+        epi(field(), (1, 2, 3))
+    dark = field()
+    dark.data[:] = 0
+    dark.data[1, 1] = 1
+    with pytest.raises(GeometryError, match="only the middle view is lit"):
+        epi(dark)
+    monkeypatch.setattr("lumigraph.core.memory.available", lambda: 10**6)
+    with pytest.raises(ValueError, match="the cost of 255 disparities for 64 x 64 places needs"):
+        epi(field((3, 3, 64, 64)), (-50, 50))
+
+
+def test_even_pictures_have_no_confidence():
+    views = LightField(np.ones((5, 5, 24, 24)), Grid((5, 5), 1.0), Grid((24, 24), 1.0), 20.0)
+    assert np.asarray(epi(views).confidence).max() < 0.01
+
+
+@pytest.mark.long
+def test_the_benchmark_scene_is_measured_as_promised():
+    import lumigraph.io as io
+
+    folder = real("hci_antinous")
+    views, truth = io.open(folder), io.open(folder / "gt_disp_lowres.pfm").data
+    start = time.process_time()
+    error = np.abs(epi(views).values - truth)
+    assert time.process_time() - start < 60
+    # The whole picture, with its border.
+    assert np.median(error) < 0.03
+    assert error.mean() < 0.15
+    assert (error > 0.07).mean() < 0.25

@@ -1,0 +1,90 @@
+"""The Fourier microscope: shift invariance, disparity, light, adjoint."""
+
+import numpy as np
+import pytest
+
+from lumigraph.deconvolution import ForwardModel
+from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.instruments import LightFieldMicroscope
+
+
+@pytest.fixture(scope="module")
+def scope():
+    # Coarse lenslets: images of 38 pixels, three across the pupil.
+    return LightFieldMicroscope.from_catalogue("lfm-fourier").replace(
+        lenslets={"pitch": "0.25 mm", "focal_length": "5 mm"},
+        fourier_lens="15 mm",
+        sensor={"pixel_pitch": "6.5 um"},
+    )
+
+
+@pytest.fixture(scope="module")
+def operator(scope):
+    return scope.operator((-20e-6, 0.0, 20e-6))
+
+
+def test_it_is_what_a_deconvolution_asks_for(operator):
+    assert isinstance(operator, ForwardModel)
+    assert operator.shape[1][0] == 3
+    assert operator.object_grid.pitch[0] == pytest.approx(6.5e-6 / (20 / 3))
+
+
+def test_the_adjoint_is_the_transpose(operator, xp, rng):
+    raw_shape, shape = operator.shape
+    volume, raw = xp.asarray(rng.random(shape)), xp.asarray(rng.random(raw_shape))
+    left = float(xp.sum(operator.forward(volume) * raw))
+    assert left == pytest.approx(float(xp.sum(volume * operator.adjoint(raw))), rel=1e-10)
+
+
+def test_single_precision_stays(operator, xp, rng):
+    volume = xp.asarray(rng.random(operator.shape[1]).astype(np.float32))
+    raw = operator.forward(volume)
+    assert raw.dtype == xp.float32
+    assert operator.adjoint(raw).dtype == xp.float32
+
+
+def test_moving_a_point_moves_every_image_alike(operator):
+    n = operator.object_grid.shape[0] // 2
+    first, second = operator.psf((2, n, n)), operator.psf((2, n + 2, n - 3))
+    np.testing.assert_allclose(second[2:, :-3], first[:-2, 3:], atol=1e-5 * first.max())
+
+
+def test_an_even_plane_of_one_reads_one_behind_the_middle_lenslet(operator):
+    volume = np.zeros(operator.shape[1])
+    volume[1] = 1
+    raw = operator.forward(volume)
+    middle = raw[raw.shape[0] // 2, raw.shape[1] // 2]
+    # 1/cos θ of the apodisation is up to 1.5 % there; what lies outside the window 4 %.
+    assert middle == pytest.approx(1.0, abs=0.05)
+
+
+def test_images_of_a_farther_point_move_towards_the_axis_by_its_slope(scope, operator):
+    # Lenslet at u sees the point under q = -u M/f_F: the image moves by -dz tan θ M f_µ/f_F along u.
+    n = operator.object_grid.shape[0] // 2
+    pitch, pixel = scope.lenslets.pitch, scope.pixels.pixel_pitch
+    row = operator.shape[0][0] // 2
+    found = []
+    for k in (0, 2):
+        line = operator.psf((k, n, n))[row - 8 : row + 9].sum(0)
+        column = round(operator.shape[0][1] / 2 - 0.5 + pitch / pixel)
+        window = line[column - 19 : column + 20]
+        found.append(float(window @ np.arange(-19, 20) / window.sum()) * pixel)
+    q = pitch * 20 / 15e-3
+    expected = -40e-6 * q / np.sqrt(1 - q**2) * 20 * 5 / 15
+    assert found[1] - found[0] == pytest.approx(expected, rel=0.12)
+
+
+def test_a_pupil_without_lenslets_is_refused(scope):
+    far = scope.replace(lenslets={"count": (2, 2), "pitch": "5 mm", "fill_factor": 0.1})
+    with pytest.raises(GeometryError, match=r"no lenslet stands in the pupil, which is 0\.75 mm wide"):
+        far.operator((0.0,))
+
+
+def test_what_cannot_be_is_refused(scope, operator, monkeypatch):
+    with pytest.raises(GeometryError, match="there are no depths"):
+        scope.operator(())
+    with pytest.raises(GeometryError, match=r"the volume has shape \(2,\)"):
+        operator.forward(np.ones(2))
+    monkeypatch.setattr("lumigraph.core.memory.available", lambda: 1000)
+    with pytest.raises(SamplingError, match=r"the images of points needs .* Use fewer slices"):
+        scope.operator((0.0,))
