@@ -75,6 +75,10 @@ class Page:
             assert time.monotonic() < end, (condition, self.page.inner_text("#status"), self.complaints)
             time.sleep(0.02)
 
+    def says(self, selector, text):
+        """Until an element says a text; the page writes with the next frame."""
+        self.wait(f"document.querySelector({selector!r}).innerText === {text!r}")
+
     def set(self, **state):
         self.page.evaluate("state => lumigraph.set(state)", state)
 

@@ -184,7 +184,6 @@ __all__ = [
     "encode",
     "hot_pixels",
     "load_camera",
-    "lumigraph",
     "open",
     "plots",
     "propagate",

@@ -17,7 +17,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import tifffile
+import zarr
 from PIL import Image
+from zarr.abc.codec import BytesBytesCodec
+from zarr.codecs import BloscCodec, GzipCodec
 
 import lumigraph.io as io
 from lumigraph.core.calibration import Calibration
@@ -162,6 +165,9 @@ def seeds() -> dict[str, tuple[list[Tree], Callable[[Tree], Tree] | None]]:
     cloud = PointCloud(rng.random((7, 3)), rng.integers(0, 255, (7, 3), np.uint8), rng.random(7))
     raw = RawImage(wide, 1e-6, 12, "GRBG", {"camera": "x", "list": [1, 2.5]})
     zarrs = [saved(thing, "a.zarr") for thing in (raw, views, volume)]
+    zarrs += [
+        foreign_zarr(codec) for codec in (GzipCodec(), BloscCodec(cname="lz4"), BloscCodec(cname="zstd"))
+    ]
     tiffs = [saved(thing, "a.tif") for thing in (raw, colour, stack, volume)]
     options = ({"compression": "zlib"}, {"tile": (16, 16)}, {"byteorder": ">"})
     tiffs += [{"a.tif": tiff(grey, **option)} for option in options]
@@ -231,9 +237,25 @@ def saved(thing: object, name: str) -> Tree:
     """What `lumigraph.io.save` writes under a name."""
     with tempfile.TemporaryDirectory() as folder:
         io.save(thing, Path(folder) / name)
-        return {
-            str(p.relative_to(folder)): p.read_bytes() for p in sorted(Path(folder).rglob("*")) if p.is_file()
-        }
+        return read_tree(Path(folder))
+
+
+def foreign_zarr(codec: BytesBytesCodec) -> Tree:
+    """An OME-Zarr volume as other programs write it."""
+    place = [{"type": "scale", "scale": [3.0, 2.0, 1.0]}]
+    axes = [{"name": name, "type": "space", "unit": "nanometer"} for name in "zyx"]
+    image = {"axes": axes, "datasets": [{"path": "0", "coordinateTransformations": place}]}
+    with tempfile.TemporaryDirectory() as folder:
+        attributes = {"ome": {"version": "0.5", "multiscales": [image]}}
+        group = zarr.create_group(Path(folder) / "a.zarr", zarr_format=3, attributes=attributes)
+        array = group.create_array("0", shape=(4, 9, 9), dtype="u2", chunks=(2, 9, 9), compressors=[codec])
+        array[...] = np.arange(4 * 81).reshape(4, 9, 9) % 50
+        return read_tree(Path(folder))
+
+
+def read_tree(folder: Path) -> Tree:
+    """Every file in a folder, by its path inside."""
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 def strip(tree: Tree, prefix: str) -> Tree:

@@ -62,11 +62,13 @@ def read_views(path: Path) -> "LightField | RawImage":
     """
     import lumigraph.io as io
     from lumigraph.core import checks
-    from lumigraph.core.calibration import Calibration
+    from lumigraph.core.lightfield import LightField
+    from lumigraph.core.raw import RawImage
 
     found = io.open(path)
-    if isinstance(found, Calibration):
-        raise FormatError(f"{path} holds a calibration where views (.zarr) or a raw image are needed.")
+    if not isinstance(found, LightField | RawImage):
+        held = type(found).__name__.lower()
+        raise FormatError(f"{path} holds a {held} where views or a raw image are needed.")
     checks.finite_array(str(path), found.data, FormatError)
     return found
 
@@ -79,13 +81,14 @@ def read_calibration(path: Path, shape: tuple[int, int] | None = None) -> "Calib
     FormatError
         Another kind of file.
     """
-    if path.suffix.lower() not in (".xml", ".ini"):
-        from lumigraph.io import load_calibration
-
-        return load_calibration(path)
     import lumigraph.io as io
 
-    return io.open(path, shape=shape)
+    ending = path.suffix.lower()
+    if ending in (".xml", ".ini"):
+        return io.open(path, shape=shape)
+    if ending in (".lfp", ".lfr", ".lfx"):
+        return io.open(path, what="calibration")
+    return io.open(path) if ending == ".json" else io.load_calibration(path)
 
 
 def save_figure(figure: Any, path: Path) -> None:
