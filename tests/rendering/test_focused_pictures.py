@@ -14,6 +14,7 @@ from lumigraph.errors import GeometryError, SamplingWarning
 from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.rendering import (
     lenslet_indices,
+    match_kinds,
     render,
     render_stack,
     rendered_grid,
@@ -97,6 +98,18 @@ def test_the_sharp_kind_of_lenslets_makes_the_picture():
     assert contrast(mixed) == pytest.approx(kept.mean(), abs=0.06)
     assert contrast(chosen) > 0.95
     assert contrast(wrong) < 0.3
+
+
+def test_the_picture_tells_which_kind_is_sharp():
+    calibration = calibrated(Lattice.hex(24.3, 0.0, (104, 124), kinds=3))
+    kept = np.array([0.5, 1.0, 0.7])
+    raw = raw_of(calibration, -0.3, blur=lambda i, j: kept[calibration.lattice.kind(i, j)])
+    sizes = np.full(lenslet_indices(calibration).shape[:2], -0.3 * 24.3)
+    for given in ((-7.3, -9.5, -12.0), (-12.0, -7.3, -9.5)):
+        assert match_kinds(raw, calibration, sizes, given) == (-12.0, -7.3, -9.5)
+    assert match_kinds(np.ones(SHAPE), calibration, sizes, (-7.3, -9.5, -12.0)) == (-7.3, -9.5, -12.0)
+    with pytest.raises(GeometryError, match=r"map of patches has shape \(2, 2\) and the lattice 3 kinds"):
+        match_kinds(raw, calibration, np.full((2, 2), -7.0), (-7.3, -9.5, -12.0))
 
 
 def test_kinds_change_over_without_a_seam():

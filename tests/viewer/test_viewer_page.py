@@ -95,6 +95,7 @@ def test_drags_keys_and_controls_change_the_settings(open_page, views):
         page.page.locator(".stage").focus()
         page.page.keyboard.press("ArrowRight")
         assert page.state("focus") > 1
+        page.page.mouse.move(*middle)
         page.page.mouse.wheel(0, -300)
         page.wait("lumigraph.app.state.zoom > 1.3")
         page.page.keyboard.press("0")

@@ -229,6 +229,8 @@ def _from_raw(found: "RawImage", how: tuple[Origin, Tiles], output: Path, shown:
     if tiles.is_auto:
         extra = depth.correlation(ready, calibration, progress=shown)
         size = extra.values
+        if sharp is not None and tiles.focus is None:
+            sharp = list(rendering.match_kinds(ready, calibration, size, sharp))
     if tiles.patches is not None:
         sizes = range_of("--patches", tiles.patches)
         return _planes(rendering.render_stack(ready, calibration, sizes, samples=tiles.samples, focus=sharp),

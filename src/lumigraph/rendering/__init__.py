@@ -8,7 +8,7 @@
 - `refocus`: shear and sum, for one depth or a stack; `sharp`: one picture focused everywhere
 - `fourier_slice`: the same by a slice through the four-dimensional spectrum
 - `focused`: plenoptic 2.0: turned patches tiled without seams, of one size or one for each lenslet;
-  `patches`: their sizes; `super_resolution`: finer than one micro-image samples
+  `patches`: their sizes; `kinds`: which lenslets are sharp; `super_resolution`: finer than one of them samples
 - `geometry`: lengths in metres, which lenslets form a rectangle
 - `interpolate`: values between samples, by gathering and weights, for every array library
 """
@@ -17,6 +17,7 @@ from lumigraph.rendering.decode import decode
 from lumigraph.rendering.encode import encode
 from lumigraph.rendering.focused import render, render_stack, rendered_grid
 from lumigraph.rendering.fourier_slice import refocus_fourier
+from lumigraph.rendering.kinds import match_kinds
 from lumigraph.rendering.patches import lenslet_indices, sharp_patches
 from lumigraph.rendering.paths import view_path
 from lumigraph.rendering.pixels import hot_pixels
@@ -40,6 +41,7 @@ __all__ = [
     "hot_pixels",
     "lenslet_indices",
     "lenslet_mosaic",
+    "match_kinds",
     "point_of_view",
     "reduce_aperture",
     "refocus",

@@ -58,8 +58,7 @@ def all_in_focus(
 
     the variance over up to 5 x 5 of the views, smoothed over the window ⟨·⟩; the minimum is found between
     the planes by a parabola. The picture is then blended from the two planes next to each place's factor, so
-    that all views
-    add up to it and noise is as low as in a refocused picture.
+    that all views add up to it and noise is as low as in a refocused picture.
 
     Parameters
     ----------
