@@ -78,9 +78,39 @@ def test_wrong_words_are_told_in_one_line(lumigraph, views):
         (("-o", "map.tiff", "--between", "2:1"), "the first must be less"),
         (("-o", "map.tiff", "--method", "correlation"), "is for raw images of cameras 2.0"),
         (("-o", "map.tiff", "--white", "white.png"), "holds views, which need no --calibration"),
+        (("-o", "map.tiff", "--correct"), "--correct simulates a camera"),
         (("-o", "map.tiff", "--focal-length", "0 mm"), "must be a finite number above 0"),
     ):
         found = lumigraph("depth", "views.zarr", *words)
         assert found.code != 0
         assert told in found.err
         assert found.err.count("\n") == 1
+
+
+@pytest.mark.long  # a minute of wave optics
+@pytest.mark.parametrize("dz", [-0.03, 0.03])
+def test_the_bias_of_diffraction_is_corrected(lumigraph, tmp_path, dz):
+    camera = lg.PlenopticCamera.from_catalogue("thesis-plenoptic-1")
+    lenslets = {**camera.lenslets.model_dump(exclude_unset=True), "count": (25, 25)}
+    camera = camera.replace(lenslets=lenslets)
+    grid, rng = camera.object_grid, np.random.default_rng(3)
+    ky, kx = rng.uniform(-4e3, 4e3, (2, 40, 1, 1))
+    waves = np.cos(ky * grid.y[:, None] + kx * grid.x + rng.uniform(0, 6, (40, 1, 1))).sum(0)
+    scene = lg.Scene((lg.Slice(np.maximum(1 + 0.15 * waves, 0), grid, dz),))
+    lg.save(lg.simulate(camera, scene), tmp_path / "raw.tiff")
+    lg.save(camera.calibration, tmp_path / "camera.toml")
+    words = (
+        "depth",
+        "raw.tiff",
+        "--calibration",
+        "camera.toml",
+        "--camera",
+        "thesis-plenoptic-1",
+        "-o",
+        "z.tiff",
+    )
+    plain, corrected = (lumigraph(*words, "--json", *more) for more in ((), ("--correct",)))
+    assert corrected.code == 0, corrected.err
+    off = [abs(json.loads(found.out)["median"] - dz) for found in (plain, corrected)]
+    assert off[0] > 4e-3
+    assert off[1] < 2.5e-3
