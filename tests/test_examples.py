@@ -18,6 +18,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
     [
         ("new_camera", ("rays.png", "raw.tiff", "picture.png")),
         ("only_waves", ("planes.png",)),
+        ("pictures", ("sharp.png", "alpha.tiff", "sweep.gif", "around.gif")),
         ("kinds_of_light", ("coherent.tiff", "partially_coherent.tiff", "incoherent.tiff")),
         ("deconvolve_focused", ("deconvolved.png", "deconvolved.tiff")),
     ],

@@ -8,7 +8,7 @@
 - `refocus`: shear and sum, for one depth or a stack; `sharp`: one picture focused everywhere
 - `fourier_slice`: the same by a slice through the four-dimensional spectrum
 - `focused`: plenoptic 2.0: turned patches tiled without seams, of one size or one for each lenslet;
-  `patches`: their sizes; `kinds`: which lenslets are sharp; `super_resolution`: finer than one of them samples
+  `patches`: their sizes; `kinds`: which lenslets are sharp; `super_resolution`: finer than one of them
 - `geometry`: lengths in metres, which lenslets form a rectangle
 - `interpolate`: values between samples, by gathering and weights, for every array library
 """
