@@ -11,8 +11,9 @@ from lumigraph.core.arrays import namespace, to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.depth import alpha_of, disparity_of, epi
+from lumigraph.depth.lines import visible
 from lumigraph.depth.pictures import Pictures
-from lumigraph.depth.sweep import moved, span
+from lumigraph.depth.sweep import costs, moved, span
 from lumigraph.errors import GeometryError
 
 
@@ -201,3 +202,38 @@ def test_the_benchmark_scene_is_measured_as_promised():
     assert np.median(error) < 0.03
     assert error.mean() < 0.15
     assert (error > 0.07).mean() < 0.25
+
+
+@pytest.fixture
+def bar(paint):
+    """A near bar, 16 columns wide, before a wall; the wall beside it is hidden from the views of one side."""
+    near = (paint[1], flat(2.0), lambda y, x: (np.abs(x) < 8) & (y > -99))
+    return views_of([near, (paint[0], flat(0.0), None)])
+
+
+def test_a_place_hidden_from_one_side_still_agrees_at_its_own_depth(bar):
+    views, truth = bar
+    pictures = Pictures.of(views)
+    cost = costs(pictures, np.array([0.0, 6.0], np.float32), 0.1, lambda done, total: None)
+    # Three columns beside the bar: it hides them from the views of that side, up to 6 px away.
+    beside = [slice(25, 28), slice(45, 48)]
+    assert (truth[:, beside[0]] == 0).all()
+    assert (truth[:, beside[1]] == 0).all()
+    for columns in beside:
+        at_wall, at_bar = cost[:, 4:-4, columns]
+        assert np.median(at_wall) < 0.02  # along y nothing is hidden; of the two sides the better one counts
+        assert np.median(at_bar) > 0.05
+
+
+def test_views_that_cannot_see_a_place_are_told(bar):
+    views, truth = bar
+    pictures = Pictures.of(views)
+    moves = (truth * pictures.reach).astype(np.float32)
+    v = pictures.middle[0]
+    seen = {u: places for row, u, places in visible(pictures, moves) if row == v}
+    # In view u the bar moves by 2 (u - 3) and covers what lies there: left of it for u < 3, else right.
+    assert not seen[0][20, 24:28].any()
+    assert seen[6][20, 24:28].all()
+    assert not seen[6][20, 45:49].any()
+    assert seen[0][20, 45:49].all()
+    assert all(places[20, 30:42].all() for places in seen.values())
