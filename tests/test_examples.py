@@ -25,6 +25,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 )
 def test_an_example_runs(name, written, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", [name])
     runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
     assert capsys.readouterr().out
     for file in written:

@@ -16,7 +16,8 @@ _LEAST_SHIFT = 4.0  # pixels: with less, an edge is not seen to be narrower than
 _SHIFTS = 0.1, 0.6  # of the pitch
 _LEAST_CORRELATION = 0.6
 _LEAST_CONTRAST = 0.02  # of the micro-images, rms: white images have none
-_NARROW = 0.75  # width of edges over the shift: 0.9 and more in all 1.0 images tried, 0.3 to 0.7 in 2.0 ones
+_LEAST_LIT = 0.5  # part of the micro-images that show something: points before a dark ground tell nothing
+_NARROW = 0.82  # width of edges over the shift: 0.9 and more in all 1.0 images tried, 0.3 to 0.76 in 2.0 ones
 
 
 def warn_if_focused(data: Array, calibration: Calibration) -> None:
@@ -48,6 +49,9 @@ def focused_shift(data: Array, calibration: Calibration) -> float | None:
         return None
     first, second = pairs
     if not min(float(first.std()), float(second.std())) > _LEAST_CONTRAST:
+        return None
+    contrasts = first.std((1, 2))
+    if np.mean(contrasts > 0.05 * contrasts.max()) < _LEAST_LIT:
         return None
     shift, likeness = _shift(first, second, calibration)
     ranges = np.ptp(first, axis=(1, 2))
