@@ -13,7 +13,7 @@ less: the last pitch of those that are followed fades out.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,11 @@ STEP = 2
 FAINTEST = 1e-5
 """Weight of a line of light that is left out."""
 
-Limits = tuple[float, float]
+Pair = tuple[float, float]
+
+Limits = Pair
+
+INFINITE: Limits = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,36 +109,121 @@ class Response:
     core: np.ndarray | None
 
 
-def response(
-    axes: tuple[Axis, Axis], array: LensletArray, wavelength: float, distance: float, cell: Any
-) -> Response:
-    """Of the cell centred at ``cell = (y, x, limits_y, limits_x)`` [m].
+class Lenslets:
+    """What a lenslet array does to the light around its cells.
 
-    Only lenslets whose centres lie within the limits, from the cell's centre [m], exist.
+    Parameters
+    ----------
+    axes
+        Of a cell, along y and along x.
+    array
+        With rows along x.
+    wavelength
+        [m]
+    distance
+        To the image [m].
     """
-    center, limits = cell[:2], cell[2:]
-    if array.shape == "square" and isinstance(array.focal_length, float):
-        pieces = [_straight(axes[k], array, wavelength, distance, (k, center[k], limits[k])) for k in (0, 1)]
-        return Response(pieces[0], pieces[1], None)
-    return _dense(axes, array, wavelength, distance, cell)
 
+    def __init__(
+        self, axes: tuple[Axis, Axis], array: LensletArray, wavelength: float, distance: float
+    ) -> None:
+        self.axes, self.array = axes, array
+        self.optics = wavelength, distance
+        self._bases = axes[0].basis(), axes[1].basis()
+        self._members: dict[tuple[float, float], np.ndarray] = {}
 
-def _straight(
-    axis: Axis, array: LensletArray, wavelength: float, distance: float, place: tuple[int, float, Limits]
-) -> np.ndarray:
-    """Square lenslets: the field (samples, window) along one axis."""
-    which, center, limits = place
-    step = abs(array.lattice.basis[1 - which][which])
-    coefficients, light = axis.basis()
-    half, total = array.fill_factor * step / 2, np.zeros((axis.samples, len(coefficients)))
-    count = nodes(half, min(map(abs, _focal(array))), axis, (wavelength, distance))
-    reach = axis.size / 2 + axis.neighbourhood
-    for middle in _row(array.lattice.origin[which] - center, step, reach, limits):
-        at, weight = legendre(middle - half, middle + half, count)
-        phase = np.exp(-1j * np.pi * (at - middle) ** 2 / (wavelength * _focal(array)[0]))
-        weight = weight * axis.fade(at, step)
-        total = total + (_spread(axis.image, at, wavelength * distance) * (weight * phase)) @ light(at)
-    return total @ coefficients
+    def response(self, center: Pair, limits: tuple[Limits, Limits] = (INFINITE, INFINITE)) -> Response:
+        """Of the cell centred at (y, x) [m].
+
+        Only lenslets whose centres lie within the limits, along y and x from the cell's centre [m], exist.
+        """
+        if self.array.shape == "square":
+            pieces = [self._straight(k, center[k], limits[k]) for k in (0, 1)]
+            return Response(pieces[0], pieces[1], None)
+        return self._dense(center, limits)
+
+    def _straight(self, which: int, center: float, limits: Limits) -> np.ndarray:
+        """Square lenslets: the field (samples, window) along one axis."""
+        axis, (coefficients, light) = self.axes[which], self._bases[which]
+        step = abs(self.array.lattice.basis[1 - which][which])
+        (focal_length,), squared = _focal(self.array), self.optics[0] * self.optics[1]
+        half, total = self.array.fill_factor * step / 2, np.zeros((axis.samples, len(coefficients)))
+        count = nodes(half, focal_length, axis, self.optics)
+        reach = axis.size / 2 + axis.neighbourhood
+        for middle in _row(self.array.lattice.origin[which] - center, step, reach, limits):
+            at, weight = legendre(middle - half, middle + half, count)
+            phase = np.exp(-1j * np.pi * (at - middle) ** 2 / (self.optics[0] * focal_length))
+            weight = weight * axis.fade(at, step)
+            total = total + (_spread(axis.image, at, squared) * (weight * phase)) @ light(at)
+        return total @ coefficients
+
+    def _dense(self, center: Pair, limits: tuple[Limits, Limits]) -> Response:
+        """Lenslets of any shape: line after line across each row of them."""
+        (down, light), (across, _) = self._bases
+        n, m = [axis.samples for axis in self.axes], (len(down), len(across))
+        core = np.zeros((n[0] * m[0], n[1] * m[1]), np.complex64)
+        at, weight, _ = self._lines
+        for row, members in self._rows(center, limits):
+            shade = weight * self.axes[0].fade(row + at, self.array.lattice.pitch)
+            seen = shade > FAINTEST * weight
+            places = (row + at)[seen]
+            spread = _spread(self.axes[0].image, places, self.optics[0] * self.optics[1]) * shade[seen]
+            along_y = spread[:, None, :] * light(places).T  # (n_y, m_y, lines)
+            along_x = np.sum([self._member(*member) for member in members], axis=0)  # (lines, n_x m_x)
+            core += along_y.reshape(-1, len(places)).astype(np.complex64) @ along_x[seen]
+        core = core.reshape(n[0], m[0], n[1], m[1]).transpose(0, 2, 1, 3)
+        return Response(down, across, core.reshape(n[0] * n[1], m[0] * m[1]))
+
+    def _rows(self, center: Pair, limits: tuple[Limits, Limits]) -> Iterator[tuple[float, list[Pair]]]:
+        """Rows of lenslets: their y, and (x, focal length) of their members."""
+        lattice, low, high = self.array.lattice.moved(-center[0], -center[1]), [], []
+        for axis, (first, last) in zip(self.axes, limits, strict=True):
+            reach, slack = axis.size / 2 + axis.neighbourhood, 1e-9 * lattice.pitch
+            low.append(max(-reach, first) - slack)
+            high.append(min(reach, last) + slack)
+        if low[0] > high[0] or low[1] > high[1]:
+            return
+        pairs = lattice.indices((low[0], high[0]), (low[1], high[1]))
+        focal = np.asarray(_focal(self.array))
+        focal = focal[lattice.kind(pairs[:, 0], pairs[:, 1]) % len(focal)]
+        places = lattice.position(pairs)
+        for row in np.unique(pairs[:, 0]):
+            mine = pairs[:, 0] == row
+            across = places[mine, 1].round(12).tolist()
+            yield float(places[mine, 0][0]), list(zip(across, focal[mine].tolist(), strict=True))
+
+    def _member(self, middle: float, focal_length: float) -> np.ndarray:
+        """Field (lines, n_x m_x) along x of one lenslet, on all lines across it; kept."""
+        known = self._members.get((middle, focal_length))
+        if known is not None:
+            return known
+        axis, (_, light) = self.axes[1], self._bases[1]
+        wavelength, result = self.optics[0], []
+        for y, _, chord in zip(*self._lines, strict=True):
+            at, weight = legendre(
+                middle - chord, middle + chord, nodes(chord, focal_length, axis, self.optics)
+            )
+            phase = np.exp(-1j * np.pi * ((at - middle) ** 2 + y**2) / (wavelength * focal_length))
+            weight = weight * axis.fade(at, self.array.lattice.pitch)
+            spread = _spread(axis.image, at, wavelength * self.optics[1])
+            result.append(((spread * (weight * phase)) @ light(at)).astype(np.complex64).ravel())
+        return self._members.setdefault((middle, focal_length), np.array(result))
+
+    @cached_property
+    def _lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Lines across a lenslet: y from its centre, quadrature weight, half the chord [m]."""
+        half = self.array.fill_factor * self.array.lattice.pitch / 2
+        count = nodes(half, min(map(abs, _focal(self.array))), self.axes[0], self.optics)
+        if self.array.shape == "round":
+            angle, weight = legendre(-math.pi / 2, math.pi / 2, count)
+            chord = half * np.cos(angle)
+            return half * np.sin(angle), weight * chord, chord
+        corner, pieces = half / math.sqrt(3), []
+        for low, high in ((-2 * corner, -corner), (-corner, corner), (corner, 2 * corner)):
+            at, weight = legendre(low, high, max(24, count * 2 // 3))
+            pieces.append((at, weight, np.minimum(half, 2 * half - math.sqrt(3) * np.abs(at))))
+        y, weight, chord = (np.concatenate(part) for part in zip(*pieces, strict=True))
+        return y, weight, chord
 
 
 def _row(origin: float, step: float, reach: float, limits: Limits) -> Iterator[float]:
@@ -150,10 +239,10 @@ def _spread(image: np.ndarray, light: np.ndarray, squared: float) -> np.ndarray:
     return np.exp(1j * np.pi * (image[:, None] - light) ** 2 / squared) / math.sqrt(squared)
 
 
-def nodes(half: float, focal_length: float, axis: Axis, optics: tuple[float, float]) -> int:
+def nodes(half: float, focal_length: float, axis: Axis, optics: Pair) -> int:
     """Quadrature nodes across a lenslet: two for each turn of the phase, and a few."""
     wavelength, distance = optics
-    steepest = half / focal_length + (axis.neighbourhood + axis.size + half) / distance
+    steepest = half / abs(focal_length) + (axis.neighbourhood + axis.size + half) / distance
     return 24 + math.ceil(2 * 2 * half * steepest / wavelength)
 
 
@@ -170,85 +259,3 @@ def _legendre(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _focal(array: LensletArray) -> tuple[float, ...]:
     return array.focal_length if isinstance(array.focal_length, tuple) else (array.focal_length,)
-
-
-def _dense(
-    axes: tuple[Axis, Axis], array: LensletArray, wavelength: float, distance: float, cell: Any
-) -> Response:
-    """Lenslets of any shape: line after line across each row of them."""
-    (down, light_y), (across, light_x) = axes[0].basis(), axes[1].basis()
-    n_y, n_x, m_y, m_x = axes[0].samples, axes[1].samples, len(down), len(across)
-    lines_y, lines_x = [], []
-    pitch, squared = array.lattice.pitch, wavelength * distance
-    known: dict[Any, np.ndarray] = {}
-    for row, members in _rows(axes, array, cell):
-        for y, weight, chord in _lines(array, axes[0], (wavelength, distance)):
-            at = np.array([row + y])
-            shade = weight * axes[0].fade(at, pitch)
-            if shade[0] < FAINTEST * weight:
-                continue
-            key = (y, chord, members)
-            if key not in known:
-                known[key] = _line(axes[1], array, (wavelength, distance), key, light_x).astype(np.complex64)
-            along = _spread(axes[0].image, at, squared) * shade  # (n_y, 1)
-            lines_y.append((along * light_y(at)).astype(np.complex64).ravel())  # (n_y m_y)
-            lines_x.append(known[key].ravel())
-    if not lines_y:
-        return Response(down, across, np.zeros((n_y * n_x, m_y * m_x), np.complex64))
-    core = np.array(lines_y).T @ np.array(lines_x)  # (n_y m_y, n_x m_x)
-    core = core.reshape(n_y, m_y, n_x, m_x).transpose(0, 2, 1, 3)
-    return Response(down, across, core.reshape(n_y * n_x, m_y * m_x))
-
-
-def _rows(axes: tuple[Axis, Axis], array: LensletArray, cell: Any) -> Iterator[tuple[float, tuple]]:
-    """Rows of lenslets: their y, and (x, focal length) of their members."""
-    y, x, limits_y, limits_x = cell
-    reach = [axis.size / 2 + axis.neighbourhood for axis in axes]
-    lattice = array.lattice.moved(-y, -x)
-    slack = 1e-9 * lattice.pitch
-    low = [max(-r, limit[0]) - slack for r, limit in zip(reach, (limits_y, limits_x), strict=True)]
-    high = [min(r, limit[1]) + slack for r, limit in zip(reach, (limits_y, limits_x), strict=True)]
-    if low[0] > high[0] or low[1] > high[1]:
-        return
-    pairs = lattice.indices((low[0], high[0]), (low[1], high[1]))
-    focal = np.asarray(_focal(array))
-    focal = focal[lattice.kind(pairs[:, 0], pairs[:, 1]) % len(focal)]
-    places = lattice.position(pairs)
-    for row in np.unique(pairs[:, 0]):
-        mine = pairs[:, 0] == row
-        members = tuple(
-            (round(float(c), 12), float(f)) for c, f in zip(places[mine, 1], focal[mine], strict=True)
-        )
-        yield float(places[mine, 0][0]), members
-
-
-def _lines(
-    array: LensletArray, axis: Axis, optics: tuple[float, float]
-) -> Iterator[tuple[float, float, float]]:
-    """Lines across a lenslet: y from its centre, quadrature weight, half the chord [m]."""
-    half, shortest = array.fill_factor * array.lattice.pitch / 2, min(map(abs, _focal(array)))
-    count = nodes(half, shortest, axis, optics)
-    if array.shape == "round":
-        angle, weight = legendre(-math.pi / 2, math.pi / 2, count)
-        yield from zip(half * np.sin(angle), weight * half * np.cos(angle), half * np.cos(angle), strict=True)
-        return
-    if array.shape == "square":
-        at, weight = legendre(-half, half, count)
-        yield from zip(at, weight, np.full(count, half), strict=True)
-        return
-    corner = half / math.sqrt(3)
-    for low, high in ((-2 * corner, -corner), (-corner, corner), (corner, 2 * corner)):
-        at, weight = legendre(low, high, max(24, count * 2 // 3))
-        yield from zip(at, weight, np.minimum(half, 2 * half - math.sqrt(3) * np.abs(at)), strict=True)
-
-
-def _line(axis: Axis, array: LensletArray, optics: tuple[float, float], key: Any, light: Any) -> np.ndarray:
-    """Field (samples, m) along x of the lenslets of one row, on one line across them."""
-    (y, chord, members), (wavelength, distance), total = key, optics, 0.0
-    for middle, focal_length in members:
-        count = nodes(chord, abs(focal_length), axis, optics)
-        at, weight = legendre(middle - chord, middle + chord, count)
-        phase = np.exp(-1j * np.pi * ((at - middle) ** 2 + y**2) / (wavelength * focal_length))
-        weight = weight * axis.fade(at, array.lattice.pitch)
-        total = total + (_spread(axis.image, at, wavelength * distance) * (weight * phase)) @ light(at)
-    return np.asarray(total)

@@ -19,20 +19,15 @@ from lumigraph.elements import LensletArray
 from lumigraph.errors import SamplingError
 from lumigraph.simulation import cells as _cells
 from lumigraph.simulation.camera import Camera
-from lumigraph.simulation.cell_response import SLACK, Axis, Limits, response
+from lumigraph.simulation.cell_response import INFINITE, SLACK, Axis, Lenslets, Limits
 from lumigraph.simulation.cells import Cells, Fineness
 from lumigraph.simulation.glare import Glare, glare
 from lumigraph.simulation.point_images import factors, images, mirrored, wave
 
 Progress = Callable[[float], None]
 
-INFINITE: Limits = (-math.inf, math.inf)
-
 VERSION = 1
 """Of what is kept on disk: to be raised with every change of the numbers."""
-
-KEPT = 2**28
-"""Blocks that are kept while the border's are computed [bytes]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,7 +102,7 @@ class Optics:
         points, samples = (math.prod(n) for n in (self.cells.points, self.cells.samples))
         block = 4.0 * points * samples
         row = (2 * self.reach[1] + 1) * block
-        kept = min(KEPT, block * math.prod(2 * k + 1 for k in self.near))
+        kept = block * math.prod(2 * k + 1 for k in self.near)
         dense = 8.0 * math.prod(axis.samples * len(axis.window) for axis in self.axes)
         return 2 * row + kept + 6 * block + (0 if self.straight else dense)
 
@@ -140,7 +135,7 @@ class Optics:
     def near(self) -> tuple[int, int]:
         """Cells to which a point's light is followed at the border of the array."""
         far = self.fineness.near(_cells.blur(self.camera, self.distance), _cells.airy(self.camera))
-        y, x = (max(1, math.ceil(far / size)) for size in self.cells.size)
+        y, x = (max(1, round(far / size)) for size in self.cells.size)
         return min(y, self.reach[0]), min(x, self.reach[1])
 
     @property
@@ -306,26 +301,30 @@ class _Builder:
 
     def __init__(self, optics: Optics) -> None:
         self.optics, self.axes = optics, optics.axes
+        distance = _cells.telecentric_distance(optics.camera)
+        self.lenslets = Lenslets(self.axes, optics.array, optics.camera.wavelength, distance)
         self.light = wave(optics.camera, optics.distance, self.axes, optics.reach)
         self.even = self.light.even and _symmetric(optics.array)
         y, x = self.axes
         self.square = y == x and bool(np.allclose(self.light.data, self.light.data.T))
         self.strongest = 1e-30
         self.norm = 0.0
-        self._kept: list[tuple[tuple[int, int], np.ndarray]] | None = None
+        self._kept: dict[tuple[int, int], np.ndarray] = {}
         self._known: dict[tuple[Limits, Limits, bool], Blocks] = {}
 
     def periodic(self) -> tuple[Blocks, dict[tuple[int, int], np.ndarray]]:
         """Blocks inside the array, and the mean images (samples,) of a cell's points."""
         found: dict[tuple[int, int], _Found] = {}
-        for key, block in self._blocks(INFINITE, INFINITE, self.optics.reach, fold=self.even):
+        _, own = next(self._blocks(INFINITE, INFINITE, (0, 0)))
+        self.strongest = float(np.linalg.norm(own))
+        for key, block in self._blocks(INFINITE, INFINITE, self.optics.reach):
             copies = 2 ** sum(k != 0 for k in key) if self.even else 1
-            self.strongest = max(self.strongest, float(np.linalg.norm(block)))
             self.norm += copies * float(np.linalg.norm(block)) ** 2
             found[key] = self._factored(block, copies)
         least = _least(found.values(), self.optics.fineness.rank**2 * self.norm)
-        result = self._unfolded({key: f.cut(least) for key, f in found.items()})
-        means = self._unfolded({key: (f.left[:, :1] * 0, f.mean[None]) for key, f in found.items()})
+        folds = (self.even, self.even)
+        result = self._unfolded({key: f.cut(least) for key, f in found.items()}, folds)
+        means = self._unfolded({key: (f.left[:, :1] * 0, f.mean[None]) for key, f in found.items()}, folds)
         even = np.ones((math.prod(self.optics.cells.points), 1))
         left_out = sum(means[key][1][0] - left.mean(0) @ right for key, (left, right) in result.items())
         left, right = result[0, 0]
@@ -337,30 +336,28 @@ class _Builder:
         if (known := self._mirrored(limits_y, limits_x, ring)) is not None:
             return known
         found: dict[tuple[int, int], _Found] = {}
-        here = self._blocks(limits_y, limits_x, self.optics.near, fold=False)
-        there = self._inside()
-        if ring:
-            for key, block in here:
-                found[key] = self._factored(block, 1)
-        else:
-            for (key, block), (_, whole) in zip(here, there, strict=True):
-                found[key] = self._factored(block - whole, 1)
+        for key, block in self._blocks(limits_y, limits_x, self.optics.near):
+            found[key] = self._factored(block if ring else block - self._inside(key), 1)
         # A row of cells is a small part of the picture: its error may be larger.
         least = _least(found.values(), (2 * self.optics.fineness.rank) ** 2 * self.norm)
-        result = {key: f.cut(least) for key, f in found.items()}
+        cut = {key: f.cut(least) for key, f in found.items()}
+        result = self._unfolded(cut, self._folds(limits_y, limits_x))
         self._known[limits_y, limits_x, ring] = result
         return result
 
-    def _inside(self) -> Iterable[tuple[tuple[int, int], np.ndarray]]:
-        """Blocks of the periodic array near a cell: kept, if they are not large."""
-        if self._kept is None:
-            blocks = self._blocks(INFINITE, INFINITE, self.optics.near, fold=False)
-            near, cells = self.optics.near, self.optics.cells
-            size = 4 * math.prod(2 * k + 1 for k in near) * math.prod(cells.points) * math.prod(cells.samples)
-            if size > KEPT:
-                return blocks
-            self._kept = list(blocks)
-        return self._kept
+    def _inside(self, key: tuple[int, int]) -> np.ndarray:
+        """A block of the periodic array near a cell; they are kept."""
+        if not self._kept:
+            self._kept = dict(self._blocks(INFINITE, INFINITE, self.optics.near))
+        if key in self._kept:
+            return self._kept[key]
+        block = self._kept[abs(key[0]), abs(key[1])]
+        flips, cells = (key[0] < 0, key[1] < 0), self.optics.cells
+        return mirrored(mirrored(block, cells.points, *flips).T, cells.samples, *flips).T
+
+    def _folds(self, limits_y: Limits, limits_x: Limits) -> tuple[bool, bool]:
+        """Whether what is up mirrors what is down, and left mirrors right."""
+        return self.even and limits_y == INFINITE, self.even and limits_x == INFINITE
 
     def _mirrored(self, limits_y: Limits, limits_x: Limits, ring: bool) -> Blocks | None:
         """Blocks at a border from those at its mirror image, or from the other side of the diagonal."""
@@ -385,24 +382,19 @@ class _Builder:
         return left, pair[1].reshape(-1, *samples).transpose(0, 2, 1).reshape(pair[1].shape)
 
     def _blocks(
-        self, limits_y: Limits, limits_x: Limits, reach: tuple[int, int], *, fold: bool
+        self, limits_y: Limits, limits_x: Limits, reach: tuple[int, int]
     ) -> Iterator[tuple[tuple[int, int], np.ndarray]]:
-        """Offset and block; folded, only offsets that are not negative, which the others mirror."""
-        optics, cells = self.optics, self.optics.cells
+        """Offset and block; only offsets that are not negative where the others mirror them."""
+        cells = self.optics.cells
         middle = [  # of any cell: only the border, as it is told, makes a difference
             e + (n // 2 + 0.5) * s for e, n, s in zip(cells.edge, cells.count, cells.size, strict=True)
         ]
-        lenslets = response(
-            self.axes,
-            optics.array,
-            optics.camera.wavelength,
-            _cells.telecentric_distance(optics.camera),
-            (middle[0], middle[1], limits_y, limits_x),
-        )
-        columns = range(0 if fold else -reach[1], reach[1] + 1)
-        for dy in range(0 if fold else -reach[0], reach[0] + 1):
+        lenslets = self.lenslets.response((middle[0], middle[1]), (limits_y, limits_x))
+        up, left = self._folds(limits_y, limits_x)
+        columns = range(0 if left else -reach[1], reach[1] + 1)
+        for dy in range(0 if up else -reach[0], reach[0] + 1):
             row = images(self.light, lenslets, self.axes, dy, columns)
-            row /= optics.image_scale**2
+            row /= self.optics.image_scale**2
             yield from (((dy, dx), block) for dx, block in zip(columns, row, strict=True))
 
     def _factored(self, block: np.ndarray, copies: int) -> _Found:
@@ -416,13 +408,11 @@ class _Builder:
         points, samples = self.optics.cells.points, self.optics.cells.samples
         return mirrored(pair[0], points, up, left), mirrored(pair[1].T, samples, up, left).T
 
-    def _unfolded(self, blocks: Blocks) -> Blocks:
-        if not self.even:
-            return blocks
+    def _unfolded(self, blocks: Blocks, folds: tuple[bool, bool]) -> Blocks:
         result = dict(blocks)
         for (dy, dx), pair in blocks.items():
-            for up in (False, True):
-                for left in (False, True):
+            for up in {False, folds[0]}:
+                for left in {False, folds[1]}:
                     key = (-dy if up else dy, -dx if left else dx)
                     if key not in result:
                         result[key] = self._turned(pair, up, left)

@@ -108,7 +108,7 @@ def images(light: Wave, lenslets: Response, axes: tuple[Axis, Axis], row: int, c
         if lenslets.core is None:
             field = field.transpose(1, 0, 2)
         else:
-            field = field.transpose(1, 0, 2).reshape(len(starts), -1) @ lenslets.core.T.astype(np.complex64)
+            field = field.transpose(1, 0, 2).reshape(len(starts), -1) @ lenslets.core.T
         intensity = field.real**2 + field.imag**2
         result[:, k] = intensity.reshape(len(columns), x.points, -1)
     return result.reshape(len(columns), y.points * x.points, -1)
