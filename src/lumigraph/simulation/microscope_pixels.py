@@ -14,6 +14,9 @@ from lumigraph.core.calibration import Calibration
 TAPS = 6
 """Samples along each axis that a pixel's value is interpolated from."""
 
+SLIVER = 1.2
+"""Lenslets of which fewer pixels than this are seen along an axis are left out [px]."""
+
 BETA = 5.0
 """Of the Kaiser window of the interpolation."""
 
@@ -53,8 +56,10 @@ class PixelPlacement:
         origin = calibration.lattice.origin
         place = np.stack(np.broadcast_arrays(y - origin[0], x - origin[1]), -1)
         place = place @ np.linalg.inv(calibration.lattice.matrix).T
-        first = np.floor(place.reshape(-1, 2).min(0) + 0.5).astype(int)
-        last = np.floor(place.reshape(-1, 2).max(0) + 0.5).astype(int)
+        # A lenslet of which the outermost pixels alone are seen tells nothing.
+        least = SLIVER / calibration.lattice.pitch
+        first = np.floor(place.reshape(-1, 2).min(0) + 0.5 + least).astype(int)
+        last = np.floor(place.reshape(-1, 2).max(0) + 0.5 - least).astype(int)
         cells = (int(last[0] - first[0]) + 1, int(last[1] - first[1]) + 1)
         samples = (cells[0] * pixels, cells[1] * pixels)
         at = ((place - first + 0.5) * pixels - 0.5).reshape(-1, 2)
