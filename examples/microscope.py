@@ -16,18 +16,17 @@ def main() -> None:
     scope = lg.LightFieldMicroscope(
         wavelength="525 nm",
         objective={"magnification": 20.0, "numerical_aperture": 0.5},
-        lenslets={"pitch": "125 um", "focal_length": "2.5 mm", "count": (13, 13)},
+        lenslets={"pitch": "125 um", "focal_length": "2.5 mm", "count": (11, 11)},
         sensor={"pixel_pitch": "5 um"},
     )
     print(scope.describe())
 
-    depths = np.arange(16, 65, 4) * um
+    depths = np.arange(16, 65, 6) * um
     operator = scope.operator(depths, 3)
     grid = operator.object_grid
     radius = np.sqrt((depths[:, None, None] - 40 * um) ** 2 + grid.y[:, None] ** 2 + grid.x**2)
     shell = (200 * np.exp(-(((radius - 20 * um) / (2 * um)) ** 2))).astype(np.float32)
-    light = np.maximum(operator.forward(shell), 0) + 1  # interpolated between samples, which may ring
-    raw = np.random.default_rng(1).poisson(light).astype(np.float32)
+    raw = np.random.default_rng(1).poisson(operator.forward(shell) + 1).astype(np.float32)
 
     widths = filters.widths_of(scope.sampling_distances(depths), grid.pitch[0])
     volume = deconvolve(raw, operator, 20, method=RichardsonLucy(filter=filters.LowPass(widths)))

@@ -169,7 +169,8 @@ def test_turned_pixels_see_a_turned_picture(xp):
     smooth = lambda a, b: 2 + np.sin(2.1 * a) * np.cos(1.7 * b)  # noqa: E731
     plane = xp.asarray(smooth(v, u))
     found = np.asarray(placement.forward(plane))[6:-6, 6:-6]
-    np.testing.assert_allclose(found, smooth(exact[..., 0], exact[..., 1])[6:-6, 6:-6], atol=3e-3)
+    np.testing.assert_allclose(found, smooth(exact[..., 0], exact[..., 1])[6:-6, 6:-6], atol=4e-3)
+    assert placement.matrix.data.min() >= 0
     raw = xp.asarray(np.random.default_rng(1).random((60, 64)))
     left = float(xp.sum(placement.forward(plane) * raw))
     assert left == pytest.approx(float(xp.sum(plane * placement.adjoint(raw))), rel=1e-10)
