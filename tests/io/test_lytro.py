@@ -218,7 +218,7 @@ def test_a_long_narrow_frame_does_not_fill_the_memory(tmp_path):
     known = json.loads(json.dumps(METADATA))
     known["image"] |= {"height": 500_000, "width": 60}
     (tmp_path / "a.json").write_text(json.dumps(known))
-    with pytest.raises(FormatError, match="lenslets 10.0.* px wide that are sheared beyond use"):
+    with pytest.raises(FormatError, match=r"lenslets 10.0.* px wide that are sheared beyond use"):
         io.open(tmp_path / "a.json")
 
 
