@@ -202,6 +202,7 @@ def test_parts_that_are_not_there_are_named(tmp_path):
         ({"tiling": "square"}, "tiled 'square', not hexUniformRowMajor"),
         ({"lensPitch": -1}, "lacks devices.mla.lensPitch"),
         ({"lensPitch": 1e-7}, "lenslets 0.07.* px wide"),
+        ({"scaleFactor": {"x": 1e-6, "y": 1}}, "more than|px wide|no lattice"),
     ],
 )
 def test_lenslets_that_make_no_lattice_are_refused(tmp_path, change, message):
@@ -209,6 +210,15 @@ def test_lenslets_that_make_no_lattice_are_refused(tmp_path, change, message):
     known["devices"]["mla"] |= change
     (tmp_path / "a.json").write_text(json.dumps(known))
     with pytest.raises(FormatError, match=message):
+        io.open(tmp_path / "a.json")
+
+
+def test_a_long_narrow_frame_does_not_fill_the_memory(tmp_path):
+    # Rows of a hexagonal lattice lean: 60 000 rows run through 60 000 x 30 000 indices, most of them outside.
+    known = json.loads(json.dumps(METADATA))
+    known["image"] |= {"height": 500_000, "width": 60}
+    (tmp_path / "a.json").write_text(json.dumps(known))
+    with pytest.raises(FormatError, match=r"lenslets 10.0.* px wide that are sheared beyond use"):
         io.open(tmp_path / "a.json")
 
 

@@ -11,6 +11,7 @@ import pytest
 import tifffile
 import zarr
 from PIL import Image
+from zarr.codecs import BloscCodec
 
 import lumigraph as lg
 import lumigraph.io as io
@@ -323,6 +324,14 @@ def test_bombs_in_a_zarr_store_are_refused(tmp_path):
     fields["codecs"].append({"name": "zstd", "configuration": {"level": 0, "checksum": False}})
     metadata.write_text(json.dumps(fields))
     with pytest.raises(FormatError, match="packed by bytes, gzip, zstd; only"):
+        io.open(tmp_path / "a.zarr")
+
+
+def test_blosc_is_refused_as_its_decoder_can_die(tmp_path):
+    for name, content in seeds.foreign_zarr(BloscCodec()).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(FormatError, match="packed by bytes, blosc; only zstd or gzip is read"):
         io.open(tmp_path / "a.zarr")
 
 

@@ -168,13 +168,13 @@ def test_a_raw_image_of_a_camera_1_is_not(alpha):
     calibration = calibrated(Lattice.square(pitch, 0.0, (120.3, 150.2)), shape)
     y, x = np.mgrid[: shape[0], : shape[1]].astype(float)
     dy, dx = calibration.lattice.offset(y, x)
-    total = 0.0
-    # Each lenslet gathers the light of its whole pitch: x - u (1 - α') over 15 places x of it.
-    for step in (np.arange(15) - 7) / 15 * pitch:
-        row, column = (
-            center + step + side * ratio * (1 - alpha) for center, side in ((y - dy, dy), (x - dx, dx))
-        )
-        total = total + np.sign(np.sin(column / 21) + np.sin(row / 17 + column / 50)) / 15
+    total, parts = 0.0, (np.arange(11) - 5) / 11 * pitch
+    # Each lenslet gathers the light of its whole pitch: x - u (1 - α') over 11 x 11 places x of it.
+    for part_y in parts:
+        for part_x in parts:
+            row = y - dy + part_y + dy * ratio * (1 - alpha)
+            column = x - dx + part_x + dx * ratio * (1 - alpha)
+            total = total + np.sign(np.sin(column / 21) + np.sin(row / 17 + column / 50)) / 121
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         decode(1 + 0.4 * total, calibration, directions=3)

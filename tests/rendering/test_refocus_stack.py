@@ -53,6 +53,14 @@ def test_invalid_samples_do_not_count(xp, rng):
     np.testing.assert_allclose(refocus_stack(everywhere, [1.3]), plain, rtol=1e-5)
 
 
+def test_a_lenslet_without_any_valid_sample_takes_its_neighbours_light():
+    data, valid = np.ones((3, 3, 11, 12)), np.ones((3, 3, 11, 12), bool)
+    data[:, :, 5, 6], valid[:, :, 5, 6] = 100.0, False
+    for oversample in (1, 3):
+        stack = refocus_stack(field(data, valid), [1.0, 1.2], oversample=oversample)
+        np.testing.assert_allclose(stack, 1, rtol=1e-9)
+
+
 def test_a_mask_of_another_shape_is_refused(rng):
     with pytest.raises(GeometryError, match=r"valid has shape \(3, 3\) but the data has \(3, 3, 5, 5\)"):
         field(rng.random((3, 3, 5, 5)), np.ones((3, 3), bool))

@@ -14,7 +14,7 @@ def views():
     return two_planes()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # while it lives, its event loop occupies the thread
 def browser():
     """Headless Chromium with WebGL in software; tests are skipped where there is none."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")

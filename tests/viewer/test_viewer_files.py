@@ -5,6 +5,7 @@ import hashlib
 import json
 import re
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -305,3 +306,11 @@ def test_the_address_is_printed_on_one_line(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("uvicorn.Server.run", lambda self, sockets: None)
     assert main(["view", str(tmp_path / "views.zarr"), "--no-open"]) == 0
     assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[\w-]{32}/\n", capsys.readouterr().out)
+
+
+def test_the_program_in_the_docs_runs(tmp_path, monkeypatch, capsys):
+    text = (Path(__file__).parents[2] / "docs" / "viewer.md").read_text()
+    monkeypatch.chdir(tmp_path)
+    for code in re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+        exec(code, {})
+    assert "MB" in capsys.readouterr().out

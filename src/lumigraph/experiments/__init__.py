@@ -4,6 +4,7 @@
 - `run`: runs experiments, resumes what was interrupted
 - `pages`: the report of a run
 - `thesis`: one table or figure, one file, one function
+- `microscope`: what a light-field microscope resolves
 - `beyond`: what the thesis does not have, such as deconvolution
 """
 

@@ -23,9 +23,9 @@ from lumigraph.sensor import Sensor
 from lumigraph.simulation.fourier_microscope import FourierMicroscopeOperator, Mosaic, fourier_operator
 from lumigraph.simulation.microscope_kernels import DROPPED, CellSampling, Lenslet
 from lumigraph.simulation.microscope_operator import Layout, MicroscopeOperator, Progress, microscope_operator
-from lumigraph.simulation.microscope_pixels import PixelPlacement
+from lumigraph.simulation.microscope_pixels import PixelPlacement, narrowed
 
-FINENESS = 1.4
+FINENESS = 1.7
 """Samples of a lenslet's image over what its cut-off asks for, where pixels are interpolated from them."""
 
 Operator = MicroscopeOperator | FourierMicroscopeOperator
@@ -317,11 +317,13 @@ class LightFieldMicroscope(Instrument):
             raise GeometryError(f"pixels is {pixels!r} but must be a whole number, a Calibration or None.")
         pitch = calibration.lattice.pitch
         cutoff = 2 * self.lenslets.pitch**2 / (min(o.wavelength for o in self.optics) * self.lenslet_distance)
-        N = max(2, math.ceil(FINENESS * cutoff), math.ceil(pitch))
+        N = max(2, math.ceil(FINENESS * cutoff), math.ceil(1.5 * pitch))
         placement, cells, middle = PixelPlacement.of(calibration, N)
         step = self.lenslet_size / pitch
         center = tuple((middle[k] - calibration.shape[k] // 2) * step for k in (0, 1))
-        return Layout(cells, CellSampling(samples, N, 1 / pitch), placement, (center[0], center[1]))
+        return Layout(
+            cells, CellSampling(samples, N, narrowed(1 / pitch, N)), placement, (center[0], center[1])
+        )
 
     def _mosaic(self) -> Mosaic:
         assert self.fourier_lens is not None  # checked above

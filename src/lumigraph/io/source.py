@@ -132,6 +132,10 @@ def nominal_indices(path: Path, lattice: Lattice, shape: tuple[int, int]) -> np.
             f"{path} gives lenslets {lattice.pitch:g} px wide on {shape[0]} x {shape[1]} px: from 2 px to "
             f"the picture's width and up to {_MOST_LENSLETS} lenslets are read. Check the file."
         )
+    # A stretched or sheared lattice runs through many more indices than it has points on the picture.
+    corners = np.array([(y, x) for y in (0, shape[0]) for x in (0, shape[1])]) - np.asarray(lattice.origin)
+    if np.prod(np.ptp(corners @ np.linalg.inv(lattice.matrix).T, axis=0) + 3) > 10 * _MOST_LENSLETS:
+        raise FormatError(f"{path} gives lenslets {lattice.pitch:g} px wide that are sheared beyond use.")
     return lattice.indices((0, shape[0] - 1), (0, shape[1] - 1))
 
 

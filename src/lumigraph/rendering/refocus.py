@@ -7,18 +7,20 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import get_blas_funcs
+from scipy.ndimage import distance_transform_edt
 
 from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, is_numpy, is_single, like, namespace, to_numpy
 from lumigraph.core.lightfield import LightField
 from lumigraph.errors import GeometryError
 from lumigraph.rendering.geometry import lit
-from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, taps, weighted
+from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, take, taps, weighted
 
 Progress = Callable[[int, int], None]
 """Called with what is done and the total."""
 
 _BLOCK = 10_000  # values summed at a time: they stay in the cache, and BLAS keeps to one thread
+_LEAST_VALID = 0.3  # of the light that would be seen without the mask of valid samples
 _LEAST_SEEN = 0.05  # of one view; places that less light reaches stay dark
 
 
@@ -107,10 +109,15 @@ def refocus_stack(
         weights = namespace(valid).reshape(valid, (*views.data.shape[:4], *tail))
         total = _sheared(as_float(views.data) * weights, open_views, planes, progress)
         seen = to_numpy(_sheared(valid, open_views, planes, None))
-    xp = namespace(views.data)
-    shares = [plane.seen(open_views) for plane in planes] if seen is None else list(seen)
-    tail = len(views.data.shape) - 4
-    return xp.stack([weighted(total[k, ...], _inverse(share), tail) for k, share in enumerate(shares)])
+    xp, tail, pictures = namespace(views.data), len(views.data.shape) - 4, []
+    for k, plane in enumerate(planes):
+        share = plane.seen(open_views)
+        if seen is None:
+            pictures.append(weighted(total[k, ...], _inverse(share), tail))
+        else:
+            picture = weighted(total[k, ...], _inverse(seen[k]), tail)
+            pictures.append(_closed(picture, seen[k] > _LEAST_VALID * share))
+    return xp.stack(pictures)
 
 
 def shifts(views: LightField, alpha: float) -> tuple[np.ndarray, np.ndarray]:
@@ -120,6 +127,16 @@ def shifts(views: LightField, alpha: float) -> tuple[np.ndarray, np.ndarray]:
         grids[0].y * (1 - alpha) / grids[1].pitch[0],
         grids[0].x * (1 - alpha) / grids[1].pitch[1],
     )
+
+
+def _closed(picture: Array, known: np.ndarray) -> Array:
+    """Picture (t, s[, c]) whose unknown places, which hardly a valid sample shows, take the nearest known."""
+    if known.all() or not known.any():
+        return picture
+    nearest = np.asarray(distance_transform_edt(~known, return_distances=False, return_indices=True))
+    flat = namespace(picture).reshape(picture, (known.size, *picture.shape[2:]))
+    index = np.ravel_multi_index((nearest[0], nearest[1]), known.shape)
+    return namespace(picture).reshape(take(flat, index.ravel(), 0), tuple(picture.shape))
 
 
 def _inverse(seen: np.ndarray) -> np.ndarray:

@@ -21,9 +21,6 @@ MARGIN = 1.15
 DROPPED = 0.01
 """Part of the light in the faintest offsets between cells, which are left out."""
 
-BANDS = 5
-"""Groups of pixel rows of a micro-image that are left out where an offset hardly lights them."""
-
 
 @dataclass(frozen=True, slots=True)
 class Lenslet:
@@ -74,53 +71,6 @@ class CellSampling:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bands:
-    """Which bands of pixel rows are lit from which rows of offsets.
-
-    Parameters
-    ----------
-    starts
-        First offset of each row of offsets, and the number of offsets.
-    edges
-        First pixel row of each band, and N.
-    kept
-        Truth values (rows of offsets, bands).
-    """
-
-    starts: np.ndarray
-    edges: np.ndarray
-    kept: np.ndarray
-
-    def of_band(self, band: int) -> list[tuple[int, int]]:
-        """Ranges of offsets that light a band."""
-        return [(int(self.starts[a]), int(self.starts[b])) for a, b in _runs(self.kept[:, band])]
-
-    def of_row(self, row: int) -> list[tuple[int, int]]:
-        """Ranges of pixel rows that a row of offsets lights."""
-        return [(int(self.edges[a]), int(self.edges[b])) for a, b in _runs(self.kept[row])]
-
-    @property
-    def multiply_adds(self) -> int:
-        """Offsets times pixel rows that are kept."""
-        return int(np.diff(self.starts) @ self.kept @ np.diff(self.edges))
-
-
-def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
-    """Where truth begins and ends along a line."""
-    steps = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return [(int(a), int(b)) for a, b in steps.reshape(-1, 2)]
-
-
-def _kept(light: np.ndarray, dropped: float) -> np.ndarray:
-    """Which entries of (rows, bands) to keep: all but the faintest."""
-    order = np.argsort(light, axis=None)
-    faint = np.cumsum(light.ravel()[order]) <= dropped * light.sum()
-    kept = np.ones(light.size, bool)
-    kept[order[faint]] = False
-    return kept.reshape(light.shape)
-
-
-@dataclass(frozen=True, eq=False)  # without slots: it is the key of a weak table
 class SliceKernel:
     """Images of a cell's points at one depth.
 
@@ -134,36 +84,12 @@ class SliceKernel:
         Of the cell.
     symmetric
         Whether only the points of an eighth of the cell are stored (`octant`).
-    dropped
-        Part of the light that `trimmed` may leave out.
     """
 
     offsets: np.ndarray
     blocks: np.ndarray
     sampling: CellSampling
     symmetric: bool
-    dropped: float = DROPPED
-
-    def trimmed(self) -> tuple[np.ndarray, "Bands"]:
-        """`matrix` without the bands of pixel rows that an offset hardly lights, and where the rest stands.
-
-        The rows of a micro-image that light reaches follow from the row of lenslets it comes to. What is
-        kept is scaled up to all of the light.
-        """
-        matrix, s, N = self.matrix(), self.sampling.points, self.sampling.pixels
-        rows = np.unique(self.offsets[:, 0])
-        edges = np.linspace(0, N, min(BANDS, N) + 1).round().astype(int)
-        starts = np.append(np.searchsorted(self.offsets[:, 0], rows), len(self.offsets))
-        cells = matrix.reshape(len(self.offsets), s * s, N, N)
-        light = np.add.reduceat(cells.sum((1, 3), dtype=np.float64), starts[:-1], axis=0)
-        light = np.add.reduceat(light, edges[:-1], axis=1)
-        kept = _kept(light, self.dropped)
-        before = cells.sum((0, 2, 3), dtype=np.float64)
-        for row, band in np.argwhere(~kept):
-            cells[starts[row] : starts[row + 1], :, edges[band] : edges[band + 1]] = 0
-        scale = before / np.maximum(cells.sum((0, 2, 3), dtype=np.float64), 1e-30)
-        cells *= scale.astype(np.float32)[None, :, None, None]
-        return matrix, Bands(starts, edges, kept)
 
     def matrix(self) -> np.ndarray:
         """(n s², N²) float32: the images of all points, offset by offset."""
@@ -256,7 +182,7 @@ def slice_kernel(
     cells = np.ascontiguousarray(cells[:, kept])
     cells *= (N * N / s**2 * passed / cells.sum((1, 2), dtype=np.float64)).astype(np.float32)[:, None, None]
     offsets = np.stack(np.divmod(kept, T), 1) - reach
-    return SliceKernel(offsets, cells, sampling, symmetric, dropped)
+    return SliceKernel(offsets, cells, sampling, symmetric)
 
 
 def kernel_bytes(

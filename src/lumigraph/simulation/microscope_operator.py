@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -22,7 +21,6 @@ from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.simulation.microscope_kernels import (
     DROPPED,
-    Bands,
     CellSampling,
     Lenslet,
     SliceKernel,
@@ -35,7 +33,6 @@ GATHERED = 2**27
 """Numbers that are gathered for one product."""
 
 _MATRICES = ByteCache(limit=3 * 2**29)
-_BANDS: WeakKeyDictionary[SliceKernel, Bands] = WeakKeyDictionary()
 
 Progress = Callable[[int, int], None]
 """Called with the slices that are done and how many there are."""
@@ -75,9 +72,8 @@ class MicroscopeOperator:
     @property
     def multiply_adds(self) -> int:
         """Of one application of `forward` or `adjoint`."""
-        sampling, like = self.kernels[0].sampling, np.zeros(0, np.float32)
-        rows = sum(_prepared(kernel, like)[1].multiply_adds for kernel in self.kernels)
-        return rows * sampling.classes * sampling.pixels * math.prod(self.cells)
+        rows = sum(len(kernel.offsets) * kernel.sampling.classes for kernel in self.kernels)
+        return rows * self.kernels[0].sampling.pixels ** 2 * math.prod(self.cells)
 
     @property
     def nbytes(self) -> int:
@@ -93,34 +89,17 @@ class MicroscopeOperator:
             Another shape than the operator's.
         """
         self._check("the volume", volume, self.shape[1])
-        xp, N = arrays.namespace(volume), self.kernels[0].sampling.pixels
-        shape = (N * N, math.prod(self.cells))
-        image = xp.zeros(shape, dtype=volume.dtype, device=arrays.device(volume))
+        xp, image = arrays.namespace(volume), 0.0
         for k, kernel in enumerate(self.kernels):
-            self._add(
-                image, _padded(_class_first(volume[k, ...], kernel.sampling.points), _reach(kernel)), kernel
-            )
+            s, reach = kernel.sampling.points, _reach(kernel)
+            points = _padded(_class_first(volume[k, ...], s), reach)
+            for rows, offsets, matrix in _products(kernel, volume, math.prod(self.cells)):
+                parts = [self._window(points, reach - dy, reach - dx) for dy, dx in offsets]
+                gathered = xp.reshape(xp.stack(parts), (rows, -1))
+                image = image + xp.matrix_transpose(matrix) @ gathered
+        N = self.kernels[0].sampling.pixels
         plane = _plane(xp.reshape(image, (N * N, *self.cells)), N)
         return plane if self.placement is None else self.placement.forward(plane)
-
-    def _add(self, image: Array, points: Array, kernel: SliceKernel) -> None:
-        """Add a slice's image (N², cells), band of pixel rows by band, from its points."""
-        xp, N, reach = arrays.namespace(image), kernel.sampling.pixels, _reach(kernel)
-        matrix, bands, classes = *_prepared(kernel, image), kernel.sampling.classes
-        for start, stop in _groups(kernel, math.prod(self.cells)):
-            parts = [
-                self._window(points, reach - dy, reach - dx) for dy, dx in kernel.offsets[start:stop].tolist()
-            ]
-            gathered = xp.reshape(xp.stack(parts), ((stop - start) * classes, -1))
-            for band in range(bands.kept.shape[1]):
-                rows = slice(int(bands.edges[band]) * N, int(bands.edges[band + 1]) * N)
-                for first, last in bands.of_band(band):
-                    first, last = max(first, start), min(last, stop)
-                    if first < last:
-                        block = xp.matrix_transpose(matrix[first * classes : last * classes, rows])
-                        image[rows, ...] += (
-                            block @ gathered[(first - start) * classes : (last - start) * classes, ...]
-                        )
 
     def adjoint(self, raw: Array) -> Array:
         """Transpose of `forward`: (z, y, x) from a raw image (ny, nx).
@@ -144,25 +123,14 @@ class MicroscopeOperator:
         return self.forward(volume)
 
     def _back(self, kernel: SliceKernel, flat: Array) -> Array:
-        xp, s, N, reach = (
-            arrays.namespace(flat),
-            kernel.sampling.points,
-            kernel.sampling.pixels,
-            _reach(kernel),
-        )
+        xp, s, reach = arrays.namespace(flat), kernel.sampling.points, _reach(kernel)
         shape = (s * s, *(n + 2 * reach for n in self.cells))
         points = xp.zeros(shape, dtype=flat.dtype, device=arrays.device(flat))
-        matrix, bands = _prepared(kernel, flat)
-        for row in range(bands.kept.shape[0]):
-            first, last = int(bands.starts[row]), int(bands.starts[row + 1])
-            own = matrix[first * s * s : last * s * s, ...]
-            parts = [own[:, a * N : b * N] @ flat[a * N : b * N, ...] for a, b in bands.of_row(row)]
-            if not parts:
-                continue
-            whole = xp.reshape(sum(parts[1:], parts[0]), (last - first, s * s, *self.cells))
-            for part, (dy, dx) in enumerate(kernel.offsets[first:last].tolist()):
+        for _, offsets, matrix in _products(kernel, flat, math.prod(self.cells)):
+            parts = xp.reshape(matrix @ flat, (len(offsets), s * s, *self.cells))
+            for part, (dy, dx) in enumerate(offsets):
                 window = self._window(points, reach - dy, reach - dx)
-                window += whole[part, ...]
+                window += parts[part, ...]
         return _plane(points[:, reach : reach + self.cells[0], reach : reach + self.cells[1]], s)
 
     def _window(self, points: Array, top: int, left: int) -> Array:
@@ -287,26 +255,19 @@ def _kept(
             partial.replace(target)
     symmetric = all(one.is_round for one in objectives)
     mapped = np.load(blocks, mmap_mode="r", allow_pickle=False)
-    return SliceKernel(np.load(places, allow_pickle=False), mapped, sampling, symmetric, dropped)
+    return SliceKernel(np.load(places, allow_pickle=False), mapped, sampling, symmetric)
 
 
-def _prepared(kernel: SliceKernel, like: Array) -> tuple[Array, Bands]:
-    """A kernel's matrix in the library and precision of an array, and its bands."""
-    trimmed: list[np.ndarray] = []
-    if kernel not in _BANDS:
-        matrix, _BANDS[kernel] = kernel.trimmed()
-        trimmed.append(matrix)
-
-    def build() -> Array:
-        return arrays.like(trimmed[0] if trimmed else kernel.trimmed()[0], like)
-
-    return _MATRICES.get((kernel, arrays.placement(like)), build), _BANDS[kernel]
-
-
-def _groups(kernel: SliceKernel, cells: int) -> Iterator[tuple[int, int]]:
-    """Ranges of offsets whose points are gathered at a time."""
-    count, step = len(kernel.offsets), max(1, GATHERED // (kernel.sampling.classes * cells))
-    yield from ((start, min(start + step, count)) for start in range(0, count, step))
+def _products(
+    kernel: SliceKernel, like: Array, cells: int
+) -> Iterator[tuple[int, list[tuple[int, int]], Array]]:
+    """Groups of offsets that fit in memory: rows, the offsets, and their matrix (rows, N²)."""
+    matrix = _MATRICES.get((kernel, arrays.placement(like)), lambda: arrays.like(kernel.matrix(), like))
+    classes, offsets = kernel.sampling.classes, [(int(dy), int(dx)) for dy, dx in kernel.offsets]
+    step = max(1, GATHERED // (classes * cells))
+    for start in range(0, len(offsets), step):
+        chosen = offsets[start : start + step]
+        yield len(chosen) * classes, chosen, matrix[start * classes : (start + len(chosen)) * classes, ...]
 
 
 def _reach(kernel: SliceKernel) -> int:

@@ -53,6 +53,7 @@ class App {
   };
 
   touched() {
+    this.moving = true; // until the next frame, however late it comes
     this.changedAt = performance.now();
     this.schedule();
   }
@@ -64,6 +65,7 @@ class App {
 
   draw(now) {
     const shown = this.panes.map((pane) => pane.draw(now));
+    this.moving = false;
     if (shown[0] && !this.first) { this.first = performance.now(); performance.mark("first-picture"); }
     this.controls.refresh();
     this.say();
@@ -106,6 +108,7 @@ class App {
   /** Draws and waits until the exact picture is there. */
   async settled() {
     this.changedAt = -1e9;
+    this.moving = false;
     await new Promise((wake) => { (this.waiting ??= []).push(wake); this.schedule(); });
   }
 }

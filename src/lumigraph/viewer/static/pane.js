@@ -9,7 +9,7 @@ import { clearOverlay, drawCross, drawLattice, drawMark, drawScaleBar } from "./
 import { toneOf } from "./tone.js";
 
 const STILL = 4; // CSS px that a click may move
-const SETTLED = 180; // ms without a change, after which a slow machine draws the exact picture
+const SETTLED = 250; // ms without a change, after which a slow machine draws the exact picture
 const MOST_PIXELS = 4e6;
 const HEAVY = 12, FEWER_PIXELS = 2.4e5; // ms for one picture on the screen, above which those of a movement are coarser
 
@@ -51,7 +51,7 @@ export class Pane {
     const { state } = this.app, box = this.stage.getBoundingClientRect();
     this.root.classList.toggle("epi", Boolean(state.epi && state.mode === "picture" && this.model.views));
     this.stage.classList.toggle("grab", state.mode === "raw" || state.mode === "volume");
-    const settled = now - this.app.changedAt > SETTLED && !this.pointers.size, most = this.heavy && !settled ? FEWER_PIXELS : MOST_PIXELS;
+    const settled = !this.app.moving && now - this.app.changedAt > SETTLED && !this.pointers.size, most = this.heavy && !settled ? FEWER_PIXELS : MOST_PIXELS;
     this.ratio = Math.min(window.devicePixelRatio, 2, Math.sqrt(most / Math.max(box.width * box.height, 1)));
     for (const canvas of [this.canvas, this.quick, this.overlay]) {
       const size = [box.width, box.height].map((n) => Math.max(1, Math.round(n * this.ratio)));

@@ -21,7 +21,7 @@ const both = (digits) => (value) => value.map(plain(digits)).join(",");
 /** name: [default, reader of text (undefined where wrong), writer]; null defaults depend on the file. */
 const FIELDS = {
   mode: [null, choice("picture", "raw", "depth", "volume"), String],
-  focus: [null, number(-1e9, 1e9), plain(4)],
+  focus: [null, number(-1e9, 1e9), plain(5)],
   aperture: [1, (text) => { const p = number(0.1, 100)(text.replace("%", "")); return p && p / 100; }, (v) => `${plain(1)(100 * v)}%`],
   shape: ["square", choice("square", "round"), String],
   view: [null, pair(-1e4, 1e4), both(2)],

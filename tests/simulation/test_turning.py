@@ -1,0 +1,85 @@
+"""Planes turned by three shears: against formulas, adjoint, power."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.grid import Grid
+from lumigraph.simulation.turning import Chain, Crop, Turn, turn_margin
+
+GRID = Grid((70, 83), (1.0, 1.2), (3.0, -2.0))
+
+
+def blob(y, x):
+    """An oblong Gaussian off the axis, of no symmetry under a turn."""
+    return np.exp(-(((y - 6) / 3) ** 2) - ((x + 9) / 4.5) ** 2)
+
+
+@pytest.mark.parametrize("angle", [0.3, -0.7, 0.02])
+def test_a_turned_gaussian_is_its_formula(angle):
+    """To rounding of what the Gaussian has beyond the samples' band and window, 1e-7."""
+    y, x = GRID.y[:, None], GRID.x[None]
+    sin, cos = math.sin(angle), math.cos(angle)
+    turned = Turn(GRID, angle).forward(blob(y, x))
+    np.testing.assert_allclose(turned, blob(x * sin + y * cos, x * cos - y * sin), atol=1e-6)
+
+
+def test_the_way_back_undoes_it_and_power_is_kept():
+    plane = blob(GRID.y[:, None], GRID.x)
+    turned = Turn(GRID, 0.4).forward(plane)
+    assert (turned**2).sum() == pytest.approx((plane**2).sum(), rel=1e-9)
+    assert turned.sum() == pytest.approx(plane.sum(), rel=1e-9)
+    np.testing.assert_allclose(Turn(GRID, -0.4).forward(turned), plane, atol=1e-7)
+
+
+def test_the_adjoint_is_the_transpose(xp, rng):
+    turn = Turn(GRID, 0.35)
+    x, y = (rng.random(GRID.shape).astype(np.float32) for _ in range(2))
+    forward, back = turn.forward(xp.asarray(x)), turn.adjoint(xp.asarray(y))
+    assert str(forward.dtype).endswith("float32")
+    left = (to_numpy(forward).astype(float) * y).sum()
+    assert left == pytest.approx((x * to_numpy(back).astype(float)).sum(), rel=1e-6)
+
+
+def test_the_margin_is_enough_for_the_corners():
+    """A light in each corner stands where it should, and nothing comes back on the other side."""
+    size, angle = (40.0, 60.0), 0.5
+    margin = turn_margin(size, angle)
+    grid = Grid((math.ceil(size[0] + 2 * margin[0]), math.ceil(size[1] + 2 * margin[1])), 1.0)
+    sin, cos = math.sin(angle), math.cos(angle)
+    y, x = grid.y[:, None], grid.x[None]
+    for corner in ((17, 27), (17, -27), (-17, 27), (-17, -27)):
+        spot = np.exp(-((y - corner[0]) ** 2 + (x - corner[1]) ** 2) / 4)
+        there = x * sin + y * cos - corner[0], x * cos - y * sin - corner[1]
+        turned = Turn(grid, angle).forward(spot)
+        expected = np.exp(-(there[0] ** 2 + there[1] ** 2) / 4)
+        np.testing.assert_allclose(turned, expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("outward", [False, True])
+def test_a_crop_and_its_transpose(xp, rng, outward):
+    crop = Crop((2, 3), outward)
+    small, large = rng.random((5, 6)), rng.random((9, 12))
+    x, y = (small, large) if outward else (large, small)
+    forward, back = to_numpy(crop.forward(xp.asarray(x))), to_numpy(crop.adjoint(xp.asarray(y)))
+    assert forward.shape == y.shape
+    assert back.shape == x.shape
+    np.testing.assert_array_equal(forward[2:7, 3:9] if outward else forward, x if outward else x[2:7, 3:9])
+    assert (forward * y).sum() == pytest.approx((x * back).sum(), rel=1e-12)
+
+
+def test_no_margin_is_no_crop(rng):
+    plane = rng.random((5, 6))
+    for crop in (Crop((0, 0)), Crop((0, 0), outward=True)):
+        np.testing.assert_array_equal(crop.forward(plane), plane)
+
+
+def test_a_chain_goes_forth_in_order_and_back_in_reverse(rng):
+    grid = Grid((14, 16), 1.0)
+    chain = Chain((Crop((2, 2), outward=True), Turn(grid, 0.2), Crop((1, 3))))
+    x, y = rng.random((10, 12)), rng.random((12, 10))
+    once = Crop((1, 3)).forward(Turn(grid, 0.2).forward(Crop((2, 2), outward=True).forward(x)))
+    np.testing.assert_array_equal(chain.forward(x), once)
+    assert (chain.forward(x) * y).sum() == pytest.approx((x * chain.adjoint(y)).sum(), rel=1e-12)
