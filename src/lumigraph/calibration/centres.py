@@ -4,11 +4,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy import ndimage
 
+from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 
 _CHUNK = 1 << 24  # pixels gathered at a time
 _ITERATIONS = 4
+_FOLLOWED = 0.9  # pitches: sigma of the window over which gaps are followed
 _SOFT = 0.2  # of the cell: over how much its window fades, so that pixels do not jump in and out
 
 
@@ -20,7 +23,7 @@ class Spots(NamedTuple):
     light: np.ndarray
 
 
-def measure(picture: np.ndarray, lattice: Lattice, *, part: float = 1.0) -> Spots:
+def measure(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> Spots:
     """Centres of the micro-images that lie wholly inside the picture and are lit.
 
     The centre is where the phase of the first harmonic over one cell vanishes along y and along x:
@@ -31,12 +34,12 @@ def measure(picture: np.ndarray, lattice: Lattice, *, part: float = 1.0) -> Spot
     ----------
     picture
         Flattened white image (y, x), zero in the dark.
-    lattice
+    model
         Where the micro-images are, to a third of a pitch [px].
     part
         Central part of the picture's height and width to look at.
     """
-    cell = _cell(lattice)
+    cell = _cell(model.lattice)
     ny, nx = picture.shape
     ranges = [
         (
@@ -45,14 +48,63 @@ def measure(picture: np.ndarray, lattice: Lattice, *, part: float = 1.0) -> Spot
         )
         for n, size in zip((ny, nx), cell, strict=True)
     ]
-    indices = lattice.indices(ranges[0], ranges[1])
-    guess = lattice.position(indices)
+    indices = model.indices_within(ranges[0], ranges[1])
+    guess = model.position(indices)
     step = max(1, int(_CHUNK / np.prod([size + 6 for size in cell])))
     parts = [_centre(picture, guess[k : k + step], cell) for k in range(0, len(guess), step)]
     centers = np.concatenate([p[0] for p in parts]) if parts else guess
     light = np.concatenate([p[1] for p in parts]) if parts else np.zeros((0, 3))
     keep = _lit(light) & (np.abs(centers - guess) < 0.35 * np.array(cell)).all(-1)
     return Spots(indices[keep], centers[keep], light[keep, 0])
+
+
+def followed(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> Spots:
+    """Centres by the phases of the lattice's first harmonics, each over a few lenslets around.
+
+    For raw images: what the scene adds to one micro-image differs from the next, the gaps do not.
+
+    Parameters
+    ----------
+    picture, model, part
+        As for `measure`.
+    """
+    lattice, (ny, nx) = model.lattice, picture.shape
+    u, v = _phases(model, (ny, nx))
+    waves = [u, v, u + v] if lattice.layout == "hex" else [u, v]
+    if lattice.layout == "hex" and float(np.dot(*lattice.basis)) < 0:
+        waves[2] = u - v
+    even = np.asarray(picture - picture.mean(), np.float32)
+    sigma = _FOLLOWED * lattice.pitch
+    ranges = [((n - 1) * (1 - part) / 2, (n - 1) * (1 + part) / 2) for n in (ny, nx)]
+    indices = model.indices_within(ranges[0], ranges[1])
+    guess = model.position(indices)
+    whole = ((guess > lattice.pitch / 2) & (guess < np.array([ny, nx]) - 1 - lattice.pitch / 2)).all(-1)
+    indices, guess = indices[whole], guess[whole]
+    rows, columns = np.clip(np.rint(guess).astype(int).T, 0, np.array([[ny - 1], [nx - 1]]))
+    angles, sizes = [], []
+    for wave in waves:
+        turned = even * np.exp(2j * np.pi * wave).astype(np.complex64)
+        local = ndimage.gaussian_filter(turned, sigma, truncate=2.5)[rows, columns]
+        angles.append(np.angle(local) / (2 * np.pi))
+        sizes.append(np.abs(local))
+    steps = np.stack(angles[:2], -1)
+    if len(waves) == 3:  # three phases for two unknowns: their least squares
+        sign = 1 if waves[2] is not None and float(np.dot(*lattice.basis)) >= 0 else -1
+        rest = angles[2] - angles[0] - sign * angles[1]
+        rest = (rest - np.rint(rest)) / 3
+        steps = steps + np.stack([rest, sign * rest], -1)
+    light = np.stack([np.sum(sizes, 0), *sizes[:2]], -1)
+    keep = _lit(light) & (np.abs(steps) < 0.35).all(-1)
+    return Spots(indices[keep], (guess + steps @ lattice.matrix.T)[keep], light[keep, 0])
+
+
+def _phases(model: Calibration, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Lattice coordinates (i, j), not rounded, of each pixel, one after the other."""
+    y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float64)
+    y, x = model.straightened(y, x)
+    inverse = np.linalg.inv(model.lattice.matrix)
+    dy, dx = y - model.lattice.origin[0], x - model.lattice.origin[1]
+    return inverse[0, 0] * dy + inverse[0, 1] * dx, inverse[1, 0] * dy + inverse[1, 1] * dx
 
 
 def _cell(lattice: Lattice) -> tuple[float, float]:

@@ -10,7 +10,8 @@ import numpy as np
 from scipy.special import j1
 
 from lumigraph.calibration.devignette import as_raw, grey
-from lumigraph.calibration.lattice_fit import calibrate, surrounded
+from lumigraph.calibration.fitting import surrounded
+from lumigraph.calibration.lattice_fit import calibrate
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice

@@ -1,10 +1,18 @@
-"""From a white image to its lattice: period, spots, robust least squares."""
+"""From a white image, or a raw image alone, to the places of its micro-images."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from lumigraph.calibration.centres import Spots, measure
+from lumigraph.calibration.autocorrelation import SMALLEST_PITCH
+from lumigraph.calibration.centres import Spots, followed, measure
 from lumigraph.calibration.devignette import as_raw, grey
-from lumigraph.calibration.period import SMALLEST_PITCH, Surface, Vectors, flattened, lattice_vectors
+from lumigraph.calibration.fitting import Fitted, fit, recentred
+from lumigraph.calibration.period import Request, Vectors, lattice_vectors
+from lumigraph.calibration.quality import fill_of, sharpness_of
+from lumigraph.calibration.surface import Surface, flattened, logarithm, valleys
+from lumigraph.calibration.template import mean_cell, sharpened
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
@@ -12,30 +20,52 @@ from lumigraph.core.lattice import Lattice, Layout, Vector
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 
+_PARTS = (0.3, 0.45, 0.65, 0.85)  # of the picture that the fit grows over
+_CLEAR = 0.15  # px of residual below which a picture is a white image for certain
+_BETTER = 0.8  # of the residual at which gaps are trusted more than light
+_SHARPENED = 6.0  # px of pitch from which the mean micro-image has enough pixels
+_AGREED = 0.01  # of a pitch
+_LARGEST = 0.02  # of the pitch: a white image's residual
+_WHITE = 0.6  # of the lenslets are found on a white image
+_SHARE = 0.4  # of the lenslets must be found on a raw image
+_UNMEASURED = (
+    "found by all gaps of a raw image together: no single centre was measured, residual_px says nothing; "
+    "check the overlay, or calibrate on a white image"
+)
+
 
 def calibrate(
-    white: RawImage | Array,
+    white: RawImage | Array | Sequence[RawImage | Array],
     layout: Layout | None = None,
     pitch: float | None = None,
     *,
+    rotation: float | None = None,
     pixel_pitch: float | None = None,
     separation: float | None = None,
     lenslet_distance: float | None = None,
 ) -> Calibration:
-    """Micro-image lattice of a white image, with the centre of every micro-image.
+    """Micro-image lattice of a white image, or of a raw image alone, with the centre of every micro-image.
 
-    The period comes from the autocorrelation, the centres from the phase of each micro-image's first
-    harmonic, the lattice from least squares with two free basis vectors; micro-images farther from it
-    than four standard deviations (dust, broken lenslets) are left out of the result.
+    Candidates for the lattice come from autocorrelation and spectrum of the light and of its dark gaps, and
+    are judged by all their harmonics. Centres come from the phase of each micro-image's first harmonic and
+    are sharpened by the mean micro-image; the lattice from least squares with two free basis vectors, and
+    tilt and radial distortion where the residuals ask for them (`fitting.fit` says when). Micro-images
+    farther from it than four standard deviations (dust, broken lenslets) are listed as missing.
+
+    On a raw image of a scene the gaps between micro-images are followed instead of their light, since a
+    scene moves from one micro-image to the next; the result says so in its notes.
 
     Parameters
     ----------
     white
-        Picture (y, x[, c]) of an evenly lit surface; a Bayer pattern is scaled to grey first.
+        Picture (y, x[, c]) of an evenly lit surface, or a list of several, or a raw image of any scene; a
+        Bayer pattern is scaled to grey first.
     layout
         "square" or "hex"; found by itself where None.
     pitch
         Distance of neighbouring micro-images [px], to 10 %; found by itself where None.
+    rotation
+        Of the rows of lenslets from +x towards +y [rad], to 2°; found by itself where None.
     pixel_pitch
         Of the sensor [m]; the white image's own where None.
     separation, lenslet_distance
@@ -50,8 +80,8 @@ def calibrate(
     Raises
     ------
     CalibrationError
-        NaN, no light, no lattice, fewer than 3 × 3 lenslets, several pitches, or a pitch or layout that
-        the picture does not support.
+        NaN, no light, no lattice, fewer than 3 × 3 lenslets, several lattices that are about equally likely,
+        or a pitch, rotation or layout that the picture does not support.
 
     Examples
     --------
@@ -65,23 +95,196 @@ def calibrate(
     origin      (44.000, 59.000) px (y, x)
     residual    0.000 px rms, 0.000 px at worst
     """
-    white = as_raw(white)
-    _check_request(layout, pitch)
-    checks.finite_array("the white image", white.data, CalibrationError)
-    original = _picture(white)
-    picture = flattened(original)
-    vectors = lattice_vectors(picture, layout, pitch)
-    lattice = _starting_lattice(picture, vectors)
-    _check_count(lattice, picture.shape)
-    spots, lattice = _fit_outwards(picture, original - np.float32(original.min()), lattice)
-    residuals = spots.centers - lattice.position(spots.indices)
+    first, original = _light(white)
+    _check_request(layout, pitch, rotation)
+    shape = (original.shape[0], original.shape[1])
+    flat = flattened(original)
+    gaps = valleys(original, 1.0)
+    vectors = lattice_vectors([flat, gaps, valleys(original, 2.0)], Request(layout, pitch, rotation))
+    _check_size(vectors, shape)
+    found = _followed(original, flat, gaps, vectors)
+    fitted = found.fitted
+    model = fitted.model(shape)
+    rms = float(np.sqrt(((fitted.spots.centers - model.position(fitted.spots.indices)) ** 2).sum(-1).mean()))
+    bright = max(float(np.percentile(fitted.spots.light, 95)), 1e-30)
     return Calibration(
-        lattice, picture.shape, spots.indices, spots.centers, float(np.sqrt((residuals**2).sum(-1).mean())),
-        pixel_pitch if pixel_pitch is not None else white.pixel_pitch, separation, lenslet_distance,
+        fitted.lattice, shape, fitted.spots.indices, fitted.spots.centers, rms,
+        pixel_pitch if pixel_pitch is not None else first.pixel_pitch, separation, lenslet_distance,
+        warp=fitted.warp, light=fitted.spots.light / bright, fill=fill_of(original, model),
+        missing=_missing(fitted, model), sharpness=sharpness_of(original, model), notes=found.notes,
     )  # fmt: skip
 
 
-def _check_request(layout: str | None, pitch: float | None) -> None:
+class _Followed(NamedTuple):
+    """A fit, the picture whose micro-images it follows, and what is to be known of it."""
+
+    fitted: Fitted
+    picture: np.ndarray
+    notes: tuple[str, ...] = ()
+
+
+def _light(white: RawImage | Array | Sequence[RawImage | Array]) -> tuple[RawImage, np.ndarray]:
+    """The first image, and the mean of all as one grey picture (y, x), each scaled to a mean of 1."""
+    images = [as_raw(image) for image in white] if isinstance(white, list | tuple) else [as_raw(white)]
+    if not images:
+        raise CalibrationError("the list of white images is empty. Give at least one image.")
+    total = np.zeros(images[0].shape, np.float32)
+    for image in images:
+        if image.shape != images[0].shape:
+            raise CalibrationError(
+                f"the white images have {images[0].shape} and {image.shape} pixels. "
+                "Give images of one camera at one setting."
+            )
+        checks.finite_array("the white image", image.data, CalibrationError)
+        picture = _picture(image)
+        total += picture / max(abs(float(picture.mean())), 1e-30)
+    return images[0], _picture(images[0]) if len(images) == 1 else total / len(images)
+
+
+def _followed(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, vectors: Vectors) -> _Followed:
+    """The fit to the light of the micro-images, or to what is between them where that is steadier."""
+    above = original - np.float32(original.min())
+    found, refused = [], []
+    try:
+        light = _by_light(flat, above, vectors)
+        if _spread(light) <= _CLEAR and _share(light, flat.shape) > _WHITE:
+            return _Followed(light, above)
+        found.append(_Followed(light, above))
+    except CalibrationError as error:
+        refused.append(error)
+    for picture in (gaps.max() - gaps, logarithm(original)):
+        try:
+            found.append(_Followed(_outwards(picture, picture, vectors, followed), picture))
+        except CalibrationError as error:
+            refused.append(error)
+    steady = [one for one in found if _agrees(one.fitted, vectors)]
+    if not steady:
+        return _Followed(_by_gaps(gaps, vectors), gaps, (_UNMEASURED,))
+    found = steady
+    sizes = [_spread(one.fitted) for one in found]
+    best = int(np.argmin(sizes))
+    if (
+        found[0].picture is above
+        and _spread(found[0].fitted) < _LARGEST * found[0].fitted.lattice.pitch
+        and sizes[best] > _BETTER * sizes[0]
+    ):
+        best = 0
+    one = found[best]
+    if one.picture is above:
+        return one
+    return one._replace(notes=_raw_notes(one.fitted, original.shape))
+
+
+def _agrees(fitted: Fitted, vectors: Vectors) -> bool:
+    """Whether a fit kept to the lattice that all harmonics tell, but for two pitches and shear."""
+    steps = np.linalg.solve(
+        np.stack([vectors.row, vectors.column]).T,
+        np.array([fitted.lattice.basis[0], fitted.lattice.basis[1]]).T,
+    )
+    return bool(np.abs(steps - np.eye(2)).max() < _AGREED)
+
+
+def _by_gaps(gaps: np.ndarray, vectors: Vectors) -> Fitted:
+    """The lattice of all harmonics of the gaps; its micro-images stand between them, and none is measured."""
+    shape = (gaps.shape[0], gaps.shape[1])
+    none = np.zeros((0, 2), np.int64)
+    lattice = Lattice(
+        (_vector(vectors.row), _vector(vectors.column)), (0.0, 0.0), vectors.layout, vectors.kinds
+    )
+    cell = mean_cell(gaps, Calibration(lattice, shape, none, none.astype(float), 0.0))
+    size = len(cell)
+    steps = np.stack(np.meshgrid(*2 * [np.arange(size) / size], indexing="ij"), -1) @ lattice.matrix.T
+    border = np.exp(-(_to_border(steps, lattice) ** 2) / 2)
+    match = np.fft.ifft2(np.fft.fft2(cell - cell.mean()) * np.conj(np.fft.fft2(border))).real
+    place = np.array(np.unravel_index(np.argmax(match), match.shape)) / size
+    lattice = _centred(lattice.moved(*(lattice.matrix @ place)), shape)
+    margin = lattice.pitch / 2
+    indices = lattice.indices((margin, shape[0] - 1 - margin), (margin, shape[1] - 1 - margin))
+    return Fitted(Spots(indices, lattice.position(indices), np.ones(len(indices))), lattice, None)
+
+
+def _to_border(points: np.ndarray, lattice: Lattice) -> np.ndarray:
+    """Distances of points (..., 2) to the nearest border between two micro-images [px]."""
+    near = np.stack(np.meshgrid([-1, 0, 1, 2], [-1, 0, 1, 2], indexing="ij"), -1).reshape(-1, 2)
+    away = np.linalg.norm(points[..., None, :] - lattice.position(near), axis=-1)
+    away.partition(1, axis=-1)
+    return (away[..., 1] - away[..., 0]) / 2
+
+
+def _share(fitted: Fitted, shape: tuple[int, ...]) -> float:
+    """Micro-images found, of those that are whole on the picture."""
+    margin = fitted.lattice.pitch / 2
+    ranges = [(margin, n - 1 - margin) for n in shape]
+    whole = fitted.model((shape[0], shape[1])).indices_within(ranges[0], ranges[1])
+    return len(fitted.spots.indices) / max(len(whole), 1)
+
+
+def _raw_notes(fitted: Fitted, shape: tuple[int, ...]) -> tuple[str, ...]:
+    share = _share(fitted, shape)
+    if share < _SHARE:
+        raise CalibrationError(
+            f"only {share:.0%} of the micro-images of pitch {fitted.lattice.pitch:.2f} px were found on this "
+            f"raw image where {_SHARE:.0%} are needed. Take a white image with the same camera settings."
+        )
+    return (
+        "found by the gaps between micro-images of a raw image; a white image tells their centres better",
+    )
+
+
+def _spread(fitted: Fitted) -> float:
+    """Median distance of the micro-images from the lattice [px]."""
+    spots = fitted.spots
+    points = fitted.lattice.position(spots.indices)
+    points = points if fitted.warp is None else fitted.warp.applied(points)
+    return float(np.median(np.hypot(*(spots.centers - points).T)))
+
+
+def _by_light(flat: np.ndarray, above: np.ndarray, vectors: Vectors) -> Fitted:
+    """Fit to light, taken again evenly lit, and once more by the mean micro-image if that is steadier."""
+    shape = (flat.shape[0], flat.shape[1])
+    fitted = _outwards(flat, above, vectors)
+    even = _evenly_lit(above, fitted)
+    fitted = recentred(fit(measure(even, fitted.model(shape)), fitted.model(shape)), shape)
+    if fitted.lattice.pitch >= _SHARPENED:
+        better = fitted
+        for _ in range(2):
+            spots = sharpened(even, better.spots, better.model(shape))
+            better = fit(spots, better.model(shape))
+        if _spread(better) < _spread(fitted) and len(better.spots.indices) > 0.95 * len(fitted.spots.indices):
+            return better
+    return fitted
+
+
+def _outwards(
+    picture: np.ndarray, whole: np.ndarray, vectors: Vectors, measured: Callable[..., Spots] = measure
+) -> Fitted:
+    """Fit the middle first, so that the error of the first guess does not grow over many lenslets."""
+    shape = (picture.shape[0], picture.shape[1])
+    none = np.zeros((0, 2), np.int64)
+    model = Calibration(_starting_lattice(picture, vectors), shape, none, none.astype(float), 0.0)
+    fitted = None
+    for part, source in (*((part, picture) for part in _PARTS), (1.0, whole), (1.0, whole)):
+        spots = measured(source, model, part=part)
+        if part < 1 and len(spots.indices) < 50:
+            continue
+        fitted = fit(spots, model)
+        model = fitted.model(shape)
+    assert fitted is not None
+    return recentred(fitted, shape)
+
+
+def _missing(fitted: Fitted, model: Calibration) -> np.ndarray:
+    """Indices (m, 2) of lenslets whose micro-images are whole on the picture but were not found."""
+    spots = fitted.spots
+    low, high = spots.centers.min(0), spots.centers.max(0)
+    expected = model.indices_within((low[0], high[0]), (low[1], high[1]))
+    first = np.minimum(expected.min(0), spots.indices.min(0))
+    there = np.zeros(np.maximum(expected.max(0), spots.indices.max(0)) - first + 1, bool)
+    there[tuple((spots.indices - first).T)] = True
+    return expected[~there[tuple((expected - first).T)]]
+
+
+def _check_request(layout: str | None, pitch: float | None, rotation: float | None) -> None:
     if not (layout is None or isinstance(layout, str)) or layout not in (None, "square", "hex"):
         raise CalibrationError(f"layout is {layout!r} but must be 'square' or 'hex', or left out.")
     if pitch is not None and checks.positive("pitch", pitch, "px", CalibrationError) < SMALLEST_PITCH:
@@ -89,6 +292,13 @@ def _check_request(layout: str | None, pitch: float | None) -> None:
             f"pitch is {pitch:g} px but micro-images below {SMALLEST_PITCH:g} px cannot be told apart. "
             "Use a sensor with smaller pixels, or lenslets farther apart."
         )
+    if rotation is not None:
+        checks.finite("rotation", rotation, "rad", CalibrationError)
+
+
+def _check_size(vectors: Vectors, shape: tuple[int, int]) -> None:
+    lattice = Lattice((_vector(vectors.row), _vector(vectors.column)), (0.0, 0.0), vectors.layout)
+    _check_count(lattice, shape)
 
 
 def _picture(white: RawImage) -> np.ndarray:
@@ -121,7 +331,9 @@ def _starting_lattice(picture: np.ndarray, vectors: Vectors) -> Lattice:
         wave_x = windows[1] * np.exp(-2j * np.pi * kx * np.arange(picture.shape[1]))
         phases.append(-np.angle(wave_y @ (windowed @ wave_x.astype(np.complex64))) / (2 * np.pi))
     origin = matrix @ np.array(phases)
-    lattice = Lattice((_vector(vectors.row), _vector(vectors.column)), _vector(origin), vectors.layout)
+    lattice = Lattice(
+        (_vector(vectors.row), _vector(vectors.column)), _vector(origin), vectors.layout, vectors.kinds
+    )
     return _centred(lattice, picture.shape)
 
 
@@ -145,85 +357,11 @@ def _check_count(lattice: Lattice, shape: tuple[int, ...]) -> None:
         )
 
 
-def _fit_outwards(picture: np.ndarray, original: np.ndarray, lattice: Lattice) -> tuple[Spots, Lattice]:
-    """Fit the middle first, so that the error of the first guess does not grow over many lenslets."""
-    for part, source in ((0.3, picture), (0.6, picture), (1.0, original)):
-        spots = measure(source, lattice, part=part)
-        if part < 1 and len(spots.indices) < 50:
-            continue
-        spots, lattice = _robust_fit(spots, lattice)
-    spots, lattice = _robust_fit(measure(_evenly_lit(original, spots), lattice), lattice)
-    centred = _centred(lattice, picture.shape)
-    moved = np.stack(lattice.index(*np.array(centred.origin)), -1)
-    return Spots(spots.indices - moved, spots.centers, spots.light), centred
-
-
-def _evenly_lit(picture: np.ndarray, spots: Spots) -> np.ndarray:
+def _evenly_lit(picture: np.ndarray, fitted: Fitted) -> np.ndarray:
     """Picture without the vignetting of its micro-images' brightness, which would move their centres."""
-    ny, nx = picture.shape
+    spots, (ny, nx) = fitted.spots, picture.shape
     y, x = (2 * spots.centers[:, axis] / (n - 1) - 1 for axis, n in enumerate((ny, nx)))
-    surface = Surface(4 if len(y) > 100 else 2 if len(y) > 20 else 1).fit(
-        y, x, spots.light / spots.light.mean()
-    )
+    surface = Surface(4 if len(y) > 100 else 2 if len(y) > 20 else 1)
+    surface.fit(y, x, spots.light / max(float(spots.light.mean()), 1e-30))
     rows, columns = np.linspace(-1, 1, ny, dtype=np.float32), np.linspace(-1, 1, nx, dtype=np.float32)
     return picture / surface(rows[:, None], columns[None, :])
-
-
-def _robust_fit(spots: Spots, lattice: Lattice) -> tuple[Spots, Lattice]:
-    """Least squares over the spots, leaving out those beyond four standard deviations, until it settles."""
-    _check_spots(spots, lattice, "lit micro-images")
-    design = np.concatenate([np.ones((len(spots.indices), 1)), spots.indices], -1)
-    keep, distance, weights = np.ones(len(design), bool), np.zeros(len(design)), np.zeros((3, 2))
-    inner = surrounded(spots.indices)
-    for _ in range(10):
-        used = keep & inner
-        weights = np.linalg.lstsq(design[used], spots.centers[used], rcond=None)[0]
-        distance = np.hypot(*(spots.centers - design @ weights).T)
-        spread = 0.85 * float(
-            np.median(distance[used])
-        )  # of one coordinate: the Rayleigh median is 1.18 of it
-        closer = distance <= max(4 * spread, 0.02)
-        if np.array_equal(closer, keep) or np.linalg.matrix_rank(design[closer & inner]) < 3:
-            break
-        keep = closer
-    kept = Spots(*(column[keep] for column in spots))
-    rms = float(np.sqrt((distance[keep] ** 2).mean()))
-    if keep.mean() < 0.5:
-        raise CalibrationError(
-            f"only {keep.sum()} of {len(keep)} micro-images stand on one lattice of pitch "
-            f"{lattice.pitch:.1f} px. Check the white image, or pass pitch= and layout=."
-        )
-    if rms > 0.1 * lattice.pitch:
-        raise CalibrationError(
-            f"the micro-images stand {rms:.2f} px rms away from a lattice of pitch {lattice.pitch:.1f} px, "
-            "where a tenth of the pitch is too much. Check the white image, or pass pitch= and layout=."
-        )
-    _check_spots(kept, lattice, "micro-images on one lattice")
-    origin, column, row = (_vector(w) for w in weights)
-    return kept, Lattice((row, column), origin, lattice.layout, lattice.kinds)
-
-
-def surrounded(indices: np.ndarray) -> np.ndarray:
-    """Spots with neighbours on all sides, or all spots where fewer than 5 x 5 are left.
-
-    At the border of an array the light of the missing neighbours is missing too, which moves a
-    micro-image's centre inwards: by half a pixel where diffraction blurs micro-images into each other.
-    """
-    first = indices.min(0) - 1
-    present = np.zeros(indices.max(0) - first + 2, bool)
-    i, j = (indices - first).T
-    present[i, j] = True
-    inner = np.ones(len(indices), bool)
-    for di, dj in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, -1), (-1, 1)):
-        inner &= present[i + di, j + dj]
-    return inner if inner.sum() >= 25 else np.ones(len(indices), bool)
-
-
-def _check_spots(spots: Spots, lattice: Lattice, what: str) -> None:
-    count = [len(np.unique(spots.indices[:, axis])) for axis in (0, 1)]
-    if min(count) < 3 or len(spots.indices) < 9:
-        raise CalibrationError(
-            f"the white image has {len(spots.indices)} {what} of pitch {lattice.pitch:.1f} px, "
-            f"in {count[0]} rows and {count[1]} columns, but a lattice needs at least 3 x 3. "
-            "Use the whole sensor's picture, evenly lit."
-        )

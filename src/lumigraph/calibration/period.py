@@ -1,28 +1,36 @@
-"""The two lattice vectors of a white image, before any spot is known: peaks of its autocorrelation.
+"""The two lattice vectors of a picture, before any micro-image is known.
 
-The autocorrelation of a periodic picture is high at every lattice vector whatever one period looks like
-(round, square, ringed, dim), where the spectrum may have its strongest line at any harmonic.
+Candidates are pairs of peaks of the autocorrelation, of the evenly lit picture and of its dark gaps.
+Pairs of lines of the spectrum are candidates, too. All are judged in the spectrum: a true lattice has a
+line at every harmonic, a coarser one has harmonics without a line, and a finer one misses lines.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import scipy.fft
-from scipy import ndimage
 
-from lumigraph.core.arrays import WORKERS
+from lumigraph.calibration.autocorrelation import SMALLEST_PITCH, Peaks, autocorrelation, reduced, refined
+from lumigraph.calibration.spectrum import Gaps, Spectrum, polished
 from lumigraph.core.lattice import Layout
 from lumigraph.errors import CalibrationError
 
-SMALLEST_PITCH = 4.0
-"""Shortest lattice vector looked for [px]: two pixels for the spot, two for the gap."""
-
-_LONGEST = 1024  # lags looked at [px]
-_PART = 0.42  # of the picture: farther lags have little overlap and much noise; 3 lenslets need 0.34
-_LEAST = 0.2  # of the autocorrelation's top; noise alone reaches 0.15 on pictures of 100 px
-_STRONG = 0.75  # of the strongest peak; the ridges of nearly touching square micro-images reach 0.5
-_DIP = 0.15  # how far the autocorrelation must fall between two lattice points
+_LEAST = 0.12  # of the autocorrelation's top; noise alone reaches 0.1 on pictures of 100 px
+_PART = 0.3  # of the strongest peak: what may be a neighbour
+_MOST = 16  # peaks paired
+_ORDERS = (2.6, 4.6)  # of the harmonics are looked at
+_EVIDENCE = 6.0  # of the score: noise reaches 3, a lattice on a clean white image 30 to 200
+_GOOD = 0.5  # of the best score: what the coarsest must have
+_MARGIN = 0.85  # the second candidate must stay below this part of the first
+_THIRDS, _HALVES = ((8, 8), (16, 16)), ((12, 0), (0, 12), (12, 12))
+_SAME = 0.8  # correlation of lenslets of one kind
+_ALIKE = 0.4  # correlation of lenslets of several kinds
+_FEWEST = 2.8  # lenslets across a picture
+_NEAR = 0.012  # of a pitch, within which two candidates are one
+_AROUND = 0.04  # and within which polishing one finds the other
+_LOOKED_AT = 4  # candidates polished
+_SIZE = 2048  # px of the middle of the picture that is looked at
+_RATIO, _ANGLES = 1.25, (52.0, 75.0)  # of neighbours: lengths, and what is hexagonal
 
 
 class Vectors(NamedTuple):
@@ -31,274 +39,268 @@ class Vectors(NamedTuple):
     row: np.ndarray
     column: np.ndarray
     layout: Layout
+    kinds: int = 1
 
 
-def lattice_vectors(picture: np.ndarray, layout: Layout | None, pitch: float | None) -> Vectors:
-    """Lattice vectors of a flattened picture (y, x), to about 0.01 px.
+class Request(NamedTuple):
+    """What the caller knows: layout, pitch [px] to 10 %, rotation [rad] to 2°."""
+
+    layout: Layout | None = None
+    pitch: float | None = None
+    rotation: float | None = None
+
+    def near(self, vectors: Vectors) -> bool:
+        """Whether a candidate is worth looking at: it may be beaten, but not ten times as coarse."""
+        return self.pitch is None or 0.4 * self.pitch < math.sqrt(_area(vectors)) < 2.5 * self.pitch
+
+    def allows(self, vectors: Vectors) -> bool:
+        """Whether a candidate is what was asked for."""
+        pitch = (math.hypot(*vectors.row) + math.hypot(*vectors.column)) / 2
+        if self.layout not in (None, vectors.layout):
+            return False
+        if self.pitch is not None and abs(pitch - self.pitch) > 0.1 * self.pitch + 0.5:
+            return False
+        if self.rotation is None:
+            return True
+        step = math.pi / (3 if vectors.layout == "hex" else 2)
+        return abs(math.remainder(math.atan2(*vectors.row) - self.rotation, step)) < math.radians(2)
+
+
+class _Candidate(NamedTuple):
+    vectors: Vectors
+    score: float
+
+
+def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
+    """Lattice vectors of a picture, from its features (y, x): light, gaps, smoother gaps.
 
     Raises
     ------
     CalibrationError
-        No period, several pitches, or a pitch or layout that the picture does not support.
+        No period, several lattices, or a pitch, rotation or layout that the picture does not support.
     """
-    correlation = _autocorrelation(picture)
-    peaks = _Peaks(correlation)
-    first, second = _shortest(peaks, pitch, layout)
-    first, second = (_refined(correlation, vector) for vector in (first, second))
-    first, second = _reduced(first, second)
-    found = _classify(first, second, layout)
-    if pitch is None and layout is None:
-        _check_single(peaks, first, second)
-    return Vectors(*_oriented(first, second, found), found)
+    middles = [_middle(feature) for feature in features]
+    pairs, tops, repeats = [], [], []
+    for feature in middles[:2]:
+        correlation = autocorrelation(feature)
+        peaks = Peaks(correlation)
+        tops.append(peaks.top())
+        strong = peaks.strong(_PART * tops[-1])
+        repeats.append([float(peaks.lengths[k]) for k in strong])
+        pairs += _pairs(correlation, peaks, strong, request)
+    if max(tops) < _LEAST:
+        raise CalibrationError(
+            f"the image shows no lattice: its autocorrelation returns to {max(tops):.2f} of its top at most, "
+            f"where a lattice gives over {_LEAST:g}. Use an evenly lit, focused white image with dark gaps "
+            "between at least 3 x 3 micro-images."
+        )
+    spectra = [Spectrum(feature) for feature in middles]
+    for spectrum in spectra:
+        pairs += spectrum.pairs()
+    longest = max(middles[0].shape) / _FEWEST
+    found = [_vectors(first, second, longest) for first, second in pairs]
+    found = _distinct([v for v in found if v is not None and request.near(v)], _NEAR)
+    if not found:
+        raise CalibrationError(_nothing(pairs, repeats[int(np.argmax(tops))]))
+    ranked = _ranked(spectra, found)
+    gaps = Gaps(middles[1])
+    chosen: list[Vectors] = []
+    for candidate in ranked:
+        if len(chosen) == _LOOKED_AT:
+            break
+        if not any(_same(candidate.vectors, other, _AROUND) for other in chosen):
+            chosen.append(candidate.vectors)
+    chosen = [_single(middles, vectors) for vectors in chosen]
+    sharp = _distinct([_polished(gaps, vectors) for vectors in chosen], _NEAR)
+    return _best(_ranked(spectra, sharp), request, middles[0].shape)
 
 
-def _autocorrelation(picture: np.ndarray) -> np.ndarray:
-    """Normalised autocorrelation for lags up to half the picture each way; element [0, nx_lag] is lag 0."""
-    wave = picture - picture.mean()
-    for axis in (0, 1):  # takes out the highest frequency: what grey() left of a Bayer pattern
-        wave = ndimage.correlate1d(wave, np.array([0.25, 0.5, 0.25], np.float32), axis=axis)
-    ny, nx = picture.shape
-    lags = tuple(min(int(_PART * n), _LONGEST) + 2 for n in (ny, nx))
-    size = tuple(scipy.fft.next_fast_len(n + lag, real=True) for n, lag in zip((ny, nx), lags, strict=True))
-    windows = [np.hanning(n + 2)[1:-1].astype(np.float32) for n in (ny, nx)]
-    spectrum: Any = scipy.fft.rfft2(wave * windows[0][:, None] * windows[1], size, workers=WORKERS)
-    power = np.square(spectrum.real) + np.square(spectrum.imag)
-    raw: Any = scipy.fft.irfft2(power, size, workers=WORKERS)
-    overlap: list[Any] = [
-        scipy.fft.irfft(np.abs(np.asarray(scipy.fft.rfft(w.astype(float), n))) ** 2, n)
-        for w, n in zip(windows, size, strict=True)
-    ]
-    columns = np.arange(-lags[1], lags[1] + 1)
-    result = raw[: lags[0] + 1][:, columns] / (overlap[0][: lags[0] + 1, None] * overlap[1][columns])
-    return result / result[0, lags[1]]
+def _polished(gaps: Gaps, vectors: Vectors) -> Vectors:
+    row, column = polished(gaps, vectors)
+    again = _vectors(*reduced(row, column))
+    return vectors if again is None else again._replace(kinds=vectors.kinds)
 
 
-def flattened(picture: np.ndarray) -> np.ndarray:
-    """Picture above its dark level, divided by a smooth quadratic surface: about 1 on average everywhere."""
-    ny, nx = picture.shape
-    step = max(1, min(ny, nx) // 512)
-    sparse = picture[::step, ::step]
-    dark = np.float32(np.percentile(sparse, 2))
-    y, x = np.linspace(-1, 1, ny, dtype=np.float32), np.linspace(-1, 1, nx, dtype=np.float32)
-    surface = Surface(2).fit(y[::step, None], x[None, ::step], sparse - dark)
-    return (picture - dark) / surface(y[:, None], x[None, :])
+def _single(features: list[np.ndarray], vectors: Vectors) -> Vectors:
+    """The lattice of single lenslets where a hexagonal candidate is that of one of three kinds.
+
+    Three kinds of lenslets in turn repeat after sqrt(3) pitches. Their micro-images are alike, so that the
+    mean cell resembles itself moved by a third of its diagonal; the places between the lenslets of a
+    lattice with one kind do not resemble lenslets.
+    """
+    half = vectors._replace(row=vectors.row / 2, column=vectors.column / 2)
+    if math.hypot(*half.row) >= SMALLEST_PITCH and _likeness(features[0], vectors, _HALVES) > _SAME:
+        return half  # whole pixels make neighbours of 5.5 px differ, and repeat after 11
+    if vectors.layout != "hex":
+        return vectors
+    if max(_likeness(feature, vectors, _THIRDS) for feature in features) < _ALIKE:
+        return vectors
+    first, second = reduced((vectors.row + vectors.column) / 3, (2 * vectors.row - vectors.column) / 3)
+    return Vectors(*_oriented(first, second, "hex"), "hex", 3)
 
 
-class Surface:
-    """Polynomial surface of brightness, kept above a tenth of its top."""
-
-    def __init__(self, degree: int) -> None:
-        self.powers = [(a, b) for a in range(degree + 1) for b in range(degree + 1 - a)]
-        self.weights: list[np.float32] = []
-        self.floor = np.float32(0)
-
-    def fit(self, y: np.ndarray, x: np.ndarray, values: np.ndarray) -> "Surface":
-        """Least squares through values at y and x, which broadcast."""
-        terms = [np.broadcast_to(y**a * x**b, values.shape).ravel() for a, b in self.powers]
-        self.weights = list(np.linalg.lstsq(np.stack(terms, -1), values.ravel(), rcond=None)[0])
-        self.weights = [np.float32(w) for w in self.weights]
-        self.floor = np.float32(-np.inf)
-        self.floor = np.float32(max(0.1 * float(self(y, x).max()), 1e-30))
-        return self
-
-    def __call__(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """The surface at y and x, which broadcast."""
-        total = np.zeros(np.broadcast_shapes(y.shape, x.shape), np.float32)
-        for weight, (a, b) in zip(self.weights, self.powers, strict=True):
-            total += weight * y**a * x**b
-        return np.maximum(total, self.floor)
+def _likeness(feature: np.ndarray, vectors: Vectors, moves: tuple[tuple[int, int], ...]) -> float:
+    """Correlation of the mean cell with itself moved by 24ths of it, the lowest of several ways."""
+    pitch, (ny, nx) = _pitch(vectors), feature.shape
+    size = 24 if pitch > 36 else 12 if pitch > 18 else 6  # every sample holds pixels
+    moves = tuple((a * size // 24, b * size // 24) for a, b in moves)
+    y, x = np.mgrid[:ny, :nx]
+    inverse = np.linalg.inv(np.stack([vectors.column, vectors.row], -1))
+    u, v = (inverse[k, 0] * y + inverse[k, 1] * x for k in (0, 1))
+    place = (np.floor(u % 1 * size) % size * size + np.floor(v % 1 * size) % size).astype(np.int64).ravel()
+    count = np.maximum(np.bincount(place, minlength=size**2), 1)
+    cell = (np.bincount(place, feature.ravel(), size**2) / count).reshape(size, size)
+    moved = (np.roll(cell, move, (0, 1)) for move in moves)
+    return min(float(np.corrcoef(cell.ravel(), other.ravel())[0, 1]) for other in moved)
 
 
-class _Peaks:
-    """Local maxima of an autocorrelation beyond its central lobe: `lags` (k, 2) and `heights` (k,)."""
-
-    def __init__(self, correlation: np.ndarray) -> None:
-        self.correlation = correlation
-        zero = correlation.shape[1] // 2
-        # The row above lag 0 is the mirror image of the row below it; the other edges are no peaks.
-        around = np.concatenate([correlation[1:2, ::-1], correlation])
-        local = (around == ndimage.maximum_filter(around, 3)) & (around > 0)
-        local[0] = local[-1] = local[:, 0] = local[:, -1] = False
-        rows, columns = np.nonzero(local)
-        tops = _tops(around, rows, columns)
-        rows = rows - 1
-        lags = np.stack([rows, columns - zero], -1)
-        length = np.hypot(*lags.T)
-        limits = np.array(correlation.shape) - 2, zero - 1
-        keep = (length >= SMALLEST_PITCH - 1) & (rows < limits[0][0]) & (np.abs(lags[:, 1]) < limits[1])
-        keep &= (lags[:, 0] > 0) | (lags[:, 1] > 0)  # a half plane: the rest is its mirror image
-        order = np.argsort(length[keep], kind="stable")
-        self.lags, self.lengths = lags[keep][order], length[keep][order]
-        self.heights = tops[keep][order]
-
-    def dips(self, index: int) -> bool:
-        """Whether the autocorrelation falls and rises again between lag 0 and this peak."""
-        steps = np.linspace(0, 1, max(8, int(self.lengths[index])))
-        zero = self.correlation.shape[1] // 2
-        y, x = self.lags[index][:, None] * steps
-        path = self.correlation[np.rint(y).astype(int), np.rint(x).astype(int) + zero]
-        return bool(path.min() < self.heights[index] * (1 - _DIP))
-
-    def strong(self, limit: float) -> list[int]:
-        """Indices of true peaks above a limit, shortest first; no more than 200."""
-        found: list[int] = []
-        for index in np.flatnonzero(self.heights >= limit):
-            if self.dips(int(index)):
-                found.append(int(index))
-            if len(found) == 200:
-                break
-        return found
-
-    def top(self) -> float:
-        """Height of the strongest peak that follows a dip; 0 without any."""
-        for index in np.argsort(-self.heights, kind="stable")[:500]:
-            if self.dips(int(index)):
-                return float(self.heights[index])
-        return 0.0
+def _middle(feature: np.ndarray) -> np.ndarray:
+    ny, nx = feature.shape
+    y, x = max(0, (ny - _SIZE) // 2), max(0, (nx - _SIZE) // 2)
+    return feature[y : y + _SIZE, x : x + _SIZE]
 
 
-def _tops(around: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Heights of peaks between the samples, by parabolas: for pitches of few pixels the samples miss them."""
-    here = around[rows, columns]
-    result = here.copy()
-    for dy, dx in ((1, 0), (0, 1)):
-        before, after = around[rows - dy, columns - dx], around[rows + dy, columns + dx]
-        bend = np.maximum(2 * here - before - after, 1e-12)
-        result += (after - before) ** 2 / (8 * bend)
+def _pairs(
+    correlation: np.ndarray, peaks: Peaks, strong: list[int], request: Request
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Refined reduced bases from the shortest strong peaks that are not parallel."""
+    limit = 1.12 * request.pitch + 1 if request.pitch is not None else math.inf
+    floor = 0.88 * request.pitch - 1 if request.pitch is not None else 0.0
+    near = [k for k in strong if floor <= peaks.lengths[k] <= limit][:_MOST]
+    lags = peaks.lags[near].astype(float)
+    result, seen = [], set()
+    better = {}
+    for a in range(len(near)):
+        for b in range(a + 1, len(near)):
+            if not _neighbours(lags[a], lags[b], 0.35):
+                continue
+            for k in (a, b):
+                if k not in better:
+                    better[k] = refined(correlation, lags[k])
+            first, second = reduced(better[a], better[b])
+            key = tuple(np.round(np.concatenate([first, second])).astype(int))
+            if key not in seen and min(math.hypot(*first), math.hypot(*second)) >= SMALLEST_PITCH:
+                seen.add(key)
+                result.append((first, second))
     return result
 
 
-def _shortest(peaks: _Peaks, pitch: float | None, layout: Layout | None) -> tuple[np.ndarray, np.ndarray]:
-    """The two shortest strong lattice vectors that are not parallel."""
-    top = peaks.top()
-    if top < _LEAST:
-        raise CalibrationError(
-            f"the white image shows no lattice: its autocorrelation returns to {top:.2f} of its top at most, "
-            "where a lattice gives over {_LEAST:g}. Use an evenly lit, focused white image with dark gaps "
-            "between at least 3 x 3 micro-images."
-        )
-    strong = peaks.strong(_STRONG * top)
-    if pitch is not None:
-        strong = _near_pitch(peaks, strong, pitch, top)
-    first = peaks.lags[strong[0]]
-    for index in strong[1:]:
-        second = peaks.lags[index]
-        sine = abs(first[0] * second[1] - first[1] * second[0]) / math.hypot(*first) / math.hypot(*second)
-        if sine > 0.5 and _fits(first, second, layout):
-            return first.astype(float), second.astype(float)
-    size = math.hypot(*first)
-    raise CalibrationError(
-        f"the white image repeats every {size:.1f} px in one direction only"
-        + (f" of a {layout} lattice" if layout else "")
-        + ". At least 3 x 3 lenslets are needed; pass the layout= that it has, or none."
-    )
+def _neighbours(first: np.ndarray, second: np.ndarray, slack: float) -> bool:
+    a, b = math.hypot(*first), math.hypot(*second)
+    sine = abs(first[0] * second[1] - first[1] * second[0]) / (a * b)
+    return sine > 0.5 and max(a, b) < (1 + slack) * min(a, b) * 2
 
 
-def _fits(first: np.ndarray, second: np.ndarray, layout: Layout | None) -> bool:
-    """Whether two vectors may be neighbours of a layout; a hexagon's are 60° apart, a square's 90°."""
-    if layout is None:
-        return True
-    cosine = abs(float(first @ second)) / math.hypot(*first) / math.hypot(*second)
-    return (cosine > 0.25) == (layout == "hex") and math.hypot(*second) < 1.3 * math.hypot(*first)
-
-
-def _near_pitch(peaks: _Peaks, strong: list[int], pitch: float, top: float) -> list[int]:
-    """Peaks within 10 % of the pitch that was asked for, weak ones too."""
-    near = [i for i in peaks.strong(0.3 * top) if abs(peaks.lengths[i] - pitch) <= 0.1 * pitch + 1]
-    shorter = [i for i in strong if peaks.lengths[i] < 0.85 * pitch]
-    hides = near and shorter and peaks.heights[shorter[0]] > 0.9 * peaks.heights[near].max()
-    if near and not hides:
-        return near
-    shown = peaks.lengths[strong[0]]
-    raise CalibrationError(
-        f"the white image has no lattice of pitch {pitch:g} px: it repeats every {shown:.1f} px. "
-        f"Leave pitch out, or pass pitch={shown:.1f}."
-    )
-
-
-def _reduced(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shortest basis of the same lattice (Lagrange and Gauss)."""
-    for _ in range(20):
-        if first @ first > second @ second:
-            first, second = second, first
-        steps = round(float(first @ second / (first @ first)))
-        if steps == 0:
-            break
-        second = second - steps * first
-    return first, second
-
-
-def _refined(correlation: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Vector from ever farther multiples of itself, each found to a fraction of a pixel."""
-    limits = np.array(correlation.shape[0] - 3, float), np.array(correlation.shape[1] // 2 - 3, float)
-    times = 1
-    while True:
-        lag = _peak_near(correlation, vector * times)
-        if lag is None:
-            return vector
-        vector = lag / times
-        far = np.abs(vector) * 2 * times
-        if far[0] > limits[0] or far[1] > limits[1] or times >= 64:
-            return vector
-        times *= 2
-
-
-def _peak_near(correlation: np.ndarray, lag: np.ndarray) -> np.ndarray | None:
-    """Sub-pixel maximum within 2 px of a lag, or None where there is none."""
-    sign = -1 if lag[0] < -0.5 else 1
-    row, column = (int(v) for v in np.rint(sign * lag))
-    column += correlation.shape[1] // 2
-    mirror = 3  # rows above lag 0 are the mirror image of those below
-    padded = np.concatenate([correlation[mirror:0:-1, ::-1], correlation])
-    window = padded[row - 2 + mirror : row + 3 + mirror, column - 2 : column + 3]
-    if window.shape != (5, 5):
+def _vectors(first: np.ndarray, second: np.ndarray, longest: float = math.inf) -> Vectors | None:
+    """Row and column vector where the basis is that of a square or hexagonal lattice."""
+    a, b = math.hypot(*first), math.hypot(*second)
+    angle = math.degrees(math.acos(min(1.0, abs(float(first @ second)) / (a * b))))
+    if b > _RATIO * a or b > longest or angle < _ANGLES[0]:
         return None
-    best = np.array(np.unravel_index(np.argmax(window), (5, 5)))
-    y, x = best
-    if not (0 < y < 4 and 0 < x < 4):
-        return None
-    slope = np.array([window[y + 1, x] - window[y - 1, x], window[y, x + 1] - window[y, x - 1]]) / 2
-    bend = np.array([window[y + 1, x] + window[y - 1, x], window[y, x + 1] + window[y, x - 1]])
-    bend = bend - 2 * window[y, x]
-    peak = np.array([row - 2, column - 2 - correlation.shape[1] // 2]) + best
-    return sign * (peak - slope / np.minimum(bend, -1e-12))
+    layout: Layout = "hex" if angle < _ANGLES[1] else "square"
+    return Vectors(*_oriented(first, second, layout), layout)
 
 
-def _classify(first: np.ndarray, second: np.ndarray, layout: Layout | None) -> Layout:
-    """Layout of a reduced basis: neighbours 60° apart are hexagonal, 90° square."""
-    ratio = math.hypot(*second) / math.hypot(*first)
-    angle = math.degrees(math.acos(abs(float(first @ second)) / math.hypot(*first) / math.hypot(*second)))
-    found: Layout = "hex" if angle < 75 else "square"
-    if layout is not None and layout != found:
-        raise CalibrationError(
-            f"the white image shows neighbours {angle:.1f} deg apart, a {found} lattice, "
-            f"but layout={layout!r} was asked for. Leave layout out, or pass pitch= as well."
-        )
-    if ratio > 1.25:
-        raise CalibrationError(
-            f"the white image shows 2 pitches ({math.hypot(*first):.1f}, {math.hypot(*second):.1f} px) "
+def _nothing(pairs: list[tuple[np.ndarray, np.ndarray]], repeats: list[float]) -> str:
+    if pairs:
+        first, second = min(pairs, key=lambda pair: math.hypot(*pair[1]))
+        angle = math.degrees(math.acos(abs(float(first @ second)) / math.hypot(*first) / math.hypot(*second)))
+        return (
+            f"the image shows 2 pitches ({math.hypot(*first):.1f}, {math.hypot(*second):.1f} px) "
             f"{angle:.0f} deg apart, where a square or hexagonal lattice has one. "
             "Check that the micro-images have dark gaps on all sides, or pass pitch= yourself."
         )
-    return found
+    return (
+        f"the image repeats every {repeats[0]:.1f} px in one direction only. At least 3 x 3 lenslets are "
+        "needed, with dark gaps between them."
+    )
 
 
-def _check_single(peaks: _Peaks, first: np.ndarray, second: np.ndarray) -> None:
-    """Refuse a picture whose strong repeats are not all points of one lattice."""
-    matrix = np.linalg.inv(np.stack([first, second], -1))
-    strong = peaks.strong(_STRONG * peaks.top())
-    near = [i for i in strong if peaks.lengths[i] < 4 * math.hypot(*second)]
-    cells = peaks.lags[near] @ matrix.T
-    off = np.hypot(*((cells - np.rint(cells)) @ np.stack([first, second], -1).T).T)
-    slack = 1.5 + 0.05 * math.hypot(*first)
-    strays = sorted({round(float(peaks.lengths[i]), 1) for i, d in zip(near, off, strict=True) if d > slack})
-    if len(strays) > 0.25 * len(near):
-        pitches = [round(math.hypot(*first), 1), *strays[:2]]
+def _distinct(found: list[Vectors], slack: float) -> list[Vectors]:
+    result: list[Vectors] = []
+    for one in found:
+        size = _area(one)
+        alike = [other for other in result if abs(_area(other) - size) < 0.15 * size]
+        if not any(_same(one, other, slack) for other in alike):
+            result.append(one)
+    return result
+
+
+def _same(one: Vectors, other: Vectors, slack: float) -> bool:
+    """Whether two bases span one lattice, to a part of a pitch."""
+    matrix = np.stack([other.row, other.column], -1)
+    steps = np.linalg.solve(matrix, np.stack([one.row, one.column], -1))
+    whole = np.rint(steps)
+    return bool(np.abs(steps - whole).max() < slack and abs(abs(np.linalg.det(whole)) - 1) < 1e-9)
+
+
+def _ranked(spectra: list[Spectrum], found: list[Vectors]) -> list[_Candidate]:
+    """Candidates by their score over the harmonics that the coarsest good one has in its first orders.
+
+    First each is judged by its own first orders. There one that is too fine may look as good as the true
+    one; over the first orders of the coarser one it misses lines.
+    """
+    own = [_total(spectra, vectors, math.sqrt(_area(vectors))) for vectors in found]
+    good = [v for v, score in zip(found, own, strict=True) if score > _GOOD * max(own)]
+    coarsest = max((math.sqrt(_area(v)) for v in good), default=math.inf)
+    scores = [_total(spectra, v, coarsest) if s > 0.2 * max(own) else 0.0
+              for v, s in zip(found, own, strict=True)]  # fmt: skip
+    ranked = [_Candidate(v, score) for v, score in zip(found, scores, strict=True)]
+    return sorted(ranked, key=lambda candidate: -candidate.score)
+
+
+def _total(spectra: list[Spectrum], vectors: Vectors, pitch: float) -> float:
+    """Score over the first orders of a pitch, and again over more, which only edges that stand still have."""
+    limits = [min(0.46, orders / pitch) for orders in _ORDERS]
+    return sum(max(0.0, spectrum.score(vectors, limit)) for spectrum in spectra for limit in limits)
+
+
+def _area(vectors: Vectors) -> float:
+    return abs(float(vectors.row[0] * vectors.column[1] - vectors.row[1] * vectors.column[0]))
+
+
+def _best(ranked: list[_Candidate], request: Request, shape: tuple[int, ...]) -> Vectors:
+    allowed = [c for c in ranked if request.allows(c.vectors)]
+    if not allowed:
+        best = ranked[0].vectors
         raise CalibrationError(
-            f"the white image shows {len(pitches)} pitches ({', '.join(f'{p:g}' for p in pitches)} px) "
-            "where a lattice has one. Check that it was taken at the same zoom and focus as the raw image, "
-            "or pass pitch= yourself."
+            f"the image has no lattice of {_asked(request)}: it has a {_told(best)}. "
+            f"Leave out what does not fit, or pass pitch={_pitch(best):.1f}."
         )
+    best = allowed[0]
+    if best.score < _EVIDENCE:
+        raise CalibrationError(
+            f"the image shows no lattice for certain: the likeliest, a {_told(best.vectors)}, scores "
+            f"{best.score:.1f} where {_EVIDENCE:g} is needed. Use an evenly lit, focused white image with "
+            "dark gaps between at least 3 x 3 micro-images, or pass pitch= and layout=."
+        )
+    slack = min(0.2, 1.5 * _pitch(best.vectors) / min(shape))  # one bin and a half of the spectrum
+    others = [c for c in allowed[1:] if c.score > _MARGIN * best.score]
+    others = [c for c in others if not _same(c.vectors, best.vectors, slack)]
+    if others:
+        raise CalibrationError(
+            f"the image shows {1 + len(others)} pitches that are about equally likely, "
+            f"a {_told(best.vectors)} and a {_told(others[0].vectors)}. Pass pitch=, layout= or rotation=."
+        )
+    return best.vectors
+
+
+def _pitch(vectors: Vectors) -> float:
+    return (math.hypot(*vectors.row) + math.hypot(*vectors.column)) / 2
+
+
+def _told(vectors: Vectors) -> str:
+    turn = math.degrees(math.atan2(*vectors.row))
+    return f"{vectors.layout} lattice of pitch {_pitch(vectors):.2f} px turned by {turn:+.2f} deg"
+
+
+def _asked(request: Request) -> str:
+    parts = [
+        f"layout {request.layout!r}" if request.layout else "",
+        f"pitch {request.pitch:g} px" if request.pitch is not None else "",
+        f"rotation {math.degrees(request.rotation):.2f} deg" if request.rotation is not None else "",
+    ]
+    return ", ".join(part for part in parts if part)
 
 
 def _oriented(first: np.ndarray, second: np.ndarray, layout: Layout) -> tuple[np.ndarray, np.ndarray]:

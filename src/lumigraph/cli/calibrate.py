@@ -9,9 +9,11 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import progress, report
 from lumigraph.cli.options import COMMON, Common, Output, above_zero, length
+from lumigraph.errors import CalibrationError
 
 if TYPE_CHECKING:
     from lumigraph.core.calibration import Calibration
+    from lumigraph.core.raw import RawImage
 
 
 @Parameter(name="*")
@@ -59,24 +61,27 @@ def calibrate(
     output: Output,
     layout: Literal["square", "hex"] | None = None,
     pitch: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
+    explain: Annotated[bool, Parameter(negative=())] = False,
     overlay: Path | None = None,
     bench: Bench = Bench(),
     common: Common = COMMON,
 ) -> None:
-    """Find the micro-images on a white image and write their lattice.
+    """Find the micro-images on a white image, or on a raw image alone, and write their lattice.
 
     Example: `lumigraph calibrate white.png -o calibration.toml --overlay lattice.png`
 
     Parameters
     ----------
     white
-        Picture of an evenly lit surface (TIFF, PNG, Zarr).
+        Picture of an evenly lit surface, or a raw image where there is none (TIFF, PNG, Zarr).
     output
         Calibration file (.toml).
     layout
         Found by itself if left out.
     pitch
         Distance of micro-images in pixels, if it is not found by itself.
+    explain
+        Say what to turn on the bench: rotation, shift, distance, tilt and aperture, against --camera.
     overlay
         Draw the lattice over the white image into this file (.png, .svg, .pdf).
     """
@@ -87,6 +92,8 @@ def calibrate(
     if overlay is not None:
         files.check_output(overlay, files.FIGURES)
     above_zero("--pitch", pitch, "px")
+    if explain and bench.camera is None:
+        raise CalibrationError("--explain compares with what was meant: give the camera file, --camera FILE.")
     known = bench.lengths()
     picture = files.read_raw(white)
     with progress("calibrate"):
@@ -95,8 +102,24 @@ def calibrate(
             from lumigraph import plots
 
             files.save_figure(plots.lattice(picture, found), overlay)
+        advice = _advice(picture, bench) if explain else {}
     io.save(found, output)
-    report(common, f"{found.report()}\nwritten     {output}", {**_values(found), "output": str(output)})
+    lines = [found.report(), *(f"note        {note}" for note in found.notes), *advice.get("advice", ())]
+    text = "\n".join([*lines, f"written     {output}"])
+    report(common, text, {**_values(found), **advice, "output": str(output)})
+
+
+def _advice(white: "RawImage", bench: Bench) -> dict[str, Any]:
+    """What to turn, one line each, and the numbers behind it."""
+    from lumigraph.calibration import diagnose
+    from lumigraph.instruments import load_camera
+    from lumigraph.instruments.lenslet_camera import LensletCamera
+
+    camera = load_camera(str(bench.camera))
+    if not isinstance(camera, LensletCamera):
+        raise CalibrationError(f"{bench.camera} has no lenslets to adjust. Give a camera with lenslets.")
+    found = diagnose(white, camera)
+    return {"advice": found.report().splitlines(), "faults": list(found.faults)}
 
 
 def _values(found: "Calibration") -> dict[str, Any]:
@@ -111,6 +134,10 @@ def _values(found: "Calibration") -> dict[str, Any]:
         "origin_px": lattice.origin,
         "basis_px": lattice.basis,
         "residual_px": found.residual_px,
+        "missing": len(found.missing),
+        "fill": found.fill,
+        "sharpness": found.sharpness,
+        "notes": found.notes,
         "pixel_pitch": found.pixel_pitch,
         "separation": found.separation,
         "lenslet_distance": found.lenslet_distance,

@@ -81,7 +81,7 @@ class Warp:
 
 
 def _shrink(radius: np.ndarray, radial: float) -> np.ndarray:
-    """r / radius, where r + radial r³ = radius, by Newton's steps from r = radius.
+    """Ratio r / radius where r + radial r³ = radius, by Newton's steps from r = radius.
 
     Beyond the fold of a barrel distortion no r exists; there the nearest is kept.
     """
