@@ -1,8 +1,7 @@
 """CPU seconds of a microscope's point images and Richardson-Lucy iterations, beside pyolaf where it is.
 
-
-lfm-guv at 15 pixels and 5 samples per lenslet, -4 to 4 um in steps of 2 um. pyolaf (GPL) is run as a black box in an
-environment of its own: PYOLAF names its interpreter, LUMIGRAPH_DATA the folder with lfm_guv.
+lfm-guv at 15 pixels and 5 samples per lenslet, -4 to 4 um in steps of 2 um. pyolaf (GPL) is run as a black
+box in an environment of its own: PYOLAF names its interpreter, LUMIGRAPH_DATA the folder with lfm_guv.
 """
 
 import json
@@ -27,8 +26,9 @@ warnings.filterwarnings("ignore")
 def cpu():
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(u.ru_utime + u.ru_stime for u in used)
-scope = dict(gridType="reg", focus="single", plenoptic=1, uLensMask=1, M=60.0, NA=1.2, ftl=200000.0, fm=2500.0,
-             lensPitch=100.0, pixelPitch=6.5, n=1.35, WaveLength=0.593, mla2sensor=2500.0, tube2mla=0, spacingPx=15.38)
+scope = dict(gridType="reg", focus="single", plenoptic=1, uLensMask=1, M=60.0, NA=1.2, ftl=200000.0,
+             fm=2500.0, lensPitch=100.0, pixelPitch=6.5, n=1.35, WaveLength=0.593, mla2sensor=2500.0,
+             tube2mla=0, spacingPx=15.38)
 with tempfile.NamedTemporaryFile("w", suffix=".yaml", delete=False) as file:
     yaml.safe_dump(scope, file)
 camera = LFM_setCameraParams(file.name, 15)
