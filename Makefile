@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test lint format bench reproduce torch lock clean
+.PHONY: demo test lint format bench reproduce fuzz torch lock clean
 .DEFAULT_GOAL := demo
 
 $(READY): requirements.lock pyproject.toml
@@ -43,6 +43,9 @@ bench: $(READY)  ## speed against plain SciPy, ratios within one run
 reproduce: $(READY)  ## the thesis' experiments at full size, and the long tests; resumes what was interrupted
 	$(BIN)/lumigraph reproduce
 	$(BIN)/python -m pytest -m long tests
+
+fuzz: $(READY)  ## 20,000 damaged files for every reader, each in a process of its own with bounds on memory and time
+	$(BIN)/python tests/fuzz/run.py --count 20000
 
 torch: $(READY)  ## optional: PyTorch, so that the array tests run on it too
 	@$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/python -m pip install --quiet --disable-pip-version-check "torch==2.13.0"
