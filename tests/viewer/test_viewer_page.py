@@ -43,6 +43,15 @@ def test_pictures_are_those_of_the_library(open_page, views):
         assert np.abs(page.pixels() - shown(between)).max() <= LEVELS
 
 
+def test_samples_that_are_not_valid_are_left_out(open_page, views, rng):
+    valid = rng.random(views.data.shape[:4]) > 0.3
+    holed = lg.LightField(views.data, views.aperture, views.lenslets, views.separation, valid)
+    with served(of_views("holed", holed)) as address:
+        page = open_page(address)
+        page.set(focus=0.93, detail=1)
+        assert np.abs(page.pixels() - shown(lg.refocus(holed, 0.93))).max() <= LEVELS
+
+
 def test_light_and_colour_follow_their_formula(open_page, views):
     with served(of_views("two planes", views)) as address:
         page = open_page(address)

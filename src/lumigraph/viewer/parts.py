@@ -66,9 +66,12 @@ class Parts:
             "lit": "".join("1" if on else "0" for on in lit(views.data).ravel()),
             "focus": [low, high],
             "detail": detail(views),
+            "masked": views.valid is not None,
             "chunks": _chunks(data.shape, coded.numbers.itemsize),
         }
         self.arrays["views"] = lambda: coded
+        if views.valid is not None:
+            self.arrays["valid"] = lambda: Coded.of(to_numpy(views.valid) > 0)
 
     def _add_raw(self, exhibit: Exhibit) -> None:
         if exhibit.raw is None:

@@ -54,6 +54,9 @@ export class Model {
       this.refocuser?.add(first, count, part.numbers);
       if (k === 0) this.changed();
     }
+    if (views.masked && this.refocuser) {
+      this.refocuser.add(0, nv * nu, (await loadArray(`${this.number}/valid`)).numbers, this.refocuser.mask);
+    }
     this.complete = true;
     if (this.refocuser) this.measure(device);
     this.changed();

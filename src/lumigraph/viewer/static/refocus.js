@@ -16,18 +16,19 @@ export class Refocuser {
   constructor(device, views) {
     Object.assign(this, { device, views, tiles: tiling(views, device.most) });
     const [nv, nu, nt, ns] = views.shape, [across, down] = this.tiles;
-    const layers = Math.ceil((nv * nu) / (across * down));
-    this.array = device.layers(views.bits, views.channels, [across * ns, down * nt, layers]);
+    this.size = [across * ns, down * nt, Math.ceil((nv * nu) / (across * down))];
+    this.array = device.layers(views.bits, views.channels, this.size);
+    this.mask = device.layers(8, 1, views.masked ? this.size : [1, 1, 1]);
   }
 
   /** Adds views: `numbers` of `count` of them, from the first. */
-  add(first, count, numbers) {
+  add(first, count, numbers, array = this.array) {
     const { device, tiles: [across, down] } = this, [, , nt, ns] = this.views.shape;
-    const size = nt * ns * this.views.channels;
+    const size = nt * ns * array.channels;
     for (let k = 0; k < count; k++) {
       const index = first + k, tile = index % (across * down);
       const corner = [(tile % across) * ns, Math.floor(tile / across) * nt, Math.floor(index / (across * down))];
-      device.fill(this.array, corner, [ns, nt], numbers.subarray(k * size, (k + 1) * size));
+      device.fill(array, corner, [ns, nt], numbers.subarray(k * size, (k + 1) * size));
     }
   }
 
@@ -44,6 +45,8 @@ export class Refocuser {
     for (let v = 0; v < nv; v++) if (used[v]) device.draw(shear, [nx, nt], this.rows, (at, gl) => {
       device.bind(0, gl.TEXTURE_2D_ARRAY, this.array.texture, at.views);
       device.bind(1, gl.TEXTURE_2D, all, at.weights);
+      device.bind(2, gl.TEXTURE_2D_ARRAY, this.mask.texture, at.valid);
+      gl.uniform1i(at.masked, views.masked ? 1 : 0);
       gl.uniform1i(at.row, v);
       gl.uniform1i(at.count, nu);
       gl.uniform2i(at.size, ns, nt);

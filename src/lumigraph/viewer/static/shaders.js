@@ -15,7 +15,8 @@ vec4 cubic(float f) {
 /** Sum over the views of one row v of the aperture, moved along s. Alpha: the weight that was seen. */
 export const SHEAR_ROW = `#version 300 es
 precision highp float; precision highp int; precision highp usampler2DArray;
-uniform usampler2DArray views;
+uniform usampler2DArray views, valid;
+uniform bool masked;      // whether some samples are not valid
 uniform sampler2D weights;
 uniform int row, count;   // row of the aperture, views in it
 uniform ivec2 size;       // of a view: columns, rows
@@ -37,8 +38,9 @@ void main() {
     for (int i = 0; i < 4; i++) {
       int column = left + i;
       if (column < 0 || column >= size.x || k[i] == 0.0) continue; // beyond the edge nothing is seen
-      vec3 value = vec3(texelFetch(views, ivec3(corner + ivec2(column, place.y), index / (tiles.x * tiles.y)), 0).rgb);
-      total += k[i] * vec4(value, 1.0);
+      ivec3 from = ivec3(corner + ivec2(column, place.y), index / (tiles.x * tiles.y));
+      if (masked && texelFetch(valid, from, 0).r == 0u) continue;
+      total += k[i] * vec4(vec3(texelFetch(views, from, 0).rgb), 1.0);
     }
   }
 }`;
