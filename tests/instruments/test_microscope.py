@@ -143,6 +143,11 @@ def test_impossible_operators_are_refused(scope, arguments, message):
         scope.operator((0.0,), **arguments)
 
 
+def test_there_is_no_ray_diagram_of_a_microscope(scope):
+    with pytest.raises(GeometryError, match="no ray diagram of a LightFieldMicroscope"):
+        lg.plots.layout(scope)
+
+
 def test_beads_come_back_where_they_were(scope, rng):
     depths = (-12e-6, 0.0, 12e-6)
     operator = scope.operator(depths, 3, pixels=10)

@@ -69,12 +69,16 @@ def layout(camera: Camera) -> Figure:
     Raises
     ------
     GeometryError
-        The object is inside the focal length, so that there are no rays to draw.
+        The object is inside the focal length, so that there are no rays to draw, or a microscope.
 
     Examples
     --------
     ``lumigraph.plots.layout(camera).savefig("layout.png")``
     """
+    if not hasattr(camera, "object_distance"):
+        raise GeometryError(
+            f"there is no ray diagram of a {type(camera).__name__}. Its describe() tells its distances."
+        )
     if camera.object_distance <= camera.main_lens.focal_length:
         raise GeometryError(
             f"the object at {camera.object_distance * MM:.6g} mm is inside the focal length of "
