@@ -147,7 +147,7 @@ def test_every_module_is_in_the_table_after_those_that_it_imports():
         for path in files("lumigraph.viewer").joinpath("static").iterdir()
         if path.name.endswith(".js")
     }
-    assert set(MODULES) == there
+    assert set(MODULES) <= there  # other pages keep their modules beside them
     for k, name in enumerate(MODULES):
         assert set(re.findall(r'from "\./([^"]+)"', static(name))) <= set(MODULES[:k])
 
