@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     )
     from lumigraph.scene import Points, Scene, Slice, targets
     from lumigraph.sensor import Sensor, demosaic
-    from lumigraph.simulation import Coherent, Incoherent, Snapshots, TiltedWaves, simulate
+    from lumigraph.simulation import Coherent, Incoherent, Snapshots, Spectrum, TiltedWaves, simulate
 
 _HOMES = {
     "lumigraph": ("analysis", "depth", "design", "plots", "units"),
@@ -128,7 +128,7 @@ _HOMES = {
     ),
     "lumigraph.scene": ("Points", "Scene", "Slice", "targets"),
     "lumigraph.sensor": ("Sensor", "demosaic"),
-    "lumigraph.simulation": ("Coherent", "Incoherent", "Snapshots", "TiltedWaves", "simulate"),
+    "lumigraph.simulation": ("Coherent", "Incoherent", "Snapshots", "Spectrum", "TiltedWaves", "simulate"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -162,6 +162,7 @@ __all__ = [
     "SingleLensCamera",
     "Slice",
     "Snapshots",
+    "Spectrum",
     "Stack",
     "ThinLens",
     "TiltedWaves",

@@ -36,11 +36,29 @@ class Light:
         Incoherent light needs none where the camera has no lenslets, or lenslets along the axes.
     na
         Numerical aperture of the tilted waves; all directions if left out.
+    wavelength
+        In the place of the camera's own, such as '550 nm'; may be given several times, which the sensor
+        sees as one; three with --colours are red, green and blue.
+    colours
+        rgb: a colour raw image; or a Bayer pattern, such as RGGB. The scene's pictures keep their colours.
     """
 
     coherence: Literal["incoherent", "coherent", "snapshots", "tilted"] = "incoherent"
     count: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
     na: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
+    wavelength: list[str] | None = None
+    colours: Literal["rgb", "RGGB", "GRBG", "GBRG", "BGGR"] | None = None
+
+    def spectrum(self) -> Any:
+        """The wavelengths that `lumigraph.simulate` takes, or None for the camera's."""
+        from lumigraph.simulation import Spectrum
+
+        wavelengths = tuple(length("--wavelength", text) or 0.0 for text in self.wavelength or [])
+        if self.colours is None:
+            return Spectrum(wavelengths, ((1.0,),) * len(wavelengths)) if wavelengths else None
+        if len(wavelengths) not in (0, 3):
+            raise FormatError(f"--colours takes 3 --wavelength, red, green and blue, not {len(wavelengths)}.")
+        return Spectrum.rgb(*wavelengths, bayer=None if self.colours == "rgb" else self.colours)
 
     def chosen(self, seed: int) -> Any:
         """The coherence that `lumigraph.simulate` takes."""
@@ -139,18 +157,23 @@ def simulate(
         Expose the sensor: photon noise, read noise, whole numbers of its bits.
     """
     from lumigraph import io
-    from lumigraph.instruments import load_camera
+    from lumigraph.instruments import LightFieldMicroscope, load_camera
     from lumigraph.simulation import Interrupted, simulate
 
     files.check_output(output, files.PICTURES)
     stage.check()
     if seed < 0:
         raise FormatError(f"--seed is {seed} but must be at least 0.")
-    described, coherence = load_camera(camera), light.chosen(seed)
+    described, coherence, spectrum = load_camera(camera), light.chosen(seed), light.spectrum()
+    if isinstance(described, LightFieldMicroscope):
+        raise FormatError(
+            f"{camera} is a light-field microscope, which this command does not simulate. "
+            "In Python, its operator(depths).forward(volume) does."
+        )
     scene = stage.built(described.object_grid)
     try:
         with progress("simulate") as shown:
-            raw = simulate(described, scene, coherence, progress=shown)
+            raw = simulate(described, scene, coherence, spectrum=spectrum, progress=shown)
     except Interrupted as stopped:
         kept = output.with_name(f"{output.name.split('.')[0]}.partial{''.join(output.suffixes)}")
         io.save(stopped.partial, kept)

@@ -16,7 +16,7 @@ from lumigraph.instruments import grids
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.parts import Lenslets
 from lumigraph.propagation import Propagate
-from lumigraph.simulation import PeriodicOperator, periodic_operator
+from lumigraph.simulation import Mixed, PeriodicOperator, Spectrum, periodic_operator
 from lumigraph.simulation.kernels import Progress
 
 
@@ -82,8 +82,9 @@ class LensletCamera(Camera):
         samples_per_lenslet: int | None = None,
         *,
         accuracy: float = 1e-3,
+        spectrum: Spectrum | None = None,
         progress: Progress | None = None,
-    ) -> PeriodicOperator:
+    ) -> PeriodicOperator | Mixed:
         """The exact model of how this camera sees incoherent planes, for `lumigraph.deconvolve`.
 
         Parameters
@@ -96,6 +97,8 @@ class LensletCamera(Camera):
             the main lens resolves, λ z1/(2D).
         accuracy
             Relative rms error of the raw image, 1e-2 to 1e-5.
+        spectrum
+            Of one channel, in the place of the camera's wavelength.
         progress
             Called as ``progress(fraction)``.
 
@@ -109,7 +112,17 @@ class LensletCamera(Camera):
         planes = self._depths(depths)
         grid = self._lenslet_samples(samples_per_lenslet)
         dz = 0.0 if depths is None else planes
-        return periodic_operator(self, grid, dz, accuracy=accuracy, progress=progress)
+        if spectrum is None:
+            return periodic_operator(self, grid, dz, accuracy=accuracy, progress=progress)
+        if len(spectrum.weights[0]) != 1:
+            raise GeometryError("an operator is of one channel but the spectrum has three. Take one of them.")
+        return Mixed(
+            [
+                periodic_operator(self.replace(wavelength=w), grid, dz, accuracy=accuracy, progress=progress)
+                for w in spectrum.wavelengths
+            ],
+            [weight for (weight,) in spectrum.weights],
+        )
 
     def _lenslet_samples(self, samples: int | None) -> Grid:
         """Object samples over the array's field, so many along a lenslet's pitch."""

@@ -6,6 +6,7 @@
   come from; `cell_response`, what lenslets do to light; `glare`, what falls far from a point's image
 - `resampling`, `turning`: from an object's samples to points and from the image's samples to pixels
 - `slices`: `Slices`, operators of several depths as one
+- `spectrum`: `Spectrum`, light of several wavelengths, colour sensors; `Mixed`, its operator
 - `single_lens`: `single_lens_operator`, incoherent planes and points before a camera without lenslets
 - `band`: band-limited samples along an axis, to and from points and pixels
 - `camera`: `Camera`, what a simulation asks of an instrument
@@ -19,6 +20,7 @@ from lumigraph.simulation.imaging import Interrupted, simulate
 from lumigraph.simulation.periodic import PeriodicOperator, periodic_operator
 from lumigraph.simulation.single_lens import SingleLensOperator, single_lens_operator
 from lumigraph.simulation.slices import Slices
+from lumigraph.simulation.spectrum import Mixed, Spectrum
 
 __all__ = [
     "Camera",
@@ -26,10 +28,12 @@ __all__ = [
     "Coherent",
     "Incoherent",
     "Interrupted",
+    "Mixed",
     "PeriodicOperator",
     "SingleLensOperator",
     "Slices",
     "Snapshots",
+    "Spectrum",
     "TiltedWaves",
     "periodic_operator",
     "simulate",

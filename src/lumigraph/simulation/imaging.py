@@ -24,6 +24,7 @@ from lumigraph.simulation.cells import fits
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Plane, Snapshots, TiltedWaves
 from lumigraph.simulation.kernels import Optics
 from lumigraph.simulation.periodic import periodic_operator
+from lumigraph.simulation.spectrum import Spectrum, by_wavelength
 
 PUPIL_OVERSAMPLING = 1.1
 """How much denser than half of λL/p the points of the pupil stand that make a white image."""
@@ -67,6 +68,7 @@ def simulate(
     scene: Scene,
     coherence: Coherence | Incoherent | None = None,
     *,
+    spectrum: Spectrum | None = None,
     progress: Progress | None = None,
     map: Callable[..., Iterable[Any]] = serial_map,  # noqa: A002 - what it is
 ) -> RawImage:
@@ -86,6 +88,9 @@ def simulate(
     coherence
         `Incoherent` (default), `Coherent`, `Snapshots` or `TiltedWaves`. The last two leave the raw image's
         relative rms error, estimated from two halves of their shots, in ``metadata["estimated_error"]``.
+    spectrum
+        Wavelengths that take the place of the camera's own, and the channels that see them. Then slices
+        may be coloured, (y, x, 3), and the raw image is (ny, nx, 3) or a Bayer mosaic.
     progress
         Called as ``progress(done, total)`` after each propagation.
     map
@@ -102,6 +107,8 @@ def simulate(
         A KeyboardInterrupt; it carries the raw image of what was finished.
     """
     coherence = Incoherent() if coherence is None else coherence
+    if spectrum is not None:
+        return _coloured(camera, scene, coherence, spectrum, progress, map)
     _check(camera, scene, coherence)
     accuracy = coherence.accuracy if isinstance(coherence, Incoherent) else None
     exact = _exact(camera, scene, accuracy)
@@ -123,6 +130,26 @@ def simulate(
             light.brighten(total / light.done)  # equal shots: fewer of them, as bright
         raise Interrupted(_read_out(camera, light, coherence)) from None
     return _read_out(camera, light, coherence)
+
+
+def _coloured(
+    camera: Camera,
+    scene: Scene,
+    coherence: Coherence | Incoherent,
+    spectrum: Spectrum,
+    progress: Progress | None,
+    map: Callable[..., Iterable[Any]],  # noqa: A002
+) -> RawImage:
+    count = len(spectrum.wavelengths)
+
+    def at_wavelength(camera: Camera, scene: Scene, number: int) -> RawImage:
+        def report(done: int, total: int) -> None:
+            if progress is not None:
+                progress(number * total + done, count * total)
+
+        return simulate(camera, scene, coherence, progress=report, map=map)
+
+    return by_wavelength(camera, scene, spectrum, at_wavelength)
 
 
 @dataclass(slots=True)
@@ -231,7 +258,7 @@ def _check(camera: Camera, scene: Scene, coherence: Coherence | Incoherent) -> N
         if isinstance(part, Slice) and part.intensity.ndim != 2:
             raise GeometryError(
                 f"a slice has shape {part.intensity.shape} but one wavelength needs grey (y, x). "
-                "Simulate one channel at a time."
+                "Give spectrum=Spectrum.rgb() for a coloured scene."
             )
         depths = part.positions[:, 2] if isinstance(part, Points) else np.array([getattr(part, "dz", 0.0)])
         if (nearest := camera.object_distance + float(depths.min())) <= 0:

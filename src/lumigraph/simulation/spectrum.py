@@ -1,0 +1,174 @@
+"""Light of several wavelengths: images add up, each in its own colour."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lumigraph.core import arrays, checks
+from lumigraph.core.arrays import Array
+from lumigraph.core.raw import BAYER_PATTERNS, RawImage
+from lumigraph.errors import GeometryError
+from lumigraph.scene import Scene, Slice
+from lumigraph.sensor import mosaic
+
+
+@dataclass(frozen=True, slots=True)
+class Spectrum:
+    """Wavelengths, and how much of each the sensor's channels see.
+
+    Lenses are thin and free of dispersion: what differs between the wavelengths is diffraction.
+
+    Parameters
+    ----------
+    wavelengths
+        In vacuum [m].
+    weights
+        (wavelengths, channels), channels 1 or 3 (red, green, blue), not negative; those of a channel are
+        scaled to a sum of 1, so that an even white scene has mean 1 in all of them.
+    bayer
+        Pattern of a colour filter, such as "RGGB": the raw image is (ny, nx). None keeps (ny, nx, 3).
+
+    Raises
+    ------
+    GeometryError
+        No wavelengths, weights of another shape or below 0, an unknown pattern, or one without colours.
+
+    Examples
+    --------
+    >>> Spectrum.band(500e-9, 600e-9, 3).wavelengths
+    (5e-07, 5.5e-07, 6e-07)
+    """
+
+    wavelengths: tuple[float, ...]
+    weights: tuple[tuple[float, ...], ...]
+    bayer: str | None = None
+
+    def __post_init__(self) -> None:
+        wavelengths = tuple(checks.positive("a wavelength", w) for w in self.wavelengths)
+        weights = np.array(self.weights, np.float64)
+        if not wavelengths or weights.shape not in ((len(wavelengths), 1), (len(wavelengths), 3)):
+            raise GeometryError(
+                f"weights have shape {weights.shape} but must have a row for each of {len(wavelengths)} "
+                "wavelengths and 1 column, or 3 for red, green and blue."
+            )
+        if not np.isfinite(weights).all() or weights.min() < 0 or weights.sum(0).min() <= 0:
+            raise GeometryError("weights must be finite, at least 0, and above 0 somewhere in each channel.")
+        if self.bayer is not None:
+            checks.choice("bayer", self.bayer, BAYER_PATTERNS)
+            if weights.shape[1] != 3:
+                raise GeometryError(f"bayer is {self.bayer!r} but the weights have 1 channel. Give three.")
+        object.__setattr__(self, "wavelengths", wavelengths)
+        object.__setattr__(self, "weights", tuple(map(tuple, (weights / weights.sum(0)).tolist())))
+
+    @classmethod
+    def band(cls, shortest: float, longest: float, count: int = 5) -> "Spectrum":
+        """One channel that sees a band [m] evenly, by so many wavelengths."""
+        count = checks.whole("count", count)
+        return cls(tuple(np.linspace(shortest, longest, count).tolist()), ((1.0,),) * count)
+
+    @classmethod
+    def rgb(
+        cls, red: float = 610e-9, green: float = 540e-9, blue: float = 465e-9, bayer: str | None = None
+    ) -> "Spectrum":
+        """A wavelength [m] for each channel of a colour sensor."""
+        return cls((red, green, blue), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), bayer)
+
+    def lit(self, scene: Scene, number: int) -> Scene:
+        """What the scene gives off at a wavelength: colours (y, x, 3) by the channels that see it."""
+        parts = []
+        for part in scene.parts:
+            if isinstance(part, Slice) and part.intensity.ndim == 3:
+                part = replace(part, intensity=self._of_wavelength(part.intensity, number))
+            parts.append(part)
+        return Scene(parts)
+
+    def _of_wavelength(self, colours: Any, number: int) -> Any:
+        weights = np.array(self.weights[number])
+        if colours.shape[2] != 3 or len(weights) != 3:
+            raise GeometryError(
+                f"a slice has {colours.shape[2]} colours but the spectrum has {len(weights)} channels. "
+                "Give a grey slice (y, x), or 3 of both."
+            )
+        share = arrays.like(weights / max(weights.sum(), 1e-300), colours)
+        return arrays.namespace(colours).sum(colours * share, axis=2)
+
+    def seen(self, images: Sequence[np.ndarray]) -> np.ndarray:
+        """Raw image (ny, nx), or (ny, nx, 3), of the images (ny, nx) at all wavelengths."""
+        image = np.tensordot(np.array(images), np.array(self.weights, np.float32), axes=(0, 0))
+        if image.shape[2] == 1:
+            return image[:, :, 0]
+        return image if self.bayer is None else mosaic(image, self.bayer)
+
+
+def by_wavelength(
+    camera: Any, scene: Scene, spectrum: Spectrum, image: Callable[[Any, Scene, int], RawImage]
+) -> RawImage:
+    """Raw image of a scene through ``image(camera, scene, number)`` at each wavelength of a spectrum.
+
+    Raises
+    ------
+    GeometryError
+        A camera that cannot change its wavelength.
+    """
+    checks.instance("spectrum", spectrum, Spectrum)
+    if not hasattr(camera, "replace"):
+        raise GeometryError(
+            f"camera is of type {type(camera).__name__}, whose wavelength cannot be replaced. "
+            "Leave spectrum out, or use a camera such as PlenopticCamera."
+        )
+    raws = [
+        image(camera.replace(wavelength=wavelength), spectrum.lit(scene, number), number)
+        for number, wavelength in enumerate(spectrum.wavelengths)
+    ]
+    known = {**raws[0].metadata, "wavelength": spectrum.wavelengths}
+    data = spectrum.seen([raw.data for raw in raws])
+    return replace(raws[0], data=data, bayer=spectrum.bayer, metadata=known)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mixed:
+    """Operator of a channel: those of several wavelengths, weighted and added up.
+
+    Parameters
+    ----------
+    operators
+        Of one shape, with ``forward`` and ``adjoint``.
+    weights
+        One for each.
+    """
+
+    operators: Sequence[Any]
+    weights: Sequence[float]
+
+    @property
+    def shape(self) -> tuple[tuple[int, int], tuple[int, ...]]:
+        """Of the raw image and of the object."""
+        return self.operators[0].shape
+
+    @property
+    def object_grid(self) -> Any:
+        """Samples of the object."""
+        return self.operators[0].object_grid
+
+    @property
+    def depths(self) -> tuple[float, ...] | None:
+        """Of the object's planes [m]; None for one plane."""
+        return getattr(self.operators[0], "depths", None)
+
+    def forward(self, intensity: Array, /) -> Array:
+        """Raw image (ny, nx) of an object's intensity, the same at all wavelengths."""
+        images = [w * a.forward(intensity) for w, a in zip(self.weights, self.operators, strict=True)]
+        return sum(images[1:], images[0])
+
+    def adjoint(self, raw: Array, /) -> Array:
+        """Transpose of `forward`."""
+        objects = [w * a.adjoint(raw) for w, a in zip(self.weights, self.operators, strict=True)]
+        return sum(objects[1:], objects[0])
+
+    def psf(self, index: tuple[int, ...], /) -> Array:
+        """Raw image (ny, nx), float32, of one object sample of intensity 1."""
+        point = np.zeros(self.shape[1], np.float32)
+        point[index] = 1
+        return self.forward(point)
