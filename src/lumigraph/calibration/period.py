@@ -22,10 +22,13 @@ _ORDERS = (2.6, 4.6)  # of the harmonics are looked at
 _EVIDENCE = 6.0  # of the score: noise reaches 3, a lattice on a clean white image 30 to 200
 _GOOD = 0.5  # of the best score: what the coarsest must have
 _MARGIN = 0.85  # the second candidate must stay below this part of the first
-_THIRDS, _HALVES = ((8, 8), (16, 16)), ((12, 0), (0, 12), (12, 12))
-_SAME = 0.8  # correlation of lenslets of one kind
+_THIRDS = (8, 8), (16, 16)
+_ALIASED = 12.0  # px of pitch below which whole pixels make neighbours differ
+_ABSENT = 0.12  # of the weakest first harmonic of the finer lattice: what only the coarser one has
+_FOLDED = 768  # px of the middle that are folded
 _ALIKE = 0.4  # correlation of lenslets of several kinds
 _FEWEST = 2.8  # lenslets across a picture
+_SUBLATTICES = [(a, b, n // a) for n in (4, 3, 2) for a in (1, 2, 3, 4) if n % a == 0 for b in range(n // a)]
 _NEAR = 0.012  # of a pitch, within which two candidates are one
 _AROUND = 0.04  # and within which polishing one finds the other
 _LOOKED_AT = 4  # candidates polished
@@ -103,13 +106,14 @@ def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
     if not found:
         raise CalibrationError(_nothing(pairs, repeats[int(np.argmax(tops))]))
     ranked = _ranked(spectra, found)
-    gaps = Gaps(middles[1])
+    gaps, light = Gaps(middles[1]), Gaps(_middle(features[0], _FOLDED))
     chosen: list[Vectors] = []
     for candidate in ranked:
-        if len(chosen) == _LOOKED_AT:
+        if len(chosen) == _LOOKED_AT or candidate.score < 0.5 * ranked[0].score:
             break
-        if not any(_same(candidate.vectors, other, _AROUND) for other in chosen):
-            chosen.append(candidate.vectors)
+        finest = _finest(light, candidate.vectors)
+        if not any(_same(finest, other, _AROUND) for other in chosen):
+            chosen.append(finest)
     chosen = [_single(middles, vectors) for vectors in chosen]
     sharp = _distinct([_polished(gaps, vectors) for vectors in chosen], _NEAR)
     return _best(_ranked(spectra, sharp), request, middles[0].shape)
@@ -121,6 +125,39 @@ def _polished(gaps: Gaps, vectors: Vectors) -> Vectors:
     return vectors if again is None else again._replace(kinds=vectors.kinds)
 
 
+def _finest(light: Gaps, vectors: Vectors) -> Vectors:
+    """The finest lattice that holds a candidate's points and all harmonics that its light really has.
+
+    Micro-images of 5.5 px repeat on whole pixels after 11 px only: the aliases of high orders leave lines,
+    faint ones, at the harmonics of the coarser lattice.
+    """
+    if _pitch(vectors) > 2.2 * _ALIASED:
+        return vectors
+    coarse = np.stack([vectors.column, vectors.row], -1)
+    for a, b, d in _SUBLATTICES:
+        divided = coarse @ np.linalg.inv(np.array([[a, b], [0, d]], float))
+        first, second = reduced(divided[:, 0], divided[:, 1])
+        finer = _vectors(first, second) if math.hypot(*first) >= SMALLEST_PITCH else None
+        if finer is not None and _pitch(finer) < _ALIASED and _absent(light, coarse, finer):
+            return finer
+    return vectors
+
+
+def _absent(light: Gaps, coarse: np.ndarray, finer: Vectors) -> bool:
+    """Whether the light has no harmonics, to the order of the finer lattice's first, but its own."""
+    fine = np.stack([finer.column, finer.row], -1)
+    steps = np.stack(np.meshgrid(*2 * [np.arange(-5, 6)], indexing="ij"), -1).reshape(-1, 2)
+    waves = steps @ np.linalg.inv(coarse)
+    order = waves @ fine
+    own = (np.abs(order - np.rint(order)) < 1e-6).all(-1)
+    size = np.hypot(*waves.T)
+    first = np.sort(size[own & (size > 1e-9)])[3]  # both directions of two waves
+    near = (size < 1.2 * first) & (size > 1e-9) & (waves[:, 1] >= 0)
+    heights = light.heights(waves)
+    mine, rest = heights[near & own], heights[near & ~own]
+    return bool(len(rest) and rest.max() < _ABSENT * mine.min())
+
+
 def _single(features: list[np.ndarray], vectors: Vectors) -> Vectors:
     """The lattice of single lenslets where a hexagonal candidate is that of one of three kinds.
 
@@ -128,12 +165,9 @@ def _single(features: list[np.ndarray], vectors: Vectors) -> Vectors:
     mean cell resembles itself moved by a third of its diagonal; the places between the lenslets of a
     lattice with one kind do not resemble lenslets.
     """
-    half = vectors._replace(row=vectors.row / 2, column=vectors.column / 2)
-    if math.hypot(*half.row) >= SMALLEST_PITCH and _likeness(features[0], vectors, _HALVES) > _SAME:
-        return half  # whole pixels make neighbours of 5.5 px differ, and repeat after 11
-    if vectors.layout != "hex":
+    if vectors.layout != "hex" or _pitch(vectors) / math.sqrt(3) < SMALLEST_PITCH:
         return vectors
-    if max(_likeness(feature, vectors, _THIRDS) for feature in features) < _ALIKE:
+    if max(_likeness(_middle(feature, _FOLDED), vectors, _THIRDS) for feature in features) < _ALIKE:
         return vectors
     first, second = reduced((vectors.row + vectors.column) / 3, (2 * vectors.row - vectors.column) / 3)
     return Vectors(*_oriented(first, second, "hex"), "hex", 3)
@@ -154,10 +188,10 @@ def _likeness(feature: np.ndarray, vectors: Vectors, moves: tuple[tuple[int, int
     return min(float(np.corrcoef(cell.ravel(), other.ravel())[0, 1]) for other in moved)
 
 
-def _middle(feature: np.ndarray) -> np.ndarray:
+def _middle(feature: np.ndarray, size: int = _SIZE) -> np.ndarray:
     ny, nx = feature.shape
-    y, x = max(0, (ny - _SIZE) // 2), max(0, (nx - _SIZE) // 2)
-    return feature[y : y + _SIZE, x : x + _SIZE]
+    y, x = max(0, (ny - size) // 2), max(0, (nx - size) // 2)
+    return feature[y : y + size, x : x + size]
 
 
 def _pairs(

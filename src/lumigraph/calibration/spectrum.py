@@ -119,11 +119,16 @@ class Gaps:
         size = [2 * n for n in gaps.shape]
         spectrum: Any = scipy.fft.rfft2(wave, size, workers=WORKERS)
         self.amplitude = np.abs(spectrum).astype(np.float32)
+        self._samples = np.array(size, float)[:, None]
 
     def height(self, waves: np.ndarray) -> float:
         """Sum of the amplitudes at waves (k, 2) as (y, x) [1/px], whose x is not below 0."""
-        at = np.stack([waves[:, k] * 2 * n for k, n in enumerate(self.shape)])
-        return float(ndimage.map_coordinates(self.amplitude, at, order=1, mode="grid-wrap").sum())
+        return float(self.heights(waves).sum())
+
+    def heights(self, waves: np.ndarray) -> np.ndarray:
+        """Amplitudes (k,) at waves (k, 2) as (y, x) [1/px], whose x is not below 0."""
+        at = waves.T * self._samples
+        return ndimage.map_coordinates(self.amplitude, at, order=1, mode="grid-wrap")
 
 
 def polished(gaps: Gaps, basis: _Basis) -> tuple[np.ndarray, np.ndarray]:
