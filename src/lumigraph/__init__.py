@@ -129,6 +129,7 @@ _HOMES = {
     "lumigraph.scene": ("Points", "Scene", "Slice", "targets"),
     "lumigraph.sensor": ("Sensor", "demosaic"),
     "lumigraph.simulation": ("Coherent", "Incoherent", "Snapshots", "Spectrum", "TiltedWaves", "simulate"),
+    "lumigraph.viewer": ("view_inline",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -200,6 +201,7 @@ __all__ = [
     "targets",
     "units",
     "view",
+    "view_inline",
     "view_path",
 ]
 

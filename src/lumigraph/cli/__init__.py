@@ -4,6 +4,8 @@
 - `options`: what verbs share: `--json`, `--debug`, quantities with units
 - `files`: reading inputs, checking outputs before a computation, writing them
 - `console`: results on standard output, progress on standard error
+- `reporting`: `--report` of every verb that computes
+- `serving`: where a page is served, and opening a browser
 - `demo`, `design`, `simulate`, `calibrate`, `decode`, `render`, `refocus`, `depth`, `deconvolve`, `view`,
   `reproduce`: the verbs
 

@@ -13,11 +13,12 @@ from cyclopts.exceptions import CycloptsError
 from lumigraph.cli.calibrate import calibrate
 from lumigraph.cli.decode import decode
 from lumigraph.cli.deconvolve import deconvolve
-from lumigraph.cli.depth import depth
 from lumigraph.cli.demo import demo
+from lumigraph.cli.depth import depth
 from lumigraph.cli.design import design
 from lumigraph.cli.refocus import refocus
 from lumigraph.cli.render import render
+from lumigraph.cli.reporting import COMMAND
 from lumigraph.cli.reproduce import reproduce
 from lumigraph.cli.simulate import simulate
 from lumigraph.cli.view import view
@@ -59,6 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
+    COMMAND.set(tuple(words))
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:

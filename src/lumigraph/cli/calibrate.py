@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import progress, report
-from lumigraph.cli.options import COMMON, Common, Output, above_zero, length
+from lumigraph.cli.console import progress
+from lumigraph.cli.options import Output, above_zero, length
+from lumigraph.cli.reporting import REPORTED, Reported, told
 from lumigraph.errors import CalibrationError
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def calibrate(
     explain: Annotated[bool, Parameter(negative=())] = False,
     overlay: Path | None = None,
     bench: Bench = Bench(),
-    common: Common = COMMON,
+    common: Reported = REPORTED,
 ) -> None:
     """Find the micro-images on a white image, or on a raw image alone, and write their lattice.
 
@@ -88,6 +89,7 @@ def calibrate(
     from lumigraph import calibration as verbs
     from lumigraph import io
 
+    common.check()
     files.check_output(output, (".toml",))
     if overlay is not None:
         files.check_output(overlay, files.FIGURES)
@@ -106,7 +108,8 @@ def calibrate(
     io.save(found, output)
     lines = [found.report(), *(f"note        {note}" for note in found.notes), *advice.get("advice", ())]
     text = "\n".join([*lines, f"written     {output}"])
-    report(common, text, {**_values(found), **advice, "output": str(output)})
+    values = {**_values(found), **advice, "output": str(output)}
+    told(common, text, values, lambda: _page(picture, found, advice), _numbers(found))
 
 
 def _advice(white: "RawImage", bench: Bench) -> dict[str, Any]:
@@ -120,6 +123,36 @@ def _advice(white: "RawImage", bench: Bench) -> dict[str, Any]:
         raise CalibrationError(f"{bench.camera} has no lenslets to adjust. Give a camera with lenslets.")
     found = diagnose(white, camera)
     return {"advice": found.report().splitlines(), "faults": list(found.faults)}
+
+
+def _numbers(found: "Calibration") -> list[tuple[str, str]]:
+    from lumigraph.core.picture import length
+
+    lines = [(line[:12].strip(), line[12:]) for line in found.report().splitlines()]
+    known = ("pixel_pitch", "separation", "lenslet_distance")
+    return [*lines, *((name.replace("_", " "), length(getattr(found, name))) for name in known)]
+
+
+def _page(white: "RawImage", found: "Calibration", advice: dict[str, Any]) -> Any:
+    import numpy as np
+
+    from lumigraph import plots
+    from lumigraph.report import Page
+
+    page = Page("Calibrate", "Where the micro-images stand on the sensor.")
+    page.section("Lattice").figure(
+        plots.lattice(white, found), "The lattice over the white image.", wide=True
+    )
+    distance = np.sort(np.hypot(*found.residuals.T))
+    if len(distance):
+        share = np.arange(1, len(distance) + 1) / len(distance)
+        drawn = plots.curves(distance, {"": share}, xlabel="distance from the lattice [px]", ylabel="share")
+        page.section("Residuals").figure(
+            drawn, "Share of the micro-images that stand as near to their place."
+        )
+    if found.notes or advice:
+        page.section("What to know").text("\n\n".join([*found.notes, *advice.get("advice", ())]))
+    return page
 
 
 def _values(found: "Calibration") -> dict[str, Any]:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import progress, report
-from lumigraph.cli.options import COMMON, Common, Output
+from lumigraph.cli.console import progress
+from lumigraph.cli.options import Output
 from lumigraph.cli.origin import NO_ORIGIN, PLENOPTIC, Origin
+from lumigraph.cli.reporting import REPORTED, Reported, told
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def decode(
     origin: Origin = NO_ORIGIN,
     devignette: Annotated[bool | None, Parameter(negative="--no-devignette")] = None,
     sampling: Sampling = Sampling(),
-    common: Common = COMMON,
+    common: Reported = REPORTED,
 ) -> None:
     """Decode a raw image of a plenoptic camera 1.0 into views.
 
@@ -80,6 +81,7 @@ def decode(
     """
     from lumigraph import io, rendering
 
+    common.check()
     files.check_output(output, files.VIEWS)
     options = sampling.chosen()
     picture = files.read_raw(raw)
@@ -95,7 +97,36 @@ def decode(
         share = 0.0 if views.valid is None else 1 - float(views.valid.mean())
         lines.insert(1, f"{int(bad.sum())} hot pixels, {100 * share:.2g} % of the samples are not valid")
         values |= {"hot_pixels": int(bad.sum()), "invalid": share}
-    report(common, "\n".join(lines), values)
+    told(common, "\n".join(lines), values, lambda: _page(picture, views), _numbers(views))
+
+
+def _numbers(views: Any) -> list[tuple[str, str]]:
+    from lumigraph.core.picture import length
+
+    nv, nu, nt, ns = views.data.shape[:4]
+    return [
+        ("views", f"{nv} x {nu}"), ("samples of a view", f"{nt} x {ns} px"),
+        ("main lens to lenslets", length(views.separation)),
+        ("views apart", length(views.aperture.pitch[1])), ("samples apart", length(views.lenslets.pitch[1])),
+    ]  # fmt: skip
+
+
+def _page(raw: "RawImage", views: Any) -> Any:
+    from lumigraph.report import Page
+
+    nv, nu = views.data.shape[:2]
+    page = Page("Decode", "A raw image of a plenoptic camera 1.0, and its views.")
+    section = page.section("Views")
+    section.figure(views.view(nv // 2, nu // 2), "The middle view.")
+    section.figure(
+        views.view(nv // 2, nu - 1 - nu // 8), "A view from the side: what is near or far has moved."
+    )
+    section.figure(
+        views.data[nv // 2, :, views.data.shape[2] // 2],
+        "Epipolar-plane image: the middle row of lenslets (across) from each view (down).",
+    )
+    page.section("Raw image").figure(raw, "As it was read.")
+    return page
 
 
 def _hot(picture: "RawImage", origin: Origin) -> Any:

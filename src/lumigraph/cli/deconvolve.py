@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import report, stages
-from lumigraph.cli.options import COMMON, Common, Output, above_zero, length
+from lumigraph.cli.console import stages
+from lumigraph.cli.options import Output, above_zero, length
+from lumigraph.cli.reporting import REPORTED, Reported, told
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -164,8 +165,7 @@ def deconvolve(
     seen: Seen = Seen(),
     wanted: Wanted = Wanted(),
     way: Way = Way(),
-    page: Annotated[Path | None, Parameter(name="--report")] = None,
-    common: Common = COMMON,
+    common: Reported = REPORTED,
 ) -> None:
     """Reconstruct what was in front of a microscope or a camera with lenslets from one raw image.
 
@@ -182,8 +182,6 @@ def deconvolve(
         Volume (.ome.tif, .ome.zarr, .h5) or picture (.tiff, .png, .zarr).
     camera
         Camera file (TOML), or the name of a bundled one.
-    page
-        Report with the likelihood, maximum projections and slices (.html).
     """  # noqa: E501 - an example is one line
     from lumigraph import io
     from lumigraph.deconvolution import Interrupted, Stop
@@ -191,8 +189,7 @@ def deconvolve(
     from lumigraph.instruments import load_camera
 
     files.check_output(output, (*files.PICTURES, ".h5", ".hdf5"))
-    if page is not None:
-        files.check_output(page, (".html",))
+    common.check()
     way.check()
     wanted_depths, described = wanted.depths(), load_camera(camera)
     picture = files.read_raw(raw)
@@ -218,10 +215,8 @@ def deconvolve(
             raise KeyboardInterrupt(f"{stopped.iterations} iterations are in {kept}.") from None
     io.save(found, output)
     values = _values(found, steps, output)
-    if page is not None:
-        _page(found, picture, steps, values).write(page)
-        values["report"] = str(page)
-    report(common, _text(values), values)
+    numbers = [(name.replace("_", " "), _shown(name, value)) for name, value in values.items()]
+    told(common, _text(values), values, lambda: _page(found, picture, steps), numbers)
 
 
 def depths(option: str, text: str) -> tuple[float, ...]:
@@ -325,10 +320,20 @@ def _text(values: dict[str, Any]) -> str:
         text += f"\n{values['iterations']} iterations, deviance {values['deviance']:.4g} per pixel"
     else:
         text += "\nthe checkpoint was finished already"
-    return text + "".join(f"\nwritten {values[key]}" for key in ("output", "report") if key in values)
+    return text + "".join(f"\nwritten {values[key]}" for key in ("output",))
 
 
-def _page(found: Any, raw: "RawImage", steps: "list[Step]", values: dict[str, Any]) -> Any:
+def _shown(name: str, value: Any) -> str:
+    """A number as the report tells it, with its unit."""
+    from lumigraph.core.picture import length
+
+    if name in ("depths", "pitch", "object_pitch", "grid_pitch", "spacing"):
+        each = value if isinstance(value, list | tuple) else [value]
+        return ", ".join(length(float(one)) for one in each)
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def _page(found: Any, raw: "RawImage", steps: "list[Step]") -> Any:
     """Likelihood, pictures, numbers."""
     from lumigraph import plots
     from lumigraph.core.volume import Volume
@@ -349,5 +354,4 @@ def _page(found: Any, raw: "RawImage", steps: "list[Step]", values: dict[str, An
             log=True,
         )  # fmt: skip
         page.section("Convergence").figure(drawn, "Poisson deviance per pixel: less is likelier.")
-    page.section("Numbers").table({name: str(value) for name, value in values.items()})
     return page

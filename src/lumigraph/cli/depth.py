@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import Count, progress, report
-from lumigraph.cli.options import COMMON, Common, Output, above_zero, length
+from lumigraph.cli.console import Count, progress
+from lumigraph.cli.options import Output, above_zero, length
 from lumigraph.cli.origin import FOCUSED, NO_ORIGIN, PLENOPTIC, Origin
 from lumigraph.cli.refocus import range_of
+from lumigraph.cli.reporting import REPORTED, Reported, told
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -129,7 +130,7 @@ def depth(
     origin: Origin = NO_ORIGIN,
     search: Search = Search(),
     lengths: Lengths = Lengths(),
-    common: Common = COMMON,
+    common: Reported = REPORTED,
 ) -> None:
     """Measure the depth of what views or a raw image show.
 
@@ -152,6 +153,7 @@ def depth(
     lowest
         Confidence below which a point is left out of .ply.
     """
+    common.check()
     files.check_output(output, MAPS)
     if confidence is not None:
         files.check_output(confidence, MAPS[:-1])
@@ -170,7 +172,26 @@ def depth(
         io.save(found.confidence, confidence)
     text, values = _told(found)
     written = [str(path) for path in (output, confidence) if path is not None]
-    report(common, "\n".join([text, *(f"written {path}" for path in written)]), {**values, "output": written})
+    text = "\n".join([text, *(f"written {path}" for path in written)])
+    numbers = [
+        (name, f"{value:.4g} {unit}".strip() if isinstance(value, float) else str(value))
+        for name, value in values.items()
+        for unit in [found.unit if name in ("low", "median", "high") and found.unit != "1" else ""]
+    ]
+    told(common, text, {**values, "output": written}, lambda: _page(found, picture), numbers)
+
+
+def _page(found: "DepthMap", picture: Any) -> Any:
+    from lumigraph import plots
+    from lumigraph.report import Page
+
+    page = Page("Depth", "How far what is seen stands, and how sure that is.")
+    section = page.section("Map")
+    section.figure(plots.show(found.values), f"{found.quantity.capitalize()} [{found.unit}].")
+    section.figure(plots.show(found.confidence), "Confidence, 0 to 1.")
+    if picture is not None:
+        section.figure(picture, "The picture of the same places.")
+    return page
 
 
 def _measured(source: Path, how: tuple[Origin, Search], shown: Count) -> "tuple[DepthMap, Any, Any]":

@@ -1,16 +1,56 @@
 """`lumigraph design`."""
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import report
-from lumigraph.cli.options import COMMON, Common
+from lumigraph.cli.reporting import REPORTED, Reported, told
+from lumigraph.cli.serving import Port, announce, check_port
+from lumigraph.errors import FormatError
+
+if TYPE_CHECKING:
+    from lumigraph.report import Page
 
 
-def design(camera: str, /, *, plot: Path | None = None, common: Common = COMMON) -> None:
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Web:
+    """The designer's page.
+
+    Parameters
+    ----------
+    web
+        Open the designer in the browser: sliders, layout, trade-offs, the image of a point, at once.
+    port
+        Of this computer, for its own browser only; any free one if left out.
+    no_open
+        Do not open a browser.
+    """
+
+    web: Annotated[bool, Parameter(negative="")] = False
+    port: Port = 0
+    no_open: Annotated[bool, Parameter(negative="")] = False
+
+    def check(self) -> None:
+        """Refuse what is wrong before anything is read."""
+        check_port(self.port)
+        if not self.web and (self.port or self.no_open):
+            raise FormatError("--port and --no-open are for the designer's page. Give --web too.")
+
+
+def design(
+    camera: str, /, *, plot: Path | None = None, page: Web = Web(), common: Reported = REPORTED
+) -> None:
     """Print everything that follows from a camera's description, with its equations.
 
+    With --web it opens a page in which the camera can be changed, and ends with Ctrl-C.
+
     Example: `lumigraph design camera.toml --plot rays.png`
+
+    Example: `lumigraph design camera.toml --web`
 
     Parameters
     ----------
@@ -21,6 +61,8 @@ def design(camera: str, /, *, plot: Path | None = None, common: Common = COMMON)
     """
     from lumigraph.instruments import load_camera
 
+    common.check()
+    page.check()
     if plot is not None:
         files.check_output(plot, files.FIGURES)
     described = load_camera(camera)
@@ -28,5 +70,35 @@ def design(camera: str, /, *, plot: Path | None = None, common: Common = COMMON)
     if plot is not None:
         from lumigraph import plots
 
-        files.save_figure(plots.layout(described), plot)
-    report(common, str(table), table.as_dict())
+        files.save_figure(plots.layout(_with_rays(described)), plot)
+    told(common, str(table), table.as_dict(), lambda: _page(described, table))
+    if page.web:
+        from lumigraph import viewer
+
+        site = viewer.designer_site(described, Path(camera).name)
+        viewer.serve(
+            site, port=page.port, ready=lambda address: announce(address, common, no_open=page.no_open)
+        )
+
+
+def _with_rays(camera: Any) -> Any:
+    if not hasattr(camera, "main_lens"):
+        raise FormatError("a light-field microscope has no drawing of rays. Leave out --plot.")
+    return camera
+
+
+def _page(camera: Any, table: Any) -> "Page":
+    from lumigraph import plots
+    from lumigraph.report import Page
+
+    page = Page("Design", f"{table.title[0].upper()}{table.title[1:]}, and all that follows in closed form.")
+    if table.warnings:
+        page.section("Warnings").text("\n\n".join(table.warnings))
+    if hasattr(camera, "main_lens"):
+        page.section("Layout").figure(plots.layout(camera), "Rays through the camera.", wide=True)
+    for title, rows in table.sections:
+        page.section(title).table(
+            [(row.name, row.text, row.source) for row in rows], header=("quantity", "value", "equation")
+        )
+    page.section("Camera file").lines(camera.to_toml())
+    return page

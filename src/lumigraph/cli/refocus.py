@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import Count, progress, report
-from lumigraph.cli.options import COMMON, Common, Output, length
+from lumigraph.cli.console import Count, progress
+from lumigraph.cli.options import Output, length
 from lumigraph.cli.origin import NO_ORIGIN, PLENOPTIC, Origin
+from lumigraph.cli.reporting import REPORTED, Reported, told
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 _MOST = 1000
 _MOST_SAMPLES = 64
+MOST_SHOWN = 24
+"""Pictures in a report."""
 
 
 @Parameter(name="*")
@@ -118,7 +121,7 @@ def refocus(
     focus: Focus = Focus(),
     origin: Origin = NO_ORIGIN,
     quality: Quality = Quality(),
-    common: Common = COMMON,
+    common: Reported = REPORTED,
 ) -> None:
     """Focus afresh on one or more depths.
 
@@ -136,6 +139,7 @@ def refocus(
         One focus: a picture (.png, .tiff, .zarr). Several: a stack (.tiff), a film (.gif, .mp4) or a folder
         for PNG files.
     """
+    common.check()
     quality.check()
     alphas = focus.chosen(origin.described(PLENOPTIC) if focus.depth else None)
     _check_output(output, alphas)
@@ -145,7 +149,28 @@ def refocus(
     shape = images[0].shape[:2]
     lines = [f"alpha {alpha:g}: {shape[0]} x {shape[1]} px" for alpha in alphas]
     text = "\n".join([*lines, *(f"written {path}" for path in written)])
-    report(common, text, {"alphas": alphas, "shape": shape, "output": [str(path) for path in written]})
+    values = {"alphas": alphas, "shape": shape, "output": [str(path) for path in written]}
+    told(common, text, values, lambda: _page(images, alphas), _numbers(shape, quality))
+
+
+def _numbers(shape: tuple[int, ...], quality: Quality) -> list[tuple[str, str]]:
+    return [
+        ("picture", f"{shape[0]} x {shape[1]} px"), ("method", quality.method),
+        ("aperture", f"{100 * quality.aperture:g} %, {quality.shape}"),
+    ]  # fmt: skip
+
+
+def _page(images: list[Any], alphas: list[float]) -> Any:
+    from lumigraph.report import Page
+
+    page, shown = Page("Refocus", "Pictures focused afresh; α' above 1 is farther."), images[:MOST_SHOWN]
+    white = max(float(image.max()) for image in images) or None
+    section = page.section("Pictures")
+    for image, alpha in zip(shown, alphas, strict=False):
+        section.figure(image, f"α' = {alpha:g}", white=white)
+    if len(images) > len(shown):
+        section.text(f"{len(images) - len(shown)} more are not shown.")
+    return page
 
 
 def light_field(path: Path, origin: Origin) -> "LightField":

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import Count, progress, report
-from lumigraph.cli.options import COMMON, Common, Output, length
+from lumigraph.cli.console import Count, progress
+from lumigraph.cli.options import Output, length
 from lumigraph.cli.origin import FOCUSED, NO_ORIGIN, Origin
-from lumigraph.cli.refocus import range_of
+from lumigraph.cli.refocus import MOST_SHOWN, range_of
+from lumigraph.cli.reporting import REPORTED, Reported, told
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -167,7 +168,7 @@ def render(
     origin: Origin = NO_ORIGIN,
     tiles: Tiles = Tiles(),
     look: Look = Look(),
-    common: Common = COMMON,
+    common: Reported = REPORTED,
 ) -> None:
     """Render pictures of a focused plenoptic camera 2.0 from its raw image, or out of views.
 
@@ -188,6 +189,7 @@ def render(
     """
     from lumigraph.core.lightfield import LightField
 
+    common.check()
     several = tiles.patches is not None or look.path is not None
     files.check_output(output, (".tif", ".tiff", *files.MOVIES) if several else files.PICTURES)
     if depth_map is not None:
@@ -210,7 +212,43 @@ def render(
     text += f"\nwritten {output}"
     if depth_map is not None:
         text, values = text + _save_map(extra, depth_map), {**values, "map": str(depth_map)}
-    report(common, text, values)
+    told(common, text, values, lambda: _page(output, extra), _numbers(values))
+
+
+def _numbers(values: dict[str, Any]) -> list[tuple[str, str]]:
+    rows, columns = values["shape"][:2]
+    found = [("picture", f"{rows} x {columns} px")]
+    for key, name, unit in (
+        ("patch_px", "patch", " px"),
+        ("alpha", "refocus factors", ""),
+        ("frames", "frames", ""),
+    ):
+        if key in values:
+            each = values[key] if isinstance(values[key], list | tuple) else [values[key]]
+            found.append((name, " to ".join(f"{x:.5g}{unit}" for x in sorted({each[0], each[-1]}))))
+    return found
+
+
+def _page(output: Path, extra: Any) -> Any:
+    from lumigraph import io
+    from lumigraph.core.stack import Stack
+    from lumigraph.report import Page
+
+    page = Page("Render", "The picture that was written.")
+    section = page.section("Picture")
+    if output.suffix.lower() in files.MOVIES:
+        section.text(f"The film is in {output.name}.")
+    else:
+        found = io.open(output)
+        pictures = list(found.data) if isinstance(found, Stack) else [found]
+        for number, image in enumerate(pictures[:MOST_SHOWN], 1):
+            caption = f"Picture {number} of {len(pictures)}." if len(pictures) > 1 else "The picture."
+            section.figure(image, caption)
+    if extra is not None:
+        from lumigraph import plots
+
+        section.figure(plots.show(extra.values), f"{extra.quantity} [{extra.unit}] of each place.")
+    return page
 
 
 _Made = tuple[str, dict[str, Any], Any]

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import progress, report
-from lumigraph.cli.options import COMMON, Common, Output, length
+from lumigraph.cli.console import progress
+from lumigraph.cli.options import Output, length
+from lumigraph.cli.reporting import REPORTED, Reported, told
 from lumigraph.errors import FormatError, GeometryError
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ def simulate(
     light: Light = Light(),
     seed: int = 0,
     noise: Annotated[bool, Parameter(negative="")] = False,
-    common: Common = COMMON,
+    common: Reported = REPORTED,
 ) -> None:
     """Simulate the raw image of a scene by wave optics.
 
@@ -160,6 +161,7 @@ def simulate(
     from lumigraph.instruments import LightFieldMicroscope, load_camera
     from lumigraph.simulation import Interrupted, simulate
 
+    common.check()
     files.check_output(output, files.PICTURES)
     stage.check()
     if seed < 0:
@@ -204,7 +206,38 @@ def simulate(
         "pixel_pitch": raw.pixel_pitch,
         "estimated_error": error,
     }
-    report(common, text, {**values, "coherence": light.coherence, "output": str(output)})
+    values |= {"coherence": light.coherence, "output": str(output)}
+    told(common, text, values, lambda: _page(raw, scene, described), _numbers(raw, light))
+
+
+def _numbers(raw: Any, light: Light) -> list[tuple[str, str]]:
+    from lumigraph.core.picture import length
+
+    error = raw.metadata.get("estimated_error")
+    found = [
+        ("raw image", f"{raw.shape[0]} x {raw.shape[1]} px"), ("pixel pitch", length(raw.pixel_pitch)),
+        ("mean", f"{raw.data.mean():.4g} {'of an even scene' if raw.bit_depth is None else 'counts'}"),
+        ("largest", f"{raw.data.max():.4g}"), ("light", light.coherence),
+    ]  # fmt: skip
+    return found if error is None else [*found, ("estimated error", f"{100 * error:.2g} % rms")]
+
+
+def _page(raw: Any, scene: "Scene", camera: Any) -> Any:
+    from lumigraph import plots
+    from lumigraph.report import Page
+
+    table = camera.describe()
+    page = Page("Simulate", f"What the sensor of a {table.title} sees.")
+    section = page.section("Raw image").figure(raw, "Upright, as a camera reads it out.", wide=True)
+    rows, columns = raw.shape
+    middle = [slice(max(0, n // 2 - 80), n // 2 + 80) for n in (rows, columns)]
+    section.figure(raw.data[middle[0], middle[1]], "The middle, pixel by pixel.", zoom=3)
+    if hasattr(camera, "main_lens"):
+        page.section("Camera").figure(plots.layout(camera), "Rays through the camera.")
+    if table.warnings:
+        page.section("Warnings").text("\n\n".join(table.warnings))
+    page.section("Camera file").lines(camera.to_toml())
+    return page
 
 
 def _scene(name: str, grid: "Grid") -> "Scene":

@@ -9,9 +9,8 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import report, stages
 from lumigraph.cli.options import COMMON, Common
+from lumigraph.cli.serving import Port, announce, check_port
 from lumigraph.errors import FormatError
-
-_MOST_PORT = 65535
 
 
 @Parameter(name="*")
@@ -51,17 +50,14 @@ class Page:
         Of the exported views, 1 to 99; 100 keeps every number, in a file several times as large.
     """
 
-    port: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0
+    port: Port = 0
     no_open: Annotated[bool, Parameter(negative="")] = False
     export: Path | None = None
     quality: Annotated[int, Parameter(allow_leading_hyphen=True)] = 90
 
     def check(self) -> None:
         """Refuse what is wrong before anything is read."""
-        if not 0 <= self.port <= _MOST_PORT:
-            raise FormatError(
-                f"--port is {self.port} but must be from 1 to {_MOST_PORT}, or 0 for a free one."
-            )
+        check_port(self.port)
         if not 1 <= self.quality <= 100:
             raise FormatError(f"--quality is {self.quality} but must be from 1 to 100.")
         if self.export is not None:
@@ -105,7 +101,11 @@ def view(
         text = f"written {written.path}: {_megabytes(written.size)} ({parts})"
         report(common, text, {"output": str(written.path), "bytes": written.size, "arrays": written.arrays})
         return
-    viewer.serve(viewer.site(exhibits), port=page.port, ready=lambda address: _ready(address, page, common))
+    viewer.serve(
+        viewer.site(exhibits),
+        port=page.port,
+        ready=lambda address: announce(address, common, no_open=page.no_open),
+    )
 
 
 def _opened(path: Path, camera: Camera) -> Any:
@@ -114,18 +114,6 @@ def _opened(path: Path, camera: Camera) -> Any:
     origin = viewer.Origin(camera.calibration, camera.white, camera.patch)
     with stages(f"open {path.name}") as shown:
         return viewer.open_exhibit(path, None if origin == viewer.Origin() else origin, shown)
-
-
-def _ready(address: str, page: Page, common: Common) -> None:
-    report(common, address, {"address": address})
-    import sys
-
-    sys.stdout.flush()
-    if not page.no_open:
-        import threading
-        import webbrowser
-
-        threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
 
 def _megabytes(size: int) -> str:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import checks, picture
 from lumigraph.core.lattice import Lattice, Vector
 from lumigraph.core.warp import Warp
 from lumigraph.errors import CalibrationError
@@ -162,6 +162,13 @@ class Calibration:
                 f"the raw image has {shape[0]} x {shape[1]} pixels but the calibration was made on "
                 f"{self.shape[0]} x {self.shape[1]}. Use the white image taken with the same camera settings."
             )
+
+    def _repr_html_(self) -> str:
+        rows = [(line[:12].strip(), line[12:]) for line in self.report().splitlines()]
+        known = ("pixel_pitch", "separation", "lenslet_distance")
+        rows += [(name.replace("_", " "), picture.length(getattr(self, name))) for name in known]
+        drawn = picture.dots(self.position(self.indices), self.shape)
+        return picture.card("Calibration", rows, drawn, "Micro-image centres")
 
     def report(self) -> str:
         """Layout, pitches, rotation, origin and quality of the fit as a few lines of text."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from lumigraph.core import checks
+from lumigraph.core import checks, picture
 from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
@@ -72,6 +72,16 @@ class LightField:
     def epi(self, v: int, t: int) -> Array:
         """Epipolar-plane image (u, s[, c]): one row of lenslets seen from one row of the aperture."""
         return self.data[v, :, t, ...]
+
+    def _repr_html_(self) -> str:
+        nv, nu, nt, ns = self.data.shape[:4]
+        rows = [
+            ("views (v, u)", f"{nv} × {nu}, {picture.length(self.aperture.pitch[1])} apart"),
+            ("samples (t, s)", f"{nt} × {ns}, {picture.length(self.lenslets.pitch[1])} apart"),
+            ("separation", picture.length(self.separation)), ("numbers", picture.numbers(self.data)),
+        ]  # fmt: skip
+        middle = picture.thumbnail(self.view(nv // 2, nu // 2))
+        return picture.card("Light field", rows, middle, "The middle view")
 
     def to_xarray(self) -> Any:
         """The radiance as an `xarray.DataArray` with named axes and coordinates in metres."""

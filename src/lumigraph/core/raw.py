@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from lumigraph.core import checks
+from lumigraph.core import checks, picture
 from lumigraph.core.arrays import Array
 from lumigraph.errors import FormatError, GeometryError
 
@@ -62,3 +62,10 @@ class RawImage:
     def shape(self) -> tuple[int, int]:
         """Rows and columns (ny, nx)."""
         return int(self.data.shape[0]), int(self.data.shape[1])
+
+    def _repr_html_(self) -> str:
+        rows = [("size", f"{picture.sized(self.data.shape)} px"), ("numbers", picture.numbers(self.data))]
+        rows += [("bits", str(self.bit_depth))] if self.bit_depth else []
+        rows += [("Bayer pattern", self.bayer)] if self.bayer else []
+        rows.append(("pixel pitch", picture.length(self.pixel_pitch)))
+        return picture.card("Raw image", rows, picture.thumbnail(self.data))

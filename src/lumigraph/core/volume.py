@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lumigraph.core import checks
-from lumigraph.core.arrays import Array
+from lumigraph.core import checks, picture
+from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 
@@ -80,6 +80,15 @@ class Volume:
         """Mean distance between neighbouring samples (dz, dy, dx) [m]; dz is 0 for one plane."""
         steps = np.abs(np.diff(self.depths))
         return float(steps.mean()) if len(steps) else 0.0, *self.grid.pitch
+
+    def _repr_html_(self) -> str:
+        low, high = (picture.length(dz) for dz in (self.depths[0], self.depths[-1]))
+        rows = [
+            ("samples (z, y, x)", picture.sized(self.shape)), ("depths", f"{low} to {high}"),
+            ("sample pitch", picture.length(self.grid.pitch[1])), ("numbers", picture.numbers(self.data)),
+        ]  # fmt: skip
+        brightest = picture.thumbnail(to_numpy(self.data).max(0))
+        return picture.card("Volume", rows, brightest, "The brightest sample along z")
 
     def plane(self, dz: float) -> Array:
         """The plane (y, x[, c]) whose depth is nearest to `dz` [m]."""

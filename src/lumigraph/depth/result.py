@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import checks, picture
 from lumigraph.core.arrays import Array, like, to_numpy
 from lumigraph.core.lightfield import LightField
 from lumigraph.errors import GeometryError
@@ -78,6 +78,22 @@ class DepthMap:
         """Refocus factors (y, x) of a map that holds them."""
         self.check("alpha")
         return self.values
+
+    def _repr_html_(self) -> str:
+        values, trust = to_numpy(self.values), to_numpy(self.confidence)
+        known = values[np.isfinite(values)]
+        ends = [
+            picture.length(float(end)) if self.unit == "m" else f"{end:.4g} {self.unit}".removesuffix(" 1")
+            for end in ((known.min(), known.max()) if known.size else ())
+        ]
+        rows = [
+            ("size", picture.sized(self.shape)), (self.quantity, " to ".join(ends) or "nothing is known"),
+            ("mean confidence", f"{float(np.nanmean(trust)):.3g}"),
+        ]  # fmt: skip
+        low = float(known.min()) if known.size else 0.0
+        return picture.card(
+            "Depth map", rows, picture.thumbnail(values - low), f"{self.quantity}, least black"
+        )
 
     def trusted(self, lowest: float) -> Array:
         """The values (y, x), NaN where the confidence is below `lowest`."""

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import ValidationError
 
+from lumigraph.core import picture
 from lumigraph.errors import FormatError
 from lumigraph.instruments import files
 from lumigraph.instruments.parts import Part
@@ -61,6 +62,17 @@ class Instrument(Part):
     def to_toml(self) -> str:
         """The description as the text of a camera file; what is computed is left out."""
         return files.write({"kind": self.KIND, **self.model_dump(by_alias=True, exclude_defaults=True)})
+
+    def _repr_html_(self) -> str:
+        table = self.describe()
+        chosen = [row for title, rows in table.sections if title != "Simulation" for row in rows]
+        warned = [("warning", text) for text in table.warnings]
+        rows = [(row.name, f"{row.text}   {row.source and f'({row.source})'}".rstrip()) for row in chosen]
+        return picture.card(f"{table.title[0].upper()}{table.title[1:]}", [*warned, *rows])
+
+    def describe(self) -> Any:
+        """The table of everything that follows from the description."""
+        raise NotImplementedError
 
     def replace(self, **changes: Any) -> Self:
         """The camera with other values; a mapping changes only the keys it has.

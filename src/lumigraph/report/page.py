@@ -1,8 +1,10 @@
 """A page of text, tables and figures, written as one HTML file."""
 
 import os
+import platform
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
@@ -102,6 +104,13 @@ class Page:
         """Add a section and return it."""
         self.sections.append(Section(title))
         return self.sections[-1]
+
+    def made_by(self, command: str) -> Section:
+        """Add the section that says how the page can be made again: the command, versions, the time."""
+        section = self.section("How it was made").lines(command)
+        made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+        versions = {name: version(name) for name in ("lumigraph", "numpy", "scipy")}
+        return section.table({**versions, "Python": platform.python_version(), "made": made})
 
     def html(self) -> str:
         """The page as one HTML document."""

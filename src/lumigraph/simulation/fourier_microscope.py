@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.fft
 
-from lumigraph.core import arrays, checks, memory
+from lumigraph.core import arrays, checks, memory, picture
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
 from lumigraph.elements.objective import Objective
@@ -96,6 +96,9 @@ class FourierMicroscopeOperator:
     def shape(self) -> tuple[tuple[int, int], tuple[int, int, int]]:
         """Pixels (ny, nx) of the raw image, samples (z, y, x) of the volume."""
         return self.raw_shape, (len(self.depths), *self.object_grid.shape)
+
+    def _repr_html_(self) -> str:
+        return picture.operator_card("Operator of a Fourier microscope", self.shape)
 
     def forward(self, volume: Array) -> Array:
         """Raw image (ny, nx) of intensities (z, y, x); an even plane of 1 gives 1 behind an open lenslet."""

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lumigraph.core import arrays, checks, memory
+from lumigraph.core import arrays, checks, memory, picture
 from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
@@ -79,6 +79,9 @@ class MicroscopeOperator:
     def nbytes(self) -> int:
         """Of the stored kernels."""
         return sum(kernel.blocks.nbytes for kernel in self.kernels)
+
+    def _repr_html_(self) -> str:
+        return picture.operator_card("Operator of a light-field microscope", self.shape)
 
     def forward(self, volume: Array) -> Array:
         """Raw image (ny, nx) of intensities (z, y, x); an even plane of 1 gives 1.

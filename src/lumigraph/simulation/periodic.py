@@ -23,10 +23,10 @@ from itertools import groupby
 
 import numpy as np
 
-from lumigraph.core import arrays, checks
+from lumigraph.core import arrays, checks, picture
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
-from lumigraph.errors import GeometryError
+from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.sensor import Sensor
 from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.cells import Cells
@@ -84,6 +84,9 @@ class PeriodicOperator:
         volume = () if self.depths is None else (len(self.depths),)
         return self.sensor.shape, (*volume, *self.object_grid.shape)
 
+    def _repr_html_(self) -> str:
+        return picture.operator_card("Operator of a camera with lenslets", self.shape)
+
     def forward(self, intensity: Array, /) -> Array:
         """Raw image (ny, nx), turned by 180°, of an object's intensity (y, x) or (z, y, x).
 
@@ -134,6 +137,14 @@ class PeriodicOperator:
                 group.return_to(points, mine @ xp.matrix_transpose(arrays.like(group.right, image)))
         points += xp.expand_dims(plane.matrix.glare.adjoint(image), axis=2)
         return plane.spread.adjoint(_as_plane(points, self.cells.points))
+
+    @property
+    def memory_bytes(self) -> float:
+        """Memory that `forward` and `adjoint` of a single-precision image take, with the matrices [bytes]."""
+        cells = (math.prod(n + 2 for n in self.cells.count)) * math.prod(self.cells.samples)
+        plane = math.sqrt(cells * math.prod(self.sensor.shape))
+        kept = sum(plane.matrix.nbytes for plane in self.planes)
+        return kept + 4 * (3 * cells + plane + math.prod(self.sensor.shape))
 
     def psf(self, index: tuple[int, ...], /) -> np.ndarray:
         """Raw image (ny, nx), float32, of one object sample of intensity 1."""
@@ -246,11 +257,14 @@ def periodic_operator(
                 progress((k + fraction) / len(depths))
 
         planes.append(_plane(optics, matrix(optics, report), grid))
-    assert optics is not None
-    several = np.ndim(dz) > 0
-    return PeriodicOperator(
-        optics.cells, tuple(planes), _readout(optics), grid, depths if several else None, camera.sensor
+    if optics is None:
+        raise GeometryError("dz is empty. Give at least one depth.")
+    several = depths if np.ndim(dz) else None
+    operator = PeriodicOperator(optics.cells, tuple(planes), _readout(optics), grid, several, camera.sensor)
+    memory.require(
+        operator.memory_bytes, "the raw image", "Use fewer lenslets, or larger pixels.", SamplingError
     )
+    return operator
 
 
 def _plane(optics: Optics, matrix: Matrix, grid: Grid) -> Plane:

@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lumigraph.core import arrays, memory
+from lumigraph.core import arrays, memory, picture
 from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
@@ -81,6 +81,9 @@ class SingleLensOperator:
         """Pixels (ny, nx) of the raw image, samples (y, x) of the object."""
         pixels = self.collect[0].shape[0], self.collect[1].shape[0]
         return pixels, self.object_grid.shape
+
+    def _repr_html_(self) -> str:
+        return picture.operator_card("Operator of a single lens", self.shape)
 
     def forward(self, intensity: Array, /) -> Array:
         """Raw image (ny, nx), turned by 180°, of an object's intensity (y, x) on `object_grid`."""

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from lumigraph.core import arrays, checks
+from lumigraph.core import arrays, checks, picture
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
@@ -52,6 +52,9 @@ class Slices:
         """Pixels (ny, nx) of the raw image, samples (z, y, x) of the object."""
         raw, plane = self.planes[0].shape
         return raw, (len(self.planes), *plane)
+
+    def _repr_html_(self) -> str:
+        return picture.operator_card("Operator of several depths", self.shape)
 
     def forward(self, intensity: Array, /) -> Array:
         """Raw image (ny, nx) of an object's intensity (z, y, x).

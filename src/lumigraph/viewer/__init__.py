@@ -8,13 +8,28 @@
 - `encoding`: arrays as bytes: as they are, losslessly smaller, or as pictures
 - `page`: the page's files, as a table to serve
 - `single_file`: the same page as one file that works from disk
+- `designer`, `designer_parameters`, `designer_curves`, `designer_point`: a camera as sliders
+- `inline`: the page inside a notebook
 - `static/`: HTML, CSS, JavaScript modules and shaders, as they are
 """
 
+from lumigraph.viewer.designer import designer_site
 from lumigraph.viewer.exhibit import Exhibit
+from lumigraph.viewer.inline import view_inline
 from lumigraph.viewer.opening import Origin, open_exhibit
 from lumigraph.viewer.page import site
 from lumigraph.viewer.server import Resource, Site, serve
 from lumigraph.viewer.single_file import export
 
-__all__ = ["Exhibit", "Origin", "Resource", "Site", "export", "open_exhibit", "serve", "site"]
+__all__ = [
+    "Exhibit",
+    "Origin",
+    "Resource",
+    "Site",
+    "designer_site",
+    "export",
+    "open_exhibit",
+    "serve",
+    "site",
+    "view_inline",
+]

@@ -68,6 +68,15 @@ def export(
         The folder does not exist or the name does not end in .html.
     """
     path = check_target(path, (".html", ".htm"))
+    text, sizes = exported(exhibits, quality, progress)
+    write_bytes(path, text.encode())
+    return Exported(path, len(text.encode()), sizes)
+
+
+def exported(
+    exhibits: Sequence[Exhibit], quality: int, progress: Progress | None = None
+) -> tuple[str, dict[str, int]]:
+    """The page as text, and the bytes of each array in it; as `export`, which writes it."""
     if not 1 <= quality <= LOSSLESS:
         raise LumigraphError(f"quality is {quality} but must be from 1 to 100.")
     parts = [Parts.of(exhibit) for exhibit in exhibits]
@@ -85,9 +94,7 @@ def export(
                 "Lower --quality, or export fewer views."
             )
         blobs[f"{number}/{name}"] = base64.b64encode(content).decode()
-    text = document(json.dumps(about(parts)), blobs).encode()
-    write_bytes(path, text)
-    return Exported(path, len(text), sizes)
+    return document(json.dumps(about(parts)), blobs), sizes
 
 
 def document(description: str, blobs: dict[str, str]) -> str:
