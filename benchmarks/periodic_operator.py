@@ -1,4 +1,4 @@
-"""The lenslet-periodic operator: its error against sums of full propagations, its transpose, speed and memory.
+"""The lenslet-periodic operator: error against sums of full propagations, transpose, speed and memory.
 
 Errors are relative rms of the raw images of single points, each with its own power, in the middle of small
 arrays and near their border, against `_point_sums`: quadrature for square lenslets, propagation for hexagons,
@@ -7,7 +7,7 @@ would change. Speed is that of the thesis' Table 5.1 camera, 39 x 39
 lenslets, USAF target, with nothing kept, against 350 snapshots (`plenoptic_snapshots`, extrapolated from a
 few). Every measurement has a process of its own.
 
-    python -m benchmarks.periodic_operator [--quick] [--only accuracy adjoint speed cost] [--counts 39 101 201]
+    python -m benchmarks.periodic_operator [--quick] [--only accuracy adjoint ...] [--counts 39 101 201]
 """
 
 import argparse
@@ -144,11 +144,11 @@ def first_image(count: int, depths: int, repeats: int) -> list[Row]:
     else:
         found_depths = 0.0
     grid = found.object_grid
-    scene = lg.targets.usaf1951(grid).parts[0].intensity.astype(np.float32)
+    target = lg.targets.usaf1951(grid) if count >= COUNTS[0] else lg.targets.siemens_star(grid)
+    target = target.parts[0].intensity.astype(np.float32)
     full = np.zeros(grid.shape, np.float32)
-    full[
-        tuple(slice((n - m) // 2, (n - m) // 2 + m) for n, m in zip(grid.shape, scene.shape, strict=True))
-    ] = scene
+    top, left = ((n - m) // 2 for n, m in zip(grid.shape, target.shape, strict=True))
+    full[top : top + target.shape[0], left : left + target.shape[1]] = target
     picture = full if depths == 1 else np.stack([full] * depths)
     before, start = _peak(), time.perf_counter()
     operator = periodic_operator(found, grid, found_depths)

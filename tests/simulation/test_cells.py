@@ -1,0 +1,136 @@
+"""Cells of a lenslet array: they tile it, hold its lattice, and are sampled finely enough."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lumigraph.core.lattice import Lattice
+from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.instruments import FocusedPlenopticCamera, SingleLensCamera
+from lumigraph.simulation import cells
+from lumigraph.simulation.cells import Cells, Fineness
+from lumigraph.units import mm, nm, um
+
+
+def focused(**lenslets):
+    table = {"pitch": 100 * um, "focal_length": 5.2 * mm, "count": (5, 4), "magnification": 0.5}
+    return FocusedPlenopticCamera(
+        wavelength=633 * nm,
+        object_distance=120 * mm,
+        main_lens={"focal_length": 60 * mm},
+        lenslets={**table, **lenslets},
+        sensor={"pixel_pitch": 6 * um},
+    )
+
+
+def of(camera):
+    return cells.cells_of(camera, cells.lenslet_array(camera), Fineness(1e-3))
+
+
+def test_samples_stand_evenly_inside_their_cells():
+    found = Cells((2.0, 3.0), (-4.0, 1.0), (3, 2), (4, 6), (5, 7))
+    grid = found.grid(found.points, 1.0, (0, 1))
+    np.testing.assert_allclose(grid.y, -4 + (np.arange(12) + 0.5) * 2 / 4)
+    np.testing.assert_allclose(grid.x, 1 - 3 + (np.arange(24) + 0.5) * 3 / 6)
+    turned = found.grid(found.samples, -2.0, (0, 0))
+    assert turned.center[0] == pytest.approx(-2 * (-4 + (15 // 2 + 0.5) * 2 / 5))
+    np.testing.assert_allclose(turned.pitch, (2 * 2 / 5, 2 * 3 / 7))
+
+
+@pytest.mark.parametrize(
+    ("lenslets", "size"),
+    [
+        ({}, (100 * um, 100 * um)),
+        ({"layout": "hex"}, (math.sqrt(3) * 100 * um, 100 * um)),
+        (
+            {"layout": "hex", "focal_length": (5 * mm, 5.2 * mm, 5.4 * mm)},
+            (math.sqrt(3) * 100 * um, 300 * um),
+        ),
+    ],
+)
+def test_a_cell_repeats_the_lattice_with_its_kinds(lenslets, size):
+    camera = focused(**lenslets)
+    found, lattice = of(camera), cells.lenslet_array(camera).lattice
+    np.testing.assert_allclose(found.size, size)
+    pairs = lattice.indices((-300 * um, 300 * um), (-400 * um, 400 * um))
+    kinds = lattice.kind(pairs[:, 0], pairs[:, 1])
+    for step in ((size[0], 0), (0, size[1])):
+        moved = np.stack(lattice.index(*(lattice.position(pairs) + step).T), axis=-1)
+        np.testing.assert_allclose(lattice.position(moved), lattice.position(pairs) + step, atol=1e-12)
+        np.testing.assert_array_equal(lattice.kind(moved[:, 0], moved[:, 1]), kinds)
+
+
+@pytest.mark.parametrize(
+    "lenslets", [{}, {"count": (4, 6)}, {"offset": (20 * um, -30 * um)}, {"layout": "hex"}]
+)
+def test_cells_cover_the_array(lenslets):
+    camera = focused(**lenslets)
+    found, extent = of(camera), cells.lenslet_array(camera).extent
+    for edge, size, n, whole in zip(found.edge, found.size, found.count, extent, strict=True):
+        assert edge <= -whole / 2 + size / 2 + 1e-9
+        assert edge + n * size >= whole / 2 - size / 2 - 1e-9
+
+
+def test_points_hold_what_the_main_lens_resolves():
+    """λL/(2D), half again as close; an even number of them."""
+    camera = focused()
+    found = of(camera)
+    finest = camera.wavelength * camera.separation / camera.pupil_diameter / 2 / 1.5
+    assert found.size[0] / found.points[0] <= finest < found.size[0] / (found.points[0] - 2)
+    assert found.points[0] % 2 == 0
+
+
+def test_the_telecentric_image_is_nearer():
+    """b L/(L + b): the lens formula of a lens of focal length L."""
+    camera = focused()
+    b = camera.lenslet_distance
+    assert 1 / cells.telecentric_distance(camera) == pytest.approx(1 / b + 1 / camera.separation)
+
+
+def test_a_blur_is_that_of_geometry():
+    """At z + dz the image is at v; rays from the pupil meet the lenslets at D/2 |v - L|/v."""
+    camera, distance = focused(), 125 * mm
+    v = 1 / (1 / (60 * mm) - 1 / distance)
+    expected = camera.pupil_diameter / 2 * abs(v - camera.separation) / v
+    assert cells.blur(camera, distance) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("lattice", [Lattice.square(2.0, 0.3, (0.4, -0.7)), Lattice.hex(2.0, -0.2)])
+def test_a_straightened_lattice_has_its_rows_along_x(lattice):
+    found = cells.straight(lattice)
+    sin, cos = math.sin(lattice.rotation), math.cos(lattice.rotation)
+    y, x = lattice.position(np.array([[1, 2], [-3, 1], [0, 0]])).T
+    np.testing.assert_allclose(
+        found.position(np.array([[1, 2], [-3, 1], [0, 0]])),
+        np.stack([y * cos - x * sin, y * sin + x * cos], 1),
+        atol=1e-12,
+    )
+    assert found.rotation == pytest.approx(0, abs=1e-12)
+
+
+def test_more_accuracy_asks_for_more_of_everything():
+    coarse, fine = Fineness(1e-2), Fineness(1e-4)
+    for name in ("oversampling", "neighbours", "border"):
+        assert getattr(fine, name) > getattr(coarse, name)
+    assert fine.reach(1.0, 1.0) > coarse.reach(1.0, 1.0)
+    assert fine.near(1.0, 1.0) > coarse.near(1.0, 1.0)
+    assert fine.rank < coarse.rank
+
+
+@pytest.mark.parametrize("accuracy", [0.02, 9e-6, float("nan")])
+def test_an_accuracy_out_of_range_is_refused(accuracy):
+    with pytest.raises(SamplingError, match="accuracy"):
+        Fineness(accuracy)
+
+
+def test_a_camera_without_lenslets_is_refused():
+    camera = SingleLensCamera(
+        wavelength=633 * nm,
+        object_distance=120 * mm,
+        main_lens={"focal_length": 60 * mm, "diameter": 3 * mm},
+        sensor={"pixel_pitch": 6 * um, "shape": (20, 20)},
+    )
+    assert not cells.fits(camera)
+    with pytest.raises(GeometryError, match="the camera has no lenslets"):
+        cells.lenslet_array(camera)

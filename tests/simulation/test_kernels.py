@@ -1,0 +1,140 @@
+"""The matrices of the lenslet-periodic operator: symmetries, light, factors, and what is kept."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lumigraph.core import store
+from lumigraph.instruments import FocusedPlenopticCamera
+from lumigraph.simulation import kernels, point_images
+from lumigraph.simulation.kernels import Optics, matrix
+from lumigraph.units import mm, nm, um
+
+
+def focused(**lenslets):
+    table = {"pitch": 80 * um, "focal_length": 5.2 * mm, "count": (4, 4), "magnification": 0.5}
+    return FocusedPlenopticCamera(
+        wavelength=633 * nm,
+        object_distance=120 * mm,
+        main_lens={"focal_length": 60 * mm},
+        lenslets={**table, **lenslets},
+        sensor={"pixel_pitch": 9 * um},
+    )
+
+
+@pytest.fixture(scope="module")
+def optics():
+    return Optics.of(focused(), 122 * mm, 1e-2)
+
+
+def block(part, offset):
+    """The product of the factors at one offset (dy, dx)."""
+    start = 0
+    for dy, dx, rank in part.offsets:
+        if (dy, dx) == offset:
+            return part.left[:, start : start + rank] @ part.right[start : start + rank]
+        start += rank
+    return np.zeros((part.left.shape[0], part.right.shape[1]))
+
+
+def whole(matrix):
+    """All parts and the glare's pictures, as dense blocks by place."""
+    return {
+        (part.rows, part.columns, offset[:2]): block(part, offset[:2])
+        for part in matrix.parts
+        for offset in part.offsets
+    }
+
+
+def test_mirrored_blocks_are_those_computed_one_by_one(optics, monkeypatch):
+    """Folding left, right, up, down and across the diagonal changes nothing but rounding and rank."""
+    folded = whole(kernels._build(optics))
+    monkeypatch.setattr(point_images.Wave, "even", False)
+    direct = whole(kernels._build(optics))
+    norm = math.sqrt(sum(np.linalg.norm(b) ** 2 for b in direct.values()))
+    none = np.zeros(next(iter(direct.values())).shape)
+    places = folded.keys() | direct.keys()
+    difference = [np.linalg.norm(folded.get(key, none) - direct.get(key, none)) for key in places]
+    assert math.sqrt(sum(np.square(difference))) < 2 * optics.fineness.rank * norm
+
+
+def test_all_light_of_a_point_is_in_its_blocks_and_the_glare(optics):
+    """Lenslets without gaps: the images of a point add up to 1, but for what the r⁻³ law has beyond."""
+    found = matrix(optics)
+    periodic, samples = found.parts[0], math.prod(optics.cells.samples)
+    near = sum(block(periodic, offset[:2]).sum(1) for offset in periodic.offsets)
+    share = optics.image_scale**2 / samples * math.prod(optics.cells.points)
+    np.testing.assert_allclose((near * share).mean(), 1, atol=0.05)
+    assert (near * share).max() < 1.05
+
+
+def test_few_factors_give_the_block_back(rng):
+    """Thirty patterns of falling strength: those above the least, orthogonal, nothing of the others."""
+    left, right = (np.linalg.qr(rng.standard_normal((n, 30)))[0] for n in (200, 90))
+    strengths = 10.0 ** -np.arange(30)[:]
+    dense = ((left * strengths) @ right.T).astype(np.float32)
+    found_left, found_right, kept = point_images.factors(dense, 3e-4)
+    np.testing.assert_allclose(kept[::-1], [1, 0.1, 1e-2, 1e-3], rtol=1e-3)
+    np.testing.assert_allclose(found_left.T @ found_left, np.eye(4), atol=1e-5)
+    assert np.linalg.norm(found_left @ found_right - dense) < 1.1e-4
+
+
+def test_a_block_of_many_patterns_is_not_cut_short(rng):
+    dense = rng.standard_normal((60, 50)).astype(np.float32)
+    left, right, _ = point_images.factors(dense, 1e-3)
+    np.testing.assert_allclose(left @ right, dense, atol=1e-4)
+
+
+def test_a_faint_block_has_no_factors(rng):
+    left, right, kept = point_images.factors(rng.random((20, 10)), 100.0)
+    assert (left.shape, right.shape, kept.shape) == ((20, 0), (0, 10), (0,))
+
+
+def test_a_mirrored_factor_is_the_plane_turned_over(rng):
+    factor = rng.random((12, 2))
+    plane = factor.reshape(3, 4, 2)
+    turned = point_images.mirrored(factor, (3, 4), True, False).reshape(3, 4, 2)
+    np.testing.assert_array_equal(turned, plane[::-1])
+    np.testing.assert_array_equal(
+        point_images.mirrored(factor, (3, 4), False, True).reshape(3, 4, 2), plane[:, ::-1]
+    )
+
+
+def test_the_key_names_what_matters(optics):
+    """Not the sensor; but every length, the accuracy and the array's border."""
+    here = optics.key
+    assert Optics.of(focused().replace(sensor={"pixel_pitch": 7 * um}), 122 * mm, 1e-2).key == here
+    others = [
+        focused(pitch=81 * um),
+        focused(count=(4, 5)),
+        focused(fill_factor=0.9),
+        focused(magnification=0.4),
+    ]
+    keys = {Optics.of(camera, 122 * mm, 1e-2).key for camera in others}
+    keys |= {Optics.of(focused(), 121 * mm, 1e-2).key, Optics.of(focused(), 122 * mm, 5e-3).key, here}
+    assert len(keys) == 7
+
+
+def assert_equal(one, other):
+    assert one.margin == other.margin
+    for mine, theirs in zip(one.parts, other.parts, strict=True):
+        assert (mine.rows, mine.columns, mine.offsets) == (theirs.rows, theirs.columns, theirs.offsets)
+        np.testing.assert_array_equal(mine.left, theirs.left)
+        np.testing.assert_array_equal(mine.right, theirs.right)
+    np.testing.assert_array_equal(one.glare.spectra, other.glare.spectra)
+    np.testing.assert_array_equal(one.glare.pictures, other.glare.pictures)
+    assert (one.glare.image, one.glare.margin) == (other.glare.image, other.glare.margin)
+
+
+def test_what_is_kept_on_disk_comes_back_and_is_not_built_again(optics, tmp_path, monkeypatch):
+    monkeypatch.setenv("LUMIGRAPH_CACHE", str(tmp_path))
+    monkeypatch.setattr(kernels, "_MATRICES", type(kernels._MATRICES)(limit=0))
+    built = matrix(optics)
+    damaged = tmp_path / optics.key / "left.npy"
+    with monkeypatch.context() as patch:
+        patch.setattr(kernels, "_build", None)
+        assert_equal(matrix(optics), built)
+    damaged.write_bytes(b"")
+    assert_equal(matrix(optics), built)
+    assert store.load(optics.key) is not None
