@@ -13,6 +13,7 @@ from lumigraph.errors import CalibrationError, GeometryError
 
 _SIGMAS = 4.0  # standard deviations beyond which a micro-image is left out
 _LEAST = 0.02  # px, within which none is left out
+_NEAR = 0.01  # of a pitch, within which a micro-image is not called missing
 _GAIN = 0.98  # of the residual's root mean square must a warp at least bring it down to
 _EVIDENCE = 12.0  # by how much the Bayesian information criterion must fall for a warp
 _FEWEST = 30  # micro-images that a warp is fitted to
@@ -37,6 +38,8 @@ class Fitted(NamedTuple):
 def fit(spots: Spots, model: Calibration, *, warped: bool = True) -> Fitted:
     """Least squares over micro-images, leaving out those beyond four standard deviations.
 
+    Those left out that stand within a hundredth of a pitch are kept in the result: they are no faults.
+
     Tilt (2 numbers) and radial distortion (1) are added, singly or together, only where the Bayesian
     information criterion n ln(rms²) + p ln n falls by more than 12 for n coordinates and p parameters, and
     the residual falls by at least 2 %: a straight lattice is never bent by the noise of its centres.
@@ -57,9 +60,12 @@ def fit(spots: Spots, model: Calibration, *, warped: bool = True) -> Fitted:
     """
     check_count(spots, model.lattice, "lit micro-images")
     try:
-        return _fitted(spots, model, warped)
+        best = _fitted(spots, model, warped)
     except GeometryError as error:  # parallel basis vectors
         raise CalibrationError(f"the micro-images stand on no lattice. {_HINT}") from error
+    distance = _distances(best, spots)
+    keep = distance <= max(_NEAR * best.lattice.pitch, float(_distances(best, best.spots).max()))
+    return best._replace(spots=Spots(*(column[keep] for column in spots)))
 
 
 def _fitted(spots: Spots, model: Calibration, warped: bool) -> Fitted:

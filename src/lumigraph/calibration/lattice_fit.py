@@ -171,7 +171,7 @@ def _followed(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, vectors:
         best = 0
     one = found[best]
     if one.picture is above:
-        return one
+        return one._replace(notes=_uncertain(one.fitted))
     return one._replace(notes=_raw_notes(one.fitted, original.shape))
 
 
@@ -228,6 +228,16 @@ def _raw_notes(fitted: Fitted, shape: tuple[int, ...]) -> tuple[str, ...]:
         )
     return (
         "found by the gaps between micro-images of a raw image; a white image tells their centres better",
+    )
+
+
+def _uncertain(fitted: Fitted) -> tuple[str, ...]:
+    spread, pitch = _spread(fitted), fitted.lattice.pitch
+    if spread <= _LARGEST * pitch:
+        return ()
+    return (
+        f"the micro-images stand {spread:.2f} px from a lattice of pitch {pitch:.2f} px, where a white image "
+        f"leaves less than {_LARGEST * pitch:.2f} px: do not trust it without a look at the overlay",
     )
 
 

@@ -26,7 +26,7 @@ _THIRDS = (8, 8), (16, 16)
 _ALIASED = 12.0  # px of pitch below which whole pixels make neighbours differ
 _ABSENT = 0.12  # of the weakest first harmonic of the finer lattice: what only the coarser one has
 _FOLDED = 768  # px of the middle that are folded
-_ALIKE = 0.4  # correlation of lenslets of several kinds
+_ALIKE = 0.55  # correlation of lenslets of several kinds; touching discs of one kind reach 0.46
 _FEWEST = 2.8  # lenslets across a picture
 _SUBLATTICES = [(a, b, n // a) for n in (4, 3, 2) for a in (1, 2, 3, 4) if n % a == 0 for b in range(n // a)]
 _NEAR = 0.012  # of a pitch, within which two candidates are one
@@ -114,8 +114,7 @@ def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
         finest = _finest(light, candidate.vectors)
         if not any(_same(finest, other, _AROUND) for other in chosen):
             chosen.append(finest)
-    chosen = [_single(middles, vectors) for vectors in chosen]
-    sharp = _distinct([_polished(gaps, vectors) for vectors in chosen], _NEAR)
+    sharp = _distinct([_polished(gaps, vectors) for vectors in _singles(middles, chosen)], _NEAR)
     return _best(_ranked(spectra, sharp), request, middles[0].shape)
 
 
@@ -158,17 +157,27 @@ def _absent(light: Gaps, coarse: np.ndarray, finer: Vectors) -> bool:
     return bool(len(rest) and rest.max() < _ABSENT * mine.min())
 
 
-def _single(features: list[np.ndarray], vectors: Vectors) -> Vectors:
-    """The lattice of single lenslets where a hexagonal candidate is that of one of three kinds.
+def _singles(features: list[np.ndarray], chosen: list[Vectors]) -> list[Vectors]:
+    """The lattices of single lenslets where hexagonal candidates are those of one of three kinds.
 
     Three kinds of lenslets in turn repeat after sqrt(3) pitches. Their micro-images are alike, so that the
     mean cell resembles itself moved by a third of its diagonal; the places between the lenslets of a
-    lattice with one kind do not resemble lenslets.
+    lattice with one kind do not resemble lenslets, at least not in both light and gaps.
     """
-    if vectors.layout != "hex" or _pitch(vectors) / math.sqrt(3) < SMALLEST_PITCH:
-        return vectors
-    if max(_likeness(_middle(feature, _FOLDED), vectors, _THIRDS) for feature in features) < _ALIKE:
-        return vectors
+    folded = [_middle(feature, _FOLDED) for feature in features]
+    repeats = []
+    for vectors in chosen:
+        if vectors.layout == "hex" and _pitch(vectors) / math.sqrt(3) >= SMALLEST_PITCH:
+            alike = [_likeness(feature, vectors, _THIRDS) for feature in folded]
+            if float(np.median(alike)) > _ALIKE:
+                repeats.append(_pitch(vectors))
+    return [
+        _third(v) if v.layout == "hex" and any(abs(_pitch(v) / p - 1) < 2 * _AROUND for p in repeats) else v
+        for v in chosen
+    ]
+
+
+def _third(vectors: Vectors) -> Vectors:
     first, second = reduced((vectors.row + vectors.column) / 3, (2 * vectors.row - vectors.column) / 3)
     return Vectors(*_oriented(first, second, "hex"), "hex", 3)
 

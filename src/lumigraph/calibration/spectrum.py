@@ -17,7 +17,7 @@ _CAP = 8.0  # and above which a line is no better
 _MOST = 16  # lines paired
 _SEARCH = 0.05  # of the pitch, and radians, that a lattice is looked for around a candidate
 _SHARPEST, _HIGHEST = 0.14, 5.0  # 1/px, and orders, that gaps have after smoothing
-_FLOOR = 1e-4  # of the mean power: rounding makes no lines
+_FLOOR = 0.03  # of the mean power: beats of the lattice with the pixels make no lines
 
 
 class _Basis(Protocol):
