@@ -23,7 +23,7 @@ from itertools import groupby
 
 import numpy as np
 
-from lumigraph.core import arrays, checks, picture
+from lumigraph.core import arrays, checks, memory, picture
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, SamplingError
