@@ -10,7 +10,7 @@ from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output
 from lumigraph.cli.origin import NO_ORIGIN, PLENOPTIC, Origin
-from lumigraph.cli.reporting import REPORTED, Reported, told
+from lumigraph.cli.reporting import REPORTED, Reported, enlarged, told
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -117,13 +117,18 @@ def _page(raw: "RawImage", views: Any) -> Any:
     nv, nu = views.data.shape[:2]
     page = Page("Decode", "A raw image of a plenoptic camera 1.0, and its views.")
     section = page.section("Views")
-    section.figure(views.view(nv // 2, nu // 2), "The middle view.")
+    middle = views.view(nv // 2, nu // 2)
+    zoom = enlarged(middle)
+    section.figure(middle, "The middle view.", zoom=zoom)
     section.figure(
-        views.view(nv // 2, nu - 1 - nu // 8), "A view from the side: what is near or far has moved."
+        views.view(nv // 2, nu - 1 - nu // 8),
+        "A view from the side: what is near or far has moved.",
+        zoom=zoom,
     )
     section.figure(
         views.data[nv // 2, :, views.data.shape[2] // 2],
         "Epipolar-plane image: the middle row of lenslets (across) from each view (down).",
+        zoom=zoom,
     )
     page.section("Raw image").figure(raw, "As it was read.")
     return page

@@ -11,7 +11,7 @@ from lumigraph.cli.console import Count, progress
 from lumigraph.cli.options import Output, above_zero, length
 from lumigraph.cli.origin import FOCUSED, NO_ORIGIN, PLENOPTIC, Origin
 from lumigraph.cli.refocus import range_of
-from lumigraph.cli.reporting import REPORTED, Reported, told
+from lumigraph.cli.reporting import REPORTED, Reported, enlarged, told
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -190,7 +190,7 @@ def _page(found: "DepthMap", picture: Any) -> Any:
     section.figure(plots.show(found.values), f"{found.quantity.capitalize()} [{found.unit}].")
     section.figure(plots.show(found.confidence), "Confidence, 0 to 1.")
     if picture is not None:
-        section.figure(picture, "The picture of the same places.")
+        section.figure(picture, "The picture of the same places.", zoom=enlarged(picture))
     return page
 
 

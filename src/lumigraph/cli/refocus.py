@@ -11,7 +11,7 @@ from lumigraph.cli import files
 from lumigraph.cli.console import Count, progress
 from lumigraph.cli.options import Output, length
 from lumigraph.cli.origin import NO_ORIGIN, PLENOPTIC, Origin
-from lumigraph.cli.reporting import REPORTED, Reported, told
+from lumigraph.cli.reporting import REPORTED, Reported, enlarged, told
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ def _page(images: list[Any], alphas: list[float]) -> Any:
     white = max(float(image.max()) for image in images) or None
     section = page.section("Pictures")
     for image, alpha in zip(shown, alphas, strict=False):
-        section.figure(image, f"α' = {alpha:g}", white=white)
+        section.figure(image, f"α' = {alpha:g}", white=white, zoom=enlarged(image))
     if len(images) > len(shown):
         section.text(f"{len(images) - len(shown)} more are not shown.")
     return page

@@ -45,6 +45,15 @@ class Reported(Common):
 REPORTED = Reported()
 
 
+_SMALL = 240
+
+
+def enlarged(image: Any) -> int | None:
+    """Times that a picture of few pixels is shown larger; None for one that needs it not."""
+    times = _SMALL // max(image.shape[:2])
+    return times if times > 1 else None
+
+
 def told(
     common: Reported, text: str, values: Mapping[str, Any], page: Callable[[], "Page"],
     numbers: Sequence[tuple[str, str]] = (),

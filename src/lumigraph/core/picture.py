@@ -15,6 +15,7 @@ THUMBNAIL = 240
 """Pixels along the longer side of a thumbnail."""
 
 _STYLE = "border-collapse:collapse;font-variant-numeric:tabular-nums;margin:0"
+_NAME = "text-align:left;font-weight:normal;opacity:.75;padding-right:1em"
 _UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 
 
@@ -53,6 +54,8 @@ def thumbnail(image: Any, size: int = THUMBNAIL) -> str:
     else:
         cut = data[: rows * step, : columns * step].astype(np.float64)
         block = cut.reshape(rows, step, columns, step, *data.shape[2:]).mean(axis=(1, 3))
+    larger = max(1, size // 2 // max(block.shape[:2]))  # few pixels are shown as squares
+    block = block.repeat(larger, axis=0).repeat(larger, axis=1)
     finite = block[np.isfinite(block)]
     low = min(0.0, float(finite.min())) if finite.size else 0.0
     high = float(np.quantile(finite, 0.999)) if finite.size else 1.0
@@ -123,7 +126,7 @@ def card(title: str, rows: Iterable[tuple[str, str]], picture: str = "", alt: st
         What the picture shows.
     """
     cells = "".join(
-        f'<tr><th scope="row" style="text-align:left;font-weight:normal;opacity:.75">{html.escape(name)}</th>'
+        f'<tr><th scope="row" style="{_NAME}">{html.escape(name)}</th>'
         f'<td style="text-align:left">{html.escape(value)}</td></tr>'
         for name, value in rows
     )
