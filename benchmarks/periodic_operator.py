@@ -41,25 +41,24 @@ GIB = 2**30
 
 def camera(**lenslets: Any) -> lg.FocusedPlenopticCamera:
     """A small camera 2.0, as the thesis' in all lengths but the pitch."""
-    table = {"pitch": 100 * um, "focal_length": 5.2 * mm, "count": (7, 7), "magnification": 0.5}
-    return lg.FocusedPlenopticCamera(
-        wavelength=633 * nm,
-        object_distance=120 * mm,
-        main_lens={"focal_length": 60 * mm},
-        lenslets={**table, **lenslets},
-        sensor={"pixel_pitch": 6 * um},
-    )
+    parts: dict[str, Any] = {
+        "main_lens": {"focal_length": 60 * mm},
+        "lenslets": {
+            "pitch": 100 * um, "focal_length": 5.2 * mm, "count": (7, 7), "magnification": 0.5, **lenslets
+        },
+        "sensor": {"pixel_pitch": 6 * um},
+    }  # fmt: skip
+    return lg.FocusedPlenopticCamera(wavelength=633 * nm, object_distance=120 * mm, **parts)
 
 
 def plenoptic() -> lg.PlenopticCamera:
     """A small camera 1.0."""
-    return lg.PlenopticCamera(
-        wavelength=633 * nm,
-        object_distance=240 * mm,
-        main_lens={"focal_length": 120 * mm},
-        lenslets={"pitch": 110 * um, "focal_length": 10 * mm, "count": (7, 7)},
-        sensor={"pixel_pitch": 9 * um},
-    )
+    parts: dict[str, Any] = {
+        "main_lens": {"focal_length": 120 * mm},
+        "lenslets": {"pitch": 110 * um, "focal_length": 10 * mm, "count": (7, 7)},
+        "sensor": {"pixel_pitch": 9 * um},
+    }
+    return lg.PlenopticCamera(wavelength=633 * nm, object_distance=240 * mm, **parts)
 
 
 CAMERAS: dict[str, Callable[[], Any]] = {
@@ -144,8 +143,8 @@ def first_image(count: int, depths: int, repeats: int) -> list[Row]:
     else:
         found_depths = 0.0
     grid = found.object_grid
-    target = lg.targets.usaf1951(grid) if count >= COUNTS[0] else lg.targets.siemens_star(grid)
-    target = target.parts[0].intensity.astype(np.float32)
+    scene: Any = lg.targets.usaf1951(grid) if count >= COUNTS[0] else lg.targets.siemens_star(grid)
+    target = np.asarray(scene.parts[0].intensity, np.float32)
     full = np.zeros(grid.shape, np.float32)
     top, left = ((n - m) // 2 for n, m in zip(grid.shape, target.shape, strict=True))
     full[top : top + target.shape[0], left : left + target.shape[1]] = target
