@@ -122,6 +122,11 @@ def test_a_defocused_microscope_sees_its_sharp_plane_elsewhere(scope):
             GeometryError,
             "focus_depth says how deep .* give sample_index",
         ),
+        (
+            {"objective": {"model": "rays"}, "configuration": "2.0", "lenslet_offset": "1 mm"},
+            GeometryError,
+            "model 'rays' needs configuration '1.0'",
+        ),
         ({"objective": {"zoom": 2}}, FormatError, "objective.zoom is not a known key"),
     ],
 )

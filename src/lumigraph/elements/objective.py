@@ -25,7 +25,7 @@ from lumigraph.core import checks
 from lumigraph.elements.zernike import noll_to_nm, zernike
 from lumigraph.errors import GeometryError
 
-Model = Literal["scalar", "vector", "paraxial"]
+Model = Literal["scalar", "vector", "paraxial", "rays"]
 
 PER_NYQUIST = 40
 """Steps of a radial table in half the smallest period of the field: linear interpolation errs by 1e-3."""
@@ -92,7 +92,8 @@ class Objective:
     numerical_aperture, index
         NA and the immersion's refractive index n.
     model
-        "scalar": Debye, good to NA 0.8; "vector": Richards and Wolf; "paraxial": for comparison.
+        "scalar": Debye, good to NA 0.8; "vector": Richards and Wolf; "paraxial": for comparison; "rays":
+        no waves, for images that were traced by rays: it has no field.
     axial_share
         With "vector", mean square of the dipoles' axial component: 1/3 for dipoles of all directions, 1 for
         dipoles along the axis, 0 for dipoles across it (of all azimuths).
@@ -107,7 +108,7 @@ class Objective:
     Raises
     ------
     GeometryError
-        NA not below the index, an unknown model, a share outside 0 to 1.
+        NA not below the index, an unknown model, a share outside 0 to 1, rays with what needs waves.
 
     Examples
     --------
@@ -141,6 +142,11 @@ class Objective:
             noll_to_nm(j)
             checks.finite(f"aberration {j}", waves, "waves rms")
         object.__setattr__(self, "aberrations", tuple((int(j), float(w)) for j, w in pairs))
+        if self.model == "rays" and (pairs or self.mismatch is not None or self.image_defocus):
+            raise GeometryError(
+                "model 'rays' knows no aberrations, sample index or lenslet offset. "
+                "Leave them out or use 'scalar'."
+            )
 
     @property
     def terms(self) -> tuple[tuple[int, float], ...]:
@@ -171,7 +177,14 @@ class Objective:
         """Amplitudes (modes, ...) at positions (y, x) in object space [m] of a point on the axis at `dz`.
 
         Together they carry the power 1 per unit area: ΣΣ|U|² dy dx = 1.
+
+        Raises
+        ------
+        GeometryError
+            The model is "rays".
         """
+        if self.model == "rays":
+            raise GeometryError("model 'rays' has no field. Use 'scalar', 'vector' or 'paraxial'.")
         y, x = np.broadcast_arrays(np.asarray(y, np.float64), np.asarray(x, np.float64))
         radius = np.hypot(y, x)
         farthest = 2.0 ** math.ceil(math.log2(max(float(radius.max()), self.wavelength) * 1.0000001))
@@ -191,6 +204,8 @@ class Objective:
 
     def radius_of(self, part: float, dz: float) -> float:
         """Radius that holds this part of the light [m], for a round image; from 0 to below 1."""
+        if self.model == "rays":
+            return abs(dz) * self.aperture / math.sqrt(self.medium**2 - self.aperture**2)
         steps, density, reach = np.zeros(1), np.zeros(1), 4 * self.wavelength / self.numerical_aperture
         reach += abs(dz) * self.aperture / math.sqrt(self.medium**2 - self.aperture**2)
         for _ in range(12):

@@ -45,7 +45,7 @@ class MicroscopeObjective(Part):
     tube_lens
         Focal length of the tube lens in use; with a maker it changes the magnification.
     model
-        "scalar", "vector" or "paraxial"; left out, vector from NA 0.8 on.
+        "scalar", "vector", "paraxial" or "rays" (for images traced by rays); left out, vector from NA 0.8 on.
     axial_share
         Of dipoles, with "vector"; 1/3 for all directions.
     aberrations
@@ -59,7 +59,7 @@ class MicroscopeObjective(Part):
     immersion_index: Positive = 1.0
     maker: str | None = None
     tube_lens: Length | None = None
-    model: Literal["scalar", "vector", "paraxial"] | None = None
+    model: Literal["scalar", "vector", "paraxial", "rays"] | None = None
     axial_share: Fraction = 1 / 3
     aberrations: Aberrations = Field(default_factory=dict)
     sample_index: Positive | None = None
@@ -150,6 +150,10 @@ class LightFieldMicroscope(Instrument):
             if given != (self.configuration == configuration):
                 verb = "needs" if self.configuration == configuration else "has no use for"
                 raise GeometryError(f"configuration {self.configuration!r} {verb} {key}. Change one of them.")
+        if self.objective.model == "rays" and self.configuration != "1.0":
+            raise GeometryError(
+                f"objective.model 'rays' needs configuration '1.0', not {self.configuration!r}. Use 'scalar'."
+            )
         if self.bandwidth is not None and self.bandwidth >= self.wavelength:
             raise GeometryError(
                 f"bandwidth {self.bandwidth * 1e9:.4g} nm is not below the wavelength "

@@ -14,6 +14,7 @@ import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.elements.objective import Objective
+from lumigraph.simulation.microscope_rays import ray_images
 
 MARGIN = 1.15
 """Samples of a lenslet, over what its light asks for."""
@@ -168,6 +169,27 @@ def slice_kernel(
     """
     symmetric, s, N = all(one.is_round for one in objectives), sampling.points, sampling.pixels
     points = octant(s) if symmetric else [(ky, kx) for ky in range(s) for kx in range(s)]
+    if objectives[0].model == "rays":  # which have no wavelength
+        cells, passed = ray_images(objectives[0], lenslet, sampling, points, dz)
+    else:
+        cells, passed = _wave_images(objectives, lenslet, sampling, points, (dz, dropped))
+    T = math.isqrt(cells.shape[1])
+    kept = _bright(cells, points, (s, T), dropped, symmetric)
+    cells = np.ascontiguousarray(cells[:, kept])
+    cells *= (N * N / s**2 * passed / cells.sum((1, 2), dtype=np.float64)).astype(np.float32)[:, None, None]
+    offsets = np.stack(np.divmod(kept, T), 1) - T // 2
+    return SliceKernel(offsets, cells, sampling, symmetric)
+
+
+def _wave_images(
+    objectives: Sequence[Objective],
+    lenslet: Lenslet,
+    sampling: CellSampling,
+    points: list[tuple[int, int]],
+    told: tuple[float, float],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Images (points, cells, N²) at (dz, dropped), and the part of their light that passes (points,)."""
+    (dz, dropped), N = told, sampling.pixels
     reach = max(reach_of(one, lenslet, dz, dropped) for one in objectives)
     T = 2 * reach + 1
     cells = np.zeros((len(points), T * T, N * N), np.float32)
@@ -178,11 +200,7 @@ def slice_kernel(
             image = bench.image(point, dz)
             cells[row] += image.reshape(T, N, T, N).transpose(0, 2, 1, 3).reshape(T * T, N * N)
             passed[row] += bench.open / len(objectives)
-    kept = _bright(cells, points, (s, T), dropped, symmetric)
-    cells = np.ascontiguousarray(cells[:, kept])
-    cells *= (N * N / s**2 * passed / cells.sum((1, 2), dtype=np.float64)).astype(np.float32)[:, None, None]
-    offsets = np.stack(np.divmod(kept, T), 1) - reach
-    return SliceKernel(offsets, cells, sampling, symmetric)
+    return cells, passed
 
 
 def kernel_bytes(
