@@ -22,7 +22,21 @@ from lumigraph.errors import SamplingWarning
 from lumigraph.instruments import load_camera
 from lumigraph.simulation import Interrupted
 
-VERBS = ("demo", "design", "simulate", "calibrate", "decode", "render", "refocus", "reproduce")
+VERBS = (
+    *(
+        "demo",
+        "design",
+        "simulate",
+        "calibrate",
+        "decode",
+        "render",
+        "refocus",
+        "depth",
+        "deconvolve",
+        "view",
+    ),
+    "reproduce",
+)
 PROGRAM = [sys.executable, "-c", "import sys; from lumigraph.cli import main; sys.exit(main())"]
 
 
@@ -97,7 +111,7 @@ def test_simulate_adds_noise_that_the_seed_repeats(lumigraph, bench):
     ("words", "expected"),
     [
         (("--coherence", "coherent"), "Coherent()"),
-        (("--count", "3"), "Incoherent(snapshots=3, rng=7)"),
+        (("--count", "3"), "Incoherent(snapshots=3, rng=7, accuracy=0.001)"),
         (("--coherence", "snapshots"), "Snapshots(count=100, coherence_index=None, rng=7)"),
         (("--coherence", "tilted", "--na", "0.01", "--count", "5"), "TiltedWaves(count=5, na=0.01)"),
     ],
@@ -105,7 +119,8 @@ def test_simulate_adds_noise_that_the_seed_repeats(lumigraph, bench):
 def test_simulate_passes_the_light_and_the_scene_on(lumigraph, bench, monkeypatch, words, expected):
     seen = {}
 
-    def simulate(camera, scene, coherence, progress):
+    def simulate(camera, scene, coherence, *, spectrum, progress):
+        assert spectrum is None
         seen.update(scene=scene, coherence=coherence)
         return io.open(bench / "raw.tiff")
 

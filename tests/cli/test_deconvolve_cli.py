@@ -56,9 +56,9 @@ def test_a_focused_camera_gives_its_picture_and_a_report(focused, tmp_path):
     picture = lg.open(tmp_path / "picture.tiff")
     camera = lg.FocusedPlenopticCamera.from_toml(tmp_path / "camera.toml")
     assert values["iterations"] == 3
-    assert values["pixel_pitch"] == pytest.approx(camera.object_grid.pitch[0])
+    assert values["pixel_pitch"] == pytest.approx(camera.operator().object_grid.pitch[0])
     assert picture.shape == tuple(values["shape"])
-    assert picture.pixel_pitch == pytest.approx(camera.object_grid.pitch[0])
+    assert picture.pixel_pitch == pytest.approx(camera.operator().object_grid.pitch[0])
     assert float(picture.data.min()) >= 0
     page = (tmp_path / "page.html").read_text()
     assert "deviance" in page

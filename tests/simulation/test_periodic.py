@@ -111,8 +111,12 @@ def test_an_even_scene_of_intensity_one_has_the_mean_of_the_magnification(name):
     grid = Grid((2 * n[0], 2 * n[1]), camera.object_grid.pitch)
     image = periodic_operator(camera, grid).forward(np.ones(grid.shape, np.float32))
     pitch = camera.calibration.lattice.pitch
-    across = round(3 * pitch * (3**0.5 if camera.lenslets.layout == "hex" else 1) / 2)
-    along, middle = round(3 * pitch / 2), [k // 2 for k in image.shape]
+    hexagonal = camera.lenslets.layout == "hex"  # a small array: one period of it
+    across, along = (
+        round(pitch * (3**0.5 if hexagonal else 3) / 2),
+        round(pitch * (1 if hexagonal else 3) / 2),
+    )
+    middle = [k // 2 for k in image.shape]
     cells = image[middle[0] - across : middle[0] + across, middle[1] - along : middle[1] + along]
     expected = (1 + camera.lenslet_distance / camera.separation) ** -2
     assert cells.mean() == pytest.approx(expected, rel=0.02)

@@ -243,15 +243,6 @@ def test_an_interrupt_keeps_what_is_finished(two_f):
     assert caught.value.partial.metadata["shots"] == 2
 
 
-def test_incoherent_light_is_white_snapshots_before_a_turned_array(focused):
-    turned = focused.replace(lenslets={"rotation": "2 deg"})
-    scene = targets.siemens_star(turned.object_grid)
-    a = simulate(turned, scene, Incoherent(3, rng=4))
-    b = simulate(turned, scene, Snapshots(3, rng=4))
-    np.testing.assert_array_equal(a.data, b.data)
-    assert a.metadata["estimated_error"] == b.metadata["estimated_error"]
-
-
 @pytest.mark.parametrize(
     ("scene", "message"),
     [
