@@ -31,10 +31,13 @@ class Banded:
 
     def forward(self, plane: Array) -> Array:
         """``matrix @ plane``: (columns, n) to (rows, n)."""
-        xp = arrays.namespace(plane)
-        return xp.concat(
-            [arrays.like(m, plane) @ plane[first : first + m.shape[1], :] for first, m in self.blocks], axis=0
-        )
+        xp, row = arrays.namespace(plane), 0
+        rows = sum(m.shape[0] for _, m in self.blocks)
+        result = xp.empty((rows, plane.shape[1]), dtype=plane.dtype, device=plane.device)
+        for first, m in self.blocks:
+            result[row : row + m.shape[0], :] = arrays.like(m, plane) @ plane[first : first + m.shape[1], :]
+            row += m.shape[0]
+        return result
 
     def adjoint(self, plane: Array) -> Array:
         """``matrix.T @ plane``: (rows, n) to (columns, n)."""
