@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from lumigraph.scene import Points, Scene, Slice, targets
     from lumigraph.sensor import Sensor, demosaic
     from lumigraph.simulation import Coherent, Incoherent, Snapshots, Spectrum, TiltedWaves, simulate
+    from lumigraph.viewer import view_inline
 
 _HOMES = {
     "lumigraph": ("analysis", "depth", "design", "plots", "units"),
