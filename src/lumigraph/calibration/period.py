@@ -25,6 +25,7 @@ _MARGIN = 0.85  # the second candidate must stay below this part of the first
 _THIRDS = (8, 8), (16, 16)
 _ALIASED = 12.0  # px of pitch below which whole pixels make neighbours differ
 _ABSENT = 0.12  # of the weakest first harmonic of the finer lattice: what only the coarser one has
+_KEPT = 0.55  # of the score of a candidate must its regular lattice keep
 _FOLDED = 768  # px of the middle that are folded
 _ALIKE = 0.55  # correlation of lenslets of several kinds; touching discs of one kind reach 0.46
 _FEWEST = 2.8  # lenslets across a picture
@@ -56,8 +57,8 @@ class Request(NamedTuple):
         """Whether a candidate is worth looking at: it may be beaten, but not ten times as coarse."""
         return self.pitch is None or 0.4 * self.pitch < math.sqrt(_area(vectors)) < 2.5 * self.pitch
 
-    def allows(self, vectors: Vectors) -> bool:
-        """Whether a candidate is what was asked for."""
+    def allows(self, vectors: Vectors, slack: float = 0.0) -> bool:
+        """Whether a candidate is what was asked for; slack [rad] is its own uncertainty."""
         pitch = (math.hypot(*vectors.row) + math.hypot(*vectors.column)) / 2
         if self.layout not in (None, vectors.layout):
             return False
@@ -66,7 +67,7 @@ class Request(NamedTuple):
         if self.rotation is None:
             return True
         step = math.pi / (3 if vectors.layout == "hex" else 2)
-        return abs(math.remainder(math.atan2(*vectors.row) - self.rotation, step)) < math.radians(2)
+        return abs(math.remainder(math.atan2(*vectors.row) - self.rotation, step)) < math.radians(2) + slack
 
 
 class _Candidate(NamedTuple):
@@ -115,7 +116,11 @@ def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
         if not any(_same(finest, other, _AROUND) for other in chosen):
             chosen.append(finest)
     sharp = _distinct([_polished(gaps, vectors) for vectors in _singles(middles, chosen)], _NEAR)
-    return _best(_ranked(spectra, sharp), request, middles[0].shape)
+    best = _ranked(spectra, sharp)
+    if best[0].score < _KEPT * ranked[0].score:
+        first, second = ranked[0].vectors.row, ranked[0].vectors.column
+        raise CalibrationError(_nothing([reduced(first, second)], []))
+    return _best(best, request, middles[0].shape)
 
 
 def _polished(gaps: Gaps, vectors: Vectors) -> Vectors:
@@ -303,7 +308,7 @@ def _area(vectors: Vectors) -> float:
 
 
 def _best(ranked: list[_Candidate], request: Request, shape: tuple[int, ...]) -> Vectors:
-    allowed = [c for c in ranked if request.allows(c.vectors)]
+    allowed = [c for c in ranked if request.allows(c.vectors, _pitch(c.vectors) / min(shape) / 2)]
     if not allowed:
         best = ranked[0].vectors
         raise CalibrationError(

@@ -37,10 +37,7 @@ def sharpened(picture: np.ndarray, spots: Spots, model: Calibration) -> Spots:
     for k in range(0, len(centers), step):
         part = slice(k, k + step)
         start = model.position(spots.indices[part])
-        for _ in range(2):
-            move = _moves(picture, mean, model, start, reach)
-            start = start + np.clip(move, -0.5, 0.5)
-        centers[part] = start
+        centers[part] = start + np.clip(_moves(picture, mean, model, start, reach), -0.5, 0.5)
     good = np.hypot(*(centers - spots.centers).T) < max(0.75, 0.05 * pitch)
     return spots._replace(centers=np.where(good[:, None], centers, spots.centers))
 

@@ -1,5 +1,6 @@
 """`lumigraph calibrate`."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -56,12 +57,11 @@ class Bench:
 
 
 def calibrate(
-    white: Path,
-    /,
-    *,
+    *white: Path,
     output: Output,
     layout: Literal["square", "hex"] | None = None,
     pitch: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
+    rotation: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
     explain: Annotated[bool, Parameter(negative=())] = False,
     overlay: Path | None = None,
     bench: Bench = Bench(),
@@ -74,13 +74,16 @@ def calibrate(
     Parameters
     ----------
     white
-        Picture of an evenly lit surface, or a raw image where there is none (TIFF, PNG, Zarr).
+        Picture of an evenly lit surface, several of them to average, or a raw image where there is none
+        (TIFF, PNG, Zarr).
     output
         Calibration file (.toml).
     layout
         Found by itself if left out.
     pitch
         Distance of micro-images in pixels, if it is not found by itself.
+    rotation
+        Of the rows of lenslets from +x towards +y in degrees, if it is not found by itself.
     explain
         Say what to turn on the bench: rotation, shift, distance, tilt and aperture, against --camera.
     overlay
@@ -93,13 +96,19 @@ def calibrate(
     files.check_output(output, (".toml",))
     if overlay is not None:
         files.check_output(overlay, files.FIGURES)
+    if not white:
+        raise CalibrationError(
+            "no white image is given. Write 'lumigraph calibrate white.png -o lattice.toml'."
+        )
     above_zero("--pitch", pitch, "px")
     if explain and bench.camera is None:
         raise CalibrationError("--explain compares with what was meant: give the camera file, --camera FILE.")
     known = bench.lengths()
-    picture = files.read_raw(white)
+    pictures = [files.read_raw(path) for path in white]
+    picture = pictures[0]
+    turn = None if rotation is None else math.radians(rotation)
     with progress("calibrate"):
-        found = verbs.calibrate(picture, layout, pitch, **known)
+        found = verbs.calibrate(pictures, layout, pitch, rotation=turn, **known)
         if overlay is not None:
             from lumigraph import plots
 
@@ -149,6 +158,14 @@ def _page(white: "RawImage", found: "Calibration", advice: dict[str, Any]) -> An
         drawn = plots.curves(distance, {"": share}, xlabel="distance from the lattice [px]", ylabel="share")
         page.section("Residuals").figure(
             drawn, "Share of the micro-images that stand as near to their place."
+        )
+        maps = [
+            (np.nan_to_num(found.residual_map), "residual [px]"),
+            (np.nan_to_num(found.light_map), "light"),
+        ]
+        page.section("Lenslet by lenslet").figure(
+            plots.images(maps, columns=2, label="0: none found"),
+            "How far each micro-image stands from the lattice, and its brightness: the vignetting.",
         )
     if found.notes or advice:
         page.section("What to know").text("\n\n".join([*found.notes, *advice.get("advice", ())]))

@@ -97,6 +97,24 @@ class Calibration:
         """Measured centre minus the fitted place of each lenslet (k, 2) as (y, x) [px]."""
         return self.centers - self.position(self.indices)
 
+    @property
+    def residual_map(self) -> np.ndarray:
+        """Distance of each measured centre from the lattice (i, j) [px]; NaN where none was measured."""
+        return self._mapped(np.hypot(*self.residuals.T))
+
+    @property
+    def light_map(self) -> np.ndarray:
+        """Brightness of each measured micro-image (i, j), the vignetting; NaN where none is known."""
+        return self._mapped(np.full(len(self.centers), np.nan) if self.light is None else self.light)
+
+    def _mapped(self, values: np.ndarray) -> np.ndarray:
+        if not len(values):
+            return np.full((1, 1), np.nan)
+        first = self.indices.min(0)
+        result = np.full(self.indices.max(0) - first + 1, np.nan)
+        result[tuple((self.indices - first).T)] = values
+        return result
+
     def position(self, indices: np.ndarray) -> np.ndarray:
         """Micro-image centres (..., 2) as (y, x) [px] of lenslets (..., 2) as (i, j)."""
         points = self.lattice.position(indices)

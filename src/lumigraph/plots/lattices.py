@@ -66,7 +66,7 @@ def cell_outline(lattice: Lattice) -> np.ndarray:
 
 
 def _arrows(axes: Axes, calibration: Calibration) -> None:
-    residuals, points = calibration.residuals, calibration.lattice.position(calibration.indices)
+    residuals, points = calibration.residuals, calibration.position(calibration.indices)
     axes.set_title(f"{len(points)} lenslets")
     rms = float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))) if len(points) else 0.0
     if rms < 1e-9:  # computed from a camera file: nothing was measured
@@ -85,7 +85,7 @@ def _cells(axes: Axes, calibration: Calibration, count: int) -> None:
     (y0, y1), (x0, x1) = [
         (max(m - half, -0.5), min(m + half, n - 0.5)) for m, n in zip(middle, calibration.shape, strict=True)
     ]
-    points = lattice.centers(
+    points = calibration.centers_within(
         (y0 - lattice.pitch, y1 + lattice.pitch), (x0 - lattice.pitch, x1 + lattice.pitch)
     )
     outlines = [(point + cell_outline(lattice))[:, ::-1] for point in points]
