@@ -168,6 +168,26 @@ def test_calibrate_writes_the_lattice_and_an_overlay(lumigraph, bench):
     assert io.open("lattice.png").data.ndim == 3
 
 
+def test_calibrate_explains_what_to_turn(lumigraph, bench):
+    camera = (bench / "camera.toml").read_text().replace("[3, 3]", "[12, 13]")
+    (bench / "camera.toml").write_text(camera)
+    y, x = np.mgrid[:153, :165] - np.array([69.7, 82])[:, None, None]
+    cos, sin = np.cos(0.02), np.sin(0.02)  # the lenslets turned by 1.15 degrees
+    spots = (np.cos(np.pi * (y * cos - x * sin) / 12.6) * np.cos(np.pi * (x * cos + y * sin) / 12.6)) ** 2
+    white = np.rint(3000 * np.clip(1.6 * spots, 0, 1) + 100).astype(np.uint16)
+    io.save(RawImage(white), bench / "turned.tiff")
+    words = ("--camera", "camera.toml", "--explain", "--report", "page.html", "--rotation", "1")
+    result = lumigraph("calibrate", "turned.tiff", "turned.tiff", "-o", "c.toml", *words)
+    assert (result.code, result.err) == (0, "")
+    assert "the lenslets are turned by +1.1" in result.out
+    page = (bench / "page.html").read_text()
+    assert page.count("<img") + page.count("<svg") >= 3
+    assert "the lenslets are turned by +1.1" in page
+    assert lumigraph("calibrate", "white.tiff", "-o", "c.toml", "--explain").code == 1
+    none = lumigraph("calibrate", "-o", "c.toml")
+    assert (none.code, "no white image is given" in none.err) == (1, True)
+
+
 def test_calibrate_takes_the_geometry_of_a_camera(lumigraph, bench):
     words = ("--layout", "square", "--pitch", "11.4", "--camera", "camera.toml", "--separation", "201 mm")
     values = json.loads(lumigraph("calibrate", "white.tiff", "-o", "c.toml", *words, "--json").out)

@@ -76,7 +76,7 @@ def _fitted(spots: Spots, model: Calibration, warped: bool) -> Fitted:
         for tilt, radial in _FREE[1:]:
             other = _robust(spots, model, (tilt, radial))
             value = _criterion(other, 6 + 2 * tilt + radial)
-            kept = len(other.spots.indices) >= len(best.spots.indices) * 0.98
+            kept = len(other.spots.indices) >= len(best.spots.indices) * 0.95 - 1
             gained = value < least - _EVIDENCE and _rms(other) < _GAIN * straight
             if kept and gained:
                 best, least, straight = other, value, _rms(other)

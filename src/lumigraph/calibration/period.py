@@ -26,6 +26,7 @@ _THIRDS = (8, 8), (16, 16)
 _ALIASED = 12.0  # px of pitch below which whole pixels make neighbours differ
 _ABSENT = 0.12  # of the weakest first harmonic of the finer lattice: what only the coarser one has
 _KEPT = 0.55  # of the score of a candidate must its regular lattice keep
+_SHEARED = 1.06  # two pitches that a search finds
 _FOLDED = 768  # px of the middle that are folded
 _ALIKE = 0.55  # correlation of lenslets of several kinds; touching discs of one kind reach 0.46
 _FEWEST = 2.8  # lenslets across a picture
@@ -115,11 +116,13 @@ def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
         finest = _finest(light, candidate.vectors)
         if not any(_same(finest, other, _AROUND) for other in chosen):
             chosen.append(finest)
-    sharp = _distinct([_polished(gaps, vectors) for vectors in _singles(middles, chosen)], _NEAR)
-    best = _ranked(spectra, sharp)
-    if best[0].score < _KEPT * ranked[0].score:
-        first, second = ranked[0].vectors.row, ranked[0].vectors.column
-        raise CalibrationError(_nothing([reduced(first, second)], []))
+    chosen = _singles(middles, chosen)
+    best = _ranked(spectra, _distinct([_polished(gaps, vectors) for vectors in chosen], _NEAR))
+    if best[0].score < _KEPT * ranked[0].score:  # sheared, or no lattice of one pitch
+        first, second = reduced(ranked[0].vectors.row, ranked[0].vectors.column)
+        if math.hypot(*second) > _SHEARED * math.hypot(*first):
+            raise CalibrationError(_nothing([(first, second)], []))
+        best = _ranked(spectra, chosen)
     return _best(best, request, middles[0].shape)
 
 
