@@ -16,12 +16,12 @@ def main() -> None:
     scope = lg.LightFieldMicroscope(
         wavelength="525 nm",
         objective={"magnification": 20.0, "numerical_aperture": 0.5},
-        lenslets={"pitch": "125 um", "focal_length": "2.5 mm", "count": (11, 11)},
-        sensor={"pixel_pitch": "5 um"},
+        lenslets={"pitch": "125 um", "focal_length": "2.5 mm", "count": (9, 9)},
+        sensor={"pixel_pitch": "6.25 um"},
     )
     print(scope.describe())
 
-    depths = np.arange(16, 65, 6) * um
+    depths = np.arange(16, 65, 8) * um
     operator = scope.operator(depths, 3)
     grid = operator.object_grid
     radius = np.sqrt((depths[:, None, None] - 40 * um) ** 2 + grid.y[:, None] ** 2 + grid.x**2)
