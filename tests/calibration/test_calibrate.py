@@ -85,8 +85,8 @@ def test_turned_hexagonal_lattice_with_rows_along_y():
 
 
 def test_largest_pitch_with_few_lenslets():
-    lattice = Lattice.square(200.6, 0.03, (150, 160))
-    pitch_error, centre_error = errors(calibrate(drawn(lattice, (850, 900), over=2)), lattice)
+    lattice = Lattice.square(200.6, 0.03, (110, 120))
+    pitch_error, centre_error = errors(calibrate(calibration_drawing.white(lattice, (650, 700))[0]), lattice)
     assert pitch_error < 0.02
     assert centre_error < 0.1
 
