@@ -12,7 +12,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, LumigraphError, SamplingError
 from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera, SingleLensCamera
 from lumigraph.scene import Scene, Slice, sources, targets
-from lumigraph.simulation import Coherent, Incoherent, Interrupted, Snapshots, TiltedWaves, simulate
+from lumigraph.simulation import Coherent, Interrupted, Snapshots, TiltedWaves, simulate
 from lumigraph.units import mm, nm, um
 
 

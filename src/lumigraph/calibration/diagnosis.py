@@ -23,7 +23,7 @@ LEAST_OFFSET = 0.25
 """Pixels."""
 LEAST_STRETCH = 3e-4
 """Of the pitch."""
-LEAST_TILT = math.radians(0.5)
+LEAST_TILT = math.radians(1.0)
 LEAST_GAP = 0.03
 """Of the pitch. Below these limits a difference is no fault."""
 

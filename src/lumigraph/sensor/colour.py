@@ -137,7 +137,7 @@ def demosaic(
 
 def _library(method: str) -> Callable[[np.ndarray, str], np.ndarray]:
     """The function of colour-demosaicing, which takes seconds to import."""
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), np.printoptions():  # it sets NumPy to print as it did years ago
         warnings.simplefilter("ignore")  # it uses names that SciPy is about to drop
         library = importlib.import_module("colour_demosaicing")
     return getattr(library, f"demosaicing_CFA_Bayer_{METHODS[method]}")

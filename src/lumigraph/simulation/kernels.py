@@ -2,8 +2,8 @@
 
 The block between two cells, (points, samples), is ``left @ right`` with as many columns in between as the
 light there has patterns: over a hundred in front of a lenslet, one or two far from it. Singular values are
-kept until the accuracy is reached; the light of what is left out is given back evenly, so that an even
-object stays exact.
+kept until the accuracy is reached; the light of what is left out is given to all points of its cell alike, so
+that an even object stays exact.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ from lumigraph.simulation.point_images import factors, images, mirrored, wave
 
 Progress = Callable[[float], None]
 
-VERSION = 1
+VERSION = 2
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 
@@ -326,9 +326,9 @@ class _Builder:
         result = self._unfolded({key: f.cut(least) for key, f in found.items()}, folds)
         means = self._unfolded({key: (f.left[:, :1] * 0, f.mean[None]) for key, f in found.items()}, folds)
         even = np.ones((math.prod(self.optics.cells.points), 1))
-        left_out = sum(means[key][1][0] - left.mean(0) @ right for key, (left, right) in result.items())
-        left, right = result[0, 0]
-        result[0, 0] = np.hstack([left, even]), np.vstack([right, np.asarray(left_out)[None]])
+        for key, (left, right) in result.items():
+            left_out = means[key][1] - left.mean(0, keepdims=True) @ right
+            result[key] = np.hstack([left, even]), np.vstack([right, left_out])
         return result, {key: mean[0] for key, (_, mean) in means.items()}
 
     def border(self, limits_y: Limits, limits_x: Limits, *, ring: bool) -> Blocks:
