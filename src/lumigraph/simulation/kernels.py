@@ -87,7 +87,7 @@ class Optics:
 
     @property
     def key(self) -> str:
-        """Names all that the matrix depends on: not the array's rotation, nor the sensor."""
+        """Names all that the matrix depends on: not the sensor, nor the object's samples."""
         camera = self.camera
         with np.printoptions(threshold=2**62, floatmode="unique"):
             known = repr((

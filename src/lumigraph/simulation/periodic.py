@@ -239,7 +239,7 @@ def periodic_operator(
     Raises
     ------
     GeometryError
-        A camera without lenslets, or a depth inside the focal length.
+        A camera without lenslets, or no depth.
     SamplingError
         An accuracy out of range, or matrices that do not fit in memory.
 
