@@ -1,6 +1,7 @@
 """CPU seconds of a microscope's point images and Richardson-Lucy iterations, beside pyolaf where it is.
 
-lfm-guv at 15 pixels and 5 samples per lenslet, -4 to 4 um in steps of 2 um. pyolaf (GPL) is run as a black
+lfm-guv at 15 pixels and 5 samples per lenslet, -4 to 4 um in steps of 2 um; with SLICES=13, -6 to 6 um in
+steps of 1 um. Iterations are medians; point images include the matrices of their frequencies. pyolaf (GPL) is run as a black
 box in an environment of its own: PYOLAF names its interpreter, LUMIGRAPH_DATA the folder with lfm_guv.
 """
 
@@ -14,7 +15,9 @@ import numpy as np
 from lumigraph.deconvolution import deconvolve
 from lumigraph.instruments import LightFieldMicroscope
 
-DEPTHS = tuple(float(z) for z in np.arange(-4e-6, 4.1e-6, 2e-6))
+SLICES = int(os.environ.get("SLICES", "5"))
+FARTHEST, STEP = (6.0, 1.0) if SLICES == 13 else (4.0, 2.0)
+DEPTHS = tuple(float(z) * 1e-6 for z in np.arange(-FARTHEST, FARTHEST + 0.1, STEP))
 
 BLACK_BOX = """
 import json, os, resource, sys, tempfile, warnings
@@ -31,21 +34,23 @@ scope = dict(gridType="reg", focus="single", plenoptic=1, uLensMask=1, M=60.0, N
              tube2mla=0, spacingPx=15.38)
 with tempfile.NamedTemporaryFile("w", suffix=".yaml", delete=False) as file:
     yaml.safe_dump(scope, file)
+far, step = float(sys.argv[2]), float(sys.argv[3])
 camera = LFM_setCameraParams(file.name, 15)
 white = tifffile.imread(os.path.join(sys.argv[1], "Radiometry_GUVExperim1.tif")).astype(float)
-centers, resolution = LFM_computeGeometryParameters(camera, white, [-4.0, 4.0], 2.0, 5, False)[:2]
+centers, resolution = LFM_computeGeometryParameters(camera, white, [-far, far], step, 5, False)[:2]
 start = cpu()
 forward, backward = LFM_computeLFMatrixOperators(camera, resolution, centers)[:2]
 images = cpu() - start
 shape, texture = np.array([425, 425]), np.array([143, 143])
 light = lambda volume: LFM_forwardProject(forward, volume, centers, resolution, shape, camera["range"])
 back = lambda raw: LFM_backwardProject(backward, raw, centers, resolution, texture, camera["range"])
-volume = np.ones((143, 143, 5))
+volume = np.ones((143, 143, round(2 * far / step) + 1))
 light(volume)
-start = cpu()
+times = [cpu()]
 for _ in range(3):
     volume = volume * np.nan_to_num(back(np.nan_to_num(np.ones((425, 425)) / light(volume))))
-print(json.dumps({"images": images, "iteration": (cpu() - start) / 3}))
+    times.append(cpu())
+print(json.dumps({"images": images, "iteration": float(np.median(np.diff(times)))}))
 """
 
 
@@ -54,15 +59,15 @@ def run() -> dict[str, dict[str, float]]:
     scope = LightFieldMicroscope.from_catalogue("lfm-guv").replace(objective={"model": "scalar"})
     start = time.process_time()
     operator = scope.operator(DEPTHS, 5, pixels=15, dropped=0.02)
-    images = time.process_time() - start
     raw = operator.forward(np.ones(operator.shape[1], np.float32)) + 1
+    images = time.process_time() - start
     deconvolve(raw, operator, 1)
     times = []
-    deconvolve(raw, operator, 8, progress=lambda step: times.append(time.process_time()))
-    found = {"lumigraph": {"images": images, "iteration": float(np.diff(times).min())}}
+    deconvolve(raw, operator, 16, progress=lambda step: times.append(time.process_time()))
+    found = {"lumigraph": {"images": images, "iteration": float(np.median(np.diff(times)))}}
     python, data = os.environ.get("PYOLAF"), os.environ.get("LUMIGRAPH_DATA")
     if python and data:
-        command = [python, "-c", BLACK_BOX, os.path.join(data, "lfm_guv")]  # noqa: PTH118
+        command = [python, "-c", BLACK_BOX, os.path.join(data, "lfm_guv"), str(FARTHEST), str(STEP)]  # noqa: PTH118
         told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
         found["pyolaf"] = json.loads(told.splitlines()[-1])
     return found

@@ -147,15 +147,15 @@ def ifft2(array: Array, *, overwrite: bool = False) -> Array:
     return namespace(array).fft.ifftn(array, axes=(-2, -1))
 
 
-def rfft2(array: Array, shape: tuple[int, int]) -> Array:
-    """2-D DFT of the last two axes of a real array, zero-padded to `shape`: (..., ny, nx // 2 + 1)."""
+def rfft2(array: Array, shape: tuple[int, int], axes: tuple[int, int] = (-2, -1)) -> Array:
+    """2-D DFT of two axes of a real array, zero-padded to `shape`: (ny, nx // 2 + 1) along them."""
     if is_numpy_array(array):
-        return scipy.fft.rfft2(array, shape, workers=WORKERS)
-    return namespace(array).fft.rfftn(array, s=shape, axes=(-2, -1))
+        return scipy.fft.rfft2(array, shape, axes=axes, workers=WORKERS)
+    return namespace(array).fft.rfftn(array, s=shape, axes=axes)
 
 
-def irfft2(array: Array, shape: tuple[int, int]) -> Array:
-    """The real array (..., *shape) whose `rfft2` this is."""
+def irfft2(array: Array, shape: tuple[int, int], axes: tuple[int, int] = (-2, -1)) -> Array:
+    """The real array, `shape` along two axes, whose `rfft2` this is."""
     if is_numpy_array(array):
-        return scipy.fft.irfft2(array, shape, workers=WORKERS)
-    return namespace(array).fft.irfftn(array, s=shape, axes=(-2, -1))
+        return scipy.fft.irfft2(array, shape, axes=axes, workers=WORKERS)
+    return namespace(array).fft.irfftn(array, s=shape, axes=axes)

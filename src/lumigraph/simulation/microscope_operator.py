@@ -2,13 +2,14 @@
 
 With s × s points in each lenslet's cell and N × N samples of the image, a plane's raw image is the sum over
 the offsets between the points' cell and the image's of (cells × s²) · (s² × N²). All offsets of a depth are
-one product: the points of the neighbouring cells are gathered first.
+one product: the points of the neighbouring cells are gathered first. Where it takes less time, all of it goes
+through the lenslets' frequencies instead (`microscope_spectrum`), with the same result to rounding.
 """
 
 import hashlib
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.simulation import microscope_spectrum
 from lumigraph.simulation.microscope_kernels import (
     DROPPED,
     CellSampling,
@@ -31,6 +33,9 @@ from lumigraph.simulation.microscope_pixels import PixelPlacement
 
 GATHERED = 2**27
 """Numbers that are gathered for one product."""
+
+SHARE = 0.3
+"""Part of the free memory that matrices of the lenslets' frequencies may take."""
 
 _MATRICES = ByteCache(limit=3 * 2**29)
 
@@ -54,6 +59,9 @@ class MicroscopeOperator:
         s samples per lenslet along each axis [m].
     placement
         Where the pixels stand; None where they are the N × N samples of each cell.
+    by_frequency
+        Whether `forward` and `adjoint` go through the lenslets' frequencies (`microscope_spectrum`), where
+        rounding may leave -1e-6 of the highest value instead of 0; else by products over all offsets.
     """
 
     kernels: tuple[SliceKernel, ...]
@@ -61,6 +69,8 @@ class MicroscopeOperator:
     cells: tuple[int, int]
     object_grid: Grid
     placement: PixelPlacement | None = None
+    by_frequency: bool = False
+    _spectra: dict = field(default_factory=dict, repr=False)
 
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int, int]]:
@@ -71,7 +81,10 @@ class MicroscopeOperator:
 
     @property
     def multiply_adds(self) -> int:
-        """Of one application of `forward` or `adjoint`."""
+        """Of the matrix products of one application of `forward` or `adjoint`."""
+        if self.by_frequency:
+            tiles = math.prod(microscope_spectrum.tiling(self.kernels, self.cells).counts)
+            return 4 * tiles * microscope_spectrum.matrix_numbers(self.kernels, self.cells)
         rows = sum(len(kernel.offsets) * kernel.sampling.classes for kernel in self.kernels)
         return rows * self.kernels[0].sampling.pixels ** 2 * math.prod(self.cells)
 
@@ -92,6 +105,22 @@ class MicroscopeOperator:
             Another shape than the operator's.
         """
         self._check("the volume", volume, self.shape[1])
+        plane = self._light(volume) if self.by_frequency else self._by_offsets(volume)
+        return plane if self.placement is None else self.placement.forward(plane)
+
+    def _light(self, volume: Array) -> Array:
+        tiling = microscope_spectrum.tiling(self.kernels, self.cells)
+        N = self.kernels[0].sampling.pixels
+        return microscope_spectrum.forward(self._matrix(volume), tiling, volume, N)
+
+    def _matrix(self, like: Array) -> Array:
+        key = arrays.placement(like)
+        if key not in self._spectra:
+            found = microscope_spectrum.matrices(self.kernels, self.cells)
+            self._spectra[key] = arrays.like(found, like)
+        return self._spectra[key]
+
+    def _by_offsets(self, volume: Array) -> Array:
         xp, image = arrays.namespace(volume), 0.0
         for k, kernel in enumerate(self.kernels):
             s, reach = kernel.sampling.points, _reach(kernel)
@@ -101,8 +130,7 @@ class MicroscopeOperator:
                 gathered = xp.reshape(xp.stack(parts), (rows, -1))
                 image = image + xp.matrix_transpose(matrix) @ gathered
         N = self.kernels[0].sampling.pixels
-        plane = _plane(xp.reshape(image, (N * N, *self.cells)), N)
-        return plane if self.placement is None else self.placement.forward(plane)
+        return _plane(xp.reshape(image, (N * N, *self.cells)), N)
 
     def adjoint(self, raw: Array) -> Array:
         """Transpose of `forward`: (z, y, x) from a raw image (ny, nx).
@@ -116,6 +144,9 @@ class MicroscopeOperator:
         xp = arrays.namespace(raw)
         plane = raw if self.placement is None else self.placement.adjoint(raw)
         N = self.kernels[0].sampling.pixels
+        if self.by_frequency:
+            tiling, s = microscope_spectrum.tiling(self.kernels, self.cells), self.kernels[0].sampling.points
+            return microscope_spectrum.adjoint(self._matrix(raw), tiling, plane, s)
         flat = xp.reshape(_class_first(plane, N), (N * N, -1))
         return xp.stack([self._back(kernel, flat) for kernel in self.kernels])
 
@@ -123,7 +154,8 @@ class MicroscopeOperator:
         """Raw image (ny, nx) of one sample (z, y, x) of intensity 1, float32 of NumPy."""
         volume = np.zeros(self.shape[1], np.float32)
         volume[index] = 1
-        return self.forward(volume)
+        plane = self._by_offsets(volume)  # dark pixels stay 0
+        return plane if self.placement is None else self.placement.forward(plane)
 
     def _back(self, kernel: SliceKernel, flat: Array) -> Array:
         xp, s, reach = arrays.namespace(flat), kernel.sampling.points, _reach(kernel)
@@ -221,8 +253,16 @@ def microscope_operator(
         if progress is not None:
             progress(done + 1, len(depths))
     return MicroscopeOperator(
-        tuple(kernels), depths, layout.cells, _object_grid(lenslet, layout), layout.placement
-    )
+        tuple(kernels), depths, layout.cells, _object_grid(lenslet, layout), layout.placement,
+        _suits_frequencies(kernels, layout.cells),
+    )  # fmt: skip
+
+
+def _suits_frequencies(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> bool:
+    """Whether the way through the lenslets' frequencies is faster, and its matrices leave memory free."""
+    needed, free = 4.0 * microscope_spectrum.matrix_numbers(kernels, cells), memory.available()
+    fits = free is None or needed < free * SHARE
+    return fits and microscope_spectrum.is_faster(kernels, cells)
 
 
 def _object_grid(lenslet: Lenslet, layout: Layout) -> Grid:
