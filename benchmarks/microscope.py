@@ -1,8 +1,9 @@
 """CPU seconds of a microscope's point images and Richardson-Lucy iterations, beside pyolaf where it is.
 
 lfm-guv at 15 pixels and 5 samples per lenslet, -4 to 4 um in steps of 2 um; with SLICES=13, -6 to 6 um in
-steps of 1 um. Iterations are medians; point images include the matrices of their frequencies. pyolaf (GPL) is run as a black
-box in an environment of its own: PYOLAF names its interpreter, LUMIGRAPH_DATA the folder with lfm_guv.
+steps of 1 um. Iterations are medians; point images include the matrices of their frequencies. pyolaf (GPL) is
+run as a black box in an environment of its own: PYOLAF names its interpreter, LUMIGRAPH_DATA the folder with
+lfm_guv.
 """
 
 import json
