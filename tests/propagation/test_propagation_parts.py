@@ -15,11 +15,11 @@ from lumigraph.propagation.window import smooth_size, window_shape
 from lumigraph.propagation.zoom import Samples, _chirp_z, _fourier_matrix
 
 
-@given(n=st.integers(1, 20000), even=st.booleans())
-def test_a_smooth_size_is_quick_close_and_even_when_asked(n, even):
-    size = smooth_size(n, even=even)
+@given(n=st.integers(1, 20000), multiple=st.integers(1, 3))
+def test_a_smooth_size_is_quick_close_and_a_multiple(n, multiple):
+    size = smooth_size(n, multiple)
     assert n <= size <= max(1.1 * n, n + 8)
-    assert not (even and size % 2)
+    assert size % multiple == 0
     rest = size
     for prime in (2, 3, 5, 7, 11):
         while rest % prime == 0:
@@ -49,7 +49,7 @@ def test_an_unpadded_window_is_the_hull_of_both_grids():
     grid = Grid((7, 10), 1.0)
     assert window_shape(grid, grid, 0, (0, 0)) == (7, 10)
     assert window_shape(grid, Grid((7, 10), 1.0), 0, (-3, 5)) == (10, 15)
-    assert window_shape(grid, grid, 0, (0, 0), even=True) == (8, 10)
+    assert window_shape(grid, grid, 0, (0, 0), (2, 2)) == (8, 10)
 
 
 @given(

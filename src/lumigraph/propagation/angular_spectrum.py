@@ -20,7 +20,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.propagation import sampling
 from lumigraph.propagation.cache import CACHE
 from lumigraph.propagation.pruned import Band, Transfer, convolve, convolved_intensity
-from lumigraph.propagation.window import check_memory, reach, window_shape
+from lumigraph.propagation.window import check_memory, reach, samples_between, window_shape
 
 Pair = tuple[float, float]
 Distance = float | Array
@@ -112,26 +112,29 @@ def _propagate(field: Field, way: Distance, method: str, pad: float, output: Gri
 def _transfer(field: Field, way: Distance, method: str, pad: float, output: Grid) -> Transfer:
     """The transfer function from the field to `output`, whose sampling is checked first."""
     distance = arrays.number(way)
-    first = output.samples_to(field.grid)
-    window = Grid(window_shape(field.grid, output, pad, first), field.grid.pitch)
+    step, between = samples_between(output, field.grid)
+    first = between.samples_to(field.grid)
+    window = Grid(window_shape(field.grid, between, pad, first, step), field.grid.pitch)
     limits = kept_frequencies(method, field.grid, window, distance, field.wavelength)
     rows, columns = Band.below(window.fy, limits[0]), Band.below(window.fx, limits[1])
     _check_memory(field, rows, columns, output)
-    farthest = tuple(map(reach, field.grid.shape, first, output.shape))
+    farthest = tuple(map(reach, field.grid.shape, first, between.shape))
     _check_sampling(method, field, window, limits, (distance, (farthest[0], farthest[1])))
     circle = limits if method in CIRCULAR else None
-    key = ("spectral", window, first, distance, field.wavelength, rows, columns, circle)
+    key = ("spectral", window, first, step, distance, field.wavelength, rows, columns, circle)
     values = CACHE.get(
         (*key, arrays.placement(field.data)),
         lambda: arrays.like(
-            _on_band(window, (rows, columns), first, (distance, field.wavelength), circle), field.data
+            _on_band(window, (rows, columns), first, (distance, field.wavelength), circle)
+            / (rows.fewer(step[0]) * columns.fewer(step[1])),
+            field.data,
         ),
     )
     if arrays.is_parameter(way):
         across, up = rows.take(window.fy), columns.take(window.fx)  # values are (columns, rows)
         waves = wave_numbers(up, across, field.wavelength)
         values = arrays.turned(values, waves, arrays.parameter(way) - distance)
-    return Transfer(values, rows, columns)
+    return Transfer(values, rows, columns, step)
 
 
 def _on_band(

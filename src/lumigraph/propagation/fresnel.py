@@ -60,7 +60,7 @@ def multi_step_fresnel(field: Field, distance: float, pad: float, grid: Grid | N
     """
     output = grid or field.grid
     first = output.samples_to(field.grid)
-    window = Grid(window_shape(field.grid, output, pad, first, even=True), field.grid.pitch)
+    window = Grid(window_shape(field.grid, output, pad, first, (2, 2)), field.grid.pitch)
     _check_steps(field, window, distance, (first, output))
     steps = sampling.fresnel_step(window, field.wavelength)
     data = _conjugate_if(distance < 0, field.data)

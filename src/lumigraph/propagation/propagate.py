@@ -20,6 +20,7 @@ from lumigraph.propagation.angular_spectrum import (
     corrected_band_limited,
 )
 from lumigraph.propagation.fresnel import fresnel, multi_step_fresnel
+from lumigraph.propagation.window import samples_between
 from lumigraph.propagation.zoom import zoom
 
 Method = Callable[[Field, Any, float, Grid | None], Field]
@@ -122,7 +123,8 @@ def propagate(
         for it, "auto" chooses it.
     grid
         Output grid; the input's own if left out. Methods that keep the pitch take any window whose
-        samples fall on the input's, smaller, larger or shifted, and compute only that window.
+        samples fall on the input's, smaller, larger or shifted, and compute only that window. All of them but
+        "multi_step_fresnel" also take every second, third … of those samples, and compute little more.
 
     Returns
     -------
@@ -282,9 +284,10 @@ def _on_window(field: Field, grid: Grid) -> Field:
     if grid == field.grid:
         return field
     data = field.data
-    for axis, first in zip((-2, -1), grid.samples_to(field.grid), strict=True):
-        data = _window_along(data, axis, first, grid.shape[axis])
-    return replace(field, data=data, grid=grid)
+    step, between = samples_between(grid, field.grid)
+    for axis, first in zip((-2, -1), between.samples_to(field.grid), strict=True):
+        data = _window_along(data, axis, first, between.shape[axis])
+    return replace(field, data=data[..., :: step[0], :: step[1]], grid=grid)
 
 
 def _window_along(data: Array, axis: int, first: int, count: int) -> Array:

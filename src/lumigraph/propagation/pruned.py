@@ -1,7 +1,8 @@
 """Convolution by a band-limited transfer function, without the transforms that see only zeros.
 
 Of a padded window only the input's own rows are transformed along x, only the columns inside the band
-along y, and only the rows that are asked for back along x. On NumPy arrays the work goes through
+along y, and only the rows that are asked for back along x; where every second sample is asked for and the
+band fits, the way back is of half the length. On NumPy arrays the work goes through
 blocks that stay in the processor's cache, one thread for each processor; other libraries do the same
 steps on whole arrays, with nothing written in place, so that PyTorch differentiates through them.
 """
@@ -46,37 +47,70 @@ class Band:
         """Frequencies that pass."""
         return self.positive + self.negative
 
+    @property
+    def parts(self) -> tuple[slice, slice]:
+        """Where they stand among all n."""
+        return slice(self.positive), slice(self.n - self.negative, self.n)
+
+    @property
+    def packed(self) -> tuple[slice, slice]:
+        """Where they stand among those that pass."""
+        return slice(self.positive), slice(self.positive, self.count)
+
     def take(self, values: np.ndarray) -> np.ndarray:
         """The passing entries of the last axis, in FFT order."""
         return np.concatenate([values[..., : self.positive], values[..., self.n - self.negative :]], -1)
 
+    def fewer(self, step: int) -> int:
+        """How many times shorter a DFT may be that gives every `step`-th sample: a divisor of it."""
+        return max(k for k in range(1, step + 1) if step % k == 0 and self.count * k <= self.n)
+
+    def thinned(self, step: int) -> "Band":
+        """The same frequencies in that shorter DFT."""
+        return Band(self.n // self.fewer(step), self.positive, self.negative)
+
 
 @dataclass(frozen=True, slots=True)
 class Transfer:
-    """A transfer function on its band: `values` (columns, rows), so that a column is contiguous."""
+    """A transfer function on its band: `values` (columns, rows), so that a column is contiguous.
+
+    Of the window every `step`-th sample (y, x) is wanted; `step` divides its shape.
+    """
 
     values: Array
     rows: Band
     columns: Band
+    step: tuple[int, int] = (1, 1)
+
+    @property
+    def thinned(self) -> tuple[Band, Band]:
+        """Rows and columns of the inverse transforms."""
+        return self.rows.thinned(self.step[0]), self.columns.thinned(self.step[1])
+
+    def kept(self, shape: tuple[int, ...]) -> list[slice]:
+        """What of those transforms makes an output of the given shape."""
+        bands = zip((self.rows, self.columns), self.step, shape, strict=True)
+        steps = [(step // band.fewer(step), n) for band, step, n in bands]
+        return [slice(0, n * step, step) for step, n in steps]
 
 
 def convolve(data: Array, transfer: Transfer, shape: tuple[int, int]) -> Array:
-    """First `shape` (ny, nx) samples of the circular convolution of `data` (..., y, x)."""
+    """First `shape` (ny, nx) samples of the circular convolution of `data` (..., y, x), or of every few."""
     if not arrays.is_numpy(data):
         return _functional(data, transfer, shape)
-    planes = data.reshape(-1, *data.shape[-2:])
-    result = np.empty((len(planes), *shape), data.dtype)
-    for plane, out in zip(planes, result, strict=True):
-        _blocked(plane, transfer, out)
-    return result.reshape(data.shape[:-2] + shape)
+    return _planes(data, transfer, shape, data.dtype)
 
 
 def convolved_intensity(data: Array, transfer: Transfer, shape: tuple[int, int]) -> Array:
     """Squared modulus of `convolve`, real; on NumPy arrays made block by block, without the field itself."""
     if not arrays.is_numpy(data):
         return arrays.intensity(_functional(data, transfer, shape))
+    return _planes(data, transfer, shape, data.real.dtype)
+
+
+def _planes(data: np.ndarray, transfer: Transfer, shape: tuple[int, int], dtype: Any) -> np.ndarray:
     planes = data.reshape(-1, *data.shape[-2:])
-    result = np.empty((len(planes), *shape), data.real.dtype)
+    result = np.empty((len(planes), *shape), dtype)
     for plane, out in zip(planes, result, strict=True):
         _blocked(plane, transfer, out)
     return result.reshape(data.shape[:-2] + shape)
@@ -84,10 +118,11 @@ def convolved_intensity(data: Array, transfer: Transfer, shape: tuple[int, int])
 
 def _functional(data: Array, transfer: Transfer, shape: tuple[int, int]) -> Array:
     xp, rows, columns = arrays.namespace(data), transfer.rows, transfer.columns
+    fewer, kept = transfer.thinned, transfer.kept(shape)
     spectrum = _only(arrays.fft(data, columns.n), columns)
     spectrum = _only(arrays.fft(xp.matrix_transpose(spectrum), rows.n), rows)
-    spectrum = arrays.ifft(_spread(spectrum * transfer.values, rows))[..., : shape[0]]
-    return arrays.ifft(_spread(xp.matrix_transpose(spectrum), columns))[..., : shape[1]]
+    spectrum = arrays.ifft(_spread(spectrum * transfer.values, fewer[0]))[..., kept[0]]
+    return arrays.ifft(_spread(xp.matrix_transpose(spectrum), fewer[1]))[..., kept[1]]
 
 
 def _only(spectrum: Array, band: Band) -> Array:
@@ -110,33 +145,34 @@ def _spread(values: Array, band: Band) -> Array:
 def _blocked(data: np.ndarray, transfer: Transfer, out: np.ndarray) -> None:
     """The pruned convolution of one plane (y, x) into `out`: the field, or its intensity if `out` is real."""
     rows, columns, H = transfer.rows, transfer.columns, transfer.values
+    (fewer_rows, fewer_columns), (kept_rows, kept_columns) = transfer.thinned, transfer.kept(out.shape)
     top, bottom = nonzero_rows(data)
     spectrum = np.empty((columns.count, max(bottom - top, out.shape[0])), data.dtype)
 
     def forward(start: int, stop: int) -> None:
         line = _fft(data[top + start : top + stop], columns.n)
-        spectrum[: columns.positive, start:stop] = line[:, : columns.positive].T
-        spectrum[columns.positive :, start:stop] = line[:, columns.n - columns.negative :].T
+        for here, of in zip(columns.parts, columns.packed, strict=True):
+            spectrum[of, start:stop] = line[:, here].T
 
     def across(start: int, stop: int) -> None:
         work = np.zeros((stop - start, rows.n), data.dtype)
         work[:, top:bottom] = spectrum[start:stop, : bottom - top]
         work = _fft(work, overwrite_x=True)
-        work[:, : rows.positive] *= H[start:stop, : rows.positive]
-        work[:, rows.positive : rows.n - rows.negative] = 0
-        work[:, rows.n - rows.negative :] *= H[start:stop, rows.positive :]
-        spectrum[start:stop, : out.shape[0]] = _ifft(work, overwrite_x=True)[:, : out.shape[0]]
+        line = np.zeros((stop - start, fewer_rows.n), data.dtype)
+        for here, there, of in zip(rows.parts, fewer_rows.parts, rows.packed, strict=True):
+            np.multiply(work[:, here], H[start:stop, of], out=line[:, there])
+        spectrum[start:stop, : out.shape[0]] = _ifft(line, overwrite_x=True)[:, kept_rows]
 
     def back(start: int, stop: int) -> None:
-        line = np.zeros((stop - start, columns.n), data.dtype)
-        line[:, : columns.positive] = spectrum[: columns.positive, start:stop].T
-        line[:, columns.n - columns.negative :] = spectrum[columns.positive :, start:stop].T
-        line = _ifft(line, overwrite_x=True)[:, : out.shape[1]]
+        line = np.zeros((stop - start, fewer_columns.n), data.dtype)
+        for there, of in zip(fewer_columns.parts, columns.packed, strict=True):
+            line[:, there] = spectrum[of, start:stop].T
+        line = _ifft(line, overwrite_x=True)[:, kept_columns]
         out[start:stop] = line if np.iscomplexobj(out) else arrays.intensity(line)
 
     _in_blocks(forward, bottom - top, columns.n * data.itemsize)
     _in_blocks(across, columns.count, rows.n * data.itemsize)
-    _in_blocks(back, out.shape[0], columns.n * data.itemsize)
+    _in_blocks(back, out.shape[0], fewer_columns.n * data.itemsize)
 
 
 def _in_blocks(job: Callable[[int, int], None], count: int, row_bytes: int) -> None:
