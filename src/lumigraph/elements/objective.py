@@ -189,7 +189,8 @@ class Objective:
         radius = np.hypot(y, x)
         farthest = 2.0 ** math.ceil(math.log2(max(float(radius.max()), self.wavelength) * 1.0000001))
         steps, tables = _tables(self, float(dz), farthest)
-        turn = np.where(radius > 0, (x + 1j * y) / np.where(radius > 0, radius, 1), 1)
+        turned = any(order for harmonics in tables for order, _ in harmonics)
+        turn = np.where(radius > 0, (x + 1j * y) / np.where(radius > 0, radius, 1), 1) if turned else 1.0
         found = np.zeros((self.modes, *radius.shape), np.complex128)
         for mode, harmonics in enumerate(tables):
             for order, table in harmonics:
@@ -255,9 +256,12 @@ def _nodes(objective: Objective, radius: float, dz: float) -> tuple[np.ndarray, 
     if objective.mismatch is not None:
         phase += k * float(np.ptp(_extra_path(objective, np.linspace(0, objective.aperture, 64))))
     phase += 20 * sum(abs(w) for _, w in objective.terms)
-    at, weight = np.polynomial.legendre.leggauss(64 * math.ceil((48 + 0.6 * phase) / 64))
+    at, weight = _legendre(64 * math.ceil((48 + 0.6 * phase) / 64))
     angle = half / 2 * (at + 1)
     return np.sin(angle), np.cos(angle), weight * half / 2 * np.sin(angle)
+
+
+_legendre = lru_cache(maxsize=8)(np.polynomial.legendre.leggauss)
 
 
 def _extra_path(objective: Objective, q: np.ndarray) -> np.ndarray:
@@ -330,7 +334,9 @@ def _harmonics(
     for row in np.flatnonzero(strength > _WEAK * strength.max()):
         order = int(row) if row < AZIMUTHS // 2 else int(row) - AZIMUTHS
         bessel = _bessel(abs(order), q, float(steps[1]), len(steps))
-        found.append((order, 1j ** abs(order) * (bessel @ (amplitude * spectrum[row]))))
+        wave = amplitude * spectrum[row]
+        parts = bessel @ np.stack([wave.real, wave.imag], axis=1)
+        found.append((order, 1j ** abs(order) * (parts[:, 0] + 1j * parts[:, 1])))
     return found
 
 

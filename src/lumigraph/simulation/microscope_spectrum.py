@@ -109,8 +109,9 @@ def matrices(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> np.ndarr
     s, N = sampling.points, sampling.pixels
     found = np.empty((told.frequencies, len(kernels), s, s, N, N), np.float32)
     for k, kernel in enumerate(kernels):
-        whole = _in_parts(kernel)
-        waves = [_waves(length, kernel.offsets[:, axis]) for axis, length in enumerate(told.lengths)]
+        first = (kernel.offsets >= 0).all(1)  # the other quadrants follow by parity
+        whole = _in_parts(kernel, first)
+        waves = [_waves(length, kernel.offsets[first, axis]) for axis, length in enumerate(told.lengths)]
         for cy, cx, qy, qx in itertools.product((0, 1), repeat=4):
             place = (_part(s, cy), _part(s, cx), _part(N, qy), _part(N, qx))
             trigonometric = waves[0][cy ^ qy][:, None] * waves[1][cx ^ qx]
@@ -123,19 +124,21 @@ def matrices(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> np.ndarr
     return found.reshape(told.frequencies, len(kernels) * s * s, N * N)
 
 
-def _in_parts(kernel: SliceKernel) -> np.ndarray:
-    """Blocks (n, s, s, N, N) between parts that are even and odd."""
-    s, N, n = kernel.sampling.points, kernel.sampling.pixels, len(kernel.offsets)
+def _in_parts(kernel: SliceKernel, chosen: np.ndarray) -> np.ndarray:
+    """Blocks (n, s, s, N, N) of the chosen offsets, between parts that are even and odd."""
+    s, N, n = kernel.sampling.points, kernel.sampling.pixels, int(chosen.sum())
     points, pixels = (parts(k).astype(np.float32) for k in (s, N))
-    whole = pixels @ kernel.matrix().reshape(n * s * s, N, N) @ pixels.T
+    whole = kernel.matrix().reshape(len(chosen), s * s, N, N)[chosen]
+    whole = pixels @ whole.reshape(n * s * s, N, N) @ pixels.T
     whole = points @ whole.reshape(n * s, s, N * N)
     return (points @ whole.reshape(n, s, s * N * N)).reshape(n, s, s, N, N)
 
 
 def _waves(length: int, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Cosine and sine (frequencies, n) of 2π f d."""
+    """Cosine and sine (frequencies, n) of 2π f d for d and -d together, d from 0 on."""
     phase = 2 * np.pi * (np.arange(length // 2 + 1)[:, None] * offsets % length) / length
-    return np.cos(phase).astype(np.float32), np.sin(phase).astype(np.float32)
+    both = np.where(offsets > 0, 2.0, 1.0)
+    return (both * np.cos(phase)).astype(np.float32), (both * np.sin(phase)).astype(np.float32)
 
 
 def _part(n: int, odd: int) -> slice:
