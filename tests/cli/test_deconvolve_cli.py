@@ -167,3 +167,20 @@ def test_mistakes_are_told_in_one_line(arguments, message, lumigraph, tmp_path):
     assert message in found.err
     assert found.err.count("\n") == 1
     assert not (tmp_path / "out.tiff").exists()
+
+
+def test_what_a_microscope_would_see_can_be_simulated_and_deconvolved(lumigraph, tmp_path):
+    (tmp_path / "scope.toml").write_text(SCOPE)
+    found = lumigraph(
+        "simulate", "scope.toml", "--point", "4 um, -6 um, 10 um", "--scene", "siemens_star", "--depth", "-5 um",
+        "-o", "raw.tiff",
+    )  # fmt: skip
+    assert found.code == 0, found.err
+    found = lumigraph(
+        "deconvolve", "raw.tiff", "--camera", "scope.toml", "--z", "-5 um, 10 um", "--iterations", 2,
+        "-o", "volume.ome.tif",
+    )  # fmt: skip
+    assert found.code == 0, found.err
+    found = lumigraph("simulate", "scope.toml", "--scene", "white", "--coherence", "coherent", "-o", "w.tiff")
+    assert found.code == 1
+    assert "fluorescence, which does not interfere. Leave coherence out" in found.err

@@ -45,13 +45,15 @@ def test_few_waves_reach_what_random_phases_need_many_for(exact, count, limit):
     """5, 3 and 1 % rms (260 waves: 1.04 %); even directions, or random ones, miss all three."""
     raw = simulate(CAMERA, chart(), TiltedWaves(count))
     assert error(raw.data, exact) < limit
-    assert error(raw.data, exact) < raw.metadata["estimated_error"] < 4 * error(raw.data, exact)
+    assert (
+        0.75 < raw.metadata["estimated_error"] / error(raw.data, exact) < 1.35
+    )  # every other wave: 1.5 to 3
 
 
 def test_snapshots_estimate_their_error(exact):
     """Halves that share snapshots, or a spread not divided by a root, are 1.4 times off or more."""
-    for count in (20, 45):
-        raw = simulate(CAMERA, chart(), Snapshots(count, rng=3))
+    for count, seed in ((20, 3), (45, 3), (12, 4), (12, 5)):
+        raw = simulate(CAMERA, chart(), Snapshots(count, rng=seed))
         assert raw.metadata["estimated_error"] == pytest.approx(error(raw.data, exact), rel=0.15)
 
 

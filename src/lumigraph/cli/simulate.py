@@ -1,5 +1,6 @@
 """`lumigraph simulate`."""
 
+import math
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from lumigraph.scene import Scene
 
 SCENES = ("white", "usaf1951", "siemens_star", "gratings", "slanted_edge", "edge", "pinhole", "photo")
-_FINEST_GROUP = 9
+_FINEST_GROUP = 12
 _COUNTS = {"incoherent": 100, "snapshots": 100, "tilted": 64}
 
 
@@ -158,7 +159,7 @@ def simulate(
         Expose the sensor: photon noise, read noise, whole numbers of its bits.
     """
     from lumigraph import io
-    from lumigraph.instruments import LightFieldMicroscope, load_camera
+    from lumigraph.instruments import load_camera
     from lumigraph.simulation import Interrupted, simulate
 
     common.check()
@@ -167,12 +168,7 @@ def simulate(
     if seed < 0:
         raise FormatError(f"--seed is {seed} but must be at least 0.")
     described, coherence, spectrum = load_camera(camera), light.chosen(seed), light.spectrum()
-    if isinstance(described, LightFieldMicroscope):
-        raise FormatError(
-            f"{camera} is a light-field microscope, which this command does not simulate. "
-            "In Python, its operator(depths).forward(volume) does."
-        )
-    scene = stage.built(described.object_grid)
+    scene = stage.built(_drawn_on(described))
     try:
         with progress("simulate") as shown:
             raw = simulate(described, scene, coherence, spectrum=spectrum, progress=shown)
@@ -208,6 +204,20 @@ def simulate(
     }
     values |= {"coherence": light.coherence, "output": str(output)}
     told(common, text, values, lambda: _page(raw, scene, described), _numbers(raw, light))
+
+
+def _drawn_on(camera: Any) -> "Grid":
+    """Samples of the scene's pictures: a microscope's as fine as its objective resolves, within reason."""
+    from lumigraph.core.grid import Grid
+
+    grid, optics = camera.object_grid, getattr(camera, "optics", None)
+    if optics is None or camera.configuration == "fourier":
+        return grid
+    finest = camera.wavelength / (4 * camera.objective.numerical_aperture)
+    finer = min(3, math.ceil(grid.pitch[0] / finest))
+    pitch = grid.pitch[0] / finer
+    ny, nx = (n * finer for n in grid.shape)
+    return Grid((ny, nx), (pitch, pitch), (0.0 if ny % 2 else pitch / 2, 0.0 if nx % 2 else pitch / 2))
 
 
 def _numbers(raw: Any, light: Light) -> list[tuple[str, str]]:

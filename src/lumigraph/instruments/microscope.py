@@ -9,6 +9,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from lumigraph.core import checks
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
@@ -24,6 +25,7 @@ from lumigraph.simulation.fourier_microscope import FourierMicroscopeOperator, M
 from lumigraph.simulation.microscope_kernels import DROPPED, CellSampling, Lenslet
 from lumigraph.simulation.microscope_operator import Layout, MicroscopeOperator, Progress, microscope_operator
 from lumigraph.simulation.microscope_pixels import PixelPlacement, narrowed
+from lumigraph.simulation.microscope_scene import SAMPLES, point_image
 
 FINENESS = 1.7
 """Samples of a lenslet's image over what its cut-off asks for, where pixels are interpolated from them."""
@@ -246,7 +248,13 @@ class LightFieldMicroscope(Instrument):
 
     @property
     def object_grid(self) -> Grid:
-        """The focused plane that the lenslets see, five samples per lenslet along each axis."""
+        """The focused plane that the lenslets see, five samples per lenslet along each axis; of a Fourier
+        microscope the field of a lenslet, as fine as its pixels.
+        """
+        if self.configuration == "fourier":
+            mosaic = self._mosaic()
+            pitch = mosaic.pixel_pitch / mosaic.total_magnification
+            return Grid((mosaic.field, mosaic.field), (pitch, pitch))
         ny, nx = (5 * n for n in self.lenslets.count)
         pitch = self.lenslet_size / 5
         return Grid((ny, nx), (pitch, pitch), tuple(0.0 if n % 2 else pitch / 2 for n in (ny, nx)))  # type: ignore[arg-type]
@@ -310,6 +318,22 @@ class LightFieldMicroscope(Instrument):
             "progress": progress,
         }
         return microscope_operator(self.optics, self.lenslet, layout, depths, **options)  # type: ignore[arg-type]
+
+    def point_image(self, y: float, x: float, dz: float = 0.0) -> np.ndarray:
+        """Raw image (ny, nx) of a point anywhere [m] that is as bright as a sample of `object_grid` of 1.
+
+        A Fourier microscope spreads it over the four samples around it, as fine as its pixels.
+
+        Examples
+        --------
+        >>> scope = LightFieldMicroscope.from_catalogue("lfm-worm")
+        >>> scope.point_image(10e-6, 0.0, 5e-6).shape == scope.sensor.shape
+        True
+        """
+        y, x, dz = (checks.finite(name, at) for name, at in zip(("y", "x", "dz"), (y, x, dz), strict=True))
+        if self.configuration == "fourier":
+            return fourier_operator(self.optics, self._mosaic(), (dz,)).point_image(y, x)
+        return point_image(self.optics, self.lenslet, self._layout(SAMPLES, None), (y, x, dz))
 
     def _layout(self, samples: int, pixels: int | Calibration | None) -> Layout:
         if isinstance(pixels, int) and not isinstance(pixels, bool):

@@ -8,6 +8,9 @@
 - `slices`: `Slices`, operators of several depths as one
 - `spectrum`: `Spectrum`, light of several wavelengths, colour sensors; `Mixed`, its operator
 - `single_lens`: `single_lens_operator`, incoherent planes and points before a camera without lenslets
+- `microscope_operator`: volumes before a light-field microscope; `microscope_kernels`, images of a cell's
+  points; `microscope_rays`, the same by rays; `microscope_spectrum`, the lenslets' frequencies;
+  `microscope_pixels`, real pixels; `microscope_scene`, scenes before one; `fourier_microscope`
 - `band`: band-limited samples along an axis, to and from points and pixels
 - `camera`: `Camera`, what a simulation asks of an instrument
 - `coherence`: `Incoherent`, `Coherent`, `Snapshots`, `TiltedWaves`: how the scene's light interferes

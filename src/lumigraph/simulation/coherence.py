@@ -55,6 +55,15 @@ class Coherence(Protocol):
         """Whether planes have independent phases in each shot, and may so share one propagation."""
         ...
 
+    @property
+    def convergence(self) -> float:
+        """Power of the number of shots with which the error falls."""
+        ...
+
+    def half(self, number: int) -> int | None:
+        """Of two halves, alike in kind, the one of a shot (from 0): their difference tells the error."""
+        ...
+
     def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
         """Each shot's complex amplitude on each plane of the scene."""
         ...
@@ -82,6 +91,15 @@ class Coherent:
     def planes_independent(self) -> bool:
         """No: one wave lights all planes."""
         return False
+
+    @property
+    def convergence(self) -> float:
+        """None: nothing is drawn."""
+        return 0.0
+
+    def half(self, number: int) -> int | None:
+        """None: nothing is drawn."""
+        return None
 
     def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
         """Amplitude 1 everywhere."""
@@ -135,6 +153,15 @@ class Snapshots:
     def planes_independent(self) -> bool:
         """Yes: each plane has its own random phases."""
         return True
+
+    @property
+    def convergence(self) -> float:
+        """That of random numbers."""
+        return 0.5
+
+    def half(self, number: int) -> int | None:
+        """Every other one."""
+        return number % 2 if self.count > 1 else None
 
     def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
         """Random phases, independent from plane to plane and from snapshot to snapshot."""
@@ -233,6 +260,15 @@ class TiltedWaves:
             )
         found, weights = directions.over_a_disc(share, frequencies, self.na / wavelength, self.count)
         return found * wavelength, weights
+
+    @property
+    def convergence(self) -> float:
+        """That of quasi-random points (measured, charts of bars, blocks and stars)."""
+        return 0.9
+
+    def half(self, number: int) -> int | None:
+        """The first half or the second: both cover all directions evenly, which every other one does not."""
+        return 2 * number // self.count if self.count > 1 else None
 
     def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
         """Converging waves exp(-ikr²/2z) with a tilt, each as bright as the directions it stands for."""

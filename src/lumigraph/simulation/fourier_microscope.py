@@ -135,6 +135,20 @@ class FourierMicroscopeOperator:
         volume[index] = 1
         return self.forward(volume)
 
+    def point_image(self, y: float, x: float) -> Array:
+        """Raw image (ny, nx) of a point [m] of intensity 1 at the first depth, shared by samples around."""
+        grid, volume = self.object_grid, np.zeros(self.shape[1], np.float32)
+        places = [
+            (at - middle) / pitch + n // 2
+            for at, middle, pitch, n in zip((y, x), grid.center, grid.pitch, grid.shape, strict=True)
+        ]
+        for row in range(math.floor(places[0]), math.floor(places[0]) + 2):
+            for column in range(math.floor(places[1]), math.floor(places[1]) + 2):
+                if 0 <= row < grid.shape[0] and 0 <= column < grid.shape[1]:
+                    share = (1 - abs(places[0] - row)) * (1 - abs(places[1] - column))
+                    volume[0, row, column] = share
+        return self.forward(volume)
+
     @property
     def _size(self) -> tuple[int, int]:
         """Of the convolutions: field and image together, rounded up to a smooth number."""

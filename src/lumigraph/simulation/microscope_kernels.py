@@ -169,10 +169,7 @@ def slice_kernel(
     """
     symmetric, s, N = all(one.is_round for one in objectives), sampling.points, sampling.pixels
     points = octant(s) if symmetric else [(ky, kx) for ky in range(s) for kx in range(s)]
-    if objectives[0].model == "rays":  # which have no wavelength
-        cells, passed = ray_images(objectives[0], lenslet, sampling, points, dz)
-    else:
-        cells, passed = _wave_images(objectives, lenslet, sampling, points, (dz, dropped))
+    cells, passed = _images(objectives, lenslet, sampling, points, (dz, dropped))
     T = math.isqrt(cells.shape[1])
     kept = _bright(cells, points, (s, T), dropped, symmetric)
     cells = np.ascontiguousarray(cells[:, kept])
@@ -181,14 +178,40 @@ def slice_kernel(
     return SliceKernel(offsets, cells, sampling, symmetric)
 
 
-def _wave_images(
+def point_cells(
     objectives: Sequence[Objective],
     lenslet: Lenslet,
     sampling: CellSampling,
-    points: list[tuple[int, int]],
+    point: tuple[float, float],
+    told: tuple[float, float],
+) -> np.ndarray:
+    """Image (T, T, N, N), in T × T cells around its own, of one point that need not be a sample.
+
+    Parameters
+    ----------
+    objectives, lenslet, sampling
+        As in `slice_kernel`.
+    point
+        Place in its cell (ky, kx), in samples from 0 to s - 1.
+    told
+        Depth [m], and the part of the light that the window may miss.
+    """
+    cells, passed = _images(objectives, lenslet, sampling, [point], told)
+    T, N = math.isqrt(cells.shape[1]), sampling.pixels
+    scale = N * N / sampling.classes * float(passed[0]) / float(cells.sum(dtype=np.float64))
+    return cells.reshape(T, T, N, N) * np.float32(scale)
+
+
+def _images(
+    objectives: Sequence[Objective],
+    lenslet: Lenslet,
+    sampling: CellSampling,
+    points: Sequence[tuple[float, float]],
     told: tuple[float, float],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Images (points, cells, N²) at (dz, dropped), and the part of their light that passes (points,)."""
+    if objectives[0].model == "rays":  # which have no wavelength
+        return ray_images(objectives[0], lenslet, sampling, points, told[0])
     (dz, dropped), N = told, sampling.pixels
     reach = max(reach_of(one, lenslet, dz, dropped) for one in objectives)
     T = 2 * reach + 1
@@ -262,8 +285,8 @@ class _Bench:
             mask = np.clip((half - np.hypot(own[:, None], own)) / self.step + 0.5, 0, 1)
         return np.tile(phase, self.cells), np.tile(mask, (self.cells, self.cells)).astype(np.float32)
 
-    def image(self, point: tuple[int, int], dz: float) -> np.ndarray:
-        """Intensity ((2 reach + 1) N, the same) of a point (ky, kx) of the middle cell."""
+    def image(self, point: tuple[float, float], dz: float) -> np.ndarray:
+        """Intensity ((2 reach + 1) N, the same) of a point (ky, kx) of the middle cell [samples]."""
         s, p, M = self.sampling.points, self.lenslet.pitch, self.lenslet.magnification
         y, x = ((self.at - ((k - (s - 1) / 2) / s) * p) / M for k in point)
         fields = self.objective.fields(y[:, None], x[None, :], dz).astype(np.complex64)

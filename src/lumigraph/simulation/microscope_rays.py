@@ -7,6 +7,7 @@ M. Levoy et al., ACM Trans. Graph. 25, 924 (2006).
 """
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +28,7 @@ def ray_images(
     objective: Objective,
     lenslet: "Lenslet",
     sampling: "CellSampling",
-    points: list[tuple[int, int]],
+    points: Sequence[tuple[float, float]],
     dz: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Images of points (ky, kx) of a cell at depth `dz`, and the part of their light that passes lenslets.

@@ -109,7 +109,7 @@ def matrices(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> np.ndarr
     s, N = sampling.points, sampling.pixels
     found = np.empty((told.frequencies, len(kernels), s, s, N, N), np.float32)
     for k, kernel in enumerate(kernels):
-        first = (kernel.offsets >= 0).all(1)  # the other quadrants follow by parity
+        first = np.asarray((kernel.offsets >= 0).all(1))  # the other quadrants follow by parity
         whole = _in_parts(kernel, first)
         waves = [_waves(length, kernel.offsets[first, axis]) for axis, length in enumerate(told.lengths)]
         for cy, cx, qy, qx in itertools.product((0, 1), repeat=4):
