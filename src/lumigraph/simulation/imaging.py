@@ -13,6 +13,7 @@ from lumigraph.core import arrays, checks, memory
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.core.raw import RawImage
+from lumigraph.core.volume import Volume
 from lumigraph.elements import CircularAperture, Train
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
 from lumigraph.propagation import Propagate, propagate
@@ -23,6 +24,7 @@ from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.cells import fits
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Plane, Snapshots, TiltedWaves
 from lumigraph.simulation.kernels import Optics
+from lumigraph.simulation.microscope_scene import Microscope, microscope_image
 from lumigraph.simulation.periodic import periodic_operator
 from lumigraph.simulation.spectrum import Spectrum, by_wavelength
 
@@ -64,8 +66,8 @@ class _Shot:
 
 
 def simulate(
-    camera: Camera,
-    scene: Scene,
+    camera: Camera | Microscope,
+    scene: Scene | Volume,
     coherence: Coherence | Incoherent | None = None,
     *,
     spectrum: Spectrum | None = None,
@@ -84,7 +86,7 @@ def simulate(
     camera
         Any instrument.
     scene
-        Slices, points and diffusers; see `lumigraph.targets`.
+        Slices, points and diffusers; see `lumigraph.targets`. Or a `Volume`, whose planes are slices.
     coherence
         `Incoherent` (default), `Coherent`, `Snapshots` or `TiltedWaves`. The last two leave the raw image's
         relative rms error, estimated from two halves of their shots, in ``metadata["estimated_error"]``.
@@ -107,8 +109,14 @@ def simulate(
         A KeyboardInterrupt; it carries the raw image of what was finished.
     """
     coherence = Incoherent() if coherence is None else coherence
+    if isinstance(scene, Volume):
+        planes = zip(scene.data, scene.depths, strict=True)
+        scene = Scene(Slice(plane, scene.grid, dz) for plane, dz in planes)
     if spectrum is not None:
         return _coloured(camera, scene, coherence, spectrum, progress, map)
+    if isinstance(camera, Microscope):
+        checks.instance("scene", scene, Scene)
+        return microscope_image(camera, scene, coherence, progress)
     _check(camera, scene, coherence)
     accuracy = coherence.accuracy if isinstance(coherence, Incoherent) else None
     exact = _exact(camera, scene, accuracy)
@@ -133,7 +141,7 @@ def simulate(
 
 
 def _coloured(
-    camera: Camera,
+    camera: Camera | Microscope,
     scene: Scene,
     coherence: Coherence | Incoherent,
     spectrum: Spectrum,
@@ -142,7 +150,7 @@ def _coloured(
 ) -> RawImage:
     count = len(spectrum.wavelengths)
 
-    def at_wavelength(camera: Camera, scene: Scene, number: int) -> RawImage:
+    def at_wavelength(camera: Camera | Microscope, scene: Scene, number: int) -> RawImage:
         def report(done: int, total: int) -> None:
             if progress is not None:
                 progress(number * total + done, count * total)
