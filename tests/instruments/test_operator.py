@@ -3,22 +3,16 @@
 import numpy as np
 import pytest
 
+import cameras
 from lumigraph.deconvolution import ForwardModel
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.simulation import Slices
-from lumigraph.units import mm, nm, um
+from lumigraph.units import mm, um
 
 
 @pytest.fixture(scope="module")
 def camera():
-    return FocusedPlenopticCamera(
-        wavelength=633 * nm,
-        object_distance=120 * mm,
-        main_lens={"focal_length": 60 * mm},
-        lenslets={"pitch": 100 * um, "focal_length": 5.2 * mm, "count": (4, 3), "magnification": 0.5},
-        sensor={"pixel_pitch": 9 * um},
-    )
+    return cameras.focused(count=(4, 3), pixel_pitch=9 * um)
 
 
 @pytest.fixture(scope="module")

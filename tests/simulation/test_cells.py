@@ -1,27 +1,20 @@
 """Cells of a lenslet array: they tile it, hold its lattice, and are sampled finely enough."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 
+import cameras
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.instruments import FocusedPlenopticCamera, SingleLensCamera
+from lumigraph.instruments import SingleLensCamera
 from lumigraph.simulation import cells
 from lumigraph.simulation.cells import Cells, Fineness
 from lumigraph.units import mm, nm, um
 
-
-def focused(**lenslets):
-    table = {"pitch": 100 * um, "focal_length": 5.2 * mm, "count": (5, 4), "magnification": 0.5}
-    return FocusedPlenopticCamera(
-        wavelength=633 * nm,
-        object_distance=120 * mm,
-        main_lens={"focal_length": 60 * mm},
-        lenslets={**table, **lenslets},
-        sensor={"pixel_pitch": 6 * um},
-    )
+focused = partial(cameras.focused, count=(5, 4))
 
 
 def of(camera):
@@ -111,8 +104,9 @@ def test_a_straightened_lattice_has_its_rows_along_x(lattice):
 
 def test_more_accuracy_asks_for_more_of_everything():
     coarse, fine = Fineness(1e-2), Fineness(1e-4)
-    for name in ("oversampling", "neighbours", "border"):
+    for name in ("neighbours", "border", "corner"):
         assert getattr(fine, name) > getattr(coarse, name)
+    assert fine.samples(3.0, 1.0) > coarse.samples(3.0, 1.0)
     assert fine.reach(1.0, 1.0) > coarse.reach(1.0, 1.0)
     assert fine.near(1.0, 1.0) > coarse.near(1.0, 1.0)
     assert fine.rank < coarse.rank

@@ -1,12 +1,15 @@
 """The lenslet-periodic operator against sums of full propagations, and its own symmetries."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
+import cameras
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError
-from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera
+from lumigraph.instruments import PlenopticCamera
 from lumigraph.scene import Scene, Slice, targets
 from lumigraph.simulation import (
     Incoherent,
@@ -19,16 +22,7 @@ from lumigraph.simulation import (
 )
 from lumigraph.units import mm, nm, um
 
-
-def focused(**lenslets):
-    table = {"pitch": 100 * um, "focal_length": 5.2 * mm, "count": (9, 9), "magnification": 0.5}
-    return FocusedPlenopticCamera(
-        wavelength=633 * nm,
-        object_distance=120 * mm,
-        main_lens={"focal_length": 60 * mm},
-        lenslets={**table, **lenslets},
-        sensor={"pixel_pitch": 6 * um},
-    )
+focused = partial(cameras.focused, count=(9, 9))
 
 
 def plenoptic():

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+import cameras
 from lumigraph.calibration import calibrate
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, LumigraphError, SamplingError
-from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera, SingleLensCamera
+from lumigraph.instruments import PlenopticCamera, SingleLensCamera
 from lumigraph.scene import Scene, Slice, sources, targets
 from lumigraph.simulation import Coherent, Interrupted, Snapshots, TiltedWaves, simulate
 from lumigraph.units import mm, nm, um
@@ -28,13 +29,7 @@ def two_f():
 
 @pytest.fixture(scope="module")
 def focused():
-    return FocusedPlenopticCamera(
-        wavelength=633 * nm,
-        object_distance=120 * mm,
-        main_lens={"focal_length": 60 * mm},
-        lenslets={"pitch": 150 * um, "focal_length": 5.2 * mm, "count": (9, 9), "magnification": 0.5},
-        sensor={"pixel_pitch": 5 * um},
-    )
+    return cameras.focused(count=(9, 9), pixel_pitch=5 * um, pitch=150 * um)
 
 
 @pytest.fixture(scope="module")

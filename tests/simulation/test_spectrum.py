@@ -3,24 +3,18 @@
 import numpy as np
 import pytest
 
+import cameras
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.scene import Scene, Slice
 from lumigraph.simulation import Incoherent, Spectrum, simulate
-from lumigraph.units import mm, nm, um
+from lumigraph.units import nm, um
 
 ROUGH = Incoherent(accuracy=1e-2)
 
 
 @pytest.fixture(scope="module")
 def camera():
-    return FocusedPlenopticCamera(
-        wavelength=633 * nm,
-        object_distance=120 * mm,
-        main_lens={"focal_length": 60 * mm},
-        lenslets={"pitch": 100 * um, "focal_length": 5.2 * mm, "count": (3, 3), "magnification": 0.5},
-        sensor={"pixel_pitch": 8 * um},
-    )
+    return cameras.focused(count=(3, 3), pixel_pitch=8 * um)
 
 
 def picture(camera, channels):

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import cast
 
 import numpy as np
 
@@ -53,7 +54,7 @@ class LowPass:
 
     def __call__(self, estimate: Array) -> Array:
         """The estimate (y, x) or (z, y, x), each plane filtered."""
-        xp, widths = arrays.namespace(estimate), tuple(self.widths)  # type: ignore[arg-type]
+        xp, widths = arrays.namespace(estimate), cast("tuple[float, ...]", self.widths)
         flat = len(estimate.shape) == 2
         planes = [estimate] if flat else [estimate[k, ...] for k in range(estimate.shape[0])]
         if len(widths) == 1:

@@ -52,8 +52,8 @@ class Scale:
         shape, xp = tuple(operator.shape[0]), arrays.namespace(like)
         response = _plane("response", exposure.response, shape, like)
         weights = _plane("weights", exposure.weights, shape, like)
-        background = exposure.background
-        if hasattr(background, "shape") and len(background.shape):  # type: ignore[union-attr]
+        background: Array = exposure.background
+        if getattr(background, "shape", ()):  # not one number, be it a 0-d array
             background = _plane("background", background, shape, like)
         ones = xp.ones(shape, dtype=like.dtype, device=arrays.device(like))
         for factor in (response, weights):
@@ -63,7 +63,7 @@ class Scale:
         if not highest > 0:
             raise GeometryError("no light of the object reaches a pixel that counts. Check grid and weights.")
         seen = sensitivity > UNSEEN * highest
-        total = background + exposure.offset  # type: ignore[operator]
+        total = background + exposure.offset
         return cls(operator, response, weights, total, sensitivity, seen, exposure.gain or 1.0)
 
     @property
