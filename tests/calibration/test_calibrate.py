@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import calibration_drawing
 from data_folder import real
+from lumigraph import io
 from lumigraph.calibration import calibrate
 from lumigraph.calibration.devignette import grey
 from lumigraph.core.lattice import Lattice
@@ -105,6 +106,20 @@ def test_vignetting_noise_and_dust_stay_out(rng):
     assert calibration.residual_px < 0.1
 
 
+def test_gaps_that_cannot_be_followed_leave_no_residual(tmp_path, rng):
+    """A picture whose lattice is known by all its gaps together alone: nothing was measured."""
+    raw = io.open(real("raytrix_r42_multifocus", "sc2_klein.png"))
+    found = calibrate(raw)
+    assert not found.measured
+    assert math.isnan(found.residual_px)
+    assert "residual    not measured" in found.report()
+    io.save(found, tmp_path / "found.toml")
+    assert "residual_px = nan  # not measured" in (tmp_path / "found.toml").read_text()
+    back = io.open(tmp_path / "found.toml")
+    assert math.isnan(back.residual_px)
+    assert back.lattice == found.lattice
+
+
 def test_two_pitches_and_shear_are_kept():
     lattice = Lattice(((-0.03, 15.39), (15.43, 0.2)), (7, 8))
     calibration = calibrate(drawn(lattice, (300, 310), fill=0.8))
@@ -193,6 +208,32 @@ def test_touching_discs_of_one_kind_are_not_three_kinds(rng):
     calibration = calibrate(white)
     assert calibration.lattice.kinds == 1
     assert calibration.lattice.pitch == pytest.approx(21.3, abs=0.01)
+
+
+@pytest.mark.parametrize("fill", [1.06, 1.1, 1.25])
+@pytest.mark.parametrize(("layout", "pitch"), [("hex", 21.3), ("hex", 9.7), ("square", 14.6)])
+def test_overlapping_discs_have_their_centres_where_it_is_dark(layout, pitch, fill, rng):
+    """Beyond 1.056 pitches (hex; square: 1.22) the brightest places are between the micro-images."""
+    lattice = getattr(Lattice, layout)(pitch, 0.01, (5, 6))
+    white = calibration_drawing.white(lattice, (250, 270), fill=fill, noise=0.02, rng=rng)[0]
+    calibration = calibrate(white)
+    pitch_error, centre_error = errors(calibration, lattice)
+    # The brightest places are 0.58 (square: 0.71) of a pitch from the centres.
+    assert pitch_error < 0.01
+    assert centre_error < 0.1
+    assert calibration.residual_px < 0.05
+    if layout == "hex" or fill > 1.2:
+        assert calibration.fill == pytest.approx(fill, abs=0.03)
+        assert "micro-images overlap" in calibration.notes[0]
+
+
+@pytest.mark.parametrize("layout", ["square", "hex"])
+@pytest.mark.parametrize("form", ["square", "rings"])
+def test_other_forms_are_not_taken_for_overlapping_discs(layout, form):
+    lattice = getattr(Lattice, layout)(21.3, 0.01, (5, 6))
+    calibration = calibrate(drawn(lattice, (300, 330), form, 0.85))
+    assert errors(calibration, lattice)[1] < 0.1
+    assert calibration.notes == ()
 
 
 PITCHES = (7.0, 8.4, 10.5, 13.3, 17.25, 21.7, 27.1, 34.865, 45.5, 58.2, 74.9, 91.0)

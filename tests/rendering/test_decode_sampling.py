@@ -133,6 +133,7 @@ def test_lenslets_that_the_calibration_misses_are_not_valid():
         assert np.abs(places - (0.2, 0.9)).max() < 9.6
 
 
+@pytest.mark.filterwarnings("ignore:the raw image repeats every")  # on the lattice that is not distorted
 @pytest.mark.parametrize("name", LATTICES)
 def test_a_distorted_lattice_is_decoded_on_its_own_centres(name):
     # 4 px at the corners, almost half a pitch.

@@ -1,6 +1,8 @@
 """From a white image, or a raw image alone, to the places of its micro-images."""
 
+import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,13 +11,16 @@ from lumigraph.calibration.autocorrelation import SMALLEST_PITCH
 from lumigraph.calibration.centres import Spots, followed, measure
 from lumigraph.calibration.devignette import as_raw, grey
 from lumigraph.calibration.fitting import Fitted, fit, recentred
+from lumigraph.calibration.overlap import Discs, overlapping, separated
 from lumigraph.calibration.period import Request, Vectors, lattice_vectors
 from lumigraph.calibration.quality import fill_of, sharpness_of
-from lumigraph.calibration.surface import Surface, flattened, logarithm, valleys
+from lumigraph.calibration.surface import Surface, flattened
 from lumigraph.calibration.template import mean_cell, sharpened
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.drift import followed as light_followed
+from lumigraph.core.gaps import logarithm, valleys
 from lumigraph.core.lattice import Lattice, Layout, Vector
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
@@ -29,7 +34,7 @@ _LARGEST = 0.02  # of the pitch: a white image's residual
 _WHITE = 0.6  # of the lenslets are found on a white image
 _SHARE = 0.4  # of the lenslets must be found on a raw image
 _UNMEASURED = (
-    "found by all gaps of a raw image together: no single centre was measured, residual_px says nothing; "
+    "found by all gaps of a raw image together: no single centre was measured, so that no residual is known; "
     "check the overlay, or calibrate on a white image"
 )
 
@@ -103,16 +108,41 @@ def calibrate(
     vectors = lattice_vectors([flat, gaps, valleys(original, 2.0)], Request(layout, pitch, rotation))
     _check_size(vectors, shape)
     found = _followed(original, flat, gaps, vectors)
+    start = found.fitted if found.notes != (_UNMEASURED,) else _by_lines(flat, found.fitted)
+    discs = overlapping(flat, start.model(shape))
+    if discs is not None:
+        found = _overlapped(flat, start, discs)
     fitted = found.fitted
     model = fitted.model(shape)
     rms = float(np.sqrt(((fitted.spots.centers - model.position(fitted.spots.indices)) ** 2).sum(-1).mean()))
+    rms = rms if found.notes != (_UNMEASURED,) else math.nan
     bright = max(float(np.percentile(fitted.spots.light, 95)), 1e-30)
     return Calibration(
         fitted.lattice, shape, fitted.spots.indices, fitted.spots.centers, rms,
         pixel_pitch if pixel_pitch is not None else first.pixel_pitch, separation, lenslet_distance,
-        warp=fitted.warp, light=fitted.spots.light / bright, fill=fill_of(original, model),
+        warp=fitted.warp, light=fitted.spots.light / bright,
+        fill=fill_of(original, model) if discs is None else discs.size,
         missing=_missing(fitted, model), sharpness=sharpness_of(original, model), notes=found.notes,
     )  # fmt: skip
+
+
+def _by_lines(flat: np.ndarray, fitted: Fitted) -> Fitted:
+    """The lattice that the light repeats on, where the gaps could not be followed."""
+    lattice = fitted.lattice
+    found = light_followed(flat, lattice.matrix, lattice.layout == "hex")
+    if found is None:
+        return fitted
+    column, row = found[0].T
+    return fitted._replace(lattice=replace(lattice, basis=(_vector(row), _vector(column))))
+
+
+def _overlapped(flat: np.ndarray, fitted: Fitted, discs: Discs) -> "_Followed":
+    """The fit to discs that overlap, with what is to be known of it."""
+    note = (
+        f"micro-images overlap, they are {discs.size:.2f} pitches wide: their centres were found by the sum "
+        "of such discs; close the main lens for less cross-talk"
+    )
+    return _Followed(separated(flat, fitted, discs), flat, (note,))
 
 
 class _Followed(NamedTuple):

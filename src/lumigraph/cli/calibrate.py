@@ -153,7 +153,9 @@ def _page(white: "RawImage", found: "Calibration", advice: dict[str, Any]) -> An
         plots.lattice(white, found), "The lattice over the white image.", wide=True
     )
     distance = np.sort(np.hypot(*found.residuals.T))
-    if len(distance):
+    if not found.measured:
+        page.section("Residuals").text("Not measured: the centres are the lattice points themselves.")
+    elif len(distance):
         share = np.arange(1, len(distance) + 1) / len(distance)
         drawn = plots.curves(distance, {"": share}, xlabel="distance from the lattice [px]", ylabel="share")
         page.section("Residuals").figure(
@@ -183,7 +185,7 @@ def _values(found: "Calibration") -> dict[str, Any]:
         "rotation_rad": lattice.rotation,
         "origin_px": lattice.origin,
         "basis_px": lattice.basis,
-        "residual_px": found.residual_px,
+        "residual_px": found.residual_px if found.measured else None,
         "missing": len(found.missing),
         "fill": found.fill,
         "sharpness": found.sharpness,

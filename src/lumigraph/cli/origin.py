@@ -63,9 +63,10 @@ class Origin:
     def prepared(
         self, raw: "RawImage", *, kind: str | None = None, devignette: bool | None = None
     ) -> "tuple[RawImage, Calibration]":
-        """The raw image, devignetted and in colour, and its calibration."""
+        """The raw image, devignetted and in colour, and its calibration; refused where they do not fit."""
         from lumigraph import calibration as verbs
         from lumigraph import sensor
+        from lumigraph.core.drift import check_drift, vouch
 
         camera = self.described(kind)
         if camera is None and self.calibration is None and self.white is None:
@@ -84,11 +85,14 @@ class Origin:
             assert white is not None  # one of the three is given
             found = verbs.calibrate(white)
         found.check_fits(raw.shape)
+        check_drift(raw.data, found)
         if white is not None and devignette is not False:
             raw = verbs.devignette(raw, white, dark=dark)
         if camera is not None:
             found = _with_lengths(found, camera)
-        return (raw if raw.bayer is None else sensor.demosaic(raw)), found
+        ready = raw if raw.bayer is None else sensor.demosaic(raw)
+        vouch(ready.data, found)
+        return ready, found
 
 
 NO_ORIGIN = Origin()

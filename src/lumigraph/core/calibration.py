@@ -33,7 +33,8 @@ class Calibration:
         Lenslet indices (k, 2) as (i, j) and the centres (k, 2) as (y, x) [px] measured for them. For a
         calibration computed from a camera file these are the lattice points themselves.
     residual_px
-        Root mean square distance of the measured centres from the lattice [px].
+        Root mean square distance of the measured centres from the lattice [px]; NaN, or 0, where none was
+        measured (`measured`).
     pixel_pitch
         Of the sensor [m]; None where unknown.
     separation
@@ -91,6 +92,11 @@ class Calibration:
         for name in ("pixel_pitch", "separation", "lenslet_distance", "fill"):
             if (value := getattr(self, name)) is not None:
                 checks.positive(name, value, error=CalibrationError)
+
+    @property
+    def measured(self) -> bool:
+        """Whether `centers` were measured on a picture: else they are the lattice points themselves."""
+        return self.residual_px > 0  # false for NaN
 
     @property
     def residuals(self) -> np.ndarray:
@@ -191,13 +197,14 @@ class Calibration:
     def report(self) -> str:
         """Layout, pitches, rotation, origin and quality of the fit as a few lines of text."""
         (column, row), mrad = self.lattice.pitches, round(self.lattice.rotation * 1e3, 3) + 0.0
-        worst = float(np.hypot(*self.residuals.T).max()) if len(self.centers) else 0.0
+        worst = float(np.hypot(*self.residuals.T).max()) if self.measured and len(self.centers) else 0.0
+        fit = f"{self.residual_px:.3f} px rms, {worst:.3f} px at worst" if self.measured else "not measured"
         lines = [
             f"layout      {self.lattice.layout}, {len(self.centers)} lenslets on "
             f"{self.shape[0]} x {self.shape[1]} px",
             f"pitch       {self.lattice.pitch:.3f} px ({row:.3f} along rows, {column:.3f} to the next row)",
             f"rotation    {mrad:+.3f} mrad ({math.degrees(mrad / 1e3):+.3f} deg)",
             f"origin      ({self.lattice.origin[0]:.3f}, {self.lattice.origin[1]:.3f}) px (y, x)",
-            f"residual    {self.residual_px:.3f} px rms, {worst:.3f} px at worst",
+            f"residual    {fit}",
         ]
         return "\n".join(lines)

@@ -1,6 +1,7 @@
 """A `Calibration` as TOML: the lattice in pixels, the geometry, and every measured centre."""
 
 import json
+import math
 import os
 import tomllib
 from pathlib import Path
@@ -33,7 +34,8 @@ def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> 
         "# Micro-images found on a white image, lengths on it in pixels; pixel (0, 0) is a pixel's centre.",
         f'kind = "{KIND}"',
         f"shape = {list(calibration.shape)}  # rows, columns",
-        f"residual_px = {float(calibration.residual_px)!r}",
+        f"residual_px = {float(calibration.residual_px)!r}"
+        + ("" if calibration.measured else "  # not measured"),
         *lengths,
         *_quality(calibration),
         "",
@@ -138,10 +140,18 @@ def _calibration(found: dict[str, Any]) -> Calibration:
         shape=(int(shape[0]), int(shape[1])),
         indices=indices.astype(np.int64),
         centers=centers,
-        residual_px=float(_numbers(found, "residual_px", ())),
+        residual_px=_residual(found),
         **{name: _length(name, found[name]) for name in _LENGTHS if name in found},
         **_extras(found, lenslets),
     )
+
+
+def _residual(found: dict[str, Any]) -> float:
+    """The residual [px], NaN where none was measured."""
+    value = found.get("residual_px")
+    if isinstance(value, float) and math.isnan(value):
+        return math.nan
+    return float(_numbers(found, "residual_px", ()))
 
 
 def _extras(found: dict[str, Any], lenslets: dict[str, Any]) -> dict[str, Any]:

@@ -49,7 +49,11 @@ def lattice(white: RawImage | Array, calibration: Calibration, *, cells: int = 6
     _cells(part, calibration, cells)
     figure.suptitle(
         f"{calibration.lattice.layout} lattice, pitch {calibration.lattice.pitch:.3f} px, "
-        f"residual {calibration.residual_px:.3f} px rms"
+        + (
+            f"residual {calibration.residual_px:.3f} px rms"
+            if calibration.measured
+            else "residual not measured"
+        )
     )
     return figure
 
@@ -92,6 +96,7 @@ def _cells(axes: Axes, calibration: Calibration, count: int) -> None:
     axes.add_collection(PolyCollection(outlines, facecolors="none", edgecolors="#35c2ff", linewidths=1.0))
     axes.plot(points[:, 1], points[:, 0], "+", color="#35c2ff", markersize=9, label="lattice")
     measured = to_numpy(calibration.centers)
-    axes.plot(measured[:, 1], measured[:, 0], ".", color="#ff5b1f", markersize=4, label="measured")
+    if calibration.measured:
+        axes.plot(measured[:, 1], measured[:, 0], ".", color="#ff5b1f", markersize=4, label="measured")
     axes.set(xlim=(x0, x1), ylim=(y1, y0), title=f"{count} pitches around the middle")
     axes.legend(loc="upper right", fontsize="small")

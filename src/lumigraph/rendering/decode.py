@@ -8,6 +8,7 @@ import numpy as np
 from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, is_complex, is_single, namespace
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.drift import check_drift
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.lightfield import LightField
@@ -71,12 +72,14 @@ def decode(
     Warns
     -----
     SamplingWarning
-        The raw image looks like that of a camera 2.0, which is not decoded but rendered.
+        The raw image looks like that of a camera 2.0, which is not decoded but rendered; or its own lattice
+        of dark gaps slips a little against the calibration's.
 
     Raises
     ------
     CalibrationError
-        The raw image has another size than the white image, NaN, or a Bayer pattern; bad has another size.
+        The raw image has another size than the white image, its own lattice slips by more than half a pitch
+        (`calibration.drift`), it has NaN, or a Bayer pattern; bad has another size.
     LumigraphError
         It would not fit in memory.
 
@@ -157,6 +160,7 @@ def check_raw(raw: RawImage, calibration: Calibration) -> None:
             f"the raw image has a Bayer pattern ({raw.bayer}): its neighbours have different colours. "
             "Demosaic it to (y, x, 3) first: lg.demosaic(raw)."
         )
+    check_drift(raw.data, calibration)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,79 @@
+"""Where micro-images stand whose discs overlap: beyond a size, the brightest places are between them."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import j1
+
+from lumigraph.calibration.centres import Spots
+from lumigraph.calibration.fitting import Fitted, fit, recentred
+from lumigraph.calibration.template import mean_cell, sharpened
+from lumigraph.core.calibration import Calibration
+
+SIZES = np.arange(0.5, 1.6, 0.01)
+"""Of discs over the pitch that are tried."""
+VANISHING = {"hex": 1.045, "square": 1.19}
+"""Of discs over the pitch, before their first harmonic vanishes and changes its sign (1.056 and 1.22)."""
+
+_ORDERS = 3.2  # harmonics that are compared
+_ALIKE = 0.97  # correlation of a mean micro-image with its discs; evenly lit ones reach 0.99
+_BETTER = 0.35  # of what touching discs leave unexplained may overlapping ones leave
+_ROUNDS = 4
+
+
+class Discs(NamedTuple):
+    """Discs that explain a mean micro-image: size over the pitch, and way to their centre (i, j)."""
+
+    size: float
+    move: np.ndarray
+
+
+def overlapping(picture: np.ndarray, model: Calibration) -> Discs | None:
+    """The discs that the mean micro-image is the sum of, where they overlap so far that gaps turn bright.
+
+    The harmonics of discs of all sizes, anywhere in the cell, are compared with those of the mean
+    micro-image. Overlapping ones are believed where they explain it far better than those with gaps.
+    """
+    lattice = model.lattice
+    cell = mean_cell(picture, model)
+    size = len(cell)
+    reach = np.rint(np.fft.fftfreq(size) * size).astype(int)
+    orders = np.stack(np.meshgrid(reach, reach, indexing="ij"), -1)
+    waves = orders @ np.linalg.inv(lattice.matrix)
+    order = np.hypot(waves[..., 0], waves[..., 1]) * lattice.pitch
+    used = (order > 0) & (order <= _ORDERS) & (np.abs(orders).max(-1) < size / 2)
+    measured = np.where(used, np.fft.fft2(cell), 0)
+    norm = math.sqrt(float(np.square(np.abs(measured)).sum()))
+    if norm <= 0:
+        return None
+    pixel = np.sinc(waves[..., 0]) * np.sinc(waves[..., 1]) * used
+    likeness, places = [], []
+    for disc in SIZES:
+        argument = math.pi * disc * np.maximum(order, 1e-9)
+        model_waves = 2 * j1(argument) / argument * pixel
+        match = np.fft.ifft2(measured * model_waves).real * size**2
+        place = np.unravel_index(int(np.argmax(match)), match.shape)
+        likeness.append(float(match[place]) / (norm * math.sqrt(float(np.square(model_waves).sum()))))
+        places.append(np.array(place) / size)
+    best = int(np.argmax(likeness))
+    apart = max(v for v, disc in zip(likeness, SIZES, strict=True) if disc < VANISHING[lattice.layout])
+    if SIZES[best] < VANISHING[lattice.layout] or likeness[best] < _ALIKE:
+        return None
+    if 1 - likeness[best] > _BETTER * (1 - apart):
+        return None
+    return Discs(float(SIZES[best]), places[best])
+
+
+def separated(picture: np.ndarray, fitted: Fitted, discs: Discs) -> Fitted:
+    """Lattice and centres by the mean micro-image alone, from where the discs have their centre."""
+    shape, lattice = (picture.shape[0], picture.shape[1]), fitted.lattice
+    lattice = lattice.moved(*(lattice.matrix @ discs.move))
+    margin = lattice.pitch / 2
+    result = Fitted(fitted.spots, lattice, fitted.warp)
+    for _ in range(_ROUNDS):
+        model = result.model(shape)
+        indices = model.indices_within((margin, shape[0] - 1 - margin), (margin, shape[1] - 1 - margin))
+        spots = Spots(indices, model.position(indices), np.ones(len(indices)))
+        result = fit(sharpened(picture, spots, model), model)
+    return recentred(result, shape)
