@@ -195,7 +195,7 @@ class Objective:
         for mode, harmonics in enumerate(tables):
             for order, table in harmonics:
                 part = np.interp(radius, steps, table)
-                found[mode] += part if order == 0 else part * turn**order
+                found[mode] += part if order == 0 else part * _power(turn, order)
         return found
 
     def intensity(self, y: np.ndarray | float, x: np.ndarray | float, dz: float) -> np.ndarray:
@@ -220,6 +220,11 @@ class Objective:
                 return float(np.interp(part, inside, steps))
             reach *= 1.6
         return reach
+
+
+def _power(turn: np.ndarray | float, order: int) -> np.ndarray | float:
+    """exp(i order φ) from exp(i φ)."""
+    return turn**order if order > 0 else np.conj(turn) ** -order
 
 
 _FOUR = ((0.0, 1.0), (1.0, 0.0), (math.sqrt(0.5), math.sqrt(0.5)), (math.sqrt(0.5), -math.sqrt(0.5)))
@@ -350,5 +355,9 @@ def _bessel(order: int, q: np.ndarray, step: float, count: int) -> np.ndarray:
         argument = np.arange(count)[:, None] * (step * q)
         while len(_BESSEL) > 5:
             _BESSEL.pop(next(iter(_BESSEL)))
-        _BESSEL[key] = j0(argument) if order == 0 else j1(argument) if order == 1 else jv(order, argument)
+        if order == 2:  # by recurrence, three times as fast as jv
+            near = np.where(argument > 0, argument, 1)
+            _BESSEL[key] = 2 * j1(argument) / near - np.where(argument > 0, j0(argument), 0)
+        else:
+            _BESSEL[key] = {0: j0, 1: j1}.get(order, lambda x: jv(order, x))(argument)
     return _BESSEL[key]
