@@ -5,7 +5,7 @@ import pytest
 
 import lumigraph as lg
 from deconvolution.models import Matrix, Placed, blur, blurred, disc
-from lumigraph.deconvolution import Exposure, RichardsonLucy, Stop
+from lumigraph.deconvolution import Exposure, LeastSquares, RichardsonLucy, Stop
 
 SHAPE = (15, 16)
 
@@ -209,6 +209,14 @@ ONES = Matrix(np.ones((6, 4)), (2, 3), (2, 2))
         (lambda: Exposure(weights=np.full((2, 2), 2.0)), "weights goes from 2 to 2 but must be from 0 to 1"),
         (lambda: Exposure(gain=0), "gain is 0"),
         (lambda: Exposure(read_noise=1), "needs the gain"),
+        (lambda: lg.deconvolve(np.ones((2, 3)), object()), "operator is of type object but must have shape"),
+        (lambda: lg.deconvolve(np.ones((2, 3)), ONES, method="rl"), "method is of type str but must"),
+        (lambda: lg.deconvolve(np.ones((2, 3)), ONES, exposure=3), "exposure is of type int"),
+        (lambda: lg.deconvolve(np.ones((2, 3)), ONES, checkpoint=3), "checkpoint is of type int"),
+        (lambda: list(lg.deconvolve_series([], object())), "operator is of type object"),
+        (lambda: RichardsonLucy(3), "prior is of type int but must have shrink"),
+        (lambda: RichardsonLucy(filter=3), "filter is of type int"),
+        (lambda: LeastSquares(3), "prior is of type int but must be a TotalVariation"),
         (
             lambda: lg.deconvolve(np.ones((2, 3)), ONES, exposure=Exposure(weights=np.ones((3, 3)))),
             r"weights has shape \(3, 3\) but the raw image \(2, 3\)",
@@ -224,6 +232,7 @@ def test_what_cannot_be_deconvolved_is_refused_in_one_line(call, message):
 def test_an_object_that_cannot_fit_is_refused_before_it_is_made():
     class Huge:
         shape = ((2, 3), (10**6, 10**6))
+        forward = adjoint = None
 
     with pytest.raises(lg.SamplingError, match="1000000 x 1000000 samples needs"):
         lg.deconvolve(np.ones((2, 3)), Huge())

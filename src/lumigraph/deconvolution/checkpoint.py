@@ -54,7 +54,13 @@ class Checkpoint:
     @classmethod
     def of(cls, place: "Checkpoint | str | os.PathLike[str]") -> "Checkpoint":
         """Itself, or a checkpoint at a path."""
-        return place if isinstance(place, Checkpoint) else cls(Path(place))
+        if isinstance(place, Checkpoint):
+            return place
+        if not isinstance(place, str | os.PathLike):
+            raise FormatError(
+                f"checkpoint is of type {type(place).__name__} but must be a path or Checkpoint."
+            )
+        return cls(Path(place))
 
     def keep(self, problem: Problem, state: State, key: str, *, now: bool = False) -> None:
         """Write the state if it is time to, or `now`."""

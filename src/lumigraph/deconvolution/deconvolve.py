@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from lumigraph.core import arrays, memory
+from lumigraph.core import arrays, checks, memory
 from lumigraph.core.arrays import Array
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.deconvolution.checkpoint import Checkpoint, fingerprint
 from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.forward import ForwardModel, depths_of, grid_of
-from lumigraph.deconvolution.methods import Method, State, Stop
+from lumigraph.deconvolution.methods import Method, State, Stop, check_offers
 from lumigraph.deconvolution.problem import Problem, Scale, values
 from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
 from lumigraph.errors import GeometryError, SamplingError
@@ -108,7 +108,7 @@ def deconvolve(
     CalibrationError
         A raw image of another shape than the operator's, a colour mosaic, NaN where pixels count, no light.
     GeometryError
-        A start of the wrong shape, or an operator without sensitivity.
+        A start of the wrong shape, an operator without sensitivity, no operator, method or exposure at all.
     FormatError
         A checkpoint that is damaged or belongs to another raw image.
     Interrupted
@@ -116,6 +116,7 @@ def deconvolve(
 
     """
     limits = iterations if isinstance(iterations, Stop) else Stop(iterations)
+    _check(operator, method)
     exposure = _known(raw, exposure)
     data = values(raw, operator, exposure)
     _require(operator, data)
@@ -150,6 +151,7 @@ def deconvolve_series(
         As in `deconvolve`; the exposure is that of the first frame for all of them.
     """
     limits = iterations if isinstance(iterations, Stop) else Stop(iterations)
+    _check(operator, method)
     scale: Scale | None = None
     for raw in frames:
         if scale is None:
@@ -240,8 +242,14 @@ def _placed(estimate: Array, raw: RawImage | Array, operator: ForwardModel) -> A
 
 def _known(raw: RawImage | Array, exposure: Exposure | None) -> Exposure:
     if exposure is not None:
+        checks.instance("exposure", exposure, Exposure)
         return exposure
     return Exposure.of(raw) if isinstance(raw, RawImage) else Exposure()
+
+
+def _check(operator: ForwardModel, method: Method) -> None:
+    check_offers("operator", operator, ("shape", "forward", "adjoint"), "Give camera.operator().")
+    check_offers("method", method, ("step", "start"), "Give RichardsonLucy() or LeastSquares().")
 
 
 def _require(operator: ForwardModel, data: Array) -> None:

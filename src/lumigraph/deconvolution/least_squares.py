@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lumigraph.core import arrays
+from lumigraph.core import arrays, checks
 from lumigraph.core.arrays import Array
 from lumigraph.deconvolution.methods import State, check_start
 from lumigraph.deconvolution.problem import Problem
@@ -44,6 +44,8 @@ class LeastSquares:
 
     def __post_init__(self) -> None:
         check_start(self.start)
+        if self.prior is not None:
+            checks.instance("prior", self.prior, TotalVariation)
 
     def step(self, problem: Problem, state: State) -> State:
         """The next state: one application of Aᵀ and one of A."""

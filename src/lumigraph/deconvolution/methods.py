@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
@@ -126,6 +126,14 @@ class Stop:
         if self.change is not None and change < self.change:
             return f"change {change:.3g} is below {self.change:g}"
         return f"{done} iterations" if done >= self.iterations else ""
+
+
+def check_offers(name: str, thing: Any, wanted: tuple[str, ...], remedy: str) -> None:
+    """Refuse what has not all of the wanted attributes, such as a camera where its operator is needed."""
+    if not all(hasattr(thing, attribute) for attribute in wanted):
+        raise GeometryError(
+            f"{name} is of type {type(thing).__name__} but must have {', '.join(wanted)}. {remedy}"
+        )
 
 
 def check_start(start: Array | None) -> None:

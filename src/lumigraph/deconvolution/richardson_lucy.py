@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
-from lumigraph.deconvolution.methods import Filter, Prior, State, check_start
+from lumigraph.deconvolution.methods import Filter, Prior, State, check_offers, check_start
 from lumigraph.deconvolution.problem import Problem
 
 
@@ -36,7 +36,7 @@ class RichardsonLucy:
     Raises
     ------
     GeometryError
-        A start with negative or NaN values.
+        A start with negative or NaN values, or what is no prior or filter.
 
     References
     ----------
@@ -51,6 +51,10 @@ class RichardsonLucy:
 
     def __post_init__(self) -> None:
         check_start(self.start)
+        if self.prior is not None:
+            check_offers("prior", self.prior, ("shrink",), "Give TotalVariation(...) or Wavelets(...).")
+        if self.filter is not None:
+            check_offers("filter", self.filter, ("__call__",), "Give LowPass(...).")
 
     def step(self, problem: Problem, state: State) -> State:
         """The next state: one application of Aᵀ and one of A."""
