@@ -35,6 +35,17 @@ count = [5, 5]
 [sensor]
 pixel_pitch = "12.5 um"
 """
+LENS = """
+kind = "single-lens"
+wavelength = "550 nm"
+object_distance = "100 mm"
+[main_lens]
+focal_length = "50 mm"
+diameter = "3 mm"
+[sensor]
+pixel_pitch = "4 um"
+shape = [40, 50]
+"""
 
 
 @pytest.fixture
@@ -184,3 +195,15 @@ def test_what_a_microscope_would_see_can_be_simulated_and_deconvolved(lumigraph,
     found = lumigraph("simulate", "scope.toml", "--scene", "white", "--coherence", "coherent", "-o", "w.tiff")
     assert found.code == 1
     assert "fluorescence, which does not interfere. Leave coherence out" in found.err
+
+
+def test_a_single_lens_is_deconvolved_too(lumigraph, tmp_path):
+    (tmp_path / "lens.toml").write_text(LENS)
+    lumigraph("simulate", "lens.toml", "--scene", "siemens_star", "--noise", "-o", "raw.tiff")
+    words = ("deconvolve", "raw.tiff", "--camera", "lens.toml", "--iterations", 3, "-o")
+    found = lumigraph(*words, "picture.tiff", "--json")
+    assert found.code == 0, found.err
+    assert lg.open(tmp_path / "picture.tiff").shape == tuple(json.loads(found.out)["shape"])
+    refused = lumigraph(*words, "other.tiff", "--samples", 3)
+    assert refused.code == 1
+    assert "has no lenslets to count --samples by" in refused.err

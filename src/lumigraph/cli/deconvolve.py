@@ -167,7 +167,7 @@ def deconvolve(
     way: Way = Way(),
     common: Reported = REPORTED,
 ) -> None:
-    """Reconstruct what was in front of a microscope or a camera with lenslets from one raw image.
+    """Reconstruct what was in front of a microscope or a camera from one raw image.
 
     A light-field microscope gives a volume, a focused camera the picture of its main lens, or one for each
     of several depths. Ctrl-C writes what was reached.
@@ -253,14 +253,10 @@ def operator_of(
     camera: Any, planes: tuple[float, ...] | None, samples: int | None, calibration: "Calibration | None"
 ) -> Any:
     """The camera's model of how it sees planes [m]."""
-    if not hasattr(camera, "operator"):
-        from lumigraph.simulation import periodic_operator
-
-        if camera.lattice is None or (planes is not None and len(planes) > 1) or samples is not None:
-            raise FormatError(
-                f"a {camera.KIND} is deconvolved at one depth, with lenslets. Give one --z, no --samples."
-            )
-        return periodic_operator(camera, camera.object_grid, planes[0] if planes else 0.0)
+    if camera.KIND == "single-lens":
+        if samples is not None:
+            raise FormatError(f"a {camera.KIND} camera has no lenslets to count --samples by. Leave it out.")
+        return camera.operator(planes)
     known: dict[str, Any] = {}
     if calibration is not None and hasattr(camera, "sampling_distances"):
         known["pixels"] = calibration
