@@ -26,6 +26,8 @@ LEAST_STRETCH = 3e-4
 LEAST_TILT = math.radians(0.1)
 LEAST_BEND = 0.02
 """Pixels that a tilt moves centres at the border: half of what a neighbour that is missing there does."""
+LEAST_PULL = 0.05
+"""The same of another pitch: what overlapping neighbours that are missing on all sides do."""
 LEAST_GAP = 0.03
 """Of the pitch. Below these limits a difference is no fault."""
 
@@ -180,8 +182,9 @@ def diagnose(white: RawImage | Array, camera: Built) -> Diagnosis:
     sizes = {
         "rotation": abs(rotation) / LEAST_ROTATION,
         "offset": float(np.hypot(*offset)) / LEAST_OFFSET,
-        "distance": abs(stretch - 1) / max(LEAST_STRETCH, _SIGMAS * error.stretch),
-        "tilt": math.hypot(*tilt) / max(LEAST_TILT, LEAST_BEND * error.tilt_per_pixel, _SIGMAS * error.tilt),
+        "distance": abs(stretch - 1) / max(LEAST_STRETCH, LEAST_PULL / error.border, _SIGMAS * error.stretch),
+        "tilt": math.hypot(*tilt)
+        / max(LEAST_TILT, LEAST_BEND * error.total / error.border**2, _SIGMAS * error.tilt),
         "gap": (1 - width / pitch) / LEAST_GAP,
         "overlap": (width / pitch - 1) / LEAST_GAP,
     }
@@ -207,11 +210,12 @@ def _lengths(intended: Calibration) -> tuple[float, float, float]:
 
 
 class _Errors(NamedTuple):
-    """Standard errors of the pitch, relative, and of the tilt [rad]; tilt that moves the border by 1 px."""
+    """Standard errors of the pitch, relative, and of the tilt [rad]; farthest centre, and T [px]."""
 
     stretch: float
     tilt: float
-    tilt_per_pixel: float
+    border: float
+    total: float
 
 
 def _tilted(
@@ -237,7 +241,8 @@ def _tilted(
     error = _Errors(
         float(errors[[1, 2, 4, 5]].max()) / lattice.pitch,
         float(errors[6:].max()),
-        total / float(np.square(ideal).max()),
+        float(np.abs(ideal).max()),
+        total,
     )
     return lattice, (float(fit[6]), float(fit[7])), error
 
