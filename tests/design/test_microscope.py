@@ -64,15 +64,13 @@ def test_the_band_limit_says_nothing_near_the_focused_plane():
         design.band_limit(WAVE, M, PITCH, 1e-6)
 
 
-def test_the_focused_plane_is_sampled_once_per_lenslet_and_gaps_close_where_directions_reach_the_neighbour():
+def test_a_plane_is_sampled_once_per_lenslet_as_long_as_a_points_light_is_not_wider():
     def distance(dz):
         return design.sampling_distance(WAVE, (NA, INDEX), PITCH / M, dz)
 
-    tangent = math.tan(math.asin(NA / INDEX))
-    closed = PITCH / M / (2 * tangent)
-    assert distance(0.0) == pytest.approx(PITCH / M)
-    assert distance(closed / 2) == pytest.approx(PITCH / M / 2)
-    assert distance(closed) < 0.1 * PITCH / M
+    edge = PITCH / M / (2 * math.tan(math.asin(NA / INDEX)))
+    assert distance(0.0) == distance(0.99 * edge) == distance(-edge) == PITCH / M
+    assert distance(1.01 * edge) == pytest.approx(WAVE / (4 * NA))
     assert distance(20e-6) == pytest.approx(1 / design.band_limit(WAVE, M, PITCH, 20e-6) / 2)
 
 

@@ -227,6 +227,19 @@ def test_a_filter_by_the_sampling_distance_takes_blocks_away_from_the_focused_pl
     assert steps(smooth) < 1.25
 
 
+def test_a_filter_of_close_planes_explains_the_data_and_keeps_the_light_in_its_plane(scope):
+    # Filtering the estimate instead leaves a misfit of 0.20, and a likeness of 0.80 (0.72 without a filter).
+    depths = (-3e-6, -1.5e-6, 0.0, 1.5e-6, 3e-6)
+    operator = scope.operator(depths, 3, pixels=10)
+    y, x, truth = operator.object_grid.y[:, None], operator.object_grid.x, np.zeros(operator.shape[1])
+    truth[2] = np.exp(-((y - 3e-6) ** 2 + (x + 4e-6) ** 2) / (2 * 2e-6**2))
+    raw = operator.forward(truth)
+    widths = filters.widths_of(scope.sampling_distances(depths), operator.object_grid.pitch[0])
+    found = deconvolve(raw, operator, 20, method=RichardsonLucy(filter=filters.LowPass(widths)))
+    assert np.linalg.norm(operator.forward(found) - raw) < 0.12 * np.linalg.norm(raw)
+    assert np.corrcoef(found[2].ravel(), truth[2].ravel())[0, 1] > 0.99
+
+
 def test_the_real_vesicle_is_a_ring_without_blocks():
     folder = real("lfm_guv")
     white, dark, raw = (

@@ -75,10 +75,10 @@ class Prior(Protocol):
 
 
 class Filter(Protocol):
-    """Applied to the estimate after each step, such as `LowPass`."""
+    """Applied to the factor of each step, such as `LowPass`."""
 
-    def __call__(self, estimate: Array, /) -> Array:
-        """The estimate (y, x) or (z, y, x), filtered."""
+    def __call__(self, factor: Array, /) -> Array:
+        """The factor (y, x) or (z, y, x) of the estimate, filtered."""
         ...
 
 

@@ -146,8 +146,9 @@ class Problem:
         """
         xp, data = arrays.namespace(model), self.data
         off = model - data
-        safe = xp.where(data > 0, data, xp.ones_like(data))
-        terms = off - xp.where(data > 0, data * xp.log1p(off / safe), xp.zeros_like(data))
+        lit = data > FAINT * self.floor  # fainter data count for nothing, and would overflow
+        safe = xp.where(lit, data, xp.ones_like(data))
+        terms = off - xp.where(lit, data * xp.log1p(off / safe), xp.zeros_like(data))
         count = float(np.prod(data.shape))
         if self.scale.weights is not None:
             count = float(xp.sum(self.scale.weights))

@@ -26,7 +26,8 @@ class RichardsonLucy:
     prior
         `TotalVariation` or `Wavelets`; None for the most likely object.
     filter
-        Applied to each new estimate, such as `LowPass`; what it leaves below 0 becomes 0.
+        Applied to the factor of each step, such as `LowPass`: an even start never takes up what it removes,
+        and light is not drawn from one plane to another. What it leaves below 0 becomes 0.
     accelerated
         Extrapolates each step by the last one (Biggs & Andrews), with as much likelihood in a third to a
         tenth of the steps; where a plain step would be likelier it is taken instead.
@@ -70,13 +71,14 @@ class RichardsonLucy:
         return found
 
     def _improved(self, problem: Problem, state: State) -> tuple[Array, dict[str, Array]]:
-        correction = problem.scale.back(problem.data / state.model)
-        estimate = _positive(problem.scale.over_sensitivity(state.estimate * correction))
+        factor = problem.scale.over_sensitivity(problem.scale.back(problem.data / state.model))
+        if self.filter is not None:
+            xp = arrays.namespace(factor)
+            factor = self.filter(xp.where(problem.scale.seen, factor, xp.ones_like(factor)))
+        estimate = _positive(state.estimate * factor)
         memory: dict[str, Array] = {}
         if self.prior is not None:
             estimate, memory = self.prior.shrink(problem, estimate, state)
-        if self.filter is not None:
-            estimate = _positive(self.filter(estimate))
         return estimate, memory
 
 

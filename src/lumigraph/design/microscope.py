@@ -231,12 +231,12 @@ def near_field(wavelength: float, magnification: float, pitch: float) -> float:
 def sampling_distance(wavelength: float, aperture: tuple[float, float], lenslet: float, dz: float) -> float:
     r"""Distance between the samples that a light field takes of a plane at depth dz [m].
 
-    .. math:: \max\left(\frac{d}{M} - 2 |dz| \tan\theta,\ \frac{0.47 \lambda M |dz|}{d},\
-              \frac{\lambda}{4\,\mathrm{NA}}\right)
+    .. math:: \frac{d}{M} \text{ for } |dz| \le \frac{d}{2 M \tan\theta}, \text{ else }
+              \max\left(\frac{0.47 \lambda M |dz|}{d},\ \frac{\lambda}{4\,\mathrm{NA}}\right)
 
-    On the focused plane all directions of a lenslet see the same place: one sample per lenslet. Away from
-    it the directions' samples spread by 2 |dz| tan θ and fill the gaps between lenslets; farther on what a
-    lenslet resolves (`band_limit`) is the limit. Finer structure in a reconstruction is not measured.
+    Near the focused plane the light of a point is not wider than a lenslet: which lenslet is lit tells where
+    it is, one sample per lenslet. Beyond that, neighbouring lenslets see a point from sides that overlap, and
+    what a lenslet resolves (`band_limit`) is the limit. Finer structure in a reconstruction is not measured.
 
     Parameters
     ----------
@@ -256,14 +256,17 @@ def sampling_distance(wavelength: float, aperture: tuple[float, float], lenslet:
 
     Examples
     --------
-    >>> [round(sampling_distance(593e-9, (1.2, 1.35), 100e-6 / 60, dz * 1e-6) * 1e6, 2) for dz in (0, .2, 10)]
-    [1.67, 0.89, 1.67]
+    >>> [round(sampling_distance(593e-9, (1.2, 1.35), 100e-6 / 60, dz * 1e-6) * 1e6, 2) for dz in (0, .4, 10)]
+    [1.67, 1.67, 1.67]
+    >>> round(sampling_distance(593e-9, (1.2, 1.35), 100e-6 / 60, 1e-6) * 1e6, 2)
+    0.17
     """
     number, index = aperture
     tangent = math.tan(math.asin(sine(number, index)))
     size, away = checks.positive("lenslet", lenslet), abs(checks.finite("dz", dz))
     wave = checks.positive("wavelength", wavelength)
-    return max(size - 2 * away * tangent, SPARROW * wave * away / size, wave / (4 * number))
+    beyond = max(SPARROW * wave * away / size, wave / (4 * number))
+    return max(size, beyond) if 2 * away * tangent <= size * (1 + 1e-9) else beyond
 
 
 def fourier_field(relay: float, magnification: float, pitch: float, focal_length: float) -> float:

@@ -77,7 +77,12 @@ def _reconstruction(scope: "LightFieldMicroscope") -> Iterator[Row]:
             yield Row(f"band limit at {dz * 1e6:g} um", limit, "1/m", "d / (0.94 λ M |dz|)")
     at = (0.0, *DEPTHS)
     for dz, distance in zip(at, scope.sampling_distances(at), strict=True):
-        yield Row(f"sampling at {dz * 1e6:g} um", distance, "m", "coarsest of gaps, lenslet and λ / (4 NA)")
+        yield Row(
+            f"sampling at {dz * 1e6:g} um",
+            distance,
+            "m",
+            "d/M up to d / (2 M tan θ), then what a lenslet resolves",
+        )
 
 
 def _fourier(scope: "LightFieldMicroscope") -> Iterator[Row]:
