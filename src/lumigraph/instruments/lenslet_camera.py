@@ -17,7 +17,7 @@ from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.parts import Lenslets
 from lumigraph.propagation import Propagate
 from lumigraph.simulation import Mixed, PeriodicOperator, Spectrum, periodic_operator
-from lumigraph.simulation.kernels import Progress
+from lumigraph.simulation.blocks import Progress
 
 
 class LensletCamera(Camera):

@@ -81,25 +81,40 @@ class Fineness:
                 f"accuracy is {accuracy:g} but must lie between {FINEST:g} and {COARSEST:g}, relative rms."
             )
 
-    @property
-    def oversampling(self) -> float:
-        """Samples of the image over what its cut-off p/(λb) asks for."""
-        return 3.75 * (1e-3 / self.accuracy) ** 0.27
+    def samples(self, fresnel_number: float, blur: float) -> float:
+        """Samples of the image along a lenslet's pitch p.
+
+        Light of the lenslet and of those beside it has frequencies up to some p/(λb); less of it comes from
+        farther ones the larger p²/(λb), and more the wider the point's image.
+
+        Parameters
+        ----------
+        fresnel_number
+            p²/(λb).
+        blur
+            Radius of a point's geometric image [p].
+        """
+        return (6 * fresnel_number + 6 + 2 * blur) * (1e-3 / self.accuracy) ** 0.2
 
     @property
     def neighbours(self) -> int:
         """Lenslets on each side of an image's cell whose light is followed into it."""
-        return math.ceil(4 * (8e-4 / self.accuracy) ** 0.23)
+        return math.ceil(5 * (1e-3 / self.accuracy) ** 0.23)
 
     @property
     def rank(self) -> float:
         """Part of the kernels' norm that their factors may leave out."""
-        return self.accuracy / 3
+        return self.accuracy / 6
 
     @property
     def border(self) -> float:
         """Lenslets that are missing farther than this from a cell [pitches] are not missed."""
-        return 2 * (1e-3 / self.accuracy) ** 0.25
+        return 4 * (1e-3 / self.accuracy) ** 0.25
+
+    @property
+    def corner(self) -> float:
+        """The same for what is missing on two sides of a corner: farther, each counts by itself."""
+        return (1e-3 / self.accuracy) ** 0.4
 
     def near(self, blur: float, airy: float) -> float:
         """As `reach`, for what the lenslets that are missing beyond the border take away."""
@@ -172,7 +187,9 @@ def cells_of(camera: Camera, array: LensletArray, fineness: Fineness) -> Cells:
         _nearest(-n * s / 2, o - s / 2, s) for n, s, o in zip(count, size, lattice.origin, strict=True)
     )
     finest = airy(camera) / 2 / OVERSAMPLING
-    image = camera.wavelength * telecentric_distance(camera) / lattice.pitch / 2 / fineness.oversampling
+    pitch, squared = lattice.pitch, camera.wavelength * telecentric_distance(camera)
+    widest = blur(camera, camera.object_distance) / pitch
+    image = pitch / fineness.samples(pitch**2 / squared, widest)
     points = tuple(2 * math.ceil(s / finest / 2) for s in size)
     samples = tuple(math.ceil(s / image) for s in size)
     return Cells(_pair(size), _pair(edge), _pair(count), _pair(points), _pair(samples))

@@ -20,18 +20,19 @@ from lumigraph.propagation import Propagate, propagate
 from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
 from lumigraph.sensor import integrate
 from lumigraph.simulation import single_lens
+from lumigraph.simulation.blocks import build_bytes
 from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.cells import fits
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Plane, Snapshots, TiltedWaves
-from lumigraph.simulation.kernels import Optics
 from lumigraph.simulation.microscope_scene import Microscope, microscope_image
+from lumigraph.simulation.optics import Optics
 from lumigraph.simulation.periodic import periodic_operator
 from lumigraph.simulation.spectrum import Spectrum, by_wavelength
 
 PUPIL_OVERSAMPLING = 1.1
 """How much denser than half of λL/p the points of the pupil stand that make a white image."""
 
-LARGEST_OPERATOR = 2.0**30
+LARGEST_OPERATOR = 2.0**31
 """A lenslet-periodic operator that takes more than this [bytes] to build gives way to snapshots."""
 
 Progress = Callable[[int, int], None]
@@ -219,7 +220,7 @@ def _exact(camera: Camera, scene: Scene, accuracy: float | None) -> list[Slice |
         return []
     slices = [part for part in scene.parts if isinstance(part, Slice)]
     optics = [Optics.of(camera, camera.object_distance + s.dz, accuracy) for s in slices]
-    return [part for part, o in zip(slices, optics, strict=True) if o.build_bytes <= LARGEST_OPERATOR]
+    return [part for part, o in zip(slices, optics, strict=True) if build_bytes(o) <= LARGEST_OPERATOR]
 
 
 def _read_out(camera: Camera, light: _Light, coherence: Coherence | Incoherent) -> RawImage:
@@ -227,9 +228,10 @@ def _read_out(camera: Camera, light: _Light, coherence: Coherence | Incoherent) 
     if light.intensity.any():
         pixels = pixels + integrate(light.intensity, camera.image_grid, camera.sensor)
     halves = {k: integrate(image, camera.image_grid, camera.sensor) for k, image in light.halves.items()}
-    pixels = pixels + sum(halves.values())
+    for half in halves.values():
+        pixels = pixels + half
     # A hard edge rings below zero when it is interpolated to pixels; a sensor counts no negative light.
-    data = np.maximum(pixels, 0).astype(np.float32)
+    data = np.maximum(pixels, 0, dtype=np.float32)
     known = {"simulated": repr(coherence), "shots": light.done, "wavelength": camera.wavelength}
     if len(halves) == 2:
         known["estimated_error"] = _error(halves, light.drawn, pixels, _drawn(coherence).convergence)

@@ -28,9 +28,11 @@ from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.sensor import Sensor
+from lumigraph.simulation.blocks import Part, Progress
 from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.cells import Cells
-from lumigraph.simulation.kernels import Matrix, Optics, Part, Progress, matrix
+from lumigraph.simulation.kernels import Matrix, matrix
+from lumigraph.simulation.optics import Optics
 from lumigraph.simulation.resampling import averaged, represented
 from lumigraph.simulation.turning import Chain, Crop, Linear, Turn, turn_margin
 

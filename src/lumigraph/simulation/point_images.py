@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import CubicSpline
 from scipy.special import j0
@@ -93,25 +94,136 @@ def _sampled(camera: Camera, distance: float, y: np.ndarray, x: np.ndarray) -> n
     return down @ pupil @ across / np.sqrt(light)
 
 
-def images(light: Wave, lenslets: Response, axes: tuple[Axis, Axis], row: int, columns: range) -> np.ndarray:
-    """Intensity (columns, points, samples) in a cell of the points of the cells (row, columns) beside it."""
-    y, x = axes
-    down, across = lenslets.down.astype(np.complex64), lenslets.across.astype(np.complex64).T
-    result = np.empty((len(columns), y.points, x.points, y.samples * x.samples), np.float32)
-    starts = [-x.margin - (d * x.points + k) - light.first[1] for d in columns for k in range(x.points)]
-    first, last = starts[0], starts[-1]  # descending, one by one
-    for k in range(y.points):
-        top = -y.margin - (row * y.points + k) - light.first[0]
-        part = down @ light.data[top : top + STEP * down.shape[1] : STEP]
-        windows = sliding_window_view(part, STEP * across.shape[0] - 1, axis=1)[:, last : first + 1, ::STEP]
-        field = windows[:, ::-1] @ across
-        if lenslets.core is None:
-            field = field.transpose(1, 0, 2)
-        else:
-            field = field.transpose(1, 0, 2).reshape(len(starts), -1) @ lenslets.core.T
-        intensity = field.real**2 + field.imag**2
-        result[:, k] = intensity.reshape(len(columns), x.points, -1)
-    return result.reshape(len(columns), y.points * x.points, -1)
+@dataclass(frozen=True, slots=True, eq=False)
+class Lit:
+    """Light behind what square lenslets do along x, for the points of a range of cells.
+
+    Parameters
+    ----------
+    rows
+        Even and odd rows of the wave, each (n, points along x, samples along x).
+    first
+        Multiple of the points' pitch of the wave's first row.
+    columns
+        Cells to which the points belong, counted from the image's.
+    """
+
+    rows: tuple[np.ndarray, np.ndarray]
+    first: int
+    columns: range
+
+
+def lit(light: Wave, across: np.ndarray, axis: Axis, columns: range) -> Lit:
+    """All rows of a wave through `across` (samples, window), of points in cells of `columns`."""
+    points = np.arange(columns.start * axis.points, columns.stop * axis.points)
+    rows = _through(light, across, axis, points)
+    return Lit((rows[::STEP].copy(), rows[1::STEP].copy()), light.first[0], columns)
+
+
+def _through(light: Wave, across: np.ndarray, axis: Axis, points: np.ndarray) -> np.ndarray:
+    """All rows of a wave, windows along x around the cell's image of each point, through (k, window)."""
+    windows = sliding_window_view(light.data, STEP * across.shape[1] - 1, axis=1)[..., ::STEP]
+    return windows[:, -axis.margin - points - light.first[1]] @ across.astype(np.complex64).T
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Apart:
+    """Images of points behind square lenslets, whose two axes are apart.
+
+    Parameters
+    ----------
+    lit
+        Light behind what they do along x.
+    down
+        (samples, window) along y.
+    axes
+        Of the cells.
+    """
+
+    lit: Lit
+    down: np.ndarray
+    axes: tuple[Axis, Axis]
+
+    def row(self, dy: int, columns: range) -> np.ndarray:
+        """Intensity (columns, points, samples) in a cell of the points of the cells (dy, columns)."""
+        y, x = self.axes
+        down, start = self.down.astype(np.complex64), columns[0] - self.lit.columns[0]
+        mine = slice(start * x.points, (start + len(columns)) * x.points)
+        result = np.empty((len(columns), y.points, x.points, y.samples, x.samples), np.float32)
+        for k in range(y.points):
+            top = -y.margin - (dy * y.points + k) - self.lit.first
+            rows = self.lit.rows[top % STEP][top // STEP :, mine]
+            field = down @ rows[: down.shape[1]].reshape(down.shape[1], -1)
+            intensity = (field.real**2 + field.imag**2).reshape(y.samples, len(columns), x.points, x.samples)
+            result[:, k] = intensity.transpose(1, 2, 0, 3)
+        return result.reshape(len(columns), y.points * x.points, -1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Few:
+    """Images of points behind lenslets of any shape, from the fields of few of the points.
+
+    A field is band-limited in the point's place too, so that those of some points give those of all.
+
+    Parameters
+    ----------
+    fields
+        (few along y, few along x, samples).
+    down, across
+        (points, few) along y and x, for the points of all cells.
+    reach
+        Cells (y, x) on each side.
+    """
+
+    fields: np.ndarray
+    down: np.ndarray
+    across: np.ndarray
+    reach: tuple[int, int]
+
+    def row(self, dy: int, columns: range) -> np.ndarray:
+        """As `Apart.row`."""
+        y, x = (len(m) // (2 * r + 1) for m, r in zip((self.down, self.across), self.reach, strict=True))
+        parts, samples = self.fields.view(np.float32), self.fields.shape[2]
+        down = self.down[(dy + self.reach[0]) * y :][:y]
+        across = self.across[(columns[0] + self.reach[1]) * x :][: len(columns) * x]
+        rows = (down @ parts.reshape(len(parts), -1)).reshape(y, *parts.shape[1:])
+        field = (across @ rows).reshape(y, len(columns), x, samples, 2)
+        intensity = field[..., 0] ** 2 + field[..., 1] ** 2
+        return intensity.transpose(1, 0, 2, 3).reshape(len(columns), y * x, samples)
+
+
+def few(light: Wave, lenslets: Response, axes: tuple[Axis, Axis], reach: tuple[int, int]) -> Few:
+    """For the points of all cells up to `reach` away."""
+    assert lenslets.core is not None
+    (y, x), core = axes, lenslets.core.T
+    down = lenslets.down.astype(np.complex64)
+    (rows, along_y), (columns, along_x) = (
+        _skeleton(axis, cells) for axis, cells in zip(axes, reach, strict=True)
+    )
+    behind = _through(light, lenslets.across, x, columns)
+    fields = np.empty((len(rows), len(columns), core.shape[1]), np.complex64)
+    for field, row in zip(fields, rows, strict=True):
+        top = -y.margin - row - light.first[0]
+        part = behind[top : top + STEP * down.shape[1] : STEP].reshape(down.shape[1], -1)
+        part = (down @ part).reshape(len(down), len(columns), -1).transpose(1, 0, 2)
+        field[:] = part.reshape(len(columns), -1) @ core
+    return Few(fields, along_y, along_x, reach)
+
+
+def _skeleton(axis: Axis, reach: int) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of few points of `reach` cells on each side, and the matrix (points, few) from them to all.
+
+    Discrete prolate sequences hold what the band lets through; rows of theirs that are far from dependent
+    are found by a pivoted QR decomposition.
+    """
+    points = np.arange(-reach * axis.points, (reach + 1) * axis.points)
+    at = points * (axis.size / axis.points)
+    strength, vectors = np.linalg.eigh(np.sinc(2 * axis.band * (at[:, None] - at)))
+    basis = vectors[:, strength > 1e-10 * strength[-1]]
+    chosen = np.asarray(scipy.linalg.qr(basis.T, mode="r", pivoting=True)[-1])
+    chosen = np.sort(chosen[: basis.shape[1]])
+    matrix = np.linalg.solve(basis[chosen].T, basis.T).T
+    return points[chosen], matrix.astype(np.float32)
 
 
 def mirrored(factor: np.ndarray, shape: tuple[int, int], up: bool, left: bool) -> np.ndarray:
@@ -136,5 +248,6 @@ def factors(block: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np
         if strength[0] < least / 2:
             break
     kept = strength > least
-    left, right = vectors[:, kept], vectors[:, kept].T @ seen
-    return left if basis is None else basis @ left, right, strength[kept]
+    left = vectors[:, kept].astype(np.float32)
+    right = vectors[:, kept].T @ seen
+    return left if basis is None else basis @ left, right.astype(np.float32), strength[kept]

@@ -1,0 +1,397 @@
+"""Matrices between the cells of a lenslet array, in factors.
+
+Inside the array all cells have the same blocks. Near its border light is missing that lenslets beyond it
+would have brought: from all cells of a row alike, from all of a column, and in the corners from both, which
+is not the sum of the two where the missing lenslets are near. So
+
+.. math:: B(a, b) = B + [B(a, ∞) - B] + [B(∞, b) - B] + [B(a, b) - B(a, ∞) - B(∞, b) + B]
+
+for a cell at a from the border along y and b along x, and the last bracket is left out far from corners.
+Cells of the ring around the array have only what is brought there.
+
+Singular values are kept until the accuracy is reached; inside the array the light of what is left out is
+given to all points of its cell alike, so that an even object stays exact. Blocks that mirror each other are
+computed once.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from lumigraph.core.arrays import WORKERS
+from lumigraph.core.threads import each
+from lumigraph.elements import LensletArray
+from lumigraph.simulation import cells as _cells
+from lumigraph.simulation.cell_response import INFINITE, Lenslets, Limits
+from lumigraph.simulation.optics import Optics
+from lumigraph.simulation.point_images import Apart, Few, Lit, factors, few, lit, mirrored, wave
+
+Progress = Callable[[float], None]
+
+State = tuple[Limits, Limits]
+
+Offset = tuple[int, int]
+
+Factors = tuple[np.ndarray, np.ndarray]
+
+Blocks = dict[Offset, Factors]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """Part of the matrix between an object's cells and an image's.
+
+    Parameters
+    ----------
+    rows, columns
+        Cells of the image, counted from the ring around the array: 0 is the ring, 1 the first row.
+    offsets
+        (dy, dx, rank): cells from the image's to the object's, row by row, and the factors' columns for it.
+    left
+        (points, R) with the ranks side by side.
+    right
+        (R, samples).
+    """
+
+    rows: tuple[int, int]
+    columns: tuple[int, int]
+    offsets: tuple[tuple[int, int, int], ...]
+    left: np.ndarray
+    right: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """Rows or columns of cells with the same lenslets around them.
+
+    Parameters
+    ----------
+    cells
+        The first and the one after the last, the ring around the array is 0.
+    limits
+        Of the lenslets' centres, from a cell's centre [m]; infinite where the border is far.
+    ring
+        Whether it is the ring.
+    close
+        Whether what is missing counts in corners too.
+    """
+
+    cells: tuple[int, int]
+    limits: Limits
+    ring: bool = False
+    close: bool = False
+
+
+def bands(optics: Optics, axis: int) -> list[Band]:
+    """Along y (0) or x (1); the first is all of the array's cells, as if it had no border."""
+    cells, extent = optics.cells, optics.array.extent
+    size, n, pitch = cells.size[axis], cells.count[axis], optics.array.lattice.pitch
+    result = [Band((1, n + 1), INFINITE)]
+    if extent is None:
+        return result
+    far, close = (
+        size / 2 + border * pitch * (1 + 1e-9) for border in (optics.fineness.border, optics.fineness.corner)
+    )
+    for row in range(n + 2):
+        middle = cells.edge[axis] + (row - 0.5) * size
+        low, high = -extent[axis] / 2 - middle, extent[axis] / 2 - middle
+        ring = row in (0, n + 1)
+        limits = _near(low, far), _near(high, far)
+        if limits == INFINITE and not ring:
+            continue
+        result.append(Band((row, row + 1), limits, ring, ring or min(abs(low), abs(high)) < close))
+    return result
+
+
+def _near(border: float, far: float) -> float:
+    """A border at a distance from a cell's centre; infinite where it is far."""
+    return round(border, 12) if abs(border) < far else math.copysign(math.inf, border)
+
+
+def _flipped(limits: Limits) -> Limits:
+    return -limits[1], -limits[0]
+
+
+Place = tuple[Band, Band]
+
+Turn = tuple[bool, bool, bool]
+
+
+def places(optics: Optics) -> list[Place]:
+    """Where blocks are added: along the borders and, where both are close, in the corners."""
+    along_y, along_x = bands(optics, 0), bands(optics, 1)
+    edges = [(y, along_x[0]) for y in along_y[1:]] + [(along_y[0], x) for x in along_x[1:]]
+    return edges + [(y, x) for y in along_y[1:] for x in along_x[1:] if y.close and x.close]
+
+
+def terms(place: Place) -> dict[State, int]:
+    """What is added at a place: a sum of blocks with the lenslets of a state."""
+    y, x = place
+    if INFINITE in (y.limits, x.limits):  # along a border
+        inside = {} if y.ring or x.ring else {(INFINITE, INFINITE): -1}
+        return {(y.limits, x.limits): 1, **inside}
+    result = {(y.limits, x.limits): 1}
+    if not x.ring:
+        result[y.limits, INFINITE] = -1
+    if not y.ring:
+        result[INFINITE, x.limits] = -1
+    if not (x.ring or y.ring):
+        result[INFINITE, INFINITE] = 1
+    return result
+
+
+def build_bytes(optics: Optics) -> float:
+    """Memory that building all parts takes [bytes], from their sizes and the usual number of factors."""
+    cells, near = optics.cells, optics.near
+    even, square = _symmetric(optics.array), cells.size[0] == cells.size[1]
+    wanted = [place for place, source, _ in _alike(places(optics), even, square) if place is source]
+    states = 1 + len({state for place in wanted for state in terms(place)})
+    points, samples = math.prod(cells.points), math.prod(cells.samples)
+    block = 4.0 * points * samples
+    rows = WORKERS * max(states * (2 * near[1] + 1), 2 * optics.reach[1] + 1) * block
+    kept = (1.3 * len(wanted) + 0.7 * len(places(optics))) * math.sqrt(points)  # factors of a block
+    rows += kept * math.prod(2 * n + 1 for n in near) * 4.0 * (points + samples)
+    if optics.straight:
+        return rows
+    dense = 8.0 * math.prod(axis.samples * len(axis.window) for axis in optics.axes)
+    few = 8.0 * samples
+    for axis, reach in zip(optics.axes, near, strict=True):
+        few *= (2 * reach + 1) * axis.size * 2 * axis.band + 12
+    return rows + WORKERS * dense + states * few
+
+
+@dataclass(slots=True)
+class _Found:
+    """Factors of one block, more of them than needed at first."""
+
+    left: np.ndarray
+    right: np.ndarray
+    strength: np.ndarray
+    copies: int
+    mean: np.ndarray
+
+    def cut(self, least: float) -> Factors:
+        kept = self.strength > least
+        return self.left[:, kept], self.right[kept]
+
+
+def build(optics: Optics, progress: Progress | None = None) -> tuple[list[Part], dict[Offset, np.ndarray]]:
+    """All parts, the periodic one first, and the mean images (samples,) of a cell's points at each offset."""
+    builder = _Builder(optics, progress or (lambda _: None))
+    rows, columns = optics.cells.count
+    inside, means = builder.periodic()
+    return [_part((1, rows + 1), (1, columns + 1), inside), *builder.border()], means
+
+
+def _part(rows: tuple[int, int], columns: tuple[int, int], blocks: Blocks) -> Part:
+    order = sorted(key for key, (left, _) in blocks.items() if left.shape[1])
+    offsets = tuple((dy, dx, blocks[dy, dx][0].shape[1]) for dy, dx in order)
+    left = np.concatenate([blocks[key][0] for key in order], axis=1, dtype=np.float32)
+    right = np.concatenate([blocks[key][1] for key in order], axis=0, dtype=np.float32)
+    return Part(rows, columns, offsets, left, right)
+
+
+class _Builder:
+    """Blocks of one depth."""
+
+    def __init__(self, optics: Optics, progress: Progress) -> None:
+        self.optics, self.axes, self.progress = optics, optics.axes, progress
+        distance = _cells.telecentric_distance(optics.camera)
+        self.lenslets = Lenslets(self.axes, optics.array, optics.camera.wavelength, distance)
+        self.light = wave(optics.camera, optics.distance, self.axes, optics.reach)
+        self.even = self.light.even and _symmetric(optics.array)
+        y, x = self.axes
+        self.square = y == x and bool(np.allclose(self.light.data, self.light.data.T))
+        self.norm = self.least = 0.0
+
+    def periodic(self) -> tuple[Blocks, dict[Offset, np.ndarray]]:
+        """Blocks inside the array, and the mean images (samples,) of a cell's points."""
+        inside, reach = (INFINITE, INFINITE), self.optics.reach
+        known = self._images([inside], reach)
+        own = next(iter(self._row(known[inside], 0, range(1))))
+        self.least = 0.02 * self.optics.fineness.rank * float(np.linalg.norm(own))
+        columns = self._columns(self.even, reach[1])
+
+        def row(dy: int) -> tuple[float, dict[Offset, _Found]]:
+            found, norm = {}, 0.0
+            for dx, block in zip(columns, self._row(known[inside], dy, columns), strict=True):
+                copies = 2 ** ((dy != 0) + (dx != 0)) if self.even else 1
+                norm += copies * float(np.linalg.norm(block)) ** 2
+                found[dy, dx] = self._factored(block, copies)
+            return norm, found
+
+        rows = list(each(row, self._columns(self.even, reach[0])))
+        self.norm = sum(norm for norm, _ in rows)
+        found = {key: f for _, part in rows for key, f in part.items()}
+        self.progress(0.1)
+        return self._completed(found)
+
+    def _completed(self, found: dict[Offset, _Found]) -> tuple[Blocks, dict[Offset, np.ndarray]]:
+        least = _least(found.values(), self.optics.fineness.rank**2 * self.norm)
+        folds = (self.even, self.even)
+        result = self._unfolded({key: f.cut(least) for key, f in found.items()}, folds)
+        means = self._unfolded({key: (f.left[:, :1] * 0, f.mean[None]) for key, f in found.items()}, folds)
+        even = np.ones((math.prod(self.optics.cells.points), 1), np.float32)
+        for key, (left, right) in result.items():
+            left_out = means[key][1] - left.mean(0, keepdims=True) @ right
+            result[key] = np.hstack([left, even]), np.vstack([right, left_out])
+        return result, {key: mean[0] for key, (_, mean) in means.items()}
+
+    def border(self) -> Iterator[Part]:
+        """What differs from `periodic` where lenslets are missing; all of it in the ring."""
+        sources = _alike(places(self.optics), self.even, self.square)
+        blocks = self._border_blocks([place for place, source, _ in sources if place is source])
+        for place, source, turn in sources:
+            mine = blocks[source] if place is source else self._copied(blocks[source], *turn)
+            if any(left.shape[1] for left, _ in mine.values()):
+                yield _part(place[0].cells, place[1].cells, mine)
+
+    def _border_blocks(self, wanted: Sequence[Place]) -> dict[Place, Blocks]:
+        """Of some places: row after row of cells, so that what they share is computed once."""
+        reach = self.optics.near
+        known = self._images({state for place in wanted for state in terms(place)}, reach)
+
+        def row(dy: int) -> dict[tuple[Place, Offset], _Found]:
+            rows: dict[State, np.ndarray] = {}
+            found = {}
+            for place in wanted:
+                if dy < 0 and self._folds(place)[0]:
+                    continue
+                for state in terms(place):
+                    if state not in rows:
+                        columns = self._columns(self._folded(state[1]), reach[1])
+                        rows[state] = self._row(known[state], dy, columns)
+                for dx in self._columns(self._folds(place)[1], reach[1]):
+                    block = sum(sign * self._picked(rows[s], s, dx) for s, sign in terms(place).items())
+                    found[place, (dy, dx)] = self._factored(np.asarray(block), 1)
+            return found
+
+        found: dict[Place, dict[Offset, _Found]] = {place: {} for place in wanted}
+        for done, part in enumerate(each(row, self._columns(False, reach[0]))):
+            for (place, offset), block in part.items():
+                found[place][offset] = block
+            self.progress(0.1 + 0.9 * (done + 1) / (2 * reach[0] + 1))
+        # A row of cells is a small part of the picture: its error may be larger.
+        budget = (2 * self.optics.fineness.rank) ** 2 * self.norm
+        result = {}
+        for place, blocks in found.items():
+            least = _least(blocks.values(), budget)
+            cut = {key: f.cut(least) for key, f in blocks.items()}
+            result[place] = self._unfolded(cut, self._folds(place))
+        return result
+
+    def _images(self, states: Iterable[State], reach: tuple[int, int]) -> dict[State, Apart | Few]:
+        """Of points of `reach` cells to all sides, with the lenslets of each state."""
+        cells, light = self.optics.cells, self.light
+        middle = [  # of any cell: only the border, as it is told, makes a difference
+            e + (n // 2 + 0.5) * s for e, n, s in zip(cells.edge, cells.count, cells.size, strict=True)
+        ]
+        behind: dict[Limits, Lit] = {}
+
+        def of(state: State) -> Apart | Few:
+            response = self.lenslets.response((middle[0], middle[1]), state)
+            if response.core is not None:
+                return few(light, response, self.axes, reach)
+            if state[1] not in behind:
+                columns = self._columns(self._folded(state[1]), reach[1])
+                behind[state[1]] = lit(light, response.across, self.axes[1], columns)
+            return Apart(behind[state[1]], response.down, self.axes)
+
+        states = list(states)
+        return dict(zip(states, each(of, states), strict=True))
+
+    def _row(self, images: Apart | Few, dy: int, columns: range) -> np.ndarray:
+        """Blocks (columns, points, samples) of one row of cells."""
+        row = images.row(dy, columns)
+        row /= self.optics.image_scale**2
+        return row
+
+    def _picked(self, row: np.ndarray, state: State, dx: int) -> np.ndarray:
+        """The block at `dx` of a row, which may hold only those that are not negative."""
+        if not self._folded(state[1]):
+            return row[dx + len(row) // 2]
+        if dx >= 0:
+            return row[dx]
+        cells = self.optics.cells
+        return mirrored(mirrored(row[-dx], cells.points, False, True).T, cells.samples, False, True).T
+
+    def _columns(self, folded: bool, reach: int) -> range:
+        return range(0 if folded else -reach, reach + 1)
+
+    def _folded(self, limits: Limits) -> bool:
+        """Whether what is on one side mirrors what is on the other."""
+        return self.even and _flipped(limits) == limits
+
+    def _folds(self, place: Place) -> tuple[bool, bool]:
+        return self._folded(place[0].limits), self._folded(place[1].limits)
+
+    def _copied(self, blocks: Blocks, across: bool, up: bool, left: bool) -> Blocks:
+        result = {}
+        for (dy, dx), pair in blocks.items():
+            (i, j), factor = ((dx, dy), self._crossed(pair)) if across else ((dy, dx), pair)
+            result[-i if up else i, -j if left else j] = self._turned(factor, up, left)
+        return result
+
+    def _crossed(self, pair: Factors) -> Factors:
+        points, samples = self.optics.cells.points, self.optics.cells.samples
+        left = pair[0].reshape(*points, -1).transpose(1, 0, 2).reshape(pair[0].shape)
+        return left, pair[1].reshape(-1, *samples).transpose(0, 2, 1).reshape(pair[1].shape)
+
+    def _turned(self, pair: Factors, up: bool, left: bool) -> Factors:
+        points, samples = self.optics.cells.points, self.optics.cells.samples
+        return mirrored(pair[0], points, up, left), mirrored(pair[1].T, samples, up, left).T
+
+    def _unfolded(self, blocks: Blocks, folds: tuple[bool, bool]) -> Blocks:
+        result = dict(blocks)
+        for (dy, dx), pair in blocks.items():
+            for up in {False, folds[0]}:
+                for left in {False, folds[1]}:
+                    key = (-dy if up else dy, -dx if left else dx)
+                    if key not in result:
+                        result[key] = self._turned(pair, up, left)
+        return result
+
+    def _factored(self, block: np.ndarray, copies: int) -> _Found:
+        left, right, strength = factors(block, self.least)
+        return _Found(left, right, strength, copies, block.mean(0, dtype=np.float64))
+
+
+def _alike(wanted: Sequence[Place], even: bool, square: bool) -> list[tuple[Place, Place, Turn]]:
+    """Each place, the first that it mirrors, and how: across the diagonal, up and down, left and right."""
+    both, first, result = (False, True) if even else (False,), {}, []
+    for place in wanted:
+        for turn in product(both if square else (False,), both, both):
+            if (key := _turned_key(place, *turn)) in first:
+                break
+        else:
+            turn = (False, False, False)
+            first[key := _turned_key(place, *turn)] = place
+        result.append((place, first[key], turn))
+    return result
+
+
+def _turned_key(place: Place, across: bool, up: bool, left: bool) -> tuple:
+    """What the blocks of the mirrored place depend on."""
+    y, x = (
+        (_flipped(band.limits) if flip else band.limits, band.ring)
+        for band, flip in zip(place, (up, left), strict=True)
+    )
+    return (x, y) if across else (y, x)
+
+
+def _symmetric(array: LensletArray) -> bool:
+    """Whether a lenslet's surroundings are the same in a mirror."""
+    return array.lattice.kinds == 1 or isinstance(array.focal_length, float)
+
+
+def _least(found: Iterable[_Found], budget: float) -> float:
+    """The strength up to which all factors together stay within a squared norm."""
+    strengths = np.concatenate([f.strength for f in found])
+    copies = np.concatenate([np.full(len(f.strength), f.copies) for f in found])
+    order = np.argsort(strengths)
+    spent = np.cumsum(copies[order] * strengths[order] ** 2)
+    k = int(np.searchsorted(spent, budget))
+    return float(strengths[order[k - 1]]) if k else 0.0

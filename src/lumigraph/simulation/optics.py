@@ -1,0 +1,94 @@
+"""What the lenslet-periodic operator of one depth depends on, and its sizes."""
+
+import hashlib
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from lumigraph.elements import LensletArray
+from lumigraph.simulation import cells as _cells
+from lumigraph.simulation.camera import Camera
+from lumigraph.simulation.cell_response import SLACK, Axis
+from lumigraph.simulation.cells import Cells, Fineness
+
+VERSION = 3
+"""Of what is kept on disk: to be raised with every change of the numbers."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Optics:
+    """What the kernels of one depth depend on.
+
+    Parameters
+    ----------
+    camera, array, cells, fineness
+        The camera, its array with rows along x, the array's cells, and the accuracy.
+    distance
+        Object to main lens [m].
+    """
+
+    camera: Camera
+    array: LensletArray
+    cells: Cells
+    fineness: Fineness
+    distance: float
+
+    @classmethod
+    def of(cls, camera: Camera, distance: float, accuracy: float) -> "Optics":
+        """Of a plane at a distance from the main lens [m]."""
+        fineness, array = Fineness(accuracy), _cells.lenslet_array(camera)
+        return cls(camera, array, _cells.cells_of(camera, array, fineness), fineness, distance)
+
+    @property
+    def rotation(self) -> float:
+        """Of the array [rad]; the cells lie in a frame that turns with it."""
+        return 0.0 if self.camera.lattice is None else self.camera.lattice.rotation
+
+    @property
+    def key(self) -> str:
+        """Names all that the matrix depends on: not the sensor, nor the object's samples."""
+        camera = self.camera
+        with np.printoptions(threshold=2**62, floatmode="unique"):
+            known = repr((
+                VERSION, camera.wavelength, camera.separation, camera.lenslet_distance, camera.pupil_diameter,
+                camera.lens_train(), self.array, self.cells, self.fineness, self.distance,
+            ))  # fmt: skip
+        return hashlib.sha256(known.encode()).hexdigest()[:32]
+
+    @property
+    def straight(self) -> bool:
+        """Whether what the lenslets do along y does not depend on x."""
+        return self.array.shape == "square" and not isinstance(self.array.focal_length, tuple)
+
+    @property
+    def axes(self) -> tuple[Axis, Axis]:
+        """Sampling of a cell along y and along x."""
+        band = SLACK / 2 / _cells.airy(self.camera)
+        neighbourhood = self.fineness.neighbours * self.array.lattice.pitch
+        y, x = (
+            Axis(size, points, samples, neighbourhood, band)
+            for size, points, samples in zip(
+                self.cells.size, self.cells.points, self.cells.samples, strict=True
+            )
+        )
+        return y, x
+
+    @property
+    def reach(self) -> tuple[int, int]:
+        """Cells along y and x to which a point's light is followed in full."""
+        far = self.fineness.reach(_cells.blur(self.camera, self.distance), _cells.airy(self.camera))
+        y, x = (max(1, math.ceil(far / size)) for size in self.cells.size)
+        return y, x
+
+    @property
+    def near(self) -> tuple[int, int]:
+        """Cells to which a point's light is followed at the border of the array."""
+        far = self.fineness.near(_cells.blur(self.camera, self.distance), _cells.airy(self.camera))
+        y, x = (max(1, round(far / size)) for size in self.cells.size)
+        return min(y, self.reach[0]), min(x, self.reach[1])
+
+    @property
+    def image_scale(self) -> float:
+        """Magnification of the telecentric image onto the sensor, 1 + b/L."""
+        return 1 + _cells.lenslet_distance(self.camera) / self.camera.separation
