@@ -241,9 +241,9 @@ def experiment(
 
 @cache
 def _discover() -> None:
-    from lumigraph.experiments import beyond, thesis
+    from lumigraph.experiments import beyond, microscope, thesis
 
-    for package in (thesis, beyond):
+    for package in (thesis, beyond, microscope):
         for module in iter_modules(package.__path__):
             import_module(f"{package.__name__}.{module.name}")
 
