@@ -109,7 +109,8 @@ def calibrate(
     _check_size(vectors, shape)
     found = _followed(original, flat, gaps, vectors)
     start = found.fitted if found.notes != (_UNMEASURED,) else _by_lines(flat, found.fitted)
-    discs = overlapping(flat, start.model(shape))
+    cell = mean_cell(flat, start.model(shape))
+    discs = overlapping(cell, start.lattice)
     if discs is not None:
         found = _overlapped(flat, start, discs)
     fitted = found.fitted
@@ -121,7 +122,7 @@ def calibrate(
         fitted.lattice, shape, fitted.spots.indices, fitted.spots.centers, rms,
         pixel_pitch if pixel_pitch is not None else first.pixel_pitch, separation, lenslet_distance,
         warp=fitted.warp, light=fitted.spots.light / bright,
-        fill=fill_of(original, model) if discs is None else discs.size,
+        fill=fill_of(cell) if discs is None else discs.size,
         missing=_missing(fitted, model), sharpness=sharpness_of(original, model), notes=found.notes,
     )  # fmt: skip
 

@@ -3,17 +3,15 @@
 import numpy as np
 from scipy import ndimage
 
-from lumigraph.calibration.template import mean_cell
 from lumigraph.core.calibration import Calibration
 
 
-def fill_of(picture: np.ndarray, model: Calibration) -> float | None:
+def fill_of(cell: np.ndarray) -> float | None:
     """Width of the mean micro-image at half its brightness over the pitch; 1 where micro-images touch.
 
     The lit part of a micro-image is the main lens' stop seen through a lenslet: it fills the pitch where the
-    f-numbers match. None where the mean micro-image has no contrast.
+    f-numbers match. None where the mean micro-image (m, m), its centre first, has no contrast.
     """
-    cell = mean_cell(picture, model)
     size = len(cell)
     dark, bright = float(cell.min()), float(np.median(cell[_near(size, 0.12)]))
     if bright - dark <= 0.05 * max(abs(bright), 1e-30):

@@ -119,15 +119,11 @@ class Gaps:
         size = [2 * n for n in gaps.shape]
         spectrum: Any = scipy.fft.rfft2(wave, size, workers=WORKERS)
         self.amplitude = np.abs(spectrum).astype(np.float32)
-        self._samples = np.array(size, float)[:, None]
-
-    def height(self, waves: np.ndarray) -> float:
-        """Sum of the amplitudes at waves (k, 2) as (y, x) [1/px], whose x is not below 0."""
-        return float(self.heights(waves).sum())
+        self._samples = np.array(size, float)
 
     def heights(self, waves: np.ndarray) -> np.ndarray:
-        """Amplitudes (k,) at waves (k, 2) as (y, x) [1/px], whose x is not below 0."""
-        at = waves.T * self._samples
+        """Amplitudes (...) at waves (..., 2) as (y, x) [1/px], whose x is not below 0."""
+        at = np.moveaxis(waves * self._samples, -1, 0)
         return ndimage.map_coordinates(self.amplitude, at, order=1, mode="grid-wrap")
 
 
@@ -149,10 +145,9 @@ def polished(gaps: Gaps, basis: _Basis) -> tuple[np.ndarray, np.ndarray]:
     for width, fine in ((_SEARCH, step), (step, step / 4), (step / 4, step / 16)):
         count = max(2, min(16, math.ceil(width / fine)))
         tries = np.arange(-count, count + 1) * fine
-        best = max(
-            (gaps.height(_turned(waves, pitch * (1 + a), angle + b)), a, b) for a in tries for b in tries
-        )
-        pitch, angle = pitch * (1 + best[1]), angle + best[2]
+        turned = _turned(waves, pitch, angle + tries) / (1 + tries)[:, None, None, None]
+        a, b = np.unravel_index(int(np.argmax(gaps.heights(turned).sum(-1))), (len(tries), len(tries)))
+        pitch, angle = pitch * (1 + tries[a]), angle + tries[b]
     return _regular(pitch, angle, turn)
 
 
@@ -171,9 +166,8 @@ def _regular(pitch: float, angle: float, turn: float) -> tuple[np.ndarray, np.nd
     return row, column
 
 
-def _turned(waves: np.ndarray, pitch: float, angle: float) -> np.ndarray:
-    """Waves (k, 2) of the lattice of pitch 1, for another pitch and rotation."""
-    cos, sin = math.cos(angle), math.sin(angle)
-    return (
-        np.stack([waves[:, 0] * cos + waves[:, 1] * sin, waves[:, 1] * cos - waves[:, 0] * sin], -1) / pitch
-    )
+def _turned(waves: np.ndarray, pitch: float, angles: np.ndarray) -> np.ndarray:
+    """Waves (n, k, 2) of the lattice of pitch 1 (k, 2), for another pitch and n rotations."""
+    cos, sin = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    y, x = waves.T
+    return np.stack([y * cos + x * sin, x * cos - y * sin], -1) / pitch

@@ -6,7 +6,7 @@ import numpy as np
 def flattened(picture: np.ndarray) -> np.ndarray:
     """Picture above its dark level, divided by a smooth quadratic surface: about 1 on average everywhere."""
     ny, nx = picture.shape
-    step = max(1, min(ny, nx) // 512)
+    step = max(1, min(ny, nx) // 200)
     sparse = picture[::step, ::step]
     dark = np.float32(np.percentile(sparse, 2))
     y, x = np.linspace(-1, 1, ny, dtype=np.float32), np.linspace(-1, 1, nx, dtype=np.float32)

@@ -11,6 +11,7 @@ from lumigraph.core.calibration import Calibration
 _SAMPLES = 8  # pixels that fall into one cell of the mean micro-image at least
 _CHUNK = 1 << 21  # pixels at a time
 _RIDGE = 1e-4
+_FINE = 768  # samples of the mean micro-image that the nearest is taken of
 
 
 def sharpened(picture: np.ndarray, spots: Spots, model: Calibration) -> Spots:
@@ -49,13 +50,13 @@ def mean_cell(picture: np.ndarray, model: Calibration, *, symmetric: bool = Fals
     size = int(np.clip(math.sqrt(count / _SAMPLES), 8, min(192, 4 * lattice.pitch)))
     rows = max(1, (1 << 20) // nx)
     light, weight = np.zeros(size * size), np.zeros(size * size)
-    inverse = np.linalg.inv(lattice.matrix)
+    inverse = size * np.linalg.inv(lattice.matrix)
     for first in range(0, ny, rows):
-        y, x = np.mgrid[first : min(first + rows, ny), :nx].astype(np.float64)
-        flat_y, flat_x = model.straightened(y, x)
-        dy, dx = flat_y - lattice.origin[0], flat_x - lattice.origin[1]
-        u, v = (inverse[k, 0] * dy + inverse[k, 1] * dx for k in (0, 1))
-        place = (np.rint(u % 1 * size) % size * size + np.rint(v % 1 * size) % size).astype(np.int64).ravel()
+        y, x = np.arange(first, min(first + rows, ny), dtype=float)[:, None], np.arange(nx, dtype=float)
+        y, x = model.straightened(y, x)
+        dy, dx = y - lattice.origin[0], x - lattice.origin[1]
+        u, v = (np.rint(inverse[k, 0] * dy + inverse[k, 1] * dx).astype(np.int64) % size for k in (0, 1))
+        place = (u * size + v).ravel()
         light += np.bincount(place, picture[first : first + rows].ravel(), size * size)
         weight += np.bincount(place, minlength=size * size)
     blurred = [ndimage.gaussian_filter(a.reshape(size, size), 0.6, mode="wrap") for a in (light, weight)]
@@ -83,12 +84,10 @@ def _moves(
     along = [(np.roll(mean, -1, a) - np.roll(mean, 1, a)) * size / 2 for a in (0, 1)]
     slopes = [inverse[0, k] * along[0] + inverse[1, k] * along[1] for k in (0, 1)]
     shape, half = u.shape, reach / 1.0
-    at = np.stack([np.broadcast_to(w, shape).ravel() * size for w in (u, v)])
-    t, ty, tx = (
-        ndimage.map_coordinates(table.astype(np.float32), at, order=1, mode="grid-wrap").reshape(shape)
-        * inside
-        for table in (mean, *slopes)
-    )
+    fine = max(1, round(_FINE / size)) * size
+    at = [np.rint(w * fine).astype(np.int32) % fine for w in (u, v)]
+    place = np.broadcast_to(at[0] * fine + at[1], shape)
+    t, ty, tx = (_refined(table, fine).ravel()[place] * inside for table in (mean, *slopes))
     terms = [t, t * (dy / half), t * (dx / half), -ty, -tx]
     flat = np.stack([np.broadcast_to(term, shape).reshape(len(centers), -1) for term in terms], 1)
     normal = flat @ flat.transpose(0, 2, 1)
@@ -98,3 +97,14 @@ def _moves(
     weights = np.linalg.solve(normal, right[..., None])[..., 0] / scale
     bright = weights[:, 0]
     return np.where(bright[:, None] > 0, weights[:, 3:] / np.maximum(bright, 1e-9)[:, None], 0)
+
+
+def _refined(table: np.ndarray, fine: int) -> np.ndarray:
+    """A periodic table with values between its samples, so that the nearest one will do."""
+    size = len(table)
+    at = np.arange(fine) * (size / fine)
+    low = at.astype(int)
+    part = (at - low).astype(np.float32)
+    table = table.astype(np.float32)
+    table = table[low] * (1 - part[:, None]) + table[(low + 1) % size] * part[:, None]
+    return table[:, low] * (1 - part) + table[:, (low + 1) % size] * part
