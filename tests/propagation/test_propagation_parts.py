@@ -10,6 +10,7 @@ from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.propagation import propagate, sampling
 from lumigraph.propagation.cache import CACHE
+from lumigraph.propagation.halves import Halves, both
 from lumigraph.propagation.pruned import Band, Transfer, convolve, nonzero_rows
 from lumigraph.propagation.window import smooth_size, window_shape
 from lumigraph.propagation.zoom import Samples, _chirp_z, _fourier_matrix
@@ -87,6 +88,21 @@ def test_chirp_z_is_the_matrix_product(n, m, seed, sign):
     expected = data @ np.exp(sign * 2j * np.pi * np.outer(source.values, target.values))
     assert np.abs(_chirp_z(data, source, target, sign) - expected).max() < 1e-9
     assert np.abs(data @ _fourier_matrix(data, source, target, sign) - expected).max() < 1e-10
+
+
+@given(n=st.integers(1, 12), m=st.integers(1, 12), k=st.integers(1, 9), seed=st.integers(0, 999))
+def test_even_and_odd_halves_make_the_whole_kernel(n, m, k, seed):
+    rng = np.random.default_rng(seed)
+    area, pitch = 633e-9 * 0.1, 1e-5
+    here, there = (rng.normal() + np.arange(n)) * pitch, (rng.normal() + np.arange(m)) * 7e-5
+    data = np.asfortranarray(rng.standard_normal((2, n, k)) + 1j * rng.standard_normal((2, n, k)))
+    kernel = np.exp(1j * np.pi * (there[:, None] - here) ** 2 / area) * pitch / np.sqrt(1j * area)
+    found = Halves.of((there, here), pitch, area, data).down(data)
+    np.testing.assert_allclose(found, kernel @ data, atol=1e-11 * np.abs(kernel).max())
+    across = Halves.of((there, here[:1]), pitch, area, data)
+    found = both(Halves.of((there, here), pitch, area, data), data[..., :1], across)
+    expected = kernel @ data[..., :1] @ kernel[:, :1].T
+    np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(kernel).max() ** 2)
 
 
 def test_a_transfer_function_is_built_once_and_only_its_band_is_kept():

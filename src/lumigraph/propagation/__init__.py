@@ -3,6 +3,7 @@
 - `propagate`: `propagate()`, the element `Propagate`, `METHODS`, and `choose_method()`, which says why
 - `angular_spectrum`: plain, band-limited, and the thesis' circular and corrected variants
 - `fresnel`: one step onto its own or a given grid, and many steps that keep the pitch
+- `halves`: the paraxial kernel onto other points by even and odd halves, on NumPy arrays
 - `zoom`: angular spectrum onto any grid, by matrix DFT or chirp-z
 - `sampling`: validity ranges and sampling rules, in closed form
 - `window`: the window of a calculation: size, quick FFT sizes, memory

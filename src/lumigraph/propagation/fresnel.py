@@ -22,6 +22,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError
 from lumigraph.propagation import sampling
 from lumigraph.propagation.cache import CACHE
+from lumigraph.propagation.halves import Halves, both
 from lumigraph.propagation.window import check_memory, reach, window_shape
 
 MOST_STEPS = 10_000
@@ -32,7 +33,8 @@ def fresnel(field: Field, distance: float | Array, pad: float, grid: Grid | None
     """One step: a single FFT onto its own pitch λ|z|/(N p), or a matrix DFT onto `grid`.
 
     `pad` has no use here: nothing wraps round, and a finer output is what `grid` is for. The matrix
-    DFT is exact for input samples that are points, in the paraxial approximation.
+    DFT is exact for input samples that are points, in the paraxial approximation; on NumPy arrays it goes by
+    halves (`propagation.halves`), in half the time.
     """
     if arrays.is_parameter(distance) and grid is not None:
         return _differentiable(field, distance, grid)
@@ -146,10 +148,11 @@ def _onto_own_grid(field: Field, distance: float, output: Grid) -> Field:
 def _onto_grid(field: Field, distance: float, output: Grid) -> Field:
     _check_points(field, distance, output)
     area = abs(distance) * field.wavelength
-    rows = _matrix(field, (output.y, field.grid.y), field.grid.pitch[0], area)
-    columns = _matrix(field, (output.x, field.grid.x), field.grid.pitch[1], area)
-    data = _conjugate_if(distance < 0, field.data)
-    data = _product(rows, data, columns) * _carrier(abs(distance), field.wavelength)
+    axes = ((output.y, field.grid.y), (output.x, field.grid.x))
+    kernel, product = (_halves, both) if arrays.is_numpy(field.data) else (_matrix, _product)
+    rows, columns = (kernel(field, pair, p, area) for pair, p in zip(axes, field.grid.pitch, strict=True))
+    data = product(rows, _conjugate_if(distance < 0, field.data), columns)
+    data = data * _carrier(abs(distance), field.wavelength)
     return replace(field, data=_conjugate_if(distance < 0, data), grid=output)
 
 
@@ -186,8 +189,17 @@ def _matrix(field: Field, axes: tuple[np.ndarray, np.ndarray], pitch: float, are
             np.exp(1j * math.pi * (squares / area % 2)) * pitch / np.sqrt(1j * area), field.data
         )
 
-    spans = tuple((len(axis), float(axis[0]), float(axis[-1])) for axis in axes)
-    return CACHE.get(("points", spans, pitch, area, arrays.placement(field.data)), build)
+    return CACHE.get(("points", _spans(axes), pitch, area, arrays.placement(field.data)), build)
+
+
+def _halves(field: Field, axes: tuple[np.ndarray, np.ndarray], pitch: float, area: float) -> Halves:
+    """The same, in even and odd halves."""
+    key = ("halves", _spans(axes), pitch, area, arrays.placement(field.data))
+    return CACHE.get(key, lambda: Halves.of(axes, pitch, area, field.data))
+
+
+def _spans(axes: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[int, float, float], ...]:
+    return tuple((len(axis), float(axis[0]), float(axis[-1])) for axis in axes)
 
 
 def _product(rows: Array, data: Array, columns: Array) -> Array:
