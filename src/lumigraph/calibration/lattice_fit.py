@@ -402,7 +402,7 @@ def _evenly_lit(picture: np.ndarray, fitted: Fitted) -> np.ndarray:
     """Picture without the vignetting of its micro-images' brightness, which would move their centres."""
     spots, (ny, nx) = fitted.spots, picture.shape
     y, x = (2 * spots.centers[:, axis] / (n - 1) - 1 for axis, n in enumerate((ny, nx)))
-    surface = Surface(4 if len(y) > 100 else 2 if len(y) > 20 else 1)
+    surface = Surface(4 if len(y) > 100 else 2 if len(y) >= 12 else 1)
     surface.fit(y, x, spots.light / max(float(spots.light.mean()), 1e-30))
     rows, columns = np.linspace(-1, 1, ny, dtype=np.float32), np.linspace(-1, 1, nx, dtype=np.float32)
     return picture / surface(rows[:, None], columns[None, :])

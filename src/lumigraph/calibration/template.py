@@ -38,7 +38,8 @@ def sharpened(picture: np.ndarray, spots: Spots, model: Calibration) -> Spots:
     for k in range(0, len(centers), step):
         part = slice(k, k + step)
         start = model.position(spots.indices[part])
-        centers[part] = start + np.clip(_moves(picture, mean, model, start, reach), -0.5, 0.5)
+        most = max(0.5, 0.01 * pitch)
+        centers[part] = start + np.clip(_moves(picture, mean, model, start, reach), -most, most)
     good = np.hypot(*(centers - spots.centers).T) < max(0.75, 0.05 * pitch)
     return spots._replace(centers=np.where(good[:, None], centers, spots.centers))
 
