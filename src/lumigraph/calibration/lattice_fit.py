@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lumigraph.calibration.autocorrelation import SMALLEST_PITCH
+from lumigraph.calibration.borders import border, edges
 from lumigraph.calibration.centres import Spots, followed, measure
 from lumigraph.calibration.devignette import as_raw, grey
 from lumigraph.calibration.fitting import Fitted, fit, recentred
@@ -190,7 +191,7 @@ def _followed(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, vectors:
             refused.append(error)
     steady = [one for one in found if _agrees(one.fitted, vectors)]
     if not steady:
-        return _Followed(_by_gaps(gaps, vectors), gaps, (_UNMEASURED,))
+        return _Followed(_by_gaps(gaps, original, vectors), gaps, (_UNMEASURED,))
     found = steady
     sizes = [_spread(one.fitted) for one in found]
     best = int(np.argmin(sizes))
@@ -215,31 +216,22 @@ def _agrees(fitted: Fitted, vectors: Vectors) -> bool:
     return bool(np.abs(steps - np.eye(2)).max() < _AGREED)
 
 
-def _by_gaps(gaps: np.ndarray, vectors: Vectors) -> Fitted:
-    """The lattice of all harmonics of the gaps; its micro-images stand between them, and none is measured."""
+def _by_gaps(gaps: np.ndarray, original: np.ndarray, vectors: Vectors) -> Fitted:
+    """The lattice of all harmonics of the gaps; none of its micro-images is measured.
+
+    They stand between the gaps, or between the edges of the picture where those are clearer.
+    """
     shape = (gaps.shape[0], gaps.shape[1])
     none = np.zeros((0, 2), np.int64)
     lattice = Lattice(
         (_vector(vectors.row), _vector(vectors.column)), (0.0, 0.0), vectors.layout, vectors.kinds
     )
-    cell = mean_cell(gaps, Calibration(lattice, shape, none, none.astype(float), 0.0))
-    size = len(cell)
-    steps = np.stack(np.meshgrid(*2 * [np.arange(size) / size], indexing="ij"), -1) @ lattice.matrix.T
-    border = np.exp(-(_to_border(steps, lattice) ** 2) / 2)
-    match = np.fft.ifft2(np.fft.fft2(cell - cell.mean()) * np.conj(np.fft.fft2(border))).real
-    place = np.array(np.unravel_index(np.argmax(match), match.shape)) / size
-    lattice = _centred(lattice.moved(*(lattice.matrix @ place)), shape)
+    model = Calibration(lattice, shape, none, none.astype(float), 0.0)
+    found = max((border(gaps, model), border(edges(original), model)), key=lambda one: one.clearness)
+    lattice = _centred(lattice.moved(*found.move), shape)
     margin = lattice.pitch / 2
     indices = lattice.indices((margin, shape[0] - 1 - margin), (margin, shape[1] - 1 - margin))
     return Fitted(Spots(indices, lattice.position(indices), np.ones(len(indices))), lattice, None)
-
-
-def _to_border(points: np.ndarray, lattice: Lattice) -> np.ndarray:
-    """Distances of points (..., 2) to the nearest border between two micro-images [px]."""
-    near = np.stack(np.meshgrid([-1, 0, 1, 2], [-1, 0, 1, 2], indexing="ij"), -1).reshape(-1, 2)
-    away = np.linalg.norm(points[..., None, :] - lattice.position(near), axis=-1)
-    away.partition(1, axis=-1)
-    return (away[..., 1] - away[..., 0]) / 2
 
 
 def _share(fitted: Fitted, shape: tuple[int, ...]) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.errors import CalibrationError, FormatError
+from lumigraph.errors import CalibrationError, FormatError, SamplingWarning
 
 if TYPE_CHECKING:
     from lumigraph.core.calibration import Calibration
@@ -79,6 +79,8 @@ class Origin:
         dark = None if self.dark is None else files.read_raw(self.dark)
         if self.calibration is not None:
             found = files.read_calibration(self.calibration, raw.shape)
+            if self.calibration.suffix.lower() != ".toml":
+                found = _aligned(found, raw)
         elif camera is not None:
             found = camera.calibration
         else:
@@ -96,6 +98,18 @@ class Origin:
 
 
 NO_ORIGIN = Origin()
+
+
+def _aligned(calibration: "Calibration", raw: "RawImage") -> "Calibration":
+    """A maker's calibration, moved to the micro-images of the raw image where they show; told if so."""
+    import warnings
+
+    from lumigraph.calibration import aligned
+
+    found = aligned(calibration, raw)
+    if found is not calibration:
+        warnings.warn(f"the maker's lattice was {found.notes[-1]}", SamplingWarning, stacklevel=2)
+    return found
 
 
 def _with_lengths(calibration: "Calibration", camera: Any) -> "Calibration":
