@@ -141,6 +141,7 @@ def test_the_key_names_what_matters(optics):
         focused(magnification=0.4),
     ]
     keys = {Optics.of(camera, 122 * mm, 1e-2).key for camera in others}
+    assert Optics.of(focused(rotation=0.1), 122 * mm, 1e-2).key == here
     keys |= {Optics.of(focused(), 121 * mm, 1e-2).key, Optics.of(focused(), 122 * mm, 5e-3).key, here}
     assert len(keys) == 7
 

@@ -2,9 +2,9 @@
 
 - `imaging`: `simulate`
 - `periodic`: `periodic_operator`, incoherent planes before a lenslet array, and its adjoint
-- `kernels`: its matrices; `optics`, what they depend on; `blocks`, how they are made, in factors; `cells`, what
-  they are matrices between; `point_images`, where they come from; `cell_response`, what lenslets do to light;
-  `glare`, what falls far from a point's image
+- `kernels`: its matrices; `optics`, what they depend on; `blocks`, how they are made, in factors; `cells`,
+  what they are matrices between; `point_images`, where they come from; `cell_response`, what lenslets do to
+  light; `glare`, what falls far from a point's image
 - `resampling`, `turning`: from an object's samples to points and from the image's samples to pixels
 - `slices`: `Slices`, operators of several depths as one
 - `spectrum`: `Spectrum`, light of several wavelengths, colour sensors; `Mixed`, its operator

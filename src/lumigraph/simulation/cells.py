@@ -114,7 +114,7 @@ class Fineness:
     @property
     def corner(self) -> float:
         """The same for what is missing on two sides of a corner: farther, each counts by itself."""
-        return (1e-3 / self.accuracy) ** 0.4
+        return 1.5 * (1e-3 / self.accuracy) ** 0.3
 
     def near(self, blur: float, airy: float) -> float:
         """As `reach`, for what the lenslets that are missing beyond the border take away."""
@@ -160,12 +160,13 @@ def lenslet_array(camera: Camera) -> LensletArray:
 
 
 def straight(lattice: Lattice) -> Lattice:
-    """The lattice turned about (0, 0) so that its rows lie along x."""
+    """The lattice turned about (0, 0) so that its rows lie along x; the same for every turn, to the last bit."""
     sin, cos = math.sin(lattice.rotation), math.cos(lattice.rotation)
     (row, column), origin = lattice.basis, lattice.origin
 
     def turned(vector: tuple[float, float]) -> tuple[float, float]:
-        return vector[0] * cos - vector[1] * sin, vector[0] * sin + vector[1] * cos
+        y, x = vector[0] * cos - vector[1] * sin, vector[0] * sin + vector[1] * cos
+        return round(y, 15), round(x, 15)
 
     row = (0.0, turned(row)[1])
     y, x = turned(column)
