@@ -74,6 +74,16 @@ def test_a_plane_is_sampled_once_per_lenslet_as_long_as_a_points_light_is_not_wi
     assert distance(20e-6) == pytest.approx(1 / design.band_limit(WAVE, M, PITCH, 20e-6) / 2)
 
 
+def test_a_low_pass_falls_from_a_lenslet_to_what_is_sampled():
+    def width(dz):
+        return design.low_pass_distance(WAVE, (NA, INDEX), PITCH / M, dz)
+
+    edge = PITCH / M / (2 * math.tan(math.asin(NA / INDEX)))
+    assert width(0.5 * edge) == PITCH / M
+    assert width(-2.5 * edge) == pytest.approx(PITCH / M / 2)
+    assert width(5 * edge) == design.sampling_distance(WAVE, (NA, INDEX), PITCH / M, 5 * edge)
+
+
 def test_fourier_lenslets_share_field_and_resolution():
     relay, pitch, f = 75e-3, 1.25e-3, 25e-3
     assert design.fourier_field(relay, 20, pitch, f) == pytest.approx(pitch * relay / (20 * f))

@@ -212,7 +212,7 @@ def test_a_filter_by_the_sampling_distance_takes_blocks_away_from_the_focused_pl
     truth = np.zeros(operator.shape[1], np.float32)
     truth[1] = 1 + np.cos(2 * np.pi * (x + 0.5 * y) / 14)
     raw = operator.forward(truth)
-    widths = filters.widths_of(scope.sampling_distances(depths), operator.object_grid.pitch[0])
+    widths = filters.widths_of(scope.low_pass_distances(depths), operator.object_grid.pitch[0])
     plain, smooth = (
         deconvolve(raw, operator, 15, method=RichardsonLucy(filter=f))
         for f in (None, filters.LowPass(widths))
@@ -234,7 +234,7 @@ def test_a_filter_of_close_planes_explains_the_data_and_keeps_the_light_in_its_p
     y, x, truth = operator.object_grid.y[:, None], operator.object_grid.x, np.zeros(operator.shape[1])
     truth[2] = np.exp(-((y - 3e-6) ** 2 + (x + 4e-6) ** 2) / (2 * 2e-6**2))
     raw = operator.forward(truth)
-    widths = filters.widths_of(scope.sampling_distances(depths), operator.object_grid.pitch[0])
+    widths = filters.widths_of(scope.low_pass_distances(depths), operator.object_grid.pitch[0])
     found = deconvolve(raw, operator, 20, method=RichardsonLucy(filter=filters.LowPass(widths)))
     assert np.linalg.norm(operator.forward(found) - raw) < 0.12 * np.linalg.norm(raw)
     assert np.corrcoef(found[2].ravel(), truth[2].ravel())[0, 1] > 0.99

@@ -150,8 +150,8 @@ class Way:
         given: dict[str, Any] = {} if self.strength is None else {"strength": self.strength}
         prior = {"none": None, "tv": TotalVariation(**given), "wavelets": Wavelets(**given)}[self.prior]
         smooth = None
-        if hasattr(camera, "sampling_distances") and not self.raw_lattice:
-            distances = camera.sampling_distances(operator.depths)
+        if hasattr(camera, "low_pass_distances") and not self.raw_lattice:
+            distances = camera.low_pass_distances(operator.depths)
             smooth = LowPass(widths_of(distances, operator.object_grid.pitch[0]))
         return RichardsonLucy(prior, smooth, accelerated=self.accelerated)
 

@@ -1,7 +1,7 @@
 """The light-field microscope."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from os import PathLike
 from typing import ClassVar, Literal, Self
@@ -262,12 +262,21 @@ class LightFieldMicroscope(Instrument):
     def sampling_distances(self, depths: Sequence[float]) -> tuple[float, ...]:
         """Distance between the samples that the lenslets take of each depth [m]: finer is not measured.
 
-        Over the object's pitch these are the widths of `deconvolution.filters.LowPass`.
+        See `design.microscope.sampling_distance`.
         """
+        return self._each(closed_forms.sampling_distance, depths)
+
+    def low_pass_distances(self, depths: Sequence[float]) -> tuple[float, ...]:
+        """Widths of a low-pass that keeps lenslet-shaped artefacts out of each depth [m].
+
+        Over the object's pitch these are the widths of `deconvolution.filters.LowPass`. See
+        `design.microscope.low_pass_distance`.
+        """
+        return self._each(closed_forms.low_pass_distance, depths)
+
+    def _each(self, closed_form: Callable[..., float], depths: Sequence[float]) -> tuple[float, ...]:
         aperture = (self.objective.numerical_aperture, self.objective.immersion_index)
-        return tuple(
-            closed_forms.sampling_distance(self.wavelength, aperture, self.lenslet_size, dz) for dz in depths
-        )
+        return tuple(closed_form(self.wavelength, aperture, self.lenslet_size, dz) for dz in depths)
 
     def operator(
         self,

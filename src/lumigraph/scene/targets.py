@@ -153,6 +153,29 @@ def usaf1951(
     return Scene([Slice(1.0 - picture if dark_bars else np.minimum(picture, 1.0), grid)])
 
 
+def usaf_elements(
+    groups: int | tuple[int, int] = (2, 4), position: Pair = (0.0, 0.0)
+) -> list[tuple[int, int, Pair, float]]:
+    """Group, element, corner (y, x) and bar width [m] of each element of `usaf1951`, coarse to fine.
+
+    From a corner the upright bars extend to +x, 5 widths in all; the lying ones begin 7 widths from it.
+
+    Examples
+    --------
+    >>> [(group, e, round(width * 1e6, 2)) for group, e, _, width in usaf_elements(7)][:2]
+    [(7, 1, 3.91), (7, 2, 3.48)]
+    """
+    first, last = _first_and_last(groups)
+    elements = list(_usaf_elements(first, last))
+    height = max(y + 5 * width for y, _, width in elements)
+    breadth = max(x + 12 * width for _, x, width in elements)
+    center = checks.pair("position", position)
+    top, left = center[0] - height / 2, center[1] - breadth / 2
+    return [
+        (first + k // 6, k % 6 + 1, (top + y, left + x), width) for k, (y, x, width) in enumerate(elements)
+    ]
+
+
 def bar_width(group: int, element: int) -> float:
     """Width of a bar of the USAF-1951 target [m]: half a line pair."""
     return 1e-3 / (2 * 2 ** (group + (element - 1) / 6))
