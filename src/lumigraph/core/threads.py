@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from threading import Lock
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -24,9 +25,31 @@ def each(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[
     >>> list(each(abs, [-1, 2]))
     [1, 2]
     """
-    with threadpool_limits(1, "blas"):
+    with _BLAS:
         pool = ThreadPoolExecutor(arrays.WORKERS, thread_name_prefix="lumigraph")
         try:
             yield from pool.map(function, items)
         finally:
             pool.shutdown(cancel_futures=True)
+
+
+class _OneThread:
+    """BLAS on one thread from the first `with` to the end of the last: the limit is the whole process'."""
+
+    def __init__(self) -> None:
+        self._lock, self._users, self._limits = Lock(), 0, None
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._users:
+                self._limits = threadpool_limits(1, "blas")
+            self._users += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._users -= 1
+            if not self._users and self._limits is not None:
+                self._limits.restore_original_limits()
+
+
+_BLAS = _OneThread()
