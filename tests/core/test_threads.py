@@ -1,4 +1,4 @@
-"""Work on several threads, and the BLAS limit around it."""
+"""Work on several threads: order, errors, and what becomes of BLAS' own threads."""
 
 import threading
 
@@ -9,37 +9,37 @@ from lumigraph.core.threads import each
 
 
 def blas():
-    """Threads of each BLAS library."""
-    return {found["num_threads"] for found in threadpool_info() if found["user_api"] == "blas"}
+    return {part["filepath"]: part["num_threads"] for part in threadpool_info() if part["user_api"] == "blas"}
 
 
-def test_calls_that_overlap_leave_blas_as_it_was():
-    """The first to begin ends first: the second must neither run unlimited nor keep the limit."""
-    with threadpool_limits(3, "blas"):
-        first, second = each(abs, range(2)), each(abs, range(2))
-        next(first), next(second)
-        list(first)
-        assert blas() == {1}
-        list(second)
-        assert blas() == {3}
+def test_results_come_in_order_and_errors_come_out():
+    assert list(each(lambda k: k * k, range(50))) == [k * k for k in range(50)]
+    with pytest.raises(ZeroDivisionError):
+        list(each(lambda k: 1 / k, [1, 0]))
 
 
-def test_an_error_of_one_piece_reaches_the_caller_and_lifts_the_limit():
-    with threadpool_limits(3, "blas"):
-        with pytest.raises(ZeroDivisionError):
-            list(each(lambda n: 1 / n, [1, 0, 2]))
-        assert blas() == {3}
+def test_products_take_one_thread_inside_and_as_many_as_before_afterwards():
+    """Also where two callers overlap: the one that leaves last lifts the limit."""
+    with threadpool_limits(2, "blas"):
+        before = blas()
+        first, second = each(lambda _: blas(), [0, 1]), each(lambda _: blas(), [0, 1])
+        assert set(next(first).values()) == {1}
+        next(second)
+        first.close()
+        assert set(blas().values()) == {1}
+        second.close()
+        assert blas() == before
 
 
-def test_callers_on_several_threads_get_their_own_results():
-    results = {}
+def test_an_error_drops_what_has_not_begun():
+    begun, hold = [], threading.Event()
 
-    def call(k):
-        results[k] = list(each(lambda n: n + k, range(5)))
+    def work(k):
+        begun.append(k)
+        if k == 0:
+            raise ValueError("enough")
+        hold.wait(0.05)
 
-    threads = [threading.Thread(target=call, args=(k,)) for k in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert results == {k: [n + k for n in range(5)] for k in range(4)}
+    with pytest.raises(ValueError, match="enough"):
+        list(each(work, range(1000)))
+    assert len(begun) < 100

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from threading import Lock
 from typing import TypeVar
 
@@ -25,7 +26,7 @@ def each(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[
     >>> list(each(abs, [-1, 2]))
     [1, 2]
     """
-    with _BLAS:
+    with _single_products():
         pool = ThreadPoolExecutor(arrays.WORKERS, thread_name_prefix="lumigraph")
         try:
             yield from pool.map(function, items)
@@ -33,23 +34,28 @@ def each(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[
             pool.shutdown(cancel_futures=True)
 
 
-class _OneThread:
-    """BLAS on one thread from the first `with` to the end of the last: the limit is the whole process'."""
+class _Limit:
+    """The process' one limit of BLAS threads: set by the first who wants it, lifted by the last."""
 
     def __init__(self) -> None:
-        self._lock, self._users, self._limits = Lock(), 0, None
+        self.lock, self.users, self.set = Lock(), 0, None
 
-    def __enter__(self) -> None:
-        with self._lock:
-            if not self._users:
-                self._limits = threadpool_limits(1, "blas")
-            self._users += 1
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._users -= 1
-            if not self._users and self._limits is not None:
-                self._limits.restore_original_limits()
+    def change(self, users: int) -> None:
+        with self.lock:
+            if self.users == 0:
+                self.set = threadpool_limits(1, "blas")
+            self.users += users
+            if self.users == 0 and self.set is not None:
+                self.set.restore_original_limits()
 
 
-_BLAS = _OneThread()
+_LIMIT = _Limit()
+
+
+@contextmanager
+def _single_products() -> Iterator[None]:
+    _LIMIT.change(1)
+    try:
+        yield
+    finally:
+        _LIMIT.change(-1)
