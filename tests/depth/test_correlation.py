@@ -59,6 +59,18 @@ def test_two_depths_stay_apart_where_they_are(name):
     assert np.abs(found.values - 7.5)[far].max() < 0.15
 
 
+@pytest.mark.parametrize(("patch", "patches"), [(4.2, (6, 9)), (9.1, (3, 6)), (-4.2, (-9, -6))])
+def test_a_size_beyond_those_tried_is_not_trusted(patch, patches):
+    raw, calibration = scene("square", patch)
+    found = correlation(raw, calibration, patches)
+    inner = (slice(2, -2), slice(2, -2))
+    assert np.quantile(found.confidence[inner], 0.9) < 0.1  # it was 0.8: agreement grows towards the end
+    inside = correlation(
+        raw, calibration, (patch / 2, patch * 1.6) if patch > 0 else (patch * 1.6, patch / 2)
+    )
+    assert np.median(inside.confidence[inner]) > 0.5
+
+
 def test_the_map_renders_what_one_size_does():
     raw, calibration = scene("hex", 5.3)
     found = correlation(raw, calibration)
@@ -133,6 +145,21 @@ def test_a_simulated_camera_tells_patch_and_distance(camera, dz):
     assert np.median(found.values[inner]) == pytest.approx(truth, rel=0.02)
     depth = metric(found, camera.calibration, focal_length=0.06, object_distance=0.12)
     assert np.median(np.asarray(depth.values)[inner]) == pytest.approx(dz, abs=6e-4)
+
+
+@pytest.mark.long  # half a minute of wave optics
+@pytest.mark.parametrize("dz", [-20e-3, 60e-3, -40e-3])
+def test_far_out_of_focus_it_is_right_or_says_that_it_is_not(camera, dz):
+    """20 mm nearer than the focus the image lies behind the sensor, and the patch changes its sign."""
+    grid = camera.object_grid
+    paint = texture(np.random.default_rng(3), longest=1.0)
+    image = np.maximum(paint(grid.y[:, None] / 40e-6, grid.x / 40e-6), 0)
+    found = correlation(simulate(camera, Scene((Slice(image, grid, dz),))), camera.calibration)
+    inner, truth = (slice(2, -2), slice(2, -2)), camera.patch_at(dz)
+    if abs(truth) < 0.08 * camera.calibration.lattice.pitch:  # smaller than any size that is tried
+        assert np.asarray(found.confidence)[inner].max() < 0.1
+    else:
+        assert np.median(np.asarray(found.values)[inner]) == pytest.approx(truth, rel=0.1)
 
 
 def test_the_real_multi_focus_camera_has_smooth_depth_without_its_lattice():

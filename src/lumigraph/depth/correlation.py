@@ -111,8 +111,9 @@ def _ranges(patches: tuple[float, float] | None, pitch: float) -> list[tuple[flo
 
 
 def _overall(scores: np.ndarray) -> float:
-    """How well the best sizes of a range explain the picture."""
-    return float((scores.max(0) - np.median(scores, axis=0)).mean())
+    """How well the best sizes of a range explain the picture, and how much better than others do."""
+    best = scores.max(0)
+    return float((2 * best - np.median(scores, axis=0)).mean())
 
 
 def _joined(scores: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -125,6 +126,8 @@ def _joined(scores: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarr
     below, at, above = (np.take_along_axis(cost, near + k, 0)[0] for k in (-1, 0, 1))
     bend = np.maximum(below - 2 * at + above, 0) / _STEP**2
     trust = np.clip(1 - at, 0, 1) * bend / (bend + _BEND)
+    # Where agreement still grows at the end of the range, the size lies beyond it.
+    trust = np.where((cost.argmin(0) % (len(sizes) - 1) == 0) & (np.abs(best - near[0]) > 0.5), 0, trust)
     aim = cheapest(np.concatenate([below[None], at[None], above[None]]))[0] - 1
     aim = sizes[0] + _STEP * (near[0] + aim)
     information = bend * trust**2
