@@ -229,3 +229,18 @@ def test_what_is_left_out_is_the_same_in_every_direction(operator):
         (image[::-1], (6, 16)), (image[:, ::-1], (14, 4)), (image.T, (16, 14)), (image[::-1, ::-1].T, (4, 6)),
     ):  # fmt: skip
         np.testing.assert_allclose(square.psf((0, *index)), mirrored, atol=1e-5 * image.max())
+
+
+def test_a_disk_without_room_is_refused_before_anything_is_computed(tmp_path, monkeypatch):
+    import shutil
+    from types import SimpleNamespace
+
+    def full(_):
+        return SimpleNamespace(total=10**9, used=10**9, free=1000)
+
+    monkeypatch.setattr(shutil, "disk_usage", full)
+    monkeypatch.setattr(module, "slice_kernel", None)
+    with pytest.raises(
+        SamplingError, match=r"images of points need up to .* GiB but the disk of .* has .* free"
+    ):
+        microscope_operator([SCOPE], LENSLET, LAYOUT, DEPTHS, folder=tmp_path / "new")

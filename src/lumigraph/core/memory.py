@@ -1,6 +1,8 @@
 """Refusing work that cannot fit in memory, before it is allocated."""
 
 import os
+import shutil
+from pathlib import Path
 
 from lumigraph.errors import LumigraphError, SamplingError
 
@@ -43,3 +45,24 @@ def require(needed: float, what: str, remedy: str, error: type[LumigraphError] =
     if free is not None and needed > free:
         advice = remedy.format(factor=needed / max(free, 1))
         raise error(f"{what} needs {needed / 2**30:.3g} GiB but {free / 2**30:.3g} GiB are free. {advice}")
+
+
+def require_disk(
+    needed: float, folder: str | os.PathLike[str], what: str, error: type[LumigraphError]
+) -> None:
+    """Refuse `what` when it needs more than is free on the disk of a folder, which may not exist yet [bytes].
+
+    Raises
+    ------
+    LumigraphError
+        Or the given child: what needs how much, how much there is.
+    """
+    place = Path(folder).absolute()
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    free = shutil.disk_usage(place).free
+    if needed > free:
+        raise error(
+            f"{what} need up to {needed / 2**30:.3g} GiB but the disk of {folder} has {free / 2**30:.3g} GiB "
+            "free. Use fewer slices or samples, or another folder."
+        )

@@ -191,7 +191,8 @@ def band_limit(wavelength: float, magnification: float, pitch: float, dz: float)
 
     References
     ----------
-    M. Broxton et al., Opt. Express 21, 25418 (2013), the section on lateral resolution.
+    M. Broxton et al., Opt. Express 21, 25418 (2013), derive such a limit. Here it follows from the aperture;
+    USAF targets that are simulated and reconstructed at 25 and 50 um agree (`microscope-usaf`).
 
     Raises
     ------

@@ -27,6 +27,7 @@ from lumigraph.simulation.microscope_kernels import (
     Lenslet,
     SliceKernel,
     kernel_bytes,
+    octant,
     slice_kernel,
 )
 from lumigraph.simulation.microscope_pixels import PixelPlacement
@@ -233,7 +234,7 @@ def microscope_operator(
     Raises
     ------
     SamplingError
-        The kernels do not fit in memory and no folder is given.
+        The kernels do not fit in memory and no folder is given, or not on its disk.
     GeometryError
         No depths, or one that is not finite.
     """
@@ -247,6 +248,9 @@ def microscope_operator(
     needed = max(sizes) * 2 + stored * sum(sizes) * (0.25 if objectives[0].is_round else 1)
     remedy = "Use fewer slices or samples, or folder= to keep them on disk."
     memory.require(needed, f"the images of points at {len(depths)} depths", remedy, SamplingError)
+    if folder is not None:
+        share = len(octant(layout.sampling.points)) / layout.sampling.classes if objectives[0].is_round else 1
+        memory.require_disk(sum(sizes) * share, folder, "the images of points", SamplingError)
     kernels = []
     for done, dz in enumerate(depths):
         kernels.append(_kept(objectives, lenslet, layout.sampling, dz, dropped, folder))
