@@ -148,6 +148,12 @@ def test_impossible_operators_are_refused(scope, arguments, message):
         scope.operator((0.0,), **arguments)
 
 
+@pytest.mark.parametrize("depths", ["5 um", ("5 um",)])
+def test_depths_that_are_no_numbers_are_refused(scope, depths):
+    with pytest.raises(GeometryError, match=r"depths are .* but must be numbers \[m\]"):
+        scope.operator(depths, 3)
+
+
 def test_there_is_no_ray_diagram_of_a_microscope(scope):
     with pytest.raises(GeometryError, match="no ray diagram of a LightFieldMicroscope"):
         lg.plots.layout(scope)

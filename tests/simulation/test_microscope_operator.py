@@ -7,7 +7,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.deconvolution import ForwardModel
 from lumigraph.elements.objective import Objective
-from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.errors import FormatError, GeometryError, SamplingError
 from lumigraph.simulation import microscope_operator as module
 from lumigraph.simulation.microscope_kernels import CellSampling, Lenslet, octant, slice_kernel
 from lumigraph.simulation.microscope_operator import Layout, microscope_operator
@@ -204,6 +204,16 @@ def test_progress_is_told_slice_by_slice():
 def test_what_cannot_be_is_refused(operator, monkeypatch):
     with pytest.raises(GeometryError, match="there are no depths"):
         microscope_operator([SCOPE], LENSLET, LAYOUT, ())
+    with pytest.raises(GeometryError, match="depths must ascend or descend, and differ"):
+        microscope_operator([SCOPE], LENSLET, LAYOUT, (0.0, 1e-6, 0.0))
+    with pytest.raises(
+        SamplingError, match=r"image of a point at 1e\+06 um, which lights 184759 lenslets .* nearer"
+    ):
+        microscope_operator([SCOPE], LENSLET, LAYOUT, (1.0,))
+    with pytest.raises(FormatError, match=r"folder /dev/null/x cannot be made"):
+        microscope_operator([SCOPE], LENSLET, LAYOUT, (0.0,), folder="/dev/null/x")
+    with pytest.raises(GeometryError, match=r"index is \(9, 9, 99\) but the volume has shape \(3, 15, 18\)"):
+        operator.psf((9, 9, 99))
     with pytest.raises(GeometryError, match="a depth is nan"):
         microscope_operator([SCOPE], LENSLET, LAYOUT, (float("nan"),))
     with pytest.raises(GeometryError, match=r"dropped is 0\.7 but must be above 0 and below 0\.5"):
@@ -216,9 +226,10 @@ def test_what_cannot_be_is_refused(operator, monkeypatch):
         GeometryError, match=r"the raw image has shape \(4,\) but the operator's is \(40, 48\)"
     ):
         operator.adjoint(np.ones(4))
-    monkeypatch.setattr("lumigraph.core.memory.available", lambda: 1000)
+    many = Layout((5, 6), CellSampling(60, 8, 1 / 8))
+    monkeypatch.setattr("lumigraph.core.memory.available", lambda: 4 * 10**6)
     with pytest.raises(SamplingError, match=r"images of points at 1 depths needs .* or folder= to keep them"):
-        microscope_operator([SCOPE], LENSLET, LAYOUT, (0.0,))
+        microscope_operator([SCOPE], LENSLET, many, (0.0,))
 
 
 def test_what_is_left_out_is_the_same_in_every_direction(operator):

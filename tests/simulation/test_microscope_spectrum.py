@@ -8,7 +8,7 @@ import pytest
 from lumigraph.elements.objective import Objective
 from lumigraph.simulation import microscope_spectrum as module
 from lumigraph.simulation.microscope_kernels import CellSampling, Lenslet
-from lumigraph.simulation.microscope_operator import Layout, microscope_operator
+from lumigraph.simulation.microscope_operator import Layout, _suits_frequencies, microscope_operator
 
 SCOPE = Objective(525e-9, 0.5)
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)
@@ -71,6 +71,6 @@ def test_the_way_is_chosen_by_time_memory_and_symmetry(monkeypatch):
     assert not flat.by_frequency
     coma = Objective(525e-9, 0.5, aberrations={8: 0.05})
     assert not microscope_operator([coma], LENSLET, Layout((9, 9), sampling), (10e-6,)).by_frequency
+    assert _suits_frequencies(deep.kernels, cells)
     monkeypatch.setattr("lumigraph.core.memory.available", lambda: 14 * 10**5)
-    small = microscope_operator([SCOPE], LENSLET, Layout(cells, sampling), (-15e-6, 15e-6))
-    assert not small.by_frequency
+    assert not _suits_frequencies(deep.kernels, cells)

@@ -314,7 +314,7 @@ class LightFieldMicroscope(Instrument):
         GeometryError
             No depths, or samples below 1.
         """
-        depths = (0.0,) if depths is None else tuple(float(dz) for dz in depths)
+        depths = (0.0,) if depths is None else _numbers(depths)
         if self.configuration == "fourier":
             return fourier_operator(self.optics, self._mosaic(), depths)
         samples = 5 if samples_per_lenslet is None else samples_per_lenslet
@@ -373,3 +373,12 @@ class LightFieldMicroscope(Instrument):
     def describe(self) -> describe.Description:
         """Magnification, resolution, depth of field, directions and band limits, each with its equation."""
         return describe_microscope.microscope(self)
+
+
+def _numbers(depths: Sequence[float]) -> tuple[float, ...]:
+    try:
+        return tuple(float(dz) for dz in np.asarray(depths, np.float64).reshape(-1))
+    except (TypeError, ValueError):
+        raise GeometryError(
+            f"depths are {depths!r} but must be numbers [m], such as (-5e-6, 0.0, 5e-6)."
+        ) from None

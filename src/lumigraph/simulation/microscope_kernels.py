@@ -12,8 +12,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from lumigraph.core import arrays
+from lumigraph.core import arrays, memory
 from lumigraph.elements.objective import Objective
+from lumigraph.errors import SamplingError
 from lumigraph.simulation.microscope_rays import ray_images
 
 MARGIN = 1.15
@@ -226,6 +227,33 @@ def _images(
     return cells, passed
 
 
+def require_window(objective: Objective, lenslet: Lenslet, sampling: CellSampling, dz: float) -> None:
+    """Refuse a depth at which the window of a point's image does not fit in memory.
+
+    Raises
+    ------
+    SamplingError
+        The depth, and how many lenslets its light is wide there.
+    """
+    spread = abs(dz) * objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
+    cells = 2 * math.ceil(spread * lenslet.magnification / lenslet.pitch) + 5
+    side = cells * _fineness(objective, lenslet, sampling) * sampling.pixels
+    what = f"the image of a point at {dz * 1e6:.4g} um, which lights {cells} lenslets across,"
+    memory.require(
+        (16.0 * objective.modes + 64) * side**2,
+        what,
+        "Use depths nearer to the focused plane.",
+        SamplingError,
+    )
+
+
+def _fineness(objective: Objective, lenslet: Lenslet, sampling: CellSampling) -> int:
+    """Samples of the light along an image sample."""
+    steepest = objective.numerical_aperture / lenslet.magnification
+    steepest += lenslet.pitch / (2 * abs(lenslet.focal_length))
+    return math.ceil(lenslet.pitch * 2 * MARGIN * steepest / objective.wavelength / sampling.pixels)
+
+
 def kernel_bytes(
     objective: Objective, lenslet: Lenslet, sampling: CellSampling, dz: float, dropped: float = DROPPED
 ) -> float:
@@ -263,8 +291,7 @@ class _Bench:
     def __init__(self, objective: Objective, lenslet: Lenslet, sampling: CellSampling, reach: int) -> None:
         self.objective, self.lenslet, self.sampling = objective, lenslet, sampling
         wave, p = objective.wavelength, lenslet.pitch
-        steepest = objective.numerical_aperture / lenslet.magnification + p / (2 * abs(lenslet.focal_length))
-        self.over = math.ceil(p * 2 * MARGIN * steepest / wave / sampling.pixels)
+        self.over = _fineness(objective, lenslet, sampling)
         self.fine = self.over * sampling.pixels
         self.cells = 2 * reach + 3  # a lenslet more on each side, for what diffracts outward
         self.step = p / self.fine

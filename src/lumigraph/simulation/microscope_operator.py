@@ -19,7 +19,7 @@ from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
 from lumigraph.elements.objective import Objective
-from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.errors import FormatError, GeometryError, SamplingError
 from lumigraph.simulation import microscope_spectrum
 from lumigraph.simulation.microscope_kernels import (
     DROPPED,
@@ -28,6 +28,7 @@ from lumigraph.simulation.microscope_kernels import (
     SliceKernel,
     kernel_bytes,
     octant,
+    require_window,
     slice_kernel,
 )
 from lumigraph.simulation.microscope_pixels import PixelPlacement
@@ -154,7 +155,10 @@ class MicroscopeOperator:
     def psf(self, index: tuple[int, ...]) -> Array:
         """Raw image (ny, nx) of one sample (z, y, x) of intensity 1, float32 of NumPy."""
         volume = np.zeros(self.shape[1], np.float32)
-        volume[index] = 1
+        try:
+            volume[index] = 1
+        except IndexError:
+            raise GeometryError(f"index is {index} but the volume has shape {self.shape[1]}.") from None
         plane = self._by_offsets(volume)  # dark pixels stay 0
         return plane if self.placement is None else self.placement.forward(plane)
 
@@ -236,19 +240,26 @@ def microscope_operator(
     SamplingError
         The kernels do not fit in memory and no folder is given, or not on its disk.
     GeometryError
-        No depths, or one that is not finite.
+        No depths, one that is not finite, or depths that are not in order.
+    FormatError
+        A folder that cannot be made.
     """
     depths = tuple(checks.finite("a depth", dz) for dz in depths)
-    if not depths:
-        raise GeometryError("there are no depths. Give at least one, such as 0.0 for the focused plane.")
+    _check_order(depths)
     if not 0 < checks.finite("dropped", dropped, "1") < 0.5:
         raise GeometryError(f"dropped is {dropped:g} but must be above 0 and below 0.5.")
+    for one in objectives:
+        require_window(one, lenslet, layout.sampling, max(depths, key=abs))
     sizes = [kernel_bytes(objectives[0], lenslet, layout.sampling, dz, dropped) for dz in depths]
     stored = 1 if folder is None else 0
     needed = max(sizes) * 2 + stored * sum(sizes) * (0.25 if objectives[0].is_round else 1)
     remedy = "Use fewer slices or samples, or folder= to keep them on disk."
     memory.require(needed, f"the images of points at {len(depths)} depths", remedy, SamplingError)
     if folder is not None:
+        try:
+            Path(folder).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FormatError(f"folder {folder} cannot be made ({error.strerror}). Give another.") from error
         share = len(octant(layout.sampling.points)) / layout.sampling.classes if objectives[0].is_round else 1
         memory.require_disk(sum(sizes) * share, folder, "the images of points", SamplingError)
     kernels = []
@@ -260,6 +271,16 @@ def microscope_operator(
         tuple(kernels), depths, layout.cells, _object_grid(lenslet, layout), layout.placement,
         _suits_frequencies(kernels, layout.cells),
     )  # fmt: skip
+
+
+def _check_order(depths: tuple[float, ...]) -> None:
+    if not depths:
+        raise GeometryError("there are no depths. Give at least one, such as 0.0 for the focused plane.")
+    steps = np.diff(depths)
+    if len(steps) and not ((steps > 0).all() or (steps < 0).all()):
+        raise GeometryError(
+            "depths must ascend or descend, and differ. Sort them, and leave out what is double."
+        )
 
 
 def _suits_frequencies(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> bool:

@@ -17,7 +17,7 @@ from lumigraph.errors import GeometryError
 from lumigraph.scene import Diffuser, Points, Scene, Slice
 from lumigraph.sensor import Sensor
 from lumigraph.simulation.coherence import Incoherent
-from lumigraph.simulation.microscope_kernels import DROPPED, Lenslet, point_cells
+from lumigraph.simulation.microscope_kernels import DROPPED, Lenslet, point_cells, require_window
 from lumigraph.simulation.microscope_operator import Layout, MicroscopeOperator
 
 SAMPLES = 5
@@ -153,6 +153,8 @@ def point_image(
     dropped
         Part of the light that the window may miss.
     """
+    for one in objectives:
+        require_window(one, lenslet, layout.sampling, position[2])
     s, N, size = layout.sampling.points, layout.sampling.pixels, lenslet.pitch / lenslet.magnification
     place = [
         (at - middle) / size + (n - 1) / 2
