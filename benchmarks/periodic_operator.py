@@ -26,6 +26,7 @@ import numpy as np
 import lumigraph as lg
 from benchmarks import _point_sums, plenoptic_snapshots
 from lumigraph.core import memory
+from lumigraph.core.arrays import WORKERS
 from lumigraph.simulation import periodic_operator
 from lumigraph.simulation.blocks import build_bytes
 from lumigraph.simulation.optics import Optics
@@ -101,7 +102,7 @@ def accuracy_of(name: str, dz: float, accuracies: Sequence[float]) -> list[Row]:
     found = CAMERAS[name]()
     at, hexagonal = points(found, dz), found.lenslets.layout == "hex"
     coarse = _point_sums.Fineness(768, 96)
-    fine = _point_sums.Fineness(1024, 192)
+    fine = _point_sums.Fineness(1024, 288)
     coarsest = _point_sums.by_propagation(found, dz, at[:1], coarse)[0]
     if hexagonal:
         reference = _point_sums.by_propagation(found, dz, at, fine)
@@ -152,7 +153,7 @@ def first_image(count: int, depths: int, repeats: int) -> list[Row]:
     full[top : top + target.shape[0], left : left + target.shape[1]] = target
     picture = full if depths == 1 else np.stack([full] * depths)
     before, start = _peak(), time.perf_counter()
-    building = build_bytes(Optics.of(found, found.object_distance, 1e-3)) / GIB
+    building = build_bytes(Optics.of(found, found.object_distance, 1e-3), WORKERS) / GIB
     operator = periodic_operator(found, grid, found_depths)
     built = time.perf_counter() - start
     predicted = before + max(building, operator.memory_bytes / GIB)

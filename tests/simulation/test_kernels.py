@@ -67,7 +67,7 @@ def test_borders_and_corners_add_up_to_what_the_lenslets_there_bring(optics, mon
     reach = optics.reach
     monkeypatch.setattr(Optics, "near", reach)
     parts = kernels._build(optics).parts
-    builder = blocks._Builder(optics, print)
+    builder = blocks._Builder(optics, print, 1)
     builder.periodic()
     for row, column in ((0, 0), (0, 2), (1, 1), (1, 2), (2, 3), (5, 1)):
         limits = []

@@ -14,8 +14,10 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-def each(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """``function(item)`` of every item, in order, on as many threads as there are processors.
+def each(
+    function: Callable[[Item], Result], items: Iterable[Item], workers: int = arrays.WORKERS
+) -> Iterator[Result]:
+    """``function(item)`` of every item, in order, on some threads: by default one for each processor.
 
     Matrix products inside `function` take one thread each: many small ones run faster so, the more on a busy
     machine, and their result does not depend on the number of processors. An interruption drops what has
@@ -27,7 +29,7 @@ def each(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[
     [1, 2]
     """
     with _single_products():
-        pool = ThreadPoolExecutor(arrays.WORKERS, thread_name_prefix="lumigraph")
+        pool = ThreadPoolExecutor(workers, thread_name_prefix="lumigraph")
         try:
             yield from pool.map(function, items)
         finally:

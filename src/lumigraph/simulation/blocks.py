@@ -21,6 +21,7 @@ from itertools import product
 
 import numpy as np
 
+from lumigraph.core import memory
 from lumigraph.core.arrays import WORKERS
 from lumigraph.core.threads import each
 from lumigraph.elements import LensletArray
@@ -143,24 +144,25 @@ def terms(place: Place) -> dict[State, int]:
     return result
 
 
-def build_bytes(optics: Optics) -> float:
+def build_bytes(optics: Optics, workers: int = 1) -> float:
     """Memory that building all parts takes [bytes], from their sizes and the usual number of factors."""
     cells, near = optics.cells, optics.near
     even, square = _symmetric(optics.array), cells.size[0] == cells.size[1]
     wanted = [place for place, source, _ in _alike(places(optics), even, square) if place is source]
-    states = 1 + len({state for place in wanted for state in terms(place)})
+    states = {(INFINITE, INFINITE)} | {state for place in wanted for state in terms(place)}
+    kept = 1 + sum(INFINITE in state for state in states)
     points, samples = math.prod(cells.points), math.prod(cells.samples)
     block = 4.0 * points * samples
-    rows = WORKERS * max(states * (2 * near[1] + 1), 2 * optics.reach[1] + 1) * block
-    kept = (1.3 * len(wanted) + 0.7 * len(places(optics))) * math.sqrt(points)  # factors of a block
-    rows += kept * math.prod(2 * n + 1 for n in near) * 4.0 * (points + samples)
+    rows = workers * max(kept * (2 * near[1] + 1), 2 * optics.reach[1] + 1) * block
+    factors = (1.3 * len(wanted) + 0.7 * len(places(optics))) * math.sqrt(points)  # of a block
+    rows += factors * math.prod(2 * n + 1 for n in near) * 4.0 * (points + samples)
     if optics.straight:
         return rows
     dense = 8.0 * math.prod(axis.samples * len(axis.window) for axis in optics.axes)
     few = 8.0 * samples
     for axis, reach in zip(optics.axes, near, strict=True):
         few *= (2 * reach + 1) * axis.size * 2 * axis.band + 12
-    return rows + WORKERS * dense + states * few
+    return rows + workers * dense + len(states) * few
 
 
 @dataclass(slots=True)
@@ -179,8 +181,14 @@ class _Found:
 
 
 def build(optics: Optics, progress: Progress | None = None) -> tuple[list[Part], dict[Offset, np.ndarray]]:
-    """All parts, the periodic one first, and the mean images (samples,) of a cell's points at each offset."""
-    builder = _Builder(optics, progress or (lambda _: None))
+    """All parts, the periodic one first, and the mean images (samples,) of a cell's points at each offset.
+
+    As many threads work at it as there are processors and as half of the memory that is free allows.
+    """
+    free, workers = memory.available() or math.inf, WORKERS
+    while workers > 1 and build_bytes(optics, workers) > free / 2:
+        workers -= 1
+    builder = _Builder(optics, progress or (lambda _: None), workers)
     rows, columns = optics.cells.count
     inside, means = builder.periodic()
     return [_part((1, rows + 1), (1, columns + 1), inside), *builder.border()], means
@@ -197,8 +205,8 @@ def _part(rows: tuple[int, int], columns: tuple[int, int], blocks: Blocks) -> Pa
 class _Builder:
     """Blocks of one depth."""
 
-    def __init__(self, optics: Optics, progress: Progress) -> None:
-        self.optics, self.axes, self.progress = optics, optics.axes, progress
+    def __init__(self, optics: Optics, progress: Progress, workers: int) -> None:
+        self.optics, self.axes, self.progress, self.workers = optics, optics.axes, progress, workers
         distance = _cells.telecentric_distance(optics.camera)
         self.lenslets = Lenslets(self.axes, optics.array, optics.camera.wavelength, distance)
         self.light = wave(optics.camera, optics.distance, self.axes, optics.reach)
@@ -223,7 +231,7 @@ class _Builder:
                 found[dy, dx] = self._factored(block, copies)
             return norm, found
 
-        rows = list(each(row, self._columns(self.even, reach[0])))
+        rows = list(each(row, self._columns(self.even, reach[0]), self.workers))
         self.norm = sum(norm for norm, _ in rows)
         found = {key: f for _, part in rows for key, f in part.items()}
         self.progress(0.1)
@@ -267,10 +275,11 @@ class _Builder:
                 for dx in self._columns(self._folds(place)[1], reach[1]):
                     block = sum(sign * self._picked(rows[s], s, dx) for s, sign in terms(place).items())
                     found[place, (dy, dx)] = self._factored(np.asarray(block), 1)
+                rows = {s: row for s, row in rows.items() if INFINITE in s}  # those of corners serve once
             return found
 
         found: dict[Place, dict[Offset, _Found]] = {place: {} for place in wanted}
-        for done, part in enumerate(each(row, self._columns(False, reach[0]))):
+        for done, part in enumerate(each(row, self._columns(False, reach[0]), self.workers)):
             for (place, offset), block in part.items():
                 found[place][offset] = block
             self.progress(0.1 + 0.9 * (done + 1) / (2 * reach[0] + 1))
@@ -301,7 +310,7 @@ class _Builder:
             return Apart(behind[state[1]], response.down, self.axes)
 
         states = list(states)
-        return dict(zip(states, each(of, states), strict=True))
+        return dict(zip(states, each(of, states, self.workers), strict=True))
 
     def _row(self, images: Apart | Few, dy: int, columns: range) -> np.ndarray:
         """Blocks (columns, points, samples) of one row of cells."""

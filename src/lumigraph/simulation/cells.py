@@ -160,7 +160,7 @@ def lenslet_array(camera: Camera) -> LensletArray:
 
 
 def straight(lattice: Lattice) -> Lattice:
-    """The lattice turned about (0, 0) so that its rows lie along x; the same for every turn, to the last bit."""
+    """The lattice turned about (0, 0) so that its rows lie along x; one for all turns, to the last bit."""
     sin, cos = math.sin(lattice.rotation), math.cos(lattice.rotation)
     (row, column), origin = lattice.basis, lattice.origin
 

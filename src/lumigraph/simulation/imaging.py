@@ -32,7 +32,7 @@ from lumigraph.simulation.spectrum import Spectrum, by_wavelength
 PUPIL_OVERSAMPLING = 1.1
 """How much denser than half of λL/p the points of the pupil stand that make a white image."""
 
-LARGEST_OPERATOR = 2.0**31
+LARGEST_OPERATOR = 2.0**32
 """A lenslet-periodic operator that takes more than this [bytes] to build gives way to snapshots."""
 
 Progress = Callable[[int, int], None]
