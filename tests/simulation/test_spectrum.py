@@ -67,7 +67,8 @@ def test_a_band_is_the_mean_of_its_wavelengths_and_so_is_its_operator(camera):
 def test_progress_counts_over_all_wavelengths(camera):
     seen = []
     simulate(camera, picture(camera, 3), ROUGH, spectrum=Spectrum.rgb(), progress=lambda *k: seen.append(k))
-    assert seen == [(1, 3), (2, 3), (3, 3)]
+    assert [done for done in seen if done[0] % 1 == 0] == [(1, 3), (2, 3), (3, 3)]
+    assert seen == sorted(seen)
 
 
 def test_what_a_spectrum_cannot_be(camera):

@@ -8,7 +8,7 @@ from typing import Any
 
 from lumigraph.cli.options import Common
 
-Count = Callable[[int, int], None]
+Count = Callable[[float, int], None]
 """Called with what is done and the total."""
 
 Stages = Callable[[str, float], None]

@@ -35,7 +35,7 @@ PUPIL_OVERSAMPLING = 1.1
 LARGEST_OPERATOR = 2.0**32
 """A lenslet-periodic operator that takes more than this [bytes] to build gives way to snapshots."""
 
-Progress = Callable[[int, int], None]
+Progress = Callable[[float, int], None]
 
 
 class Interrupted(KeyboardInterrupt):
@@ -95,7 +95,8 @@ def simulate(
         Wavelengths that take the place of the camera's own, and the channels that see them. Then slices
         may be coloured, (y, x, 3), and the raw image is (ny, nx, 3) or a Bayer mosaic.
     progress
-        Called as ``progress(done, total)`` after each propagation.
+        Called as ``progress(done, total)`` after each propagation and, where a lenslet-periodic operator is
+        built, with the fraction of it that is.
     map
         Runs the propagations, such as a pool's ``imap``; results are added in order, so that every map
         gives the same raw image.
@@ -127,7 +128,7 @@ def simulate(
     total = len(exact) + count
     try:
         for part in exact:
-            light.pixels += _exactly(camera, part, accuracy)
+            light.pixels += _exactly(camera, part, accuracy, light.within(progress, total))
             light.count(progress, total)
         for half, image in map(_Shot.arrive, shots):
             light.add(half, image)
@@ -152,7 +153,7 @@ def _coloured(
     count = len(spectrum.wavelengths)
 
     def at_wavelength(camera: Camera | Microscope, scene: Scene, number: int) -> RawImage:
-        def report(done: int, total: int) -> None:
+        def report(done: float, total: int) -> None:
             if progress is not None:
                 progress(number * total + done, count * total)
 
@@ -184,6 +185,15 @@ class _Light:
         self.intensity *= factor
         self.halves = {half: image * factor for half, image in self.halves.items()}
 
+    def within(self, progress: Progress | None, total: int) -> Callable[[float], None]:
+        """Function that tells how much of the next shot is done."""
+
+        def tell(fraction: float) -> None:
+            if progress is not None and fraction < 1:
+                progress(self.done + fraction, total)
+
+        return tell
+
     def count(self, progress: Progress | None, total: int) -> None:
         self.done += 1
         if progress is not None:
@@ -197,13 +207,16 @@ def _drawn(coherence: Coherence | Incoherent) -> Coherence:
     return coherence
 
 
-def _exactly(camera: Camera, part: Slice | Points, accuracy: float | None) -> np.ndarray:
+def _exactly(
+    camera: Camera, part: Slice | Points, accuracy: float | None, progress: Callable[[float], None]
+) -> np.ndarray:
     if isinstance(part, Points):
         return single_lens.points_image(camera, part)
     if single_lens.fits(camera):
         return single_lens.slice_image(camera, part.trimmed())
     part = part.trimmed()
-    operator = periodic_operator(camera, part.grid, part.dz, accuracy=accuracy or 1e-3)
+    accuracy = accuracy or 1e-3
+    operator = periodic_operator(camera, part.grid, part.dz, accuracy=accuracy, progress=progress)
     return operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
 
 
