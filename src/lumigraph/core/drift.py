@@ -77,7 +77,8 @@ def drift(data: Array, calibration: Calibration) -> Drift | None:
 
     Dark gaps between micro-images leave lines in the spectrum at the lattice's harmonics. The lattice is
     searched for by its first ones, within 25 % of the calibration's pitch and 6° of its rotation, and
-    refined on those that follow. A raw image without gaps, or of fewer than 8 lenslets across, tells nothing.
+    refined on those that follow. A raw image without gaps, or of fewer than some 14 lenslets across, tells
+    nothing.
     """
     picture, corner = _middle(to_numpy(data))
     basis, waves = _expected(calibration, picture.shape, corner)
