@@ -22,7 +22,7 @@ def kept(tmp_path, monkeypatch):
 
 def test_what_is_saved_is_loaded_as_read_only_maps(kept):
     store.save("key", ARRAYS)
-    found = store.load("key")
+    found = store.load("key", ARRAYS)
     assert found is not None
     assert set(found) == set(ARRAYS)
     for name, array in ARRAYS.items():
@@ -34,16 +34,16 @@ def test_what_is_saved_is_loaded_as_read_only_maps(kept):
 
 
 def test_nothing_is_found_under_another_key():
-    assert store.load("key") is None
+    assert store.load("key", ARRAYS) is None
     store.save("key", ARRAYS)
-    assert store.load("another") is None
+    assert store.load("another", ARRAYS) is None
 
 
 def test_off_keeps_nothing(kept, monkeypatch):
     monkeypatch.setenv("LUMIGRAPH_CACHE", "OFF")
     store.save("key", ARRAYS)
     assert store.folder() is None
-    assert store.load("key") is None
+    assert store.load("key", ARRAYS) is None
     assert not kept.exists()
 
 
@@ -62,7 +62,7 @@ def test_a_half_written_folder_is_not_seen(kept, monkeypatch):
 
     def dies(file, array, **options):
         write(file, array, **options)
-        seen.append(store.load("key"))
+        seen.append(store.load("key", ARRAYS))
         if len(seen) == 2:
             raise KeyboardInterrupt
 
@@ -70,7 +70,7 @@ def test_a_half_written_folder_is_not_seen(kept, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         store.save("key", ARRAYS)
     assert seen == [None, None]
-    assert store.load("key") is None
+    assert store.load("key", ARRAYS) is None
     assert list(kept.iterdir()) == []
 
 
@@ -79,19 +79,19 @@ def test_a_damaged_folder_counts_as_none_and_goes(kept, damage):
     store.save("key", ARRAYS)
     file = kept / "key" / "left.npy"
     file.write_bytes(file.read_bytes()[:-8] if damage is None else damage)
-    assert store.load("key") is None
+    assert store.load("key", ARRAYS) is None
     assert not (kept / "key").exists()
     store.save("key", ARRAYS)
-    assert store.load("key") is not None
+    assert store.load("key", ARRAYS) is not None
 
 
 def test_pickles_are_neither_written_nor_read(kept):
     with pytest.raises(ValueError, match="Object arrays cannot be saved"):
         store.save("key", {"left": np.array([{}])})
-    assert store.load("key") is None
+    assert store.load("key", ARRAYS) is None
     (kept / "key").mkdir()
     np.save(kept / "key" / "left.npy", np.array([{}]), allow_pickle=True)
-    assert store.load("key") is None
+    assert store.load("key", ARRAYS) is None
 
 
 def test_the_folders_not_used_for_longest_go(kept, monkeypatch):
@@ -99,7 +99,7 @@ def test_the_folders_not_used_for_longest_go(kept, monkeypatch):
     for age, key in enumerate(("oldest", "older", "old")):
         store.save(key, {"data": np.zeros(1000 - 128, np.uint8)})
         os.utime(kept / key, (1000 + age, 1000 + age))
-    assert store.load("oldest") is not None  # which is a use
+    assert store.load("oldest", ["data"]) is not None  # which is a use
     store.save("new", {"data": np.zeros(1000 - 128, np.uint8)})
     assert sorted(path.name for path in kept.iterdir()) == ["new", "old", "oldest"]
 
@@ -110,13 +110,13 @@ def test_what_is_larger_than_the_limit_is_not_kept(kept, monkeypatch):
     assert not kept.exists()
     monkeypatch.setattr(store, "LIMIT", 48 + 128)
     store.save("key", {"left": ARRAYS["left"]})
-    assert store.load("key") is not None
+    assert store.load("key", ["left"]) is not None
 
 
 def test_a_disk_that_cannot_be_written_is_no_error(kept):
     kept.write_text("a file where the folder should be")
     store.save("key", ARRAYS)
-    assert store.load("key") is None
+    assert store.load("key", ARRAYS) is None
 
 
 def test_two_processes_that_keep_the_same_do_not_disturb_each_other(kept):
@@ -126,7 +126,7 @@ import numpy as np
 from lumigraph.core import store
 for _ in range(30):
     store.save("key", {"a": np.full(5000, 7.0), "b": np.full(5000, 7.0)})
-    found = store.load("key")
+    found = store.load("key", ["a", "b"])
     assert found is not None and set(found) == {"a", "b"}, found
     assert all((array == 7).all() and array.shape == (5000,) for array in found.values())
 """

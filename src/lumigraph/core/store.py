@@ -9,6 +9,7 @@ import contextlib
 import os
 import shutil
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -28,18 +29,18 @@ def folder() -> Path | None:
     return Path(base) / "lumigraph"
 
 
-def load(key: str) -> dict[str, np.ndarray] | None:
-    """The arrays kept under a key, memory-mapped and read-only; None where there are none, or damaged."""
+def load(key: str, names: Iterable[str]) -> dict[str, np.ndarray] | None:
+    """Arrays kept under a key, memory-mapped and read-only; None where one of them is missing or damaged."""
     where = folder()
     if where is None or not (where / key).is_dir():
         return None
     try:
-        found = {path.stem: np.load(path, mmap_mode="r") for path in (where / key).glob("*.npy")}
+        found = {name: np.load(where / key / f"{name}.npy", mmap_mode="r") for name in names}
         os.utime(where / key)
     except (OSError, ValueError, EOFError):
         shutil.rmtree(where / key, ignore_errors=True)
         return None
-    return found or None
+    return found
 
 
 def save(key: str, arrays: dict[str, np.ndarray]) -> None:

@@ -55,7 +55,7 @@ def matrix(optics: Optics, progress: Progress | None = None) -> Matrix:
     key = optics.key
 
     def found() -> Matrix:
-        arrays = store.load(key)
+        arrays = store.load(key, _ARRAYS)
         if arrays is None:
             memory.require(
                 build_bytes(optics),
@@ -70,6 +70,10 @@ def matrix(optics: Optics, progress: Progress | None = None) -> Matrix:
         return _unpacked(arrays)
 
     return _MATRICES.get(key, found)
+
+
+_ARRAYS = ("places", "offsets", "left", "right", "spectra", "pictures", "shape")
+"""What `_packed` makes of a matrix."""
 
 
 def _packed(matrix: Matrix) -> dict[str, np.ndarray]:

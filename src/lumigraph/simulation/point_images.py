@@ -1,5 +1,6 @@
 """Images of the points of a cell of a lenslet array: what the lenslet-periodic operator repeats."""
 
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -240,7 +241,7 @@ def factors(block: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np
     points = block.shape[0]
     if np.linalg.norm(block) <= least:
         return np.zeros((points, 0)), np.zeros((0, block.shape[1])), np.zeros(0)
-    sketch = np.random.default_rng(0).standard_normal((points, points // 5), np.float32)
+    sketch = np.random.default_rng(0).standard_normal((points, math.ceil(points / 5)), np.float32)
     for basis in (np.linalg.qr(block @ (block.T @ sketch))[0], None):
         seen = (block if basis is None else basis.T @ block).astype(np.float64)
         strength, vectors = np.linalg.eigh(seen @ seen.T)
