@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from lumigraph.cli import files
+from lumigraph.cli import files, pictures
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output
 from lumigraph.cli.origin import NO_ORIGIN, PLENOPTIC, Origin
@@ -70,10 +70,13 @@ def decode(
 
     Example: `lumigraph decode raw.png --white white.png --dark dark.png --hot-pixels --samples 2 -o views`
 
+    Example: `lumigraph decode IMG_0001-stk.lfp -o pictures`
+
     Parameters
     ----------
     raw
-        Raw image (TIFF, PNG, Zarr, Lytro); a Bayer pattern is demosaiced.
+        Raw image (TIFF, PNG, Zarr, Lytro); a Bayer pattern is demosaiced. A Lytro container of pictures,
+        depth and confidence maps is unpacked.
     output
         Views (.zarr, .zarr.zip, .h5, _eslf.png), or a folder of pictures.
     devignette
@@ -82,6 +85,12 @@ def decode(
     from lumigraph import io, rendering
 
     common.check()
+    if parts := pictures.parts_of(raw):
+        if origin.is_given or origin.camera is not None:
+            raise FormatError(
+                f"{raw} holds pictures, which need neither --calibration nor --white. Leave them out."
+            )
+        return pictures.unpack(raw, parts, output, common)
     files.check_output(output, files.VIEWS)
     options = sampling.chosen()
     picture = files.read_raw(raw)
