@@ -49,3 +49,19 @@ def test_a_raw_image_off_its_calibration_is_told_so(verb, lumigraph, drawn):
         assert told in warned.err
         assert warned.err.count("12.4") == 1, "told once"
     assert "12.4" not in lumigraph(*words, "--calibration", "fits.toml").err
+
+
+@pytest.mark.usefixtures("drawn")
+def test_deconvolve_refuses_a_calibration_that_drifted(lumigraph, tmp_path):
+    (tmp_path / "scope.toml").write_text(
+        'kind = "light-field-microscope"\nwavelength = "550 nm"\n'
+        "[objective]\nmagnification = 20\nnumerical_aperture = 0.4\n"
+        '[lenslets]\npitch = "100 um"\nfocal_length = "2 mm"\ncount = [19, 19]\n'
+        '[sensor]\npixel_pitch = "8.0645 um"\n'
+    )
+    words = ("deconvolve", "drawn.tiff", "--camera", "scope.toml", "-o", "volume.tiff", "--iterations", 1)
+    refused = lumigraph(*words, "--calibration", "drifted.toml")
+    assert (refused.code, refused.err.count("\n")) == (1, 1)
+    assert "repeats every 12.400 px" in refused.err
+    assert "has a pitch of 13.400 px" in refused.err
+    assert "12.4" not in lumigraph(*words, "--calibration", "fits.toml").err

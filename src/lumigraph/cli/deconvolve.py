@@ -45,9 +45,10 @@ class Seen:
     background: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
     calibration: Path | None = None
 
-    def lenslets(self, shape: tuple[int, int]) -> "Calibration | None":
-        """Where the micro-images are; None if nothing tells."""
+    def lenslets(self, raw: "RawImage") -> "Calibration | None":
+        """Where the micro-images are, compared with what the raw image shows; None if nothing tells."""
         from lumigraph import calibration as verbs
+        from lumigraph.core.drift import check_drift
 
         if self.calibration is not None:
             found = files.read_calibration(self.calibration)
@@ -55,7 +56,8 @@ class Seen:
             found = verbs.calibrate(files.read_raw(self.white))
         else:
             return None
-        found.check_fits(shape)
+        found.check_fits(raw.shape)
+        check_drift(raw.data, found)
         return found
 
     def exposure(self, raw: "RawImage", calibration: "Calibration | None") -> Any:
@@ -195,7 +197,7 @@ def deconvolve(
     picture = files.read_raw(raw)
     steps: list[Step] = []
     with stages("deconvolve") as shown:
-        calibration = seen.lenslets(picture.shape)
+        calibration = seen.lenslets(picture)
         exposure = seen.exposure(picture, calibration)
         shown("point images", 0.0)
         operator = operator_of(described, wanted_depths, wanted.samples, calibration)
