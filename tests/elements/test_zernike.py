@@ -71,3 +71,12 @@ def test_the_strehl_ratio_falls_with_the_square_of_the_rms_phase():
 def test_impossible_plates_are_refused(build, message):
     with pytest.raises(GeometryError, match=message):
         build()
+
+
+def test_a_turned_plate_is_the_plate_seen_from_turned_axes(rng):
+    """Every order to 5, sine and cosine, off the axis."""
+    plate = ZernikePlate({j: rng.normal() for j in range(1, 22)}, 2.0, (0.1, -0.2))
+    y, x = rng.uniform(-0.6, 0.6, (2, 50))
+    sin, cos = math.sin(0.7), math.cos(0.7)
+    turned = plate.turned(0.7).phase(y * cos + x * sin, x * cos - y * sin)
+    np.testing.assert_allclose(turned, plate.phase(y, x), atol=1e-12)

@@ -8,6 +8,7 @@ import pytest
 
 import cameras
 from lumigraph.core.lattice import Lattice
+from lumigraph.elements import RectangularAperture, Train
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.instruments import SingleLensCamera
 from lumigraph.simulation import cells
@@ -87,6 +88,24 @@ def test_a_blur_is_that_of_geometry():
     v = 1 / (1 / (60 * mm) - 1 / distance)
     expected = camera.pupil_diameter / 2 * abs(v - camera.separation) / v
     assert cells.blur(camera, distance) == pytest.approx(expected)
+
+
+def test_an_aberrated_lens_blurs_as_its_rays_do():
+    """Defocus as a Zernike term is defocus: c sqrt(3) (2ρ² - 1) takes the place of π r² (1/z' - 1/z)/λ."""
+    camera, further = focused(), 130 * mm
+    waves = camera.pupil_diameter**2 / 8 * (1 / further - 1 / camera.object_distance)
+    waves /= 2 * math.sqrt(3) * camera.wavelength
+    aberrated = camera.replace(main_lens={"focal_length": 60 * mm, "aberrations": {4: waves}})
+    expected = cells.blur(camera, further)
+    assert cells.blur(aberrated, camera.object_distance) == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_lens_that_may_not_be_round_is_refused_before_turned_lenslets(monkeypatch):
+    camera = focused(rotation=0.1)
+    train = Train((*camera.lens_train().elements, RectangularAperture((1 * mm, 2 * mm))))
+    monkeypatch.setattr(type(camera), "lens_train", lambda _: train)
+    with pytest.raises(GeometryError, match=r"RectangularAperture, which may not be round.* 0\.1 rad"):
+        cells.lens(camera)
 
 
 @pytest.mark.parametrize("lattice", [Lattice.square(2.0, 0.3, (0.4, -0.7)), Lattice.hex(2.0, -0.2)])

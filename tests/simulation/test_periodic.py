@@ -42,6 +42,9 @@ CAMERAS = {
     "2.0, Galilean": focused(magnification=-0.4, focal_length=8 * mm),
     "2.0, hexagonal": focused(layout="hex", count=(6, 5)),
     "2.0, turned": focused(rotation=0.1, count=(7, 7)),
+    "2.0, turned behind an aberrated lens": focused(rotation=0.6, count=(5, 5)).replace(
+        main_lens={"focal_length": 60 * mm, "aberrations": {6: 0.15, 8: 0.1}}
+    ),
     "2.0, three kinds": focused(
         layout="hex", count=(6, 6), focal_length=(5.2 * mm, 5.0 * mm, 5.4 * mm), shape="round", rotation=-0.02
     ),

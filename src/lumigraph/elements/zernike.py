@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import eval_jacobi
@@ -133,15 +133,31 @@ class ZernikePlate:
 
     def transmission(self, grid: Grid, wavelength: float) -> np.ndarray:
         """Complex factor (ny, nx) of each sample."""
-        y, x = (grid.y - self.center[0])[:, None], grid.x - self.center[1]
+        stop = CircularAperture(self.diameter, self.center, self.edge).transmission(grid, wavelength)
+        return np.exp(1j * self.phase(grid.y[:, None], grid.x)) * stop
+
+    def phase(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Phase [rad] at places that broadcast [m], whatever the stop lets through."""
+        y, x = y - self.center[0], x - self.center[1]
         rho, theta = np.hypot(y, x) / (self.diameter / 2), np.arctan2(y, x)
         rho = np.minimum(rho, 1.5)  # high orders overflow far outside the stop
-        phase = np.zeros(grid.shape)
+        phase = np.zeros(np.shape(rho))
         for j, coefficient in dict(self.coefficients).items():
             phase += coefficient * zernike(j, rho, theta)
-        return np.exp(1j * phase) * CircularAperture(self.diameter, self.center, self.edge).transmission(
-            grid, wavelength
-        )
+        return phase
+
+    def turned(self, angle: float) -> "ZernikePlate":
+        """The plate turned about (0, 0) by `angle` [rad], from +x towards +y."""
+        table: dict[int, float] = {}
+        for j, coefficient in dict(self.coefficients).items():
+            n, m = noll_to_nm(j)
+            own, other = math.cos(m * angle), math.sin(m * angle)
+            table[j] = table.get(j, 0.0) + coefficient * own
+            if m:
+                partner = j + 1 if j < HIGHEST and noll_to_nm(j + 1) == (n, -m) else j - 1
+                table[partner] = table.get(partner, 0.0) + coefficient * other
+        (y, x), sin, cos = self.center, math.sin(angle), math.cos(angle)
+        return replace(self, coefficients=table, center=(y * cos + x * sin, x * cos - y * sin))
 
     def __call__(self, field: Field) -> Field:
         """The field just behind the plate."""

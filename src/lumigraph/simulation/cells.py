@@ -5,10 +5,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
-from lumigraph.elements import LensletArray, ThinLens
+from lumigraph.elements import CircularAperture, LensletArray, ThinLens, Train, ZernikePlate
+from lumigraph.elements.train import Element
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.simulation.camera import Camera
 
@@ -201,10 +204,54 @@ def airy(camera: Camera) -> float:
     return camera.wavelength * camera.separation / camera.pupil_diameter
 
 
+def lens(camera: Camera) -> Train:
+    """The camera's main lens, turned about the axis as `lenslet_array` turns the array.
+
+    Raises
+    ------
+    GeometryError
+        An element that is not known to be round, before a turned array.
+    """
+    train, rotation = camera.lens_train(), 0.0 if camera.lattice is None else camera.lattice.rotation
+    if not rotation:
+        return train
+    return Train(_turned(element, -rotation) for element in train.elements)
+
+
+def _turned(element: Element, angle: float) -> Element:
+    if isinstance(element, ZernikePlate):
+        return element.turned(angle)
+    if isinstance(element, ThinLens) or (
+        isinstance(element, CircularAperture) and element.center == (0.0, 0.0)
+    ):
+        return element
+    raise GeometryError(
+        f"the main lens has {type(element).__name__}, which may not be round, and the lenslets are turned by "
+        f"{-angle:.6g} rad. Use lenslets that are not turned, or Snapshots."
+    )
+
+
 def blur(camera: Camera, distance: float) -> float:
-    """Radius of a point's geometric image in the lenslet plane [m]."""
-    (focal_length,) = (p.focal_length for p in camera.lens_train().elements if isinstance(p, ThinLens))
-    return camera.pupil_diameter / 2 * abs(1 - camera.separation * (1 / focal_length - 1 / distance))
+    """Radius of a point's geometric image in the lenslet plane [m].
+
+    A ray through (y, x) of the pupil arrives at (y, x) (1 - L/f + L/z) + λL/(2π) ∇φ for plates of phase φ.
+    Where they aberrate, it is √2 times the rms distance from the axis, as of an even disc: few rays go farther.
+    """
+    elements = camera.lens_train().elements
+    (focal_length,) = (p.focal_length for p in elements if isinstance(p, ThinLens))
+    spread = 1 - camera.separation * (1 / focal_length - 1 / distance)
+    plates = [p for p in elements if isinstance(p, ZernikePlate)]
+    if not plates:
+        return camera.pupil_diameter / 2 * abs(spread)
+    angle = np.arange(64)[:, None] * (math.pi / 32)
+    rho = camera.pupil_diameter / 2 * np.sqrt((np.arange(64) + 0.5) / 64)  # of equal areas
+    y, x, step = rho * np.sin(angle), rho * np.cos(angle), camera.pupil_diameter * 1e-5
+    bend = camera.wavelength * camera.separation / (2 * math.pi) / (2 * step)
+    down, across = y * spread, x * spread
+    for plate in plates:
+        down = down + bend * (plate.phase(y + step, x) - plate.phase(y - step, x))
+        across = across + bend * (plate.phase(y, x + step) - plate.phase(y, x - step))
+    return math.sqrt(2 * float(np.mean(down**2 + across**2)))
 
 
 def _pair(values: Iterable[Any]) -> tuple[Any, Any]:
