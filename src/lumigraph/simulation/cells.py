@@ -235,7 +235,7 @@ def blur(camera: Camera, distance: float) -> float:
     """Radius of a point's geometric image in the lenslet plane [m].
 
     A ray through (y, x) of the pupil arrives at (y, x) (1 - L/f + L/z) + λL/(2π) ∇φ for plates of phase φ.
-    Where they aberrate, it is √2 times the rms distance from the axis, as of an even disc: few rays go farther.
+    Where they aberrate, it is √2 times the rms distance from the axis, as of an even disc: few go farther.
     """
     elements = camera.lens_train().elements
     (focal_length,) = (p.focal_length for p in elements if isinstance(p, ThinLens))
