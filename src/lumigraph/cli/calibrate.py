@@ -47,7 +47,7 @@ class Bench:
             from lumigraph.instruments import load_camera
 
             described = load_camera(self.camera)
-            known = {name: getattr(described, name) for name in ("separation", "lenslet_distance")}
+            known = {name: getattr(described, name, None) for name in ("separation", "lenslet_distance")}
             known["pixel_pitch"] = described.sensor.pixel_pitch
         for name in known:
             option = f"--{name.replace('_', '-')}"
@@ -129,7 +129,9 @@ def _advice(white: "RawImage", bench: Bench) -> dict[str, Any]:
 
     camera = load_camera(str(bench.camera))
     if not isinstance(camera, LensletCamera):
-        raise CalibrationError(f"{bench.camera} has no lenslets to adjust. Give a camera with lenslets.")
+        raise CalibrationError(
+            f"{bench.camera} is a {camera.KIND}: --explain is for plenoptic cameras. Leave it out."
+        )
     found = diagnose(white, camera)
     return {"advice": found.report().splitlines(), "faults": list(found.faults)}
 

@@ -111,7 +111,7 @@ class Lengths:
 
         focal = above_zero("--focal-length", length("--focal-length", self.focal_length), "m")
         distance = above_zero("--object-distance", length("--object-distance", self.object_distance), "m")
-        if camera is not None:
+        if hasattr(camera, "main_lens"):  # of a microscope disparities are told
             focal, distance = focal or camera.main_lens.focal_length, distance or camera.object_distance
         if focal is None:
             return None
@@ -159,7 +159,7 @@ def depth(
         files.check_output(confidence, MAPS[:-1])
     if output.suffix.lower() == ".ply" and origin.camera is None and lengths.focal_length is None:
         raise FormatError("points need the camera's lengths. Give --camera FILE, or --focal-length.")
-    if search.correct and origin.described(PLENOPTIC) is None:
+    if search.correct and getattr(origin.described(PLENOPTIC), "KIND", None) != PLENOPTIC:
         raise FormatError("--correct simulates a camera. Give --camera FILE of a plenoptic camera 1.0.")
     with progress("depth") as shown:
         found, grounds, picture = _measured(source, (origin, search), shown)

@@ -50,6 +50,11 @@ class Origin:
         from lumigraph.instruments import load_camera
 
         camera: Any = load_camera(self.camera)
+        if not hasattr(camera, "lenslets"):
+            raise FormatError(
+                f"--camera {self.camera} is a {camera.KIND}, which has no lenslets: "
+                "use 'lumigraph deconvolve'."
+            )
         if kind == FOCUSED != camera.KIND:
             raise FormatError(
                 f"--camera {self.camera} is a {camera.KIND}, which is decoded: use 'lumigraph decode'."
@@ -81,11 +86,11 @@ class Origin:
             found = files.read_calibration(self.calibration, raw.shape)
             if self.calibration.suffix.lower() != ".toml":
                 found = _aligned(found, raw)
-        elif camera is not None:
-            found = camera.calibration
-        else:
-            assert white is not None  # one of the three is given
+        elif white is not None:
             found = verbs.calibrate(white)
+        else:
+            assert camera is not None  # one of the three is given
+            found = camera.calibration
         found.check_fits(raw.shape)
         check_drift(raw.data, found)
         if white is not None and devignette is not False:
@@ -113,10 +118,10 @@ def _aligned(calibration: "Calibration", raw: "RawImage") -> "Calibration":
 
 
 def _with_lengths(calibration: "Calibration", camera: Any) -> "Calibration":
-    """The calibration with the lengths of a camera where it has none."""
+    """The calibration with the lengths of a camera where it has none; a microscope has no separation."""
     pairs = (
         ("pixel_pitch", camera.sensor.pixel_pitch),
-        ("separation", camera.separation),
+        ("separation", getattr(camera, "separation", None)),
         ("lenslet_distance", camera.lenslet_distance),
     )
     missing = {name: value for name, value in pairs if getattr(calibration, name) is None}

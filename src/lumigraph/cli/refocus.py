@@ -49,6 +49,11 @@ class Focus:
         if self.depth:
             if camera is None:
                 raise FormatError("--depth needs the camera's geometry. Give --camera FILE, or --alpha.")
+            if not hasattr(camera, "alpha"):
+                raise FormatError(
+                    f"--depth has no refocus factor in a {camera.KIND}. Give --alpha, or use "
+                    "'lumigraph deconvolve --z'."
+                )
             found += [camera.alpha(length("--depth", text) or 0.0) for text in self.depth]
         if not found:
             raise FormatError("where to focus is not known. Give --alpha 0.95 or --alphas 0.9:1.1:9.")

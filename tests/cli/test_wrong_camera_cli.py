@@ -1,0 +1,87 @@
+"""Verbs for plenoptic cameras, given a microscope or a camera without lenslets."""
+
+import numpy as np
+import pytest
+
+import lumigraph.io as io
+from lumigraph.core.lattice import Lattice
+from lumigraph.core.raw import RawImage
+
+SCOPE = """
+kind = "light-field-microscope"
+wavelength = "550 nm"
+[objective]
+magnification = 20
+numerical_aperture = 0.4
+[lenslets]
+pitch = "100 um"
+focal_length = "2 mm"
+count = [19, 19]
+[sensor]
+pixel_pitch = "8 um"
+shape = [200, 220]
+"""
+LENS = """
+kind = "single-lens"
+wavelength = "550 nm"
+object_distance = "100 mm"
+[main_lens]
+focal_length = "50 mm"
+diameter = "3 mm"
+[sensor]
+pixel_pitch = "4 um"
+shape = [200, 220]
+"""
+
+
+@pytest.fixture
+def microscope(lumigraph, tmp_path):
+    """A white and a raw image of micro-images 12.5 px apart, 5 px from where scope.toml has them."""
+    y, x = np.mgrid[:200, :220].astype(float)
+    dy, dx = Lattice.square(12.5, 0, (105, 110)).offset(y, x)
+    white = 1 + 199 * np.exp(-((np.hypot(dy, dx) / 5.3) ** 6))
+    io.save(RawImage(white.astype(np.float32)), tmp_path / "white.tiff")
+    io.save(RawImage((white * (2 + np.sin(y / 30))).astype(np.float32)), tmp_path / "raw.tiff")
+    (tmp_path / "scope.toml").write_text(SCOPE)
+    (tmp_path / "lens.toml").write_text(LENS)
+    return lumigraph
+
+
+def test_a_microscopes_white_image_tells_where_its_lenslets_are(microscope, tmp_path):
+    words = ("--white", "white.tiff", "--camera", "scope.toml")
+    found = microscope("decode", "raw.tiff", *words, "-o", "views.zarr")
+    assert (found.code, found.err) == (0, "")  # no word of a shift: the camera's lattice is not taken
+    found = microscope("calibrate", "white.tiff", "--camera", "scope.toml", "-o", "a.toml")
+    assert found.code == 0, found.err
+    assert io.open(tmp_path / "a.toml").pixel_pitch == pytest.approx(8e-6)
+    found = microscope("depth", "raw.tiff", *words, "-o", "map.pfm")
+    assert found.code == 0, found.err
+    assert found.out.startswith("disparity of")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ("calibrate", "white.tiff", "--camera", "scope.toml", "--explain", "-o", "a.toml"),
+            "scope.toml is a light-field-microscope: --explain is for plenoptic cameras",
+        ),
+        (
+            ("refocus", "raw.tiff", "--camera", "scope.toml", "--depth", "3 um", "-o", "a.png"),
+            "--depth has no refocus factor in a light-field-microscope. Give --alpha",
+        ),
+        (
+            ("depth", "raw.tiff", "--camera", "scope.toml", "--correct", "-o", "a.pfm"),
+            "Give --camera FILE of a plenoptic camera 1.0",
+        ),
+        (
+            ("decode", "raw.tiff", "--camera", "lens.toml", "-o", "a.zarr"),
+            "single-lens, which has no lenslets",
+        ),
+        (("render", "raw.tiff", "--camera", "lens.toml", "--patch", 4, "-o", "a.png"), "has no lenslets"),
+    ],
+)
+def test_what_a_camera_cannot_do_is_refused_in_a_line(microscope, words, message):
+    refused = microscope(*words)
+    assert (refused.code, refused.out, refused.err.count("\n")) == (1, "", 1)
+    assert message in refused.err
