@@ -141,6 +141,9 @@ def test_render_planes_and_finer(lumigraph, focused):
     fine = lumigraph("render", "focused.tiff", *words, "-o", "b.tiff", "--json")
     ratio = np.divide(json.loads(fine.out)["shape"], json.loads(plain.out)["shape"])
     np.testing.assert_allclose(ratio, 19 / 9, rtol=0.05)
+    assert lumigraph("render", "focused.tiff", *words, "--smoothness", "1", "-o", "c.tiff").code == 0
+    rough, smooth = (np.abs(np.diff(io.open(name).data, axis=1)).mean() for name in ("b.tiff", "c.tiff"))
+    assert smooth < 0.8 * rough
 
 
 @pytest.mark.parametrize(
@@ -165,6 +168,10 @@ def test_render_planes_and_finer(lumigraph, focused):
         (("render", "raw.tiff", "--patch", "5", "--map", "m.tiff", "-o", "o.png"), ["--map", "auto"]),
         (("render", "raw.tiff", "--patch", "5", "--patches", "4:6:3", "-o", "o.tiff"), ["--patch", "one"]),
         (("render", "raw.tiff", "--patch", "5", "--finer", "9", "-o", "o.png"), ["--finer is 9"]),
+        (
+            ("render", "raw.tiff", "--patch", "5", "--smoothness", "0.1", "-o", "o.png"),
+            ["--smoothness is 0.1", "--finer"],
+        ),
         (
             ("render", "raw.tiff", "--patch", "5", "--finer", "2", "--blend", "-o", "o.png"),
             ["--finer", "--blend"],
