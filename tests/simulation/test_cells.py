@@ -75,6 +75,19 @@ def test_points_hold_what_the_main_lens_resolves():
     assert found.points[0] % 2 == 0
 
 
+def test_the_ring_is_as_wide_as_light_reaches_and_the_sensor_sees():
+    """One cell beside micro-images that abut; more where they overlap, but none that no pixel sees."""
+    camera = focused()
+    assert of(camera).ring == (1, 1)
+    assert of(camera.replace(sensor={"pixel_pitch": 6 * um, "shape": (400, 100)})).ring == (2, 1)
+    wide = camera.replace(main_lens={"focal_length": 60 * mm, "diameter": 8 * mm})
+    assert cells.spill(camera) == 0
+    width = 8 * mm * camera.lenslet_distance / camera.separation
+    assert cells.spill(wide) == pytest.approx((width - 1.25 * camera.lenslets.pitch) / 2)
+    assert of(wide).ring == (2, 2)  # its sensor is as large as what geometry asks for
+    assert of(wide.replace(sensor={"pixel_pitch": 6 * um, "shape": (400, 400)})).ring == (4, 4)
+
+
 def test_the_telecentric_image_is_nearer():
     """b L/(L + b): the lens formula of a lens of focal length L."""
     camera = focused()

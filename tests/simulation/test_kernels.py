@@ -8,11 +8,12 @@ import pytest
 
 import cameras
 from lumigraph.core import store
+from lumigraph.instruments import PlenopticCamera
 from lumigraph.simulation import blocks, kernels, point_images
 from lumigraph.simulation.cells import Fineness
 from lumigraph.simulation.kernels import matrix
 from lumigraph.simulation.optics import Optics
-from lumigraph.units import mm, um
+from lumigraph.units import mm, nm, um
 
 focused = partial(cameras.focused, pixel_pitch=9 * um, pitch=80 * um)
 
@@ -57,11 +58,16 @@ def test_mirrored_blocks_are_those_computed_one_by_one(optics, monkeypatch):
     assert difference(folded, whole(kernels._build(optics))) < 1e-4
 
 
-def test_borders_and_corners_add_up_to_what_the_lenslets_there_bring(optics, monkeypatch):
+@pytest.mark.parametrize("shape", [None, (81, 81)])
+def test_borders_and_corners_add_up_to_what_the_lenslets_there_bring(shape, monkeypatch):
     """Each cell's blocks, summed over the parts that it is in, against its own from its own lenslets alone.
 
-    The array has 4 x 4 lenslets: all corners count.
+    The array has 4 x 4 lenslets: all corners count. A larger sensor sees more cells beside it.
     """
+    monkeypatch.setattr(Fineness, "ring", 1.9)
+    optics = Optics.of(focused().replace(sensor={"pixel_pitch": 9 * um, "shape": shape}), 122 * mm, 1e-2)
+    first = optics.cells.ring[0]
+    assert first == (1 if shape is None else 2)
     for name, value in (("rank", 1e-5), ("border", 9.0), ("corner", 9.0)):
         monkeypatch.setattr(Fineness, name, value)
     reach = optics.reach
@@ -69,10 +75,11 @@ def test_borders_and_corners_add_up_to_what_the_lenslets_there_bring(optics, mon
     parts = kernels._build(optics).parts
     builder = blocks._Builder(optics, print, 1)
     builder.periodic()
-    for row, column in ((0, 0), (0, 2), (1, 1), (1, 2), (2, 3), (5, 1)):
+    last = optics.cells.image[0] - 1
+    for row, column in ((0, 0), (0, 2), (1, 1), (1, 2), (2, 3), (last, 1)):
         limits = []
         for k, cell in enumerate((row, column)):
-            middle = optics.cells.edge[k] + (cell - 0.5) * optics.cells.size[k]
+            middle = optics.cells.edge[k] + (cell - first + 0.5) * optics.cells.size[k]
             half = optics.array.extent[k] / 2
             limits.append((-half - middle, half - middle))
         state = (limits[0], limits[1])
@@ -88,8 +95,24 @@ def test_borders_and_corners_add_up_to_what_the_lenslets_there_bring(optics, mon
                 assert np.linalg.norm(found - expected) < 2e-4 * builder.norm**0.5
 
 
-def test_all_light_of_a_point_is_in_its_blocks_and_the_glare(optics):
-    """Lenslets without gaps: the images of a point add up to 1, but for what the r⁻³ law has beyond."""
+def wide():
+    """A camera 1.0 of one lenslet, whose micro-image is three pitches wide."""
+    return PlenopticCamera(
+        wavelength=633 * nm,
+        object_distance=240 * mm,
+        main_lens={"focal_length": 120 * mm, "diameter": 8 * mm},
+        lenslets={"pitch": 110 * um, "focal_length": 10 * mm, "count": (1, 1)},
+        sensor={"pixel_pitch": 9 * um},
+    )
+
+
+@pytest.mark.parametrize("camera", [focused(count=(1, 1)), wide()], ids=["matched", "wide"])
+def test_all_light_of_a_point_is_in_its_blocks_and_the_glare(camera):
+    """Lenslets without gaps: the images of a point add up to 1, but for what the r⁻³ law has beyond.
+
+    Behind a wide main lens micro-images overlap: light goes farther, and interferes more finely.
+    """
+    optics = Optics.of(camera, camera.object_distance + 2 * mm, 1e-2)
     found = matrix(optics)
     periodic, samples = found.parts[0], math.prod(optics.cells.samples)
     near = sum(block(periodic, offset[:2]).sum(1) for offset in periodic.offsets)

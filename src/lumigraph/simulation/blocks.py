@@ -48,7 +48,7 @@ class Part:
     Parameters
     ----------
     rows, columns
-        Cells of the image, counted from the ring around the array: 0 is the ring, 1 the first row.
+        Cells of the image, counted from the outermost ring around the array.
     offsets
         (dy, dx, rank): cells from the image's to the object's, row by row, and the factors' columns for it.
     left
@@ -71,11 +71,11 @@ class Band:
     Parameters
     ----------
     cells
-        The first and the one after the last, the ring around the array is 0.
+        The first and the one after the last, from the outermost ring around the array.
     limits
         Of the lenslets' centres, from a cell's centre [m]; infinite where the border is far.
     ring
-        Whether it is the ring.
+        Whether it is of a ring.
     close
         Whether what is missing counts in corners too.
     """
@@ -90,16 +90,18 @@ def bands(optics: Optics, axis: int) -> list[Band]:
     """Along y (0) or x (1); the first is all of the array's cells, as if it had no border."""
     cells, extent = optics.cells, optics.array.extent
     size, n, pitch = cells.size[axis], cells.count[axis], optics.array.lattice.pitch
-    result = [Band((1, n + 1), INFINITE)]
+    first = cells.ring[axis]
+    result = [Band((first, first + n), INFINITE)]
     if extent is None:
         return result
     far, close = (
-        size / 2 + border * pitch * (1 + 1e-9) for border in (optics.fineness.border, optics.fineness.corner)
+        size / 2 + border * pitch * (1 + 1e-9) + optics.spill
+        for border in (optics.fineness.border, optics.fineness.corner)
     )
-    for row in range(n + 2):
-        middle = cells.edge[axis] + (row - 0.5) * size
+    for row in range(cells.image[axis]):
+        middle = cells.edge[axis] + (row - first + 0.5) * size
         low, high = -extent[axis] / 2 - middle, extent[axis] / 2 - middle
-        ring = row in (0, n + 1)
+        ring = not first <= row < first + n
         limits = _near(low, far), _near(high, far)
         if limits == INFINITE and not ring:
             continue
@@ -189,9 +191,9 @@ def build(optics: Optics, progress: Progress | None = None) -> tuple[list[Part],
     while workers > 1 and build_bytes(optics, workers) > free / 2:
         workers -= 1
     builder = _Builder(optics, progress or (lambda _: None), workers)
-    rows, columns = optics.cells.count
     inside, means = builder.periodic()
-    return [_part((1, rows + 1), (1, columns + 1), inside), *builder.border()], means
+    rows, columns = (band[0].cells for band in (bands(optics, 0), bands(optics, 1)))
+    return [_part(rows, columns, inside), *builder.border()], means
 
 
 def _part(rows: tuple[int, int], columns: tuple[int, int], blocks: Blocks) -> Part:

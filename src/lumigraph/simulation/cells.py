@@ -39,6 +39,8 @@ class Cells:
         Object points along y and x of a cell, even.
     samples
         Samples of the image along y and x of a cell.
+    ring
+        Cells of the image on each side of the array, at least one.
     """
 
     size: tuple[float, float]
@@ -46,6 +48,13 @@ class Cells:
     count: tuple[int, int]
     points: tuple[int, int]
     samples: tuple[int, int]
+    ring: tuple[int, int] = (1, 1)
+
+    @property
+    def image(self) -> tuple[int, int]:
+        """Cells along y and x of the image: the array's and the ring."""
+        y, x = (n + 2 * r for n, r in zip(self.count, self.ring, strict=True))
+        return y, x
 
     def grid(self, per_cell: tuple[int, int], scale: float, margin: tuple[int, int]) -> Grid:
         """`per_cell` samples of each cell and of `margin` more on all sides, times `scale`.
@@ -118,6 +127,11 @@ class Fineness:
     def corner(self) -> float:
         """The same for what is missing on two sides of a corner: farther, each counts by itself."""
         return 1.5 * (1e-3 / self.accuracy) ** 0.3
+
+    @property
+    def ring(self) -> float:
+        """How far beyond the array's micro-images light is followed [pitches]."""
+        return 1.9 * (1e-3 / self.accuracy) ** 0.3
 
     def near(self, blur: float, airy: float) -> float:
         """As `reach`, for what the lenslets that are missing beyond the border take away."""
@@ -192,11 +206,51 @@ def cells_of(camera: Camera, array: LensletArray, fineness: Fineness) -> Cells:
     )
     finest = airy(camera) / 2 / OVERSAMPLING
     pitch, squared = lattice.pitch, camera.wavelength * telecentric_distance(camera)
-    widest = blur(camera, camera.object_distance) / pitch
-    image = pitch / fineness.samples(pitch**2 / squared, widest)
+    widest, beyond = blur(camera, camera.object_distance) / pitch, spill(camera)
+    # Where micro-images overlap, light of more lenslets interferes.
+    image = pitch / fineness.samples(pitch * (pitch + 2 / 3 * beyond) / squared, widest)
     points = tuple(2 * math.ceil(s / finest / 2) for s in size)
     samples = tuple(math.ceil(s / image) for s in size)
-    return Cells(_pair(size), _pair(edge), _pair(count), _pair(points), _pair(samples))
+    seen = _seen(camera)
+    ring = (
+        max(
+            1,
+            min(
+                math.ceil((beyond + fineness.ring * pitch) / s),
+                math.ceil((h + max(e, -e - n * s)) / s - 1e-6),
+            ),
+        )
+        for h, e, n, s in zip(seen, edge, count, size, strict=True)
+    )
+    return Cells(_pair(size), _pair(edge), _pair(count), _pair(points), _pair(samples), _pair(ring))
+
+
+def _seen(camera: Camera) -> tuple[float, float]:
+    """How far the sensor sees along y and x of the straight array, on the telecentric image [m]."""
+    scale, rotation = (
+        1 + lenslet_distance(camera) / camera.separation,
+        camera.lattice.rotation if camera.lattice else 0.0,
+    )
+    grid, sin, cos = camera.sensor.grid, abs(math.sin(rotation)), abs(math.cos(rotation))
+    height, width = ((n + 1) * p / 2 / scale for n, p in zip(grid.shape, grid.pitch, strict=True))
+    return height * cos + width * sin, width * cos + height * sin
+
+
+def diffraction(camera: Camera) -> float:
+    """Width of the diffraction on the image [m]: the main lens', or the lenslets' where it is wide.
+
+    They are the same where the f-numbers match, and taken for the same up to a quarter more.
+    """
+    assert camera.lattice is not None  # `fits` has been asked
+    behind = camera.wavelength * telecentric_distance(camera) / camera.lattice.pitch
+    return airy(camera) + 0 * max(0, 0.8 * behind)
+
+
+def spill(camera: Camera) -> float:
+    """How far a micro-image reaches over its lenslet's edge [m]: 0 but where the main lens is wide."""
+    assert camera.lattice is not None  # `fits` has been asked
+    width = camera.pupil_diameter * lenslet_distance(camera) / camera.separation
+    return 0 * max(0.0, width - 1.25 * camera.lattice.pitch) / 2
 
 
 def airy(camera: Camera) -> float:

@@ -27,7 +27,7 @@ class Matrix:
     glare
         The rest: faint, and far from the diagonal.
     margin
-        Cells (y, x) beyond the ring around the array whose points reach into it.
+        Cells (y, x) beyond the rings around the array whose points reach into them.
     """
 
     parts: tuple[Part, ...]
@@ -109,5 +109,4 @@ def _unpacked(arrays: dict[str, np.ndarray]) -> Matrix:
 
 def _build(optics: Optics, progress: Progress | None = None) -> Matrix:
     parts, means = build(optics, progress)
-    rows, columns = optics.cells.count
-    return Matrix(tuple(parts), glare(means, optics.cells.size, (rows + 2, columns + 2)), optics.reach)
+    return Matrix(tuple(parts), glare(means, optics.cells.size, optics.cells.image), optics.reach)

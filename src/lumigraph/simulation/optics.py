@@ -47,7 +47,7 @@ class Optics:
 
     @property
     def key(self) -> str:
-        """Names all that the matrix depends on: not the sensor, nor the object's samples."""
+        """Names all that the matrix depends on: not the pixels, nor the object's samples."""
         camera = self.camera
         with np.printoptions(threshold=2**62, floatmode="unique"):
             known = repr((
@@ -62,10 +62,15 @@ class Optics:
         return self.array.shape == "square" and not isinstance(self.array.focal_length, tuple)
 
     @property
+    def spill(self) -> float:
+        """How far a micro-image reaches over its lenslet's edge [m]."""
+        return _cells.spill(self.camera)
+
+    @property
     def axes(self) -> tuple[Axis, Axis]:
         """Sampling of a cell along y and along x."""
         band = SLACK / 2 / _cells.airy(self.camera)
-        neighbourhood = self.fineness.neighbours * self.array.lattice.pitch
+        neighbourhood = self.fineness.neighbours * self.array.lattice.pitch + self.spill
         y, x = (
             Axis(size, points, samples, neighbourhood, band)
             for size, points, samples in zip(
@@ -77,14 +82,16 @@ class Optics:
     @property
     def reach(self) -> tuple[int, int]:
         """Cells along y and x to which a point's light is followed in full."""
-        far = self.fineness.reach(_cells.blur(self.camera, self.distance), _cells.airy(self.camera))
+        blur = _cells.blur(self.camera, self.distance) + self.spill
+        far = self.fineness.reach(blur, _cells.diffraction(self.camera))
         y, x = (max(1, math.ceil(far / size)) for size in self.cells.size)
         return y, x
 
     @property
     def near(self) -> tuple[int, int]:
         """Cells to which a point's light is followed at the border of the array."""
-        far = self.fineness.near(_cells.blur(self.camera, self.distance), _cells.airy(self.camera))
+        blur = _cells.blur(self.camera, self.distance) + self.spill
+        far = self.fineness.near(blur, _cells.diffraction(self.camera))
         y, x = (max(1, round(far / size)) for size in self.cells.size)
         return min(y, self.reach[0]), min(x, self.reach[1])
 

@@ -102,7 +102,7 @@ class PeriodicOperator:
             arrays.namespace(intensity),
             intensity if self.depths is not None else intensity[None, ...],
         )
-        rows, columns = (n + 2 for n in self.cells.count)
+        rows, columns = self.cells.image
         like = {"dtype": intensity.dtype, "device": intensity.device}
         image = xp.zeros((rows, columns, math.prod(self.cells.samples)), **like)
         for k, plane in enumerate(self.planes):
@@ -130,7 +130,7 @@ class PeriodicOperator:
 
     def _returned(self, plane: Plane, image: Array) -> Array:
         xp, margin = arrays.namespace(image), plane.matrix.margin
-        shape = [n + 2 + 2 * m for n, m in zip(self.cells.count, margin, strict=True)]
+        shape = [n + 2 * m for n, m in zip(self.cells.image, margin, strict=True)]
         size = (*shape, math.prod(self.cells.points))
         points = xp.zeros(size, dtype=image.dtype, device=image.device)
         for part in plane.matrix.parts:
@@ -143,7 +143,7 @@ class PeriodicOperator:
     @property
     def memory_bytes(self) -> float:
         """Memory that `forward` and `adjoint` of a single-precision image take, with the matrices [bytes]."""
-        cells = (math.prod(n + 2 for n in self.cells.count)) * math.prod(self.cells.samples)
+        cells = math.prod(self.cells.image) * math.prod(self.cells.samples)
         plane = math.sqrt(cells * math.prod(self.sensor.shape))
         kept = sum(plane.matrix.nbytes for plane in self.planes)
         return kept + 4 * (3 * cells + plane + math.prod(self.sensor.shape))
@@ -272,7 +272,7 @@ def periodic_operator(
 def _plane(optics: Optics, matrix: Matrix, grid: Grid) -> Plane:
     """The spread of an object's samples onto the points of the cells, turned with the array."""
     cells, camera = optics.cells, optics.camera
-    ring = (1 + matrix.margin[0], 1 + matrix.margin[1])
+    ring = (cells.ring[0] + matrix.margin[0], cells.ring[1] + matrix.margin[1])
     scale = -optics.distance / camera.separation
     if not optics.rotation:
         return Plane(matrix, represented(grid, cells.grid(cells.points, scale, ring)))
@@ -287,9 +287,9 @@ def _readout(optics: Optics) -> Linear:
     """Means over the pixels of the image's samples, turned back."""
     cells, pixels = optics.cells, optics.camera.sensor.grid
     if not optics.rotation:
-        return averaged(cells.grid(cells.samples, optics.image_scale, (1, 1)), pixels)
-    wide = _widened(cells.grid(cells.samples, 1.0, (1, 1)), optics)
-    margin = tuple((w - 1) * n for w, n in zip(wide, cells.samples, strict=True))
+        return averaged(cells.grid(cells.samples, optics.image_scale, cells.ring), pixels)
+    wide = _widened(cells.grid(cells.samples, 1.0, cells.ring), optics)
+    margin = tuple((w - r) * n for w, r, n in zip(wide, cells.ring, cells.samples, strict=True))
     turn = Turn(cells.grid(cells.samples, 1.0, wide), -optics.rotation)
     mean = averaged(cells.grid(cells.samples, optics.image_scale, wide), pixels)
     return Chain((Crop((margin[0], margin[1]), outward=True), turn, mean))
