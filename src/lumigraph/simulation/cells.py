@@ -243,14 +243,14 @@ def diffraction(camera: Camera) -> float:
     """
     assert camera.lattice is not None  # `fits` has been asked
     behind = camera.wavelength * telecentric_distance(camera) / camera.lattice.pitch
-    return airy(camera) + 0 * max(0, 0.8 * behind)
+    return max(airy(camera), 0.8 * behind)
 
 
 def spill(camera: Camera) -> float:
     """How far a micro-image reaches over its lenslet's edge [m]: 0 but where the main lens is wide."""
     assert camera.lattice is not None  # `fits` has been asked
     width = camera.pupil_diameter * lenslet_distance(camera) / camera.separation
-    return 0 * max(0.0, width - 1.25 * camera.lattice.pitch) / 2
+    return max(0.0, width - 1.25 * camera.lattice.pitch) / 2
 
 
 def airy(camera: Camera) -> float:
