@@ -55,6 +55,19 @@ def test_other_methods_agree(lumigraph, views, method):
     assert median == pytest.approx(NEAR, abs=0.05)
 
 
+def test_the_focal_stack_of_fused_suits_views_far_apart(lumigraph, views, tmp_path):
+    near = lg.open(tmp_path / "views.zarr")
+    lenslets = lg.Grid(near.lenslets.shape, near.lenslets.pitch[0] / 10)  # 100 px per view for α' = 0
+    lg.save(lg.LightField(near.data, near.aperture, lenslets, near.separation), tmp_path / "far.zarr")
+
+    def error(*words):
+        assert lumigraph("depth", "far.zarr", "--method", "fused", "-o", "map.pfm", *words).code == 0
+        return float(np.abs(lg.open(tmp_path / "map.pfm").data - NEAR).mean())
+
+    assert error() < 0.006
+    assert error("--alphas", "0.9:1.1:21") > 0.007  # planes a pixel per view apart
+
+
 def test_patches_of_a_raw_image(lumigraph, tmp_path):
     lattice = lg.Lattice.square(12.0, origin=(6, 6))
     y, x = np.meshgrid(*map(np.arange, (96, 108)), indexing="ij")

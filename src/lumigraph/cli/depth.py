@@ -1,5 +1,6 @@
 """`lumigraph depth`."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 MAPS = (".pfm", ".tif", ".tiff", ".png", ".zarr", ".ply")
 _PLANES = "0.9:1.1:21"
+_MOST_PLANES = 101
 
 
 @Parameter(name="*")
@@ -38,7 +40,8 @@ class Search:
         Least and most that may occur, 'least:most': disparities [px per view] for epi, patches [px] for
         correlation; found by itself if left out.
     alphas
-        Refocus factors 'first:last:count' of the focal stack; for focus and fused.
+        Refocus factors 'first:last:count' of the focal stack; if left out, 0.9:1.1:21 for focus, and those
+        that epi has found for fused.
     correct
         Correct what diffraction at the lenslets does to the method, by simulating textured planes before the
         camera of --camera, a plenoptic 1.0; takes half a minute.
@@ -48,7 +51,7 @@ class Search:
 
     method: Literal["auto", "epi", "focus", "fused", "correlation"] = "auto"
     between: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
-    alphas: str = _PLANES
+    alphas: str | None = None
     correct: bool = False
     smooth: float = 0.0
 
@@ -74,12 +77,28 @@ class Search:
         if self.method != "focus":
             found.append(depth.epi(views, self.ends(), progress=shown))
         if self.method in ("focus", "fused"):
-            sharp = depth.from_focus(views, range_of("--alphas", self.alphas))
+            sharp = depth.from_focus(views, self._planes(found, views))
             found.append(sharp if self.method == "focus" else depth.disparity_of(sharp, views))
         if self.method != "fused" and not self.smooth:
             return found[0]
         v, u = (n // 2 for n in views.aperture.shape)
         return depth.fuse(found, views.view(v, u), smoothness=self.smooth or 1.0)
+
+    def _planes(self, found: "list[DepthMap]", views: "LightField") -> list[float]:
+        """Refocus factors of the focal stack: where disparities are known, a pixel apart in outer views."""
+        import numpy as np
+
+        from lumigraph import depth
+
+        if self.alphas is not None or not found:
+            return range_of("--alphas", self.alphas or _PLANES)
+        low, high = np.nanquantile(np.asarray(found[0].values, float), (0.02, 0.98))
+        count = max(views.aperture.shape)
+        spare = 2 / count
+        ends = depth.DepthMap(np.array([[high + spare, low - spare]]), np.ones((1, 2)), "disparity")
+        first, last = np.maximum(np.asarray(depth.alpha_of(ends, views).values)[0], 0.05)
+        planes = math.ceil((high - low + 2 * spare) * count) + 1
+        return [float(alpha) for alpha in np.linspace(first, last, min(max(21, planes), _MOST_PLANES))]
 
     def of_raw(self, raw: "RawImage", calibration: "Calibration", shown: Count) -> "DepthMap":
         """Patches of the lenslets."""
