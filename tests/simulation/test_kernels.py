@@ -121,6 +121,19 @@ def test_all_light_of_a_point_is_in_its_blocks_and_the_glare(camera):
     assert (near * share).max() < 1.05
 
 
+def test_what_makes_building_larger_is_told():
+    """Lenslets with gaps leave more factors; behind an odd main lens no border mirrors another."""
+
+    def needed(**main_lens):
+        camera = focused().replace(main_lens={"focal_length": 60 * mm, **main_lens})
+        return blocks.build_bytes(Optics.of(camera, 122 * mm, 3e-3))
+
+    faint = 1e-3  # it hardly blurs, and is odd all the same
+    assert needed(aberrations={8: faint}) > 1.8 * needed(aberrations={11: faint})
+    gaps = blocks.build_bytes(Optics.of(focused(fill_factor=0.4), 122 * mm, 3e-3))
+    assert gaps > 1.8 * needed()
+
+
 def test_few_factors_give_the_block_back(rng):
     """Thirty patterns of falling strength: those above the least, orthogonal, nothing of the others."""
     left, right = (np.linalg.qr(rng.standard_normal((n, 30)))[0] for n in (200, 90))

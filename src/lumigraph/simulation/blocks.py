@@ -149,7 +149,8 @@ def terms(place: Place) -> dict[State, int]:
 def build_bytes(optics: Optics, workers: int = 1) -> float:
     """Memory that building all parts takes [bytes], from their sizes and the usual number of factors."""
     cells, near = optics.cells, optics.near
-    even, square = _symmetric(optics.array), cells.size[0] == cells.size[1]
+    even = _symmetric(optics.array) and _cells.mirrored(optics.camera)
+    square = even and cells.size[0] == cells.size[1]
     wanted = [place for place, source, _ in _alike(places(optics), even, square) if place is source]
     states = {(INFINITE, INFINITE)} | {state for place in wanted for state in terms(place)}
     kept = 1 + sum(INFINITE in state for state in states)
@@ -157,6 +158,7 @@ def build_bytes(optics: Optics, workers: int = 1) -> float:
     block = 4.0 * points * samples
     rows = workers * max(kept * (2 * near[1] + 1), 2 * optics.reach[1] + 1) * block
     factors = (1.3 * len(wanted) + 0.7 * len(places(optics))) * math.sqrt(points)  # of a block
+    factors /= optics.array.fill_factor  # small lenslets diffract more widely
     rows += factors * math.prod(2 * n + 1 for n in near) * 4.0 * (points + samples)
     if optics.straight:
         return rows

@@ -10,7 +10,7 @@ import numpy as np
 from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
-from lumigraph.elements import CircularAperture, LensletArray, ThinLens, Train, ZernikePlate
+from lumigraph.elements import CircularAperture, LensletArray, ThinLens, Train, ZernikePlate, noll_to_nm
 from lumigraph.elements.train import Element
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.simulation.camera import Camera
@@ -283,6 +283,20 @@ def _turned(element: Element, angle: float) -> Element:
         f"the main lens has {type(element).__name__}, which may not be round, and the lenslets are turned by "
         f"{-angle:.6g} rad. Use lenslets that are not turned, or Snapshots."
     )
+
+
+def mirrored(camera: Camera) -> bool:
+    """Whether the main lens is known to be the same in a mirror along each axis of the straight array."""
+    return all(
+        isinstance(element, ThinLens | CircularAperture)
+        or (isinstance(element, ZernikePlate) and all(map(_even, *zip(*element.coefficients, strict=True))))
+        for element in lens(camera).elements
+    )
+
+
+def _even(j: int, coefficient: float) -> bool:
+    _, m = noll_to_nm(j)
+    return abs(coefficient) < 1e-9 or (m >= 0 and m % 2 == 0)
 
 
 def blur(camera: Camera, distance: float) -> float:
