@@ -9,6 +9,7 @@ from scipy import ndimage
 from data_folder import real
 from lumigraph import io
 from lumigraph.calibration import aligned, calibrate
+from lumigraph.calibration.borders import border
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import CalibrationError
@@ -61,3 +62,9 @@ def test_the_real_crop_is_found_by_its_maker_s_file_and_by_itself_alike():
     assert np.hypot(*moved.lattice.offset(*alone.lattice.origin)) < 0.3
     assert alone.lattice.kinds == 3
     assert alone.lattice.pitch == pytest.approx(34.865, abs=0.1)
+
+
+def test_pictures_whose_quarters_are_not_alike_are_placed(rng):
+    """An odd number of pixels, where a quarter's mean cell would be a sample larger than another's."""
+    model = known(Lattice.square(58.2), (203, 203))
+    assert np.isfinite(border(rng.random((203, 203), np.float32), model).clearness)

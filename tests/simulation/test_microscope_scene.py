@@ -38,7 +38,9 @@ def test_a_point_between_samples_is_between_their_images(scope):
     x = np.arange(between.shape[1])
     places = [image.sum(0) @ x / image.sum() for image in (*at, between)]
     assert places[2] == pytest.approx((places[0] + places[1]) / 2, abs=0.05)
-    assert places[1] - places[0] == pytest.approx(grid.pitch[1] * 20 / 12.5e-6, rel=0.15)  # lenslets invert what they see
+    assert places[1] - places[0] == pytest.approx(
+        grid.pitch[1] * 20 / 12.5e-6, rel=0.15
+    )  # lenslets invert what they see
     assert np.abs(between - at[0]).sum() > 0.05 * between.sum()
 
 

@@ -66,7 +66,7 @@ def aligned(calibration: Calibration, raw: RawImage | Array) -> Calibration:
 
 def border(feature: np.ndarray, model: Calibration) -> Border:
     """Where a feature (y, x), edges or gaps, gathers in the cell of a lattice."""
-    (ny, nx), lattice = feature.shape, model.lattice
+    (ny, nx), lattice = (n // 2 * 2 for n in feature.shape), model.lattice  # quarters of one size
     cells = []
     for rows in (slice(0, ny // 2), slice(ny // 2, ny)):
         for columns in (slice(0, nx // 2), slice(nx // 2, nx)):
