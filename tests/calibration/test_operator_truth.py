@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
+from cameras import focused
 from lumigraph import calibrate
 from lumigraph.core.grid import Grid
 from lumigraph.core.warp import Warp
 from lumigraph.simulation import periodic_operator
 from lumigraph.units import um
-from cameras import focused
 
 COUNTS = {"square": (21, 21), "hex": (24, 21)}
 PITCHES = (7.0, 8.4, 10.5, 13.3, 17.25, 21.7, 27.1, 34.865, 45.5, 58.2, 74.9, 91.0)
