@@ -28,7 +28,7 @@ def each(
     >>> list(each(abs, [-1, 2]))
     [1, 2]
     """
-    with _single_products():
+    with single_products():
         pool = ThreadPoolExecutor(workers, thread_name_prefix="lumigraph")
         try:
             yield from pool.map(function, items)
@@ -55,7 +55,8 @@ _LIMIT = _Limit()
 
 
 @contextmanager
-def _single_products() -> Iterator[None]:
+def single_products() -> Iterator[None]:
+    """Context, or decorator, in which matrix products take one thread each."""
     _LIMIT.change(1)
     try:
         yield

@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from lumigraph.core import arrays, memory
+from lumigraph.core.threads import single_products
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import SamplingError
 from lumigraph.simulation.microscope_rays import ray_images
@@ -147,6 +148,7 @@ def reach_of(objective: Objective, lenslet: Lenslet, dz: float, dropped: float) 
     return max(1, math.ceil(radius / lenslet.pitch))
 
 
+@single_products()
 def slice_kernel(
     objectives: Sequence[Objective],
     lenslet: Lenslet,

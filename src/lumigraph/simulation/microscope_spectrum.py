@@ -22,6 +22,7 @@ import scipy.fft
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
+from lumigraph.core.threads import single_products
 from lumigraph.simulation.microscope_kernels import SliceKernel
 
 TILE = 40
@@ -103,6 +104,7 @@ def is_faster(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> bool:
     return products * sampling.pixels**2 > WEIGHT * tiles * matrix_numbers(kernels, cells)
 
 
+@single_products()
 def matrices(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> np.ndarray:
     """R (frequencies, depths s², N²) float32; the parts that are even over a cell come first."""
     told, sampling = tiling(kernels, cells), kernels[0].sampling
