@@ -18,7 +18,7 @@ M. Broxton et al., Opt. Express 21, 25418 (2013) use the same periodicity in a l
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
@@ -35,6 +35,9 @@ from lumigraph.simulation.kernels import Matrix, matrix
 from lumigraph.simulation.optics import Optics
 from lumigraph.simulation.resampling import averaged, represented
 from lumigraph.simulation.turning import Chain, Crop, Linear, Turn, turn_margin
+
+PIECE = 600
+"""Cells of the image that are computed at a time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,7 +110,7 @@ class PeriodicOperator:
         image = xp.zeros((rows, columns, math.prod(self.cells.samples)), **like)
         for k, plane in enumerate(self.planes):
             points = _by_cell(plane.spread.forward(layers[k, ...]), self.cells.points)
-            for part in plane.matrix.parts:
+            for part in _pieces(plane.matrix.parts):
                 (top, bottom), (first, last) = part.rows, part.columns
                 for group in _groups(part, plane.matrix.margin):
                     image[top:bottom, first:last, :] += group.seen(points) @ arrays.like(group.right, image)
@@ -133,7 +136,7 @@ class PeriodicOperator:
         shape = [n + 2 * m for n, m in zip(self.cells.image, margin, strict=True)]
         size = (*shape, math.prod(self.cells.points))
         points = xp.zeros(size, dtype=image.dtype, device=image.device)
-        for part in plane.matrix.parts:
+        for part in _pieces(plane.matrix.parts):
             mine = image[part.rows[0] : part.rows[1], part.columns[0] : part.columns[1], :]
             for group in _groups(part, margin):
                 group.return_to(points, mine @ xp.matrix_transpose(arrays.like(group.right, image)))
@@ -146,7 +149,7 @@ class PeriodicOperator:
         cells = math.prod(self.cells.image) * math.prod(self.cells.samples)
         plane = math.sqrt(cells * math.prod(self.sensor.shape))
         kept = sum(plane.matrix.nbytes for plane in self.planes)
-        return kept + 4 * (3 * cells + plane + math.prod(self.sensor.shape))
+        return kept + 4 * (4 * cells + plane + math.prod(self.sensor.shape))
 
     def psf(self, index: tuple[int, ...], /) -> np.ndarray:
         """Raw image (ny, nx), float32, of one object sample of intensity 1."""
@@ -159,6 +162,15 @@ def _check(name: str, array: Array, shape: tuple[int, ...]) -> None:
     checks.array(name, array)
     if tuple(array.shape) != shape:
         raise GeometryError(f"{name} has shape {tuple(array.shape)} but the operator takes {shape}.")
+
+
+def _pieces(parts: Sequence[Part]) -> Iterator[Part]:
+    """The parts, those of many cells in rows that stay in the processor's cache."""
+    for part in parts:
+        (top, bottom), (first, last) = part.rows, part.columns
+        step = max(1, PIECE // (last - first))
+        for row in range(top, bottom, step):
+            yield replace(part, rows=(row, min(row + step, bottom)))
 
 
 def _groups(part: Part, margin: tuple[int, int]) -> "Iterator[_Group]":

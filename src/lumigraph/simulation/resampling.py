@@ -50,6 +50,27 @@ class Banded:
             row += m.shape[0]
         return result
 
+    def across(self, plane: Array) -> Array:
+        """``plane @ matrix.T``: (n, columns) to (n, rows)."""
+        xp, row = arrays.namespace(plane), 0
+        rows = sum(m.shape[0] for _, m in self.blocks)
+        result = xp.empty((plane.shape[0], rows), dtype=plane.dtype, device=plane.device)
+        for first, m in self.blocks:
+            turned = xp.matrix_transpose(arrays.like(m, plane))
+            result[:, row : row + m.shape[0]] = plane[:, first : first + m.shape[1]] @ turned
+            row += m.shape[0]
+        return result
+
+    def across_adjoint(self, plane: Array) -> Array:
+        """``plane @ matrix``: (n, rows) to (n, columns)."""
+        xp, row = arrays.namespace(plane), 0
+        result = xp.zeros((plane.shape[0], self.columns), dtype=plane.dtype, device=plane.device)
+        for first, m in self.blocks:
+            part = plane[:, row : row + m.shape[0]] @ arrays.like(m, plane)
+            result[:, first : first + m.shape[1]] += part
+            row += m.shape[0]
+        return result
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Resampling:
@@ -60,13 +81,11 @@ class Resampling:
 
     def forward(self, plane: Array) -> Array:
         """(y, x) to (rows of `y`, rows of `x`)."""
-        xp = arrays.namespace(plane)
-        return xp.matrix_transpose(self.x.forward(xp.matrix_transpose(self.y.forward(plane))))
+        return self.x.across(self.y.forward(plane))
 
     def adjoint(self, plane: Array) -> Array:
         """The transpose of `forward`."""
-        xp = arrays.namespace(plane)
-        return self.y.adjoint(xp.matrix_transpose(self.x.adjoint(xp.matrix_transpose(plane))))
+        return self.y.adjoint(self.x.across_adjoint(plane))
 
 
 def represented(source: Grid, points: Grid) -> Resampling:
