@@ -98,7 +98,7 @@ def _expose(camera: PlenopticCamera | FocusedPlenopticCamera, scene: Scene, tell
     """White image, calibration from it, raw image; both with photon and read noise."""
     rng = np.random.default_rng(1)
 
-    def counted(what: str, first: float, last: float) -> Callable[[int, int], None]:
+    def counted(what: str, first: float, last: float) -> Callable[[float, int], None]:
         return lambda done, total: tell(what, first + (last - first) * done / total)
 
     light = simulate(camera, targets.white(), progress=counted("white image", 0.0, 0.4))
