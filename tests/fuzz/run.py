@@ -185,10 +185,16 @@ def read(tree: Tree, folder: Path) -> None:
         raise error
 
 
+def memory() -> tuple[int, int]:
+    """Of this process: all addresses, and what is resident [bytes]."""
+    size, resident = (int(word) for word in Path("/proc/self/statm").read_text().split()[:2])
+    return size * resource.getpagesize(), resident * resource.getpagesize()
+
+
 def _limit() -> None:
-    pages = [int(word) for word in Path("/proc/self/statm").read_text().split()[:2]]
-    size, resident = (n * resource.getpagesize() for n in pages)
-    resource.setrlimit(resource.RLIMIT_AS, (size + MEMORY - resident,) * 2)
+    """Bound the memory: all of it in a process of its own, what is added in a large one that forked."""
+    size, resident = memory()
+    resource.setrlimit(resource.RLIMIT_AS, (size + max(MEMORY - resident, MEMORY // 2),) * 2)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 

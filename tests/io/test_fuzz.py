@@ -23,10 +23,11 @@ def test_every_reader_has_seeds(found):
 @pytest.mark.parametrize("reader", READERS)
 def test_damaged_files_are_opened_or_refused(found, reader):
     trees, mend = found[reader]
+    held = run.memory()[1]  # by tests before this one, and by the children that are forked here
     score = run.run(trees, mend, 60 if reader == "zarr" else 200, seed=7)
     assert score.failures == []
     assert score.opened + score.refused == (60 if reader == "zarr" else 200)
-    assert score.most_memory < 1 << 30
+    assert score.most_memory < max(run.MEMORY, held + run.MEMORY // 2)
     assert score.slowest < 5
 
 
