@@ -211,17 +211,10 @@ def cells_of(camera: Camera, array: LensletArray, fineness: Fineness) -> Cells:
     image = pitch / fineness.samples(pitch * (pitch + 2 / 3 * beyond) / squared, widest)
     points = tuple(2 * math.ceil(s / finest / 2) for s in size)
     samples = tuple(math.ceil(s / image) for s in size)
-    seen = _seen(camera)
-    ring = (
-        max(
-            1,
-            min(
-                math.ceil((beyond + fineness.ring * pitch) / s),
-                math.ceil((h + max(e, -e - n * s)) / s - 1e-6),
-            ),
-        )
-        for h, e, n, s in zip(seen, edge, count, size, strict=True)
-    )
+    lit, ring = beyond + fineness.ring * pitch, []
+    for seen, e, n, s in zip(_seen(camera), edge, count, size, strict=True):
+        looked_at = math.ceil((seen + max(e, -e - n * s)) / s - 1e-6)
+        ring.append(max(1, min(math.ceil(lit / s), looked_at)))
     return Cells(_pair(size), _pair(edge), _pair(count), _pair(points), _pair(samples), _pair(ring))
 
 
