@@ -71,7 +71,9 @@ def like(values: np.ndarray, array: Array) -> Array:
         values = values.astype(np.float32 if single else np.float64, copy=False)
     if is_numpy_array(array):
         return values
-    return namespace(array).asarray(np.asarray(values, order="C"), device=device(array))
+    # PyTorch warns of arrays that cannot be written to, as those mapped from files.
+    values = np.require(values, requirements=("C", "W"))
+    return namespace(array).asarray(values, device=device(array))
 
 
 def is_parameter(value: Any) -> bool:
