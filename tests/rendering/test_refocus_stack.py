@@ -42,6 +42,36 @@ def test_a_stack_is_the_mean_of_moved_views(rng, interpolation, shape):
         np.testing.assert_allclose(picture[inner, inner], expected[inner, inner], atol=1e-12)
 
 
+REAL = ["?", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8", "g", ">u2", ">f4", ">f8"]
+
+
+@pytest.mark.parametrize("dtype", REAL)
+@pytest.mark.parametrize("masked", [False, True])
+def test_every_type_of_number_refocuses_to_the_same_picture(rng, dtype, masked):
+    data = rng.integers(0, 100, (3, 4, 12, 13)).astype(dtype)
+    valid = rng.random(data.shape) < 0.9 if masked else None
+    expected = refocus_stack(field(data.astype(float), valid), [0.8, 1.0])
+    found = refocus_stack(field(data, valid), [0.8, 1.0])
+    assert found.dtype == (np.float64 if dtype in ("f8", ">f8", "g") else np.float32)
+    np.testing.assert_allclose(found, expected, rtol=2e-5, atol=2e-4)
+
+
+@pytest.mark.parametrize("dtype", ["F", "D", "G", ">c8"])
+def test_complex_light_fields_refocus_part_by_part(rng, dtype):
+    data = (rng.random((3, 4, 12, 13)) + 1j * rng.random((3, 4, 12, 13))).astype(dtype)
+    found = refocus_stack(field(data), [0.8, 1.2], oversample=2)
+    parts = [
+        refocus_stack(field(part.astype(float)), [0.8, 1.2], oversample=2) for part in (data.real, data.imag)
+    ]
+    np.testing.assert_allclose(found, parts[0] + 1j * parts[1], atol=1e-12 if dtype in "DG" else 1e-5)
+
+
+def test_complex_numbers_of_other_array_libraries_refocus_alike(xp, rng):
+    data = rng.random((3, 3, 9, 8)) + 1j * rng.random((3, 3, 9, 8))
+    found = to_numpy(refocus_stack(field(xp.asarray(data)), [0.8, 1.2]))
+    np.testing.assert_allclose(found, refocus_stack(field(data), [0.8, 1.2]), atol=1e-12)
+
+
 def test_invalid_samples_do_not_count(xp, rng):
     views = rng.random((3, 3, 12, 13, 3)).astype(np.float32)
     valid = rng.random(views.shape[:4]) < 0.9

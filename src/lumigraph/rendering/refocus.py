@@ -10,7 +10,7 @@ from scipy.linalg import get_blas_funcs
 from scipy.ndimage import distance_transform_edt
 
 from lumigraph.core import checks, memory
-from lumigraph.core.arrays import Array, is_numpy, is_single, like, namespace, to_numpy
+from lumigraph.core.arrays import Array, is_complex, is_numpy, like, namespace, to_numpy
 from lumigraph.core.lightfield import LightField
 from lumigraph.errors import GeometryError
 from lumigraph.rendering.geometry import lit
@@ -215,10 +215,8 @@ def _sheared(data: Array, open_views: np.ndarray, planes: list[_Plane], progress
     gap = max(plane.s.reach for plane in planes)
     width = (ns + gap) * colours
     times = len(planes[0].s.taps)
-    sample = as_float(data[:1, :1, :1, :1, ...])
-    pictures = [
-        [[like(np.zeros(nt * width), sample) for _ in range(times)] for _ in range(times)] for _ in planes
-    ]
+    sample = _summable(data[:1, :1, :1, :1, ...])
+    pictures = [[[_zeros((nt * width,), sample) for _ in range(times)] for _ in range(times)] for _ in planes]
     add = _adder(sample)
     rows = max(1, _BLOCK // width) if is_numpy(data) else nt
     for v in range(nv):
@@ -236,14 +234,25 @@ def _sheared(data: Array, open_views: np.ndarray, planes: list[_Plane], progress
     return xp.stack([_interleaved(picture, (nt, ns, gap), tail) for picture in pictures])
 
 
+def _summable(data: Array) -> Array:
+    """Data as BLAS sums it, in place: real or complex, single or double precision, this machine's bytes."""
+    data = as_float(data)
+    dtype = _zeros((1,), data).dtype
+    return data if data.dtype == dtype else namespace(data).astype(data, dtype)
+
+
+def _zeros(shape: tuple[int, ...], sample: Array) -> Array:
+    return like(np.zeros(shape, complex if is_complex(sample) else float), sample)
+
+
 def _flat_rows(part: Array, used: list[int], gap: int) -> list[Array]:
     """Rows (u, t, s[, c]) of views as one line of values for each u, with `gap` zeros after each row."""
     xp = namespace(part)
     shape = (part.shape[1], gap, *part.shape[3:])
     lines = []
     for u in used:
-        rows = as_float(part[u, ...])
-        padded = xp.concat([rows, like(np.zeros(shape), rows)], axis=1)
+        rows = _summable(part[u, ...])
+        padded = xp.concat([rows, _zeros(shape, rows)], axis=1)
         lines.append(xp.reshape(padded, (-1,)))
     return lines
 
@@ -265,7 +274,8 @@ def _adder(sample: Array) -> _Add:
 
     A stack calls it 600,000 times: on NumPy arrays it is one BLAS call, which takes a microsecond.
     """
-    axpy: Any = get_blas_funcs("axpy", dtype=np.dtype(np.float32 if is_single(sample) else np.float64))
+    # Of the data's own type: f2py would add to a copy of a total of another one.
+    axpy: Any = get_blas_funcs("axpy", dtype=sample.dtype) if is_numpy(sample) else None
 
     def add_numpy(total: Array, line: Array, first: int, weight: float) -> None:
         if first >= 0:
@@ -296,7 +306,7 @@ def _interleaved(picture: list[list[Array]], shape: tuple[int, int, int], tail: 
 
 
 def _check_memory(views: LightField, count: int, oversample: int) -> None:
-    itemsize = 8 if "64" in str(views.data.dtype) else 4
+    itemsize = to_numpy(_summable(views.data[:1, :1, :1, :1, ...])).itemsize
     picture = math.prod(views.data.shape[2:]) * oversample**2 * itemsize
     size = 1.2 * math.prod(views.data.shape[1:]) * itemsize + (3 * count + 3) * picture
     memory.require(
