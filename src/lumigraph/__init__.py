@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from lumigraph.calibration import calibrate, devignette
     from lumigraph.core.calibration import Calibration
     from lumigraph.core.cloud import PointCloud
+    from lumigraph.core.depth_map import DepthMap
     from lumigraph.core.field import Field
     from lumigraph.core.grid import Grid
     from lumigraph.core.lattice import Lattice
@@ -78,6 +79,7 @@ _HOMES = {
     "lumigraph.calibration": ("calibrate", "devignette"),
     "lumigraph.core.calibration": ("Calibration",),
     "lumigraph.core.cloud": ("PointCloud",),
+    "lumigraph.core.depth_map": ("DepthMap",),
     "lumigraph.core.field": ("Field",),
     "lumigraph.core.grid": ("Grid",),
     "lumigraph.core.lattice": ("Lattice",),
@@ -140,6 +142,7 @@ __all__ = [
     "CalibrationError",
     "CircularAperture",
     "Coherent",
+    "DepthMap",
     "Field",
     "FocusedPlenopticCamera",
     "FormatError",

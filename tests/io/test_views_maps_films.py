@@ -346,10 +346,7 @@ def test_films_are_written_not_read_and_mp4_needs_a_package(tmp_path, monkeypatc
 
 
 def test_a_depth_map_is_saved_by_its_values(tmp_path):
-    class Map:
-        values, quantity, unit = np.eye(3), "disparity", "px"
-
-    lg.save(Map(), tmp_path / "d.tiff")
+    lg.save(lg.DepthMap(np.eye(3), np.ones((3, 3)), "disparity"), tmp_path / "d.tiff")
     back = lg.open(tmp_path / "d.tiff")
     assert isinstance(back, RawImage)
     assert (back.data.tolist(), back.metadata) == (

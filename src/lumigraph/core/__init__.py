@@ -7,6 +7,7 @@
 - `calibration`: `Calibration`, the micro-images found on a raw image
 - `warp`: `Warp`, tilt and distortion of their lattice
 - `lightfield`: `LightField`, decoded radiance (v, u, t, s)
+- `depth_map`: `DepthMap`, a depth for each place, and how sure it is
 - `picture`: thumbnails and tables for notebooks
 - `volume`: `Volume`, reconstructed intensities (z, y, x)
 - `stack`: `Stack`, pictures in an order; `cloud`: `PointCloud`, points in space

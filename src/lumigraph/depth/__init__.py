@@ -1,6 +1,6 @@
 """Depth from a light field.
 
-- `result`: `DepthMap`, what every estimate returns: values of one quantity, and a confidence for each
+- `quantities`: disparities as refocus factors; every estimate returns a `core.depth_map.DepthMap`
 - `epi`: disparities from the slopes of the lines of epipolar-plane images
 - `from_focus`: refocus factors from the sharpness of a focal stack; `point_alpha` for a picture of one
   point, and `BiasCurve`, which corrects what diffraction does to either
@@ -12,12 +12,13 @@
 - `smooth`: surfaces through uncertain values that may be slanted, bent and torn
 """
 
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.depth.correlation import correlation
 from lumigraph.depth.epi import epi
 from lumigraph.depth.from_focus import BiasCurve, from_focus, point_alpha, sharpness
 from lumigraph.depth.fuse import fuse
 from lumigraph.depth.metric import cloud, metric, virtual_depth
-from lumigraph.depth.result import DepthMap, alpha_of, disparity_of
+from lumigraph.depth.quantities import alpha_of, disparity_of
 
 __all__ = [
     "BiasCurve",

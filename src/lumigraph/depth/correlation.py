@@ -9,8 +9,8 @@ from scipy.ndimage import gaussian_filter
 from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, like, to_numpy
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.raw import RawImage
-from lumigraph.depth.result import DepthMap
 from lumigraph.depth.smooth import Stiffness, update
 from lumigraph.depth.volume import Progress, cheapest, semi_global, silent
 from lumigraph.errors import CalibrationError, GeometryError

@@ -5,10 +5,10 @@ from scipy.ndimage import median_filter
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import like
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.depth.lines import refined
 from lumigraph.depth.pictures import Pictures
-from lumigraph.depth.result import DepthMap
 from lumigraph.depth.sweep import labels, span, swept
 from lumigraph.depth.volume import Progress, silent
 from lumigraph.errors import GeometryError

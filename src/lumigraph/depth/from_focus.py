@@ -11,8 +11,8 @@ from scipy.ndimage import gaussian_filter
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, like, to_numpy
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
-from lumigraph.depth.result import DepthMap
 from lumigraph.errors import CalibrationError, GeometryError
 from lumigraph.rendering import refocus_stack
 

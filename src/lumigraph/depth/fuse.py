@@ -8,7 +8,7 @@ from scipy.ndimage import distance_transform_edt
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, like, to_numpy
-from lumigraph.depth.result import DepthMap
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.depth.smooth import Stiffness, update
 from lumigraph.errors import GeometryError
 

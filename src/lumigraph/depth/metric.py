@@ -8,8 +8,9 @@ from lumigraph.core import checks
 from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.cloud import PointCloud
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
-from lumigraph.depth.result import DepthMap, alpha_of
+from lumigraph.depth.quantities import alpha_of
 from lumigraph.design import thin_lens
 from lumigraph.errors import CalibrationError, GeometryError
 from lumigraph.rendering import lenslet_indices

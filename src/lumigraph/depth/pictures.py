@@ -9,7 +9,7 @@ from scipy.ndimage import convolve
 from lumigraph.core import checks, memory
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.lightfield import LightField
-from lumigraph.depth.result import disparity_per_alpha
+from lumigraph.depth.quantities import disparity_per_alpha
 from lumigraph.errors import GeometryError
 
 MOST_VIEWS = 9

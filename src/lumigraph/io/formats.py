@@ -10,6 +10,7 @@ import numpy as np
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.cloud import PointCloud
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
@@ -285,8 +286,8 @@ def _stack(pages: list[RawImage]) -> Stack:
 def _picture(thing: Any, *, single: bool) -> RawImage:
     if isinstance(thing, RawImage):
         return thing
-    if hasattr(thing, "quantity") and hasattr(thing, "values"):  # a DepthMap, which stands on a higher floor
-        known = {"quantity": thing.quantity, "unit": getattr(thing, "unit", "")}
+    if isinstance(thing, DepthMap):
+        known = {"quantity": thing.quantity, "unit": thing.unit}
         return RawImage(to_numpy(thing.values).astype(np.float32), metadata=known)
     if not hasattr(thing, "shape"):
         raise FormatError(
