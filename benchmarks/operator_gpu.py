@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks import plenoptic_snapshots
 from benchmarks.two_f_snapshots import show as show
 from lumigraph.core import arrays
-from lumigraph.simulation.periodic import PeriodicOperator, periodic_operator
+from lumigraph.operators.periodic import PeriodicOperator, periodic_operator
 
 Row = dict[str, Any]
 REPEATS = 7

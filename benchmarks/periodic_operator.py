@@ -27,9 +27,9 @@ import lumigraph as lg
 from benchmarks import _point_sums, plenoptic_snapshots
 from lumigraph.core import memory
 from lumigraph.core.arrays import WORKERS
-from lumigraph.simulation import periodic_operator
-from lumigraph.simulation.blocks import build_bytes
-from lumigraph.simulation.optics import Optics
+from lumigraph.operators import periodic_operator
+from lumigraph.operators.blocks import build_bytes
+from lumigraph.operators.optics import Optics
 from lumigraph.units import mm, nm, um
 
 Row = dict[str, Any]

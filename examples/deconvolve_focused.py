@@ -7,7 +7,7 @@ import numpy as np
 
 import lumigraph as lg
 from lumigraph.deconvolution import Exposure, RichardsonLucy, TotalVariation
-from lumigraph.simulation import periodic_operator
+from lumigraph.operators import periodic_operator
 from lumigraph.units import mm, nm, um
 
 

@@ -10,7 +10,7 @@ from cameras import focused
 from lumigraph import calibrate
 from lumigraph.core.grid import Grid
 from lumigraph.core.warp import Warp
-from lumigraph.simulation import periodic_operator
+from lumigraph.operators import periodic_operator
 from lumigraph.units import um
 
 COUNTS = {"square": (21, 21), "hex": (24, 21)}

@@ -6,7 +6,7 @@ import pytest
 import cameras
 from lumigraph.deconvolution import ForwardModel
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.simulation import Slices
+from lumigraph.operators import Slices
 from lumigraph.units import mm, um
 
 

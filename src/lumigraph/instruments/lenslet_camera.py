@@ -15,9 +15,10 @@ from lumigraph.errors import GeometryError
 from lumigraph.instruments import grids
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.parts import Lenslets
+from lumigraph.operators import Mixed, PeriodicOperator, periodic_operator
+from lumigraph.operators.blocks import Progress
 from lumigraph.propagation import Propagate
-from lumigraph.simulation import Mixed, PeriodicOperator, Spectrum, periodic_operator
-from lumigraph.simulation.blocks import Progress
+from lumigraph.simulation import Spectrum
 
 
 class LensletCamera(Camera):

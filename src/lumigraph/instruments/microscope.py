@@ -20,11 +20,11 @@ from lumigraph.instruments import describe, describe_microscope
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.parts import Lenslets, Part, Pixels, check_pixels
 from lumigraph.instruments.quantities import Aberrations, Displacement, Fraction, Length, Positive, Wavelength
+from lumigraph.operators.fourier_microscope import FourierMicroscopeOperator, Mosaic, fourier_operator
+from lumigraph.operators.microscope_kernels import DROPPED, CellSampling, Lenslet
+from lumigraph.operators.microscope_operator import Layout, MicroscopeOperator, Progress, microscope_operator
+from lumigraph.operators.microscope_pixels import PixelPlacement, narrowed
 from lumigraph.sensor import Sensor
-from lumigraph.simulation.fourier_microscope import FourierMicroscopeOperator, Mosaic, fourier_operator
-from lumigraph.simulation.microscope_kernels import DROPPED, CellSampling, Lenslet
-from lumigraph.simulation.microscope_operator import Layout, MicroscopeOperator, Progress, microscope_operator
-from lumigraph.simulation.microscope_pixels import PixelPlacement, narrowed
 from lumigraph.simulation.microscope_scene import SAMPLES, point_image
 
 FINENESS = 1.7

@@ -12,8 +12,8 @@ from lumigraph.elements import Train
 from lumigraph.errors import FormatError
 from lumigraph.instruments import describe, grids
 from lumigraph.instruments.camera import Camera
+from lumigraph.operators import SingleLensOperator, Slices, single_lens_operator
 from lumigraph.propagation import Propagate
-from lumigraph.simulation import SingleLensOperator, Slices, single_lens_operator
 
 
 class SingleLensCamera(Camera):

@@ -16,17 +16,17 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.elements import CircularAperture, Train
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
+from lumigraph.operators import single_lens
+from lumigraph.operators.blocks import build_bytes
+from lumigraph.operators.camera import Camera
+from lumigraph.operators.cells import fits
+from lumigraph.operators.optics import Optics
+from lumigraph.operators.periodic import periodic_operator
 from lumigraph.propagation import Propagate, propagate
 from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
 from lumigraph.sensor import integrate
-from lumigraph.simulation import single_lens
-from lumigraph.simulation.blocks import build_bytes
-from lumigraph.simulation.camera import Camera
-from lumigraph.simulation.cells import fits
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Plane, Snapshots, TiltedWaves
 from lumigraph.simulation.microscope_scene import Microscope, microscope_image
-from lumigraph.simulation.optics import Optics
-from lumigraph.simulation.periodic import periodic_operator
 from lumigraph.simulation.spectrum import Spectrum, by_wavelength
 
 PUPIL_OVERSAMPLING = 1.1

@@ -14,11 +14,11 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.raw import RawImage
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError
+from lumigraph.operators.microscope_kernels import DROPPED, Lenslet, point_cells, require_window
+from lumigraph.operators.microscope_operator import Layout, MicroscopeOperator
 from lumigraph.scene import Diffuser, Points, Scene, Slice
 from lumigraph.sensor import Sensor
 from lumigraph.simulation.coherence import Incoherent
-from lumigraph.simulation.microscope_kernels import DROPPED, Lenslet, point_cells, require_window
-from lumigraph.simulation.microscope_operator import Layout, MicroscopeOperator
 
 SAMPLES = 5
 """Samples along a lenslet of a scene's slice, at least: those of the microscope's ``object_grid``."""

@@ -12,10 +12,10 @@ from lumigraph.deconvolution import Exposure, RichardsonLucy, deconvolve
 from lumigraph.design.plenoptic2 import rendered_cutoff
 from lumigraph.experiments.registry import Context, Outcome, Row, experiment
 from lumigraph.instruments import FocusedPlenopticCamera
+from lumigraph.operators.periodic import periodic_operator
 from lumigraph.plots.curves import curves, images
 from lumigraph.rendering import render
 from lumigraph.rendering.focused import rendered_grid
-from lumigraph.simulation.periodic import periodic_operator
 
 PARTS = (0.1, 0.3, 0.42, 0.6, 0.75, 0.9, 1.1)
 """Frequencies over the main lens's cut-off; the rendered picture ends at 0.5 where m = 0.5."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lumigraph.core.arrays import to_numpy
-from lumigraph.simulation.glare import glare
+from lumigraph.operators.glare import glare
 
 SIZE = (2.0, 1.5)
 REACH = (1, 2)

@@ -7,7 +7,7 @@ import pytest
 
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
-from lumigraph.simulation.turning import Chain, Crop, Turn, turn_margin
+from lumigraph.operators.turning import Chain, Crop, Turn, turn_margin
 
 GRID = Grid((70, 83), (1.0, 1.2), (3.0, -2.0))
 

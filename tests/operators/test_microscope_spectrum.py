@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from lumigraph.elements.objective import Objective
-from lumigraph.simulation import microscope_spectrum as module
-from lumigraph.simulation.microscope_kernels import CellSampling, Lenslet
-from lumigraph.simulation.microscope_operator import Layout, _suits_frequencies, microscope_operator
+from lumigraph.operators import microscope_spectrum as module
+from lumigraph.operators.microscope_kernels import CellSampling, Lenslet
+from lumigraph.operators.microscope_operator import Layout, _suits_frequencies, microscope_operator
 
 SCOPE = Objective(525e-9, 0.5)
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)

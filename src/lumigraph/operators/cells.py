@@ -13,7 +13,7 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.elements import CircularAperture, LensletArray, ThinLens, Train, ZernikePlate, noll_to_nm
 from lumigraph.elements.train import Element
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.simulation.camera import Camera
+from lumigraph.operators.camera import Camera
 
 OVERSAMPLING = 1.5
 """How much closer than λL/(2D) the points of a cell stand, so that a short kernel interpolates them."""

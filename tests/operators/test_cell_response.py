@@ -10,8 +10,8 @@ from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.elements import LensletArray
+from lumigraph.operators.cell_response import INFINITE, Axis, Lenslets, legendre, nodes
 from lumigraph.propagation import propagate
-from lumigraph.simulation.cell_response import INFINITE, Axis, Lenslets, legendre, nodes
 from lumigraph.units import mm, nm, um
 
 WAVELENGTH, DISTANCE, PITCH = 633 * nm, 4 * mm, 100 * um

@@ -8,7 +8,7 @@ import numpy as np
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
-from lumigraph.simulation.band import HALF_WIDTH, integral, kernel
+from lumigraph.operators.band import HALF_WIDTH, integral, kernel
 
 _ROWS = 64
 """Of a block."""

@@ -33,12 +33,12 @@ from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
 from lumigraph.elements import ThinLens
 from lumigraph.errors import SamplingError, SamplingWarning
+from lumigraph.operators import band
+from lumigraph.operators.band import Span
+from lumigraph.operators.camera import Camera
 from lumigraph.propagation import propagate
 from lumigraph.propagation.window import smooth_size
 from lumigraph.scene import Points, Slice, sources
-from lumigraph.simulation import band
-from lumigraph.simulation.band import Span
-from lumigraph.simulation.camera import Camera
 
 COARSEST_PUPIL = 512
 """Samples across the pupil, at least."""

@@ -11,8 +11,8 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.elements import RectangularAperture, Train
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.instruments import SingleLensCamera
-from lumigraph.simulation import cells
-from lumigraph.simulation.cells import Cells, Fineness
+from lumigraph.operators import cells
+from lumigraph.operators.cells import Cells, Fineness
 from lumigraph.units import mm, nm, um
 
 focused = partial(cameras.focused, count=(5, 4))

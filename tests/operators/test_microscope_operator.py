@@ -8,10 +8,10 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.deconvolution import ForwardModel
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import FormatError, GeometryError, SamplingError
-from lumigraph.simulation import microscope_operator as module
-from lumigraph.simulation.microscope_kernels import CellSampling, Lenslet, octant, slice_kernel
-from lumigraph.simulation.microscope_operator import Layout, microscope_operator
-from lumigraph.simulation.microscope_pixels import PixelPlacement
+from lumigraph.operators import microscope_operator as module
+from lumigraph.operators.microscope_kernels import CellSampling, Lenslet, octant, slice_kernel
+from lumigraph.operators.microscope_operator import Layout, microscope_operator
+from lumigraph.operators.microscope_pixels import PixelPlacement
 
 SCOPE = Objective(525e-9, 0.5)
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)

@@ -25,10 +25,10 @@ from lumigraph.core import memory
 from lumigraph.core.arrays import WORKERS
 from lumigraph.core.threads import each
 from lumigraph.elements import LensletArray
-from lumigraph.simulation import cells as _cells
-from lumigraph.simulation.cell_response import INFINITE, Lenslets, Limits
-from lumigraph.simulation.optics import Optics
-from lumigraph.simulation.point_images import Apart, Few, Lit, factors, few, lit, mirrored, wave
+from lumigraph.operators import cells as _cells
+from lumigraph.operators.cell_response import INFINITE, Lenslets, Limits
+from lumigraph.operators.optics import Optics
+from lumigraph.operators.point_images import Apart, Few, Lit, factors, few, lit, mirrored, wave
 
 Progress = Callable[[float], None]
 

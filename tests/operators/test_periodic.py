@@ -10,16 +10,9 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError
 from lumigraph.instruments import PlenopticCamera
+from lumigraph.operators import band, cells, periodic_operator
 from lumigraph.scene import Scene, Slice, targets
-from lumigraph.simulation import (
-    Incoherent,
-    Snapshots,
-    band,
-    cells,
-    imaging,
-    periodic_operator,
-    simulate,
-)
+from lumigraph.simulation import Incoherent, Snapshots, imaging, simulate
 from lumigraph.units import mm, nm, um
 
 focused = partial(cameras.focused, count=(9, 9))

@@ -5,7 +5,7 @@ import pytest
 
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
-from lumigraph.simulation.resampling import Banded, averaged, banded, represented
+from lumigraph.operators.resampling import Banded, averaged, banded, represented
 
 
 def dense(matrix: Banded) -> np.ndarray:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from lumigraph.elements import LensletArray
-from lumigraph.simulation import cells as _cells
-from lumigraph.simulation.camera import Camera
-from lumigraph.simulation.cell_response import SLACK, Axis
-from lumigraph.simulation.cells import Cells, Fineness
+from lumigraph.operators import cells as _cells
+from lumigraph.operators.camera import Camera
+from lumigraph.operators.cell_response import SLACK, Axis
+from lumigraph.operators.cells import Cells, Fineness
 
 VERSION = 4
 """Of what is kept on disk: to be raised with every change of the numbers."""

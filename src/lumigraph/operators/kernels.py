@@ -11,9 +11,9 @@ import numpy as np
 from lumigraph.core import memory, store
 from lumigraph.core.cache import ByteCache
 from lumigraph.errors import SamplingError
-from lumigraph.simulation.blocks import Part, Progress, build, build_bytes
-from lumigraph.simulation.glare import Glare, glare
-from lumigraph.simulation.optics import Optics
+from lumigraph.operators.blocks import Part, Progress, build, build_bytes
+from lumigraph.operators.glare import Glare, glare
+from lumigraph.operators.optics import Optics
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lumigraph.elements.objective import Objective
-from lumigraph.simulation.microscope_kernels import CellSampling, Lenslet, slice_kernel
-from lumigraph.simulation.microscope_operator import Layout, microscope_operator
+from lumigraph.operators.microscope_kernels import CellSampling, Lenslet, slice_kernel
+from lumigraph.operators.microscope_operator import Layout, microscope_operator
 
 RAYS = Objective(500e-9, 1.2, 1.35, "rays")
 LENSLET = Lenslet(104e-6, 2.4375e-3, 2.4375e-3, 60.0, 104e-6)

@@ -14,10 +14,10 @@ from scipy.special import j0
 from lumigraph.core.grid import Grid
 from lumigraph.elements import ThinLens, Train
 from lumigraph.errors import SamplingWarning
+from lumigraph.operators import cells as _cells
+from lumigraph.operators.camera import Camera
+from lumigraph.operators.cell_response import STEP, Axis, Response, legendre
 from lumigraph.scene import sources
-from lumigraph.simulation import cells as _cells
-from lumigraph.simulation.camera import Camera
-from lumigraph.simulation.cell_response import STEP, Axis, Response, legendre
 
 PUPIL = 1024
 """Samples across the main lens, or more where its light is followed far."""

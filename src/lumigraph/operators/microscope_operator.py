@@ -20,8 +20,8 @@ from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import FormatError, GeometryError, SamplingError
-from lumigraph.simulation import microscope_spectrum
-from lumigraph.simulation.microscope_kernels import (
+from lumigraph.operators import microscope_spectrum
+from lumigraph.operators.microscope_kernels import (
     DROPPED,
     CellSampling,
     Lenslet,
@@ -31,7 +31,7 @@ from lumigraph.simulation.microscope_kernels import (
     require_window,
     slice_kernel,
 )
-from lumigraph.simulation.microscope_pixels import PixelPlacement
+from lumigraph.operators.microscope_pixels import PixelPlacement
 
 GATHERED = 2**27
 """Numbers that are gathered for one product."""

@@ -23,7 +23,7 @@ import scipy.fft
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 from lumigraph.core.threads import single_products
-from lumigraph.simulation.microscope_kernels import SliceKernel
+from lumigraph.operators.microscope_kernels import SliceKernel
 
 TILE = 40
 """Lenslets along each side of a tile, at most."""

@@ -8,7 +8,7 @@ import pytest
 from lumigraph.core.arrays import namespace, to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
-from lumigraph.simulation.slices import Slices
+from lumigraph.operators.slices import Slices
 
 GRID = Grid((3, 4), 1.0)
 

@@ -27,14 +27,14 @@ from lumigraph.core import arrays, checks, memory, picture
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.operators.blocks import Part, Progress
+from lumigraph.operators.camera import Camera
+from lumigraph.operators.cells import Cells
+from lumigraph.operators.kernels import Matrix, matrix
+from lumigraph.operators.optics import Optics
+from lumigraph.operators.resampling import averaged, represented
+from lumigraph.operators.turning import Chain, Crop, Linear, Turn, turn_margin
 from lumigraph.sensor import Sensor
-from lumigraph.simulation.blocks import Part, Progress
-from lumigraph.simulation.camera import Camera
-from lumigraph.simulation.cells import Cells
-from lumigraph.simulation.kernels import Matrix, matrix
-from lumigraph.simulation.optics import Optics
-from lumigraph.simulation.resampling import averaged, represented
-from lumigraph.simulation.turning import Chain, Crop, Linear, Turn, turn_margin
 
 PIECE = 600
 """Cells of the image that are computed at a time."""

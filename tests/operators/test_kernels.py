@@ -9,10 +9,10 @@ import pytest
 import cameras
 from lumigraph.core import store
 from lumigraph.instruments import PlenopticCamera
-from lumigraph.simulation import blocks, kernels, point_images
-from lumigraph.simulation.cells import Fineness
-from lumigraph.simulation.kernels import matrix
-from lumigraph.simulation.optics import Optics
+from lumigraph.operators import blocks, kernels, point_images
+from lumigraph.operators.cells import Fineness
+from lumigraph.operators.kernels import matrix
+from lumigraph.operators.optics import Optics
 from lumigraph.units import mm, nm, um
 
 focused = partial(cameras.focused, pixel_pitch=9 * um, pitch=80 * um)

@@ -12,8 +12,9 @@ from lumigraph.deconvolution.forward import ForwardModel
 from lumigraph.elements import CircularAperture, ZernikePlate
 from lumigraph.errors import SamplingError
 from lumigraph.instruments import FocusedPlenopticCamera, SingleLensCamera
+from lumigraph.operators import band, single_lens, single_lens_operator
 from lumigraph.scene import Scene, Slice, targets
-from lumigraph.simulation import Snapshots, band, simulate, single_lens, single_lens_operator
+from lumigraph.simulation import Snapshots, simulate
 from lumigraph.units import mm, nm, um
 
 TWO_F = SingleLensCamera(

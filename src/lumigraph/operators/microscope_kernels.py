@@ -16,7 +16,7 @@ from lumigraph.core import arrays, memory
 from lumigraph.core.threads import single_products
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import SamplingError
-from lumigraph.simulation.microscope_rays import ray_images
+from lumigraph.operators.microscope_rays import ray_images
 
 MARGIN = 1.15
 """Samples of a lenslet, over what its light asks for."""

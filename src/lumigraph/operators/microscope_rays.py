@@ -15,7 +15,7 @@ import numpy as np
 from lumigraph.elements.objective import Objective
 
 if TYPE_CHECKING:
-    from lumigraph.simulation.microscope_kernels import CellSampling, Lenslet
+    from lumigraph.operators.microscope_kernels import CellSampling, Lenslet
 
 PER_PIXEL = 4
 """Rays along each side of a pixel."""

@@ -1,0 +1,31 @@
+"""Linear image formers: from objects to raw images, and back.
+
+- `periodic`: `periodic_operator`, incoherent planes before a lenslet array, and its adjoint
+- `kernels`: its matrices; `optics`, what they depend on; `blocks`, how they are made, in factors; `cells`,
+  what they are matrices between; `point_images`, where they come from; `cell_response`, what lenslets do to
+  light; `glare`, what falls far from a point's image
+- `resampling`, `turning`: from an object's samples to points and from the image's samples to pixels
+- `slices`: `Slices`, operators of several depths as one; `mixed`: `Mixed`, of several wavelengths
+- `single_lens`: `single_lens_operator`, incoherent planes and points before a camera without lenslets
+- `microscope_operator`: volumes before a light-field microscope; `microscope_kernels`, images of a cell's
+  points; `microscope_rays`, the same by rays; `microscope_spectrum`, the lenslets' frequencies;
+  `microscope_pixels`, real pixels; `fourier_microscope`
+- `band`: band-limited samples along an axis, to and from points and pixels
+- `camera`: `Camera`, what an operator asks of an instrument
+"""
+
+from lumigraph.operators.camera import Camera
+from lumigraph.operators.mixed import Mixed
+from lumigraph.operators.periodic import PeriodicOperator, periodic_operator
+from lumigraph.operators.single_lens import SingleLensOperator, single_lens_operator
+from lumigraph.operators.slices import Slices
+
+__all__ = [
+    "Camera",
+    "Mixed",
+    "PeriodicOperator",
+    "SingleLensOperator",
+    "Slices",
+    "periodic_operator",
+    "single_lens_operator",
+]
