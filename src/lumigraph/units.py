@@ -19,9 +19,11 @@ nm = 1e-9
 rad = 1.0
 mrad = 1e-3
 deg = math.pi / 180
+s = 1.0
+ms = 1e-3
 
-_SI_UNIT = {"length": "m", "angle": "rad"}
-_EXAMPLE = {"length": "150 um", "angle": "2 deg"}
+_SI_UNIT = {"length": "m", "angle": "rad", "time": "s"}
+_EXAMPLE = {"length": "150 um", "angle": "2 deg", "time": "10 ms"}
 # A number, then one unit name. Expressions are refused: "9**9**9 m" would keep the parser busy for ever.
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d_]*|°)\s*")
 
@@ -42,7 +44,7 @@ def parse(text: str | float, dimension: str = "length") -> float:
         A number and a unit, such as ``"150 um"`` or ``"2.5 mrad"``. A bare number is refused, because
         it does not say whether it means metres or millimetres; zero needs no unit.
     dimension
-        ``"length"`` [m] or ``"angle"`` [rad].
+        ``"length"`` [m], ``"angle"`` [rad] or ``"time"`` [s].
 
     Raises
     ------

@@ -181,6 +181,27 @@ def test_an_exposed_sensor_tells_its_noise():
     assert exposure.background == 2.0
 
 
+def test_a_black_level_has_no_noise_of_its_own(rng):
+    """In a dim picture on 100 counts; counted as light they would leave a deviance of .3."""
+    sensor = lg.Sensor(
+        (30, 30),
+        5e-6,
+        full_well=8000,
+        read_noise=6,
+        bits=12,
+        black_level=100,
+        dark_current=40,
+        exposure_time=1,
+    )
+    operator, scene = blurred((30, 30), 1.0), disc((30, 30), 60, 30)
+    raw, steps = sensor.expose(operator.forward(scene), reference=1.0, fill=2 / 8000, rng=rng), []
+    exposure = Exposure.of(raw)
+    assert exposure.background == pytest.approx(100 + 40 / sensor.gain)
+    method = RichardsonLucy(start=scene * 2 / sensor.gain)
+    lg.deconvolve(raw, operator, 1, method=method, exposure=exposure, progress=steps.append)
+    assert steps[0].deviance == pytest.approx(1, abs=0.15)  # 3 standard deviations of 900 pixels
+
+
 ONES = Matrix(np.ones((6, 4)), (2, 3), (2, 2))
 
 
@@ -209,6 +230,7 @@ ONES = Matrix(np.ones((6, 4)), (2, 3), (2, 2))
         (lambda: Exposure(weights=np.full((2, 2), 2.0)), "weights goes from 2 to 2 but must be from 0 to 1"),
         (lambda: Exposure(gain=0), "gain is 0"),
         (lambda: Exposure(read_noise=1), "needs the gain"),
+        (lambda: Exposure(2.0, black_level=3.0), "black_level is 3 but must lie between 0 and"),
         (lambda: lg.deconvolve(np.ones((2, 3)), object()), "operator is of type object but must have shape"),
         (lambda: lg.deconvolve(np.ones((2, 3)), ONES, method="rl"), "method is of type str but must"),
         (lambda: lg.deconvolve(np.ones((2, 3)), ONES, exposure=3), "exposure is of type int"),

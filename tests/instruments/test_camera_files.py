@@ -149,6 +149,11 @@ CHANGES = [  # what to replace in EXAMPLE, by what, which error, in which words
     ("[sensor]", "[sensor]\nbits = 40", G, r"sensor\.bits: 40 is not a whole number from 1 to 16"),
     ("[sensor]", "[sensor]\nfull_well = 0", G, r"sensor\.full_well: 0 is not above zero"),
     ("[sensor]", "[sensor]\nread_noise = -1", G, r"sensor\.read_noise: -1 is below zero"),
+    ("[sensor]", "[sensor]\nquantum_efficiency = 2", G, r"efficiency: 2 is not above 0 and at most 1"),
+    ("[sensor]", "[sensor]\nexposure_time = 0.01", F, r"exposure_time: 0\.01 has no unit\. .* '10 ms'"),
+    ("[sensor]", '[sensor]\nexposure_time = "10 mm"', F, r"exposure_time: '10 mm' is not a time"),
+    ("[sensor]", "[sensor]\nblack_level = 5000", G, r"sensor: black_level is 5000 but the highest"),
+    ("[sensor]", "[sensor]\npattern_seed = -1", G, r"pattern_seed: -1 is not a whole number of at least 0"),
     ("[sensor]", "[sensor]\nshape = [40000, 40000]", G, r"sensor\.shape: 40000 x 40000 = 1\.6e\+09 pixels"),
     ("[main_lens]", "[main_lens]\naberrations = 3", F, r"main_lens\.aberrations: 3 is not a table"),
     ("[main_lens]", "[main_lens]\naberrations = {x = 1}", F, r"aberrations: 'x' is not a Noll index"),
@@ -291,7 +296,13 @@ def test_any_camera_survives_a_round_trip_through_toml(tmp_path_factory, pitch, 
             "fill_factor": fill,
             "offset": (pitch / 9, -pitch / 9),
         },
-        sensor={"pixel_pitch": pitch / 7.3, "bits": 8, "full_well": 1234.5},
+        sensor={
+            "pixel_pitch": pitch / 7.3,
+            "bits": 8,
+            "full_well": 1234.5,
+            "black_level": 8.0,
+            "exposure_time": 0.0125,
+        },
     )
     path = tmp_path_factory.mktemp("round") / "camera.toml"
     path.write_text(camera.to_toml(), encoding="utf-8")

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,52 @@ def test_noise_follows_the_photon_transfer_curve(rng, level):
     # 60,000 pixels: the mean to 5σ/245, the variance to 5 sqrt(2/60000) = 3 %.
     assert electrons.mean() == pytest.approx(expected, abs=5 * math.sqrt(variance / 60000))
     assert electrons.var() == pytest.approx(variance, rel=0.03)
+
+
+def test_a_black_level_keeps_the_noise_of_dark_pixels(rng):
+    """Mean and variance in the dark as the model says; clipped at 0 they are .8 and 1.5, not 0 and 4.3."""
+    sensor = replace(SENSOR, bits=12, full_well=10000, read_noise=5.0)
+    expected = (5.0 / sensor.gain) ** 2 + 1 / 12
+    clipped = sensor.expose(np.zeros(sensor.shape), rng=rng).data
+    assert (clipped.mean(), clipped.var()) == (pytest.approx(0.8, abs=0.02), pytest.approx(1.47, abs=0.05))
+    dark = replace(sensor, black_level=64).expose(np.zeros(sensor.shape), rng=rng).data
+    assert dark.mean() == pytest.approx(64, abs=5 * math.sqrt(expected / dark.size))
+    assert dark.var() == pytest.approx((5.0 / (10000 / (4095 - 64))) ** 2 + 1 / 12, rel=0.03)
+
+
+def test_photons_become_electrons_by_the_quantum_efficiency_and_dark_current_adds(rng):
+    sensor = replace(SENSOR, quantum_efficiency=0.6, dark_current=200.0, exposure_time=0.5, black_level=32)
+    raw = sensor.expose(np.full(sensor.shape, 2.0), photons=2500, rng=rng)
+    electrons = (raw.data - 32.0) * sensor.gain
+    variance = 0.6 * 5000 + 100 + 12.0**2 + sensor.gain**2 / 12
+    assert electrons.mean() == pytest.approx(0.6 * 5000 + 100, abs=5 * math.sqrt(variance / 60000))
+    assert electrons.var() == pytest.approx(variance, rel=0.03)
+    known = {
+        name: raw.metadata[name] for name in ("photons_per_intensity", "dark_signal", "black_level", "gain")
+    }
+    expected = {"photons_per_intensity": 2500, "dark_signal": 100, "black_level": 32, "gain": sensor.gain}
+    assert known == pytest.approx(expected)
+
+
+def test_fixed_patterns_stay_from_exposure_to_exposure_and_differ_between_sensors(rng):
+    """The covariance of two exposures: (PRNU mean)² + DSNU², PRNU alone of it in proportion to light."""
+    sensor = replace(SENSOR, prnu=0.02, dsnu=30.0, black_level=200)
+    for light in (0.0, 0.5):
+        pair = [
+            sensor.expose(np.full(sensor.shape, light), reference=1, fill=1, rng=rng).data for _ in range(2)
+        ]
+        found = np.cov(*(each.ravel() * sensor.gain for each in pair))[0, 1]
+        assert found == pytest.approx((0.02 * light * 20000) ** 2 + 30.0**2, rel=0.05)
+    other = replace(sensor, pattern_seed=1).expose(np.full(sensor.shape, 0.5), reference=1, fill=1).data
+    own = sensor.expose(np.full(sensor.shape, 0.5), reference=1, fill=1).data
+    assert abs(np.corrcoef(own.ravel(), other.ravel())[0, 1]) < 0.02
+
+
+def test_what_is_left_out_changes_no_exposure():
+    """The numbers of a sensor without the newer fields, as they were before those came."""
+    light = np.array([[0.0, 0.25, 0.5], [0.75, 1.0, 0.1]])
+    raw = Sensor((2, 3), 5e-6).expose(light, rng=np.random.default_rng(3))
+    assert raw.data.tolist() == [[0, 888, 1868], [2710, 3681, 376]]
 
 
 def test_without_random_numbers_an_exposure_is_rounded_only():
@@ -83,6 +130,11 @@ def test_light_that_cannot_be_is_refused(light, error, message):
         ({"pixel_pitch": -1e-6}, "pixel_pitch is -1e-06 m but must be above 0 m"),
         ({"full_well": 0}, "full_well is 0 electrons but must be above 0 electrons"),
         ({"read_noise": -1}, "read_noise is -1 electrons but must be at least 0"),
+        ({"quantum_efficiency": 1.2}, "quantum_efficiency is 1.2 but must be above 0 and at most 1"),
+        ({"dark_current": -1}, "dark_current is -1 electrons per second but must be at least 0"),
+        ({"exposure_time": math.nan}, "exposure_time is nan but must be a finite number"),
+        ({"black_level": 255, "bits": 8}, "black_level is 255 but the highest number of 8 bits is 255"),
+        ({"pattern_seed": -1}, "pattern_seed is -1 but must be a whole number of at least 0"),
         ({"bits": 17}, "bits is 17 but must be a whole number from 1 to 16"),
         ({"bits": 8.0}, "bits is 8.0 but must be a whole number"),
     ],
@@ -97,6 +149,8 @@ def test_exposures_need_a_reference_and_a_fill_above_zero():
         SENSOR.expose(np.ones(SENSOR.shape), reference=0.0)
     with pytest.raises(GeometryError, match="fill is -1 but must be above 0"):
         SENSOR.expose(np.ones(SENSOR.shape), fill=-1.0)
+    with pytest.raises(GeometryError, match="photons 100 and reference 2 both set the scale"):
+        SENSOR.expose(np.ones(SENSOR.shape), photons=100, reference=2)
 
 
 @pytest.mark.parametrize("pattern", ["RGGB", "GRBG", "GBRG", "BGGR"])

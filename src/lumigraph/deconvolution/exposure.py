@@ -15,7 +15,7 @@ from lumigraph.errors import CalibrationError
 class Exposure:
     r"""How a raw image r follows from the light A o on the pixels.
 
-    .. math:: g\,r \sim \mathrm{Poisson}(g\,(v \cdot A o + b)) + \mathcal N(0, \sigma^2)
+    .. math:: g\,(r - r_0) \sim \mathrm{Poisson}(g\,(v \cdot A o + b - r_0)) + \mathcal N(0, \sigma^2)
 
     Nothing is subtracted from a raw image or divided out of it, which would spoil the noise's statistics:
     a dark image is given as `background`, a white image's vignetting as `response`.
@@ -33,6 +33,8 @@ class Exposure:
         g: photo-electrons per unit of the raw image's values; known, it gives `Stop.deviance` its scale.
     read_noise
         σ, standard deviation of the reading [electrons]; needs the gain.
+    black_level
+        The part of the background that is no light and has no noise of its own, in the raw image's values.
 
     Raises
     ------
@@ -45,6 +47,7 @@ class Exposure:
     weights: Array | None = None
     gain: float | None = None
     read_noise: float = 0.0
+    black_level: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("background", "response", "weights"):
@@ -59,23 +62,33 @@ class Exposure:
                 "Give gain=, the electrons per unit of the raw image's values."
             )
 
+        level = checks.finite("black_level", self.black_level, "1", CalibrationError)
+        dark = float(np.mean(to_numpy(self.background))) if level else 0.0
+        if not 0 <= level <= dark * (1 + 1e-9):
+            raise CalibrationError(
+                f"black_level is {level:g} but must lie between 0 and the background, {dark:g} in the mean. "
+                "The background counts all that a dark pixel reads."
+            )
+
     @classmethod
     def of(cls, raw: RawImage, **known: Any) -> "Exposure":
-        """Gain and read noise as a raw image of `Sensor.expose` tells them, and what else is `known`."""
-        full_well, noise = (raw.metadata.get(name) for name in ("full_well", "read_noise"))
+        """Gain, noise and dark signal that a raw image of `Sensor.expose` records, and what is `known`."""
         found: dict[str, Any] = {}
-        if full_well is not None and raw.bit_depth is not None:
-            found["gain"] = float(full_well) / (2**raw.bit_depth - 1)
-            found["read_noise"] = float(noise or 0.0)
+        if "full_well" in raw.metadata and raw.bit_depth is not None:
+            told = {name: float(raw.metadata.get(name, 0.0)) for name in ("read_noise", "black_level")}
+            highest = 2**raw.bit_depth - 1 - told["black_level"]
+            gain = float(raw.metadata["full_well"]) / highest
+            dark = float(raw.metadata.get("dark_signal", 0.0)) / gain
+            found = {**told, "gain": gain, "background": told["black_level"] + dark}
         return cls(**{**found, **known})
 
     @property
     def offset(self) -> float:
-        """σ²/g, which shifts both data and model so that their sum of noises stays Poisson's.
+        """σ²/g less the black level: it shifts both data and model so that their noises sum to Poisson's.
 
         D. L. Snyder, A. M. Hammoud & R. L. White, J. Opt. Soc. Am. A 10, 1014 (1993).
         """
-        return 0.0 if self.gain is None else self.read_noise**2 / self.gain
+        return -self.black_level + (0.0 if self.gain is None else self.read_noise**2 / self.gain)
 
 
 def _check_plane(name: str, value: Any, most: float | None) -> None:

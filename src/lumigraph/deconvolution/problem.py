@@ -29,7 +29,7 @@ class Scale:
     response, weights
         v and w of `Exposure` (ny, nx), or None for 1.
     background
-        b + σ²/g: a number or (ny, nx).
+        b + σ²/g, less the black level: a number or (ny, nx), at least 0.
     sensitivity
         Aᵀ(v w): light on the pixels of each object sample, per intensity.
     seen
@@ -64,6 +64,8 @@ class Scale:
             raise GeometryError("no light of the object reaches a pixel that counts. Check grid and weights.")
         seen = sensitivity > UNSEEN * highest
         total = background + exposure.offset
+        if getattr(total, "shape", ()):  # a dark image's noise may reach below the black level
+            total = xp.where(total > 0, total, xp.zeros_like(total))
         return cls(operator, response, weights, total, sensitivity, seen, exposure.gain or 1.0)
 
     @property
@@ -95,7 +97,7 @@ class Problem:
     scale
         What the frames of a series share.
     data
-        r + σ²/g (ny, nx), at least 0.
+        r + σ²/g, less the black level (ny, nx), at least 0.
     floor
         Least value of a model.
     """

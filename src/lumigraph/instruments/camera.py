@@ -14,7 +14,7 @@ from lumigraph.elements import ThinLens, Train, ZernikePlate
 from lumigraph.errors import GeometryError
 from lumigraph.instruments.grids import Sampling
 from lumigraph.instruments.instrument import Instrument
-from lumigraph.instruments.parts import MainLens, Pixels, check_pixels
+from lumigraph.instruments.parts import MainLens, Pixels
 from lumigraph.instruments.quantities import Length, Wavelength
 from lumigraph.propagation import Propagate
 from lumigraph.sensor import Sensor
@@ -71,10 +71,7 @@ class Camera(Instrument):
     @property
     def sensor(self) -> Sensor:
         """The pixels; without a shape given, as many as all micro-images need."""
-        shape = self.pixels.shape or self._covering_shape()
-        check_pixels(shape)
-        given = self.pixels
-        return Sensor(shape, given.pixel_pitch, given.full_well, given.read_noise, given.bits)
+        return self.pixels.sensor(self.pixels.shape or self._covering_shape())
 
     def _covering_shape(self) -> tuple[int, int]:
         raise NotImplementedError

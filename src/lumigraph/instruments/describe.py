@@ -9,6 +9,7 @@ from lumigraph.design import plenoptic1 as design1
 from lumigraph.design import plenoptic2 as design2
 from lumigraph.design import resolution
 from lumigraph.errors import SamplingError
+from lumigraph.sensor import Sensor
 
 if TYPE_CHECKING:
     from lumigraph.instruments.camera import Camera
@@ -227,9 +228,34 @@ def _sensor(camera: "Camera") -> Iterator[Row]:
     yield Row("pixels", tuple(sensor.shape), "", given)
     yield Row("pixel pitch", sensor.pixel_pitch, "m", "given")
     yield Row("sensor size", tuple(n * sensor.pixel_pitch for n in sensor.shape), "m", "height x width")
+    yield from readout(sensor)
     yield Row(
         "field of view", tuple(2 * half for half in camera.sampling.object_half), "m", "in the focused plane"
     )
+
+
+def readout(sensor: Sensor) -> Iterator[Row]:
+    """What the sensor makes of photons, by EMVA 1288's model."""
+    noise = 3 * sensor.dark_noise / sensor.gain
+    yield Row("full well", sensor.full_well, "electrons", "given")
+    yield Row("gain", sensor.gain, "electrons per count", "full well / (highest count - black level)")
+    yield Row("read noise", sensor.read_noise, "electrons", "given")
+    yield Row(
+        "dynamic range",
+        sensor.full_well / math.hypot(sensor.dark_noise, sensor.gain / math.sqrt(12)),
+        "",
+        "full well / noise in the dark, quantisation included",
+    )
+    clipped = "" if sensor.black_level >= noise else f"; below 3 σ = {noise:.3g} counts dark noise is clipped"
+    yield Row("black level", sensor.black_level, "counts", f"given{clipped}")
+    if sensor.quantum_efficiency < 1:
+        yield Row("quantum efficiency", sensor.quantum_efficiency, "", "electrons per photon, given")
+    if sensor.dark_signal:
+        yield Row("dark signal", sensor.dark_signal, "electrons", "dark current times exposure time")
+    if sensor.prnu:
+        yield Row("PRNU", sensor.prnu, "", "rms of the pixels' response over its mean, given")
+    if sensor.dsnu:
+        yield Row("DSNU", sensor.dsnu, "electrons", "rms of the pixels' dark signal, given")
 
 
 def _sampling(camera: "Camera") -> Iterator[Row]:

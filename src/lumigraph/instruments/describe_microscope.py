@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from lumigraph.design import microscope as design
-from lumigraph.instruments.describe import Description, Row
+from lumigraph.instruments.describe import Description, Row, readout
 
 if TYPE_CHECKING:
     from lumigraph.instruments.microscope import LightFieldMicroscope
@@ -102,6 +102,7 @@ def _sensor(scope: "LightFieldMicroscope") -> Iterator[Row]:
     sensor = scope.sensor
     yield Row("pixels", tuple(sensor.shape), "", "given" if scope.pixels.shape else "all micro-images fit")
     yield Row("pixel pitch", sensor.pixel_pitch, "m", "given")
+    yield from readout(sensor)
     yield Row("relay magnification", scope.relay_magnification, "", "lenslets' images to sensor, given")
     yield Row("micro-image pitch", scope.micro_image_pitch, "m", "d times relay")
     yield Row("micro-image pitch in pixels", scope.micro_image_pitch / sensor.pixel_pitch, "px", "")

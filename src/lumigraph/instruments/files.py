@@ -128,6 +128,8 @@ def _text(key: str, value: Any) -> str:
         return f'"{_metres(value)}"'
     if isinstance(value, float) and key == "rotation":
         return f'"{value!r} rad"'
+    if isinstance(value, float) and key == "exposure_time":
+        return f'"{value!r} s"'
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 

@@ -18,7 +18,7 @@ from lumigraph.elements.objective import Mismatch, Model, Objective
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import describe, describe_microscope
 from lumigraph.instruments.instrument import Instrument
-from lumigraph.instruments.parts import Lenslets, Part, Pixels, check_pixels
+from lumigraph.instruments.parts import Lenslets, Part, Pixels
 from lumigraph.instruments.quantities import Aberrations, Displacement, Fraction, Length, Positive, Wavelength
 from lumigraph.operators.fourier_microscope import FourierMicroscopeOperator, Mosaic, fourier_operator
 from lumigraph.operators.microscope_kernels import DROPPED, CellSampling, Lenslet
@@ -228,8 +228,7 @@ class LightFieldMicroscope(Instrument):
         given = self.pixels
         size = self.relay_magnification / given.pixel_pitch
         shape = given.shape or tuple(2 * math.ceil(reach * size - 0.5) + 1 for reach in self.lenslets.reach)
-        check_pixels((shape[0], shape[1]))
-        return Sensor((shape[0], shape[1]), given.pixel_pitch, given.full_well, given.read_noise, given.bits)
+        return given.sensor((shape[0], shape[1]))
 
     @cached_property
     def calibration(self) -> Calibration:

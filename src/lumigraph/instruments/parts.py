@@ -24,7 +24,10 @@ from lumigraph.instruments.quantities import (
     Offset,
     OneOrThree,
     Positive,
+    Seed,
+    Time,
 )
+from lumigraph.sensor import Sensor
 
 MOST_PIXELS = 2**28
 """Largest sensor: 268 million pixels, 1 GiB in single precision."""
@@ -206,6 +209,8 @@ class Pixels(Part):
         Electrons rms.
     bits
         Of the readout.
+    quantum_efficiency, dark_current, exposure_time, black_level, prnu, dsnu, pattern_seed
+        As for `Sensor`; left out, an ideal one. The time is text such as "10 ms", or [s].
     """
 
     pixel_pitch: Length
@@ -213,6 +218,13 @@ class Pixels(Part):
     full_well: Positive = 10000.0
     read_noise: NotNegative = 5.0
     bits: Bits = 12
+    quantum_efficiency: Fraction = 1.0
+    dark_current: NotNegative = 0.0
+    exposure_time: Time = 0.0
+    black_level: NotNegative = 0.0
+    prnu: NotNegative = 0.0
+    dsnu: NotNegative = 0.0
+    pattern_seed: Seed = 0
 
     @field_validator("shape")
     @classmethod
@@ -220,6 +232,18 @@ class Pixels(Part):
         if shape is not None:
             check_pixels(shape)
         return shape
+
+    @model_validator(mode="after")
+    def _level_below_the_highest(self) -> "Pixels":
+        self.sensor((1, 1))  # it knows what black levels its bits leave
+        return self
+
+    def sensor(self, shape: tuple[int, int]) -> Sensor:
+        """These pixels, so many of them."""
+        check_pixels(shape)
+        return Sensor(
+            shape, **{name: getattr(self, name) for name in type(self).model_fields if name != "shape"}
+        )
 
 
 def check_pixels(shape: tuple[int, int]) -> None:

@@ -20,8 +20,8 @@ FROM_FILE = {"file": True}
 SHORTEST, LONGEST = 1e-9, 1e5
 """Lengths outside 1 nm to 100 km are mistakes, and would overflow further down [m]."""
 
-_EXAMPLE = {"length": "150 um", "angle": "2 deg"}
-_SI_UNIT = {"length": "m", "angle": "rad"}
+_EXAMPLE = {"length": "150 um", "angle": "2 deg", "time": "10 ms"}
+_SI_UNIT = {"length": "m", "angle": "rad", "time": "s"}
 
 
 def _quantity(value: Any, info: ValidationInfo, dimension: str) -> float:
@@ -73,6 +73,13 @@ def _angle(value: Any, info: ValidationInfo) -> float:
     return number
 
 
+def _time(value: Any, info: ValidationInfo) -> float:
+    number = _quantity(value, info, "time")
+    if not 0 <= number <= LONGEST:
+        raise GeometryError(f"{_shown(value, 's')} is not between 0 s and 100,000 s. Check the unit.")
+    return number
+
+
 def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise GeometryError(f"{value!r} is not a finite number. Give a number without a unit.")
@@ -96,8 +103,14 @@ def _not_negative(value: Any) -> float:
 def _fraction(value: Any) -> float:
     number = _number(value)
     if not 0 < number <= 1:
-        raise GeometryError(f"{value!r} is not above 0 and at most 1. Give the filled part of the pitch.")
+        raise GeometryError(f"{value!r} is not above 0 and at most 1. Give a fraction, such as 0.9.")
     return number
+
+
+def _seed(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
+        raise GeometryError(f"{value!r} is not a whole number of at least 0. Give a seed, such as 1.")
+    return int(value)
 
 
 def _bits(value: Any) -> int:
@@ -156,6 +169,8 @@ Offset = Annotated[tuple[float, float], BeforeValidator(_pair)]
 """Two displacements (y, x) of either sign [m]."""
 OneOrThree = Annotated[tuple[float, ...], BeforeValidator(_one_or_three)]
 """One length, or one for each kind of a multi-focus array [m]."""
+Time = Annotated[float, BeforeValidator(_time)]
+"""Zero or more [s]."""
 Number = Annotated[float, BeforeValidator(_number)]
 """A finite number without a unit."""
 Positive = Annotated[float, BeforeValidator(_positive)]
@@ -166,6 +181,8 @@ Fraction = Annotated[float, BeforeValidator(_fraction)]
 """Above 0, at most 1."""
 Bits = Annotated[int, BeforeValidator(_bits)]
 """1 to 16."""
+Seed = Annotated[int, BeforeValidator(_seed)]
+"""Of random numbers: 0 or more."""
 Counts = Annotated[tuple[int, int], BeforeValidator(_counts)]
 """Two whole numbers (ny, nx), at least 1."""
 Aberrations = Annotated[
