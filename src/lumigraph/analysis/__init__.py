@@ -3,16 +3,22 @@
 - `signal`: `snr` and `rms_error` of an image against a reference
 - `profiles`: `first_zero`, `full_width` and `contrast` of a profile
 - `transfer`: `mtf` of a point image, and its `cutoff`
+- `slanted_edge`: the MTF across an edge in a picture, as ISO 12233 measures it
+- `photon_transfer`: gain, noise, dark signal and full well of a sensor, by EMVA 1288
 - `psf`: `centroid` and `encircled_energy` of a point image
 """
 
 from lumigraph.analysis import psf
+from lumigraph.analysis.photon_transfer import PhotonTransfer, photon_transfer
 from lumigraph.analysis.profiles import contrast, first_zero, full_width
 from lumigraph.analysis.psf import centroid, encircled_energy
 from lumigraph.analysis.signal import rms_error, snr
+from lumigraph.analysis.slanted_edge import SlantedEdge, slanted_edge
 from lumigraph.analysis.transfer import cutoff, mtf
 
 __all__ = [
+    "PhotonTransfer",
+    "SlantedEdge",
     "centroid",
     "contrast",
     "cutoff",
@@ -20,7 +26,9 @@ __all__ = [
     "first_zero",
     "full_width",
     "mtf",
+    "photon_transfer",
     "psf",
     "rms_error",
+    "slanted_edge",
     "snr",
 ]
