@@ -175,9 +175,8 @@ def photon_transfer(
 def _highest(flats: Sequence[Pair], highest: float | None) -> float:
     if highest is not None:
         return checks.positive("highest", highest, "counts", CalibrationError)
-    first = flats[0][0]
-    known = isinstance(first, RawImage) and first.bit_depth is not None
-    return float(2**first.bit_depth - 1) if known else math.inf
+    depth = getattr(flats[0][0], "bit_depth", None)
+    return math.inf if depth is None else float(2**depth - 1)
 
 
 def _moments(pair: Pair, top: float) -> _Moments:
@@ -215,7 +214,7 @@ def _gain(
     means: np.ndarray, variances: np.ndarray, spreads: np.ndarray, dark_spread: float
 ) -> tuple[float, float]:
     """Electrons per count and their error, from a line through the dark pair; its error is in all of them."""
-    weights = 1 / np.maximum(spreads, np.finfo(float).tiny) ** 2
+    weights = 1 / np.maximum(spreads, 1e-9 * means) ** 2
     total = float(weights @ means**2)
     slope = float(weights @ (means * variances)) / total
     if slope <= 0:
