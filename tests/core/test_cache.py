@@ -1,10 +1,14 @@
+import os
+import subprocess
+import sys
+
 import numpy as np
 
-from lumigraph.core.cache import ByteCache
+from lumigraph.core.cache import Budget, ByteCache, shared_limit
 
 
 def test_a_cache_builds_once_and_forgets_the_least_recently_used_first():
-    cache, built = ByteCache(limit=200), []
+    cache, built = ByteCache(Budget(limit=200)), []
 
     def get(key):
         return cache.get(key, lambda: built.append(key) or np.zeros(10))
@@ -17,7 +21,7 @@ def test_a_cache_builds_once_and_forgets_the_least_recently_used_first():
 
 
 def test_what_is_larger_than_the_limit_is_returned_but_not_kept():
-    cache = ByteCache(limit=100)
+    cache = ByteCache(Budget(limit=100))
     small = cache.get("small", lambda: np.zeros(5))
     assert cache.get("big", lambda: np.zeros(100)).shape == (100,)
     assert cache.used == 40
@@ -25,8 +29,35 @@ def test_what_is_larger_than_the_limit_is_returned_but_not_kept():
 
 
 def test_clear_forgets_everything(xp):
-    cache = ByteCache(limit=1000)
+    cache = ByteCache(Budget(limit=1000))
     cache.get("a", lambda: xp.asarray(np.zeros(3, np.complex64)))
     assert cache.used == 24
     cache.clear()
     assert cache.used == 0
+
+
+def test_several_caches_stay_within_one_budget():
+    budget = Budget(limit=200)
+    caches = [ByteCache(budget) for _ in range(3)]
+    for cache in caches:
+        cache.get("same key", lambda: np.zeros(10))
+    assert [cache.used for cache in caches] == [0, 80, 80]
+    assert budget.used == 160
+    assert caches[1].get("same key", lambda: np.ones(10)).sum() == 0
+    caches[1].clear()
+    assert [cache.used for cache in caches] == [0, 0, 80]
+
+
+def test_every_cache_of_the_package_shares_the_budget_that_the_user_chose():
+    """Six of them could once hold 6.5 GiB, each within a limit of its own."""
+    program = """
+import gc, lumigraph, lumigraph.operators.kernels, lumigraph.operators.microscope_operator
+from lumigraph.core.cache import SHARED, ByteCache
+caches = [thing for thing in gc.get_objects() if isinstance(thing, ByteCache)]
+assert len(caches) >= 4 and all(cache._budget is SHARED for cache in caches), caches
+print(SHARED.limit)
+"""
+    environment = {**os.environ, "LUMIGRAPH_MEMORY": "100"}
+    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment)
+    assert said.stdout.strip() == str(100 * 2**20), said.stderr
+    assert 2**28 <= shared_limit() <= 2**32

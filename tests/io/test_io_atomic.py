@@ -11,7 +11,7 @@ import pytest
 
 import lumigraph.io as io
 from lumigraph.errors import FormatError
-from lumigraph.io import target
+from lumigraph.store import atomic
 
 NAMES = ["a.png", "a.tiff", "a.zarr", "a.zarr.zip", "a.h5", "a.pfm"]
 
@@ -32,15 +32,15 @@ def test_a_failure_before_the_end_keeps_the_old_file(tmp_path, monkeypatch, name
     def fail(*_):
         raise failure
 
-    monkeypatch.setattr(target, "_take_place", fail)
-    with pytest.raises(type(failure)):
+    monkeypatch.setattr(atomic, "_take_place", fail)
+    with pytest.raises(FormatError if isinstance(failure, OSError) else type(failure)):
         io.save(np.full((4, 4), 2, np.uint8), tmp_path / name)
     assert io.open(tmp_path / name).data.max() == 1
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
 def test_a_store_is_replaced_where_the_system_cannot_swap_folders(tmp_path, monkeypatch):
-    monkeypatch.setattr(target, "_exchanged", lambda *_: False)
+    monkeypatch.setattr(atomic, "_exchanged", lambda *_: False)
     for value in (1, 2):
         io.save(np.full((4, 4), value, np.uint8), tmp_path / "a.zarr")
     assert io.open(tmp_path / "a.zarr").data.max() == 2

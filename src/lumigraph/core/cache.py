@@ -1,54 +1,120 @@
-"""Remembering what is dearer to compute than to keep, within a bound of memory."""
+"""Remembering what is dearer to compute than to keep, within one bound of memory for all that is kept."""
 
+import os
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from threading import Lock
 from typing import Any
 
+from lumigraph.core import memory
 
-class ByteCache:
-    """Arrays by key; the one unused for longest goes first when they hold more than `limit` bytes.
+_SHARE, _LEAST, _MOST = 0.25, 2**28, 4 * 2**30
+"""Part of the machine's memory that all caches may hold together, and its bounds [bytes]."""
+
+
+class Budget:
+    """What several caches keep, in the order of its last use, within a number of bytes for all of them.
 
     Parameters
     ----------
     limit
-        Bytes that the kept arrays may hold together; a larger array is returned but not kept.
+        Bytes; those of `shared_limit` where it is None.
+    """
+
+    def __init__(self, limit: int | None = None) -> None:
+        self._limit = limit
+        self.used = 0
+        self._kept: OrderedDict[tuple[Hashable, Hashable], tuple[Any, int]] = OrderedDict()
+        self._lock = Lock()
+
+    @property
+    def limit(self) -> int:
+        """Bytes that all caches may hold together."""
+        if self._limit is None:
+            self._limit = shared_limit()
+        return self._limit
+
+    def found(self, key: tuple[Hashable, Hashable]) -> Any:
+        """What is kept under a key, now the last to go; None where nothing is."""
+        with self._lock:
+            if key not in self._kept:
+                return None
+            self._kept.move_to_end(key)
+            return self._kept[key][0]
+
+    def keep(self, key: tuple[Hashable, Hashable], thing: Any, size: int) -> None:
+        """Keep a thing of `size` bytes unless it exceeds the limit; what was unused for longest goes."""
+        with self._lock:
+            if key in self._kept or size > self.limit:
+                return
+            self._kept[key] = thing, size
+            self.used += size
+            while self.used > self.limit:
+                self.used -= self._kept.popitem(last=False)[1][1]
+
+    def forget(self, cache: Hashable) -> None:
+        """Drop what one cache keeps."""
+        with self._lock:
+            for key in [key for key in self._kept if key[0] is cache]:
+                self.used -= self._kept.pop(key)[1]
+
+    def held(self, cache: Hashable) -> int:
+        """Bytes that one cache holds."""
+        with self._lock:
+            return sum(size for key, (_, size) in self._kept.items() if key[0] is cache)
+
+
+def shared_limit() -> int:
+    """``LUMIGRAPH_MEMORY`` in MiB, or a quarter of the memory, from 256 MiB to 4 GiB [bytes]."""
+    chosen = os.environ.get("LUMIGRAPH_MEMORY", "")
+    if chosen.isdecimal():
+        return int(chosen[:9]) * 2**20
+    whole = memory.total()
+    return _MOST if whole is None else int(min(max(whole * _SHARE, _LEAST), _MOST))
+
+
+SHARED = Budget()
+"""The budget of every cache of this process."""
+
+
+class ByteCache:
+    """Arrays by key; all caches share one budget, and what was not used for longest goes first.
+
+    Parameters
+    ----------
+    budget
+        Another one than all caches share.
 
     Examples
     --------
     >>> import numpy as np
-    >>> cache = ByteCache(limit=100)
+    >>> cache = ByteCache(Budget(limit=100))
     >>> cache.get("ones", lambda: np.ones(8)).sum(), cache.used
     (np.float64(8.0), 64)
     """
 
-    def __init__(self, limit: int) -> None:
-        self.limit = limit
-        self.used = 0
-        self._kept: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
-        self._lock = Lock()
+    def __init__(self, budget: Budget = SHARED) -> None:
+        self._budget = budget
+
+    @property
+    def used(self) -> int:
+        """Bytes that this cache holds."""
+        return self._budget.held(self)
 
     def get(self, key: Hashable, build: Callable[[], Any]) -> Any:
-        """The array, or what has ``nbytes``, kept under `key`; built where there is none. To be read only."""
-        with self._lock:
-            if key in self._kept:
-                self._kept.move_to_end(key)
-                return self._kept[key][0]
-        array = build()
-        size = _bytes(array)
-        with self._lock:
-            if key not in self._kept and size <= self.limit:
-                self._kept[key] = array, size
-                self.used += size
-                while self.used > self.limit:
-                    self.used -= self._kept.popitem(last=False)[1][1]
-        return array
+        """The array, or what has ``nbytes``, kept under `key`; built where there is none. To be read only.
+
+        An array larger than the budget is returned but not kept.
+        """
+        found = self._budget.found((self, key))
+        if found is None:
+            found = build()
+            self._budget.keep((self, key), found, _bytes(found))
+        return found
 
     def clear(self) -> None:
-        """Forget everything."""
-        with self._lock:
-            self._kept.clear()
-            self.used = 0
+        """Forget everything that this cache keeps."""
+        self._budget.forget(self)
 
 
 def _bytes(array: Any) -> int:

@@ -2,15 +2,15 @@
 
 import hashlib
 import os
-import secrets
 import time
-import zipfile
+import warnings
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from lumigraph import store
 from lumigraph.core import arrays, checks
 from lumigraph.core.arrays import Array
 from lumigraph.deconvolution.methods import State
@@ -63,26 +63,31 @@ class Checkpoint:
         return cls(Path(place))
 
     def keep(self, problem: Problem, state: State, key: str, *, now: bool = False) -> None:
-        """Write the state if it is time to, or `now`."""
+        """Write the state if it is time to, or `now`; a full disk ends in a warning, and the run goes on."""
         if not now and time.monotonic() - self._written < self.every:
             return
         content = {f"{_PREFIX}{name}": arrays.to_numpy(array) for name, array in state.memory.items()}
         content |= {"estimate": arrays.to_numpy(state.estimate), "done": np.int64(state.done)}
         content |= {"key": np.str_(key), "sensitivity": _trace(problem)}
-        _write(self.path, content)
+        try:
+            store.write(self.path, content)
+        except FormatError as error:
+            warnings.warn(f"the checkpoint {error}", RuntimeWarning, stacklevel=2)
         self._written = time.monotonic()
 
     def found(self, problem: Problem, key: str) -> State | None:
-        """The state in the file; None where there is no file.
+        """The state in the file; None where there is no file, or, with a warning, a damaged one.
 
         Raises
         ------
         FormatError
-            A damaged file, or one of another raw image, camera or method.
+            No checkpoint, or one of another raw image, camera or method.
         """
         if not self.path.exists():
             return None
         content = _read(self.path)
+        if content is None:
+            return None
         like, shape = problem.data, tuple(problem.scale.sensitivity.shape)
         trace = content["sensitivity"]
         mine = _trace(problem)
@@ -142,24 +147,19 @@ def _trace(problem: Problem) -> np.ndarray:
     return values[:: max(1, values.size // 997)]
 
 
-def _write(path: Path, content: dict[str, Any]) -> None:
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(6)}.tmp")
+def _read(path: Path) -> dict[str, np.ndarray] | None:
+    """What the file holds; None, with a warning, where it is a checkpoint that was damaged."""
     try:
-        with temporary.open("wb") as file:
-            np.savez(file, **content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _read(path: Path) -> dict[str, np.ndarray]:
-    try:
-        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
-            content = {name: file[name] for name in file.files}
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
-        raise FormatError(f"the checkpoint {path} is damaged ({error}). Remove it.") from error
+        content = store.read(path)
+    except store.DamagedError:
+        warnings.warn(
+            f"the checkpoint {path} is damaged: the run starts from the beginning, and writes it again.",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return None
+    except (FormatError, OSError) as error:
+        raise FormatError(f"{path} is no checkpoint of a deconvolution. Give another name.") from error
     if not {"estimate", "done", "key", "sensitivity"} <= content.keys():
         raise FormatError(f"{path} is no checkpoint of a deconvolution. Give another name.")
     return content

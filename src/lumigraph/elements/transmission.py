@@ -14,7 +14,7 @@ from lumigraph.errors import GeometryError, SamplingWarning
 
 Edge = Literal["grey", "hard"]
 
-TRANSMISSIONS = ByteCache(limit=2**30)
+TRANSMISSIONS = ByteCache()
 """Transmissions by (element, grid, wavelength, placement); bounded, the least recently used go first."""
 
 

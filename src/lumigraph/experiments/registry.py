@@ -1,9 +1,9 @@
 """What an experiment is, what it is given, what it answers, and how it is found by its id."""
 
 import difflib
-import io
 import re
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from lumigraph.errors import LumigraphError
-from lumigraph.io.target import write_bytes
+from lumigraph import store
+from lumigraph.errors import FormatError, LumigraphError
 
 Tell = Callable[[float, str], None]
 """Called with the fraction of an experiment that is done, and what goes on."""
@@ -146,14 +146,13 @@ class Context:
             )
         path = None if self.folder is None else self.folder / f"{name}.npz"
         if path is not None and path.exists():
-            with np.load(path, allow_pickle=False) as stored:
-                return _value({key: stored[key] for key in stored.files})
+            with suppress(FormatError):  # damaged: computed again
+                return _value(store.read(path))
         parts = _parts(function())
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
-            buffer = io.BytesIO()
-            np.savez(buffer, **parts)
-            write_bytes(path, buffer.getvalue())
+            store.write(path, parts)
+            parts = store.read(path)  # of one layout in memory, whether computed or found
         return _value(parts)
 
 

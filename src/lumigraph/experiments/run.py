@@ -8,18 +8,26 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from lumigraph import store
+from lumigraph.errors import FormatError
 from lumigraph.experiments.registry import Context, Experiment, Outcome, Row, experiments
 from lumigraph.io.target import write_bytes
 from lumigraph.report.pictures import Picture, picture
 
 Progress = Callable[[str, float], None]
 """Called with what goes on and the fraction of the whole that is done."""
+
+_RESULT = "result"
+"""Name of a stored result: one array, the bytes of its JSON."""
 
 _APART = ("cli", "demo", "report", "viewer")
 """Folders of the package that change no number."""
@@ -106,16 +114,16 @@ def _run_or_read(
     one: Experiment, folder: Path, quick: bool, fresh: bool, tell: Callable[[float, str], None]
 ) -> Result:
     name = f"{one.id}-{'quick' if quick else 'full'}-{sources(one)[:16]}"
-    whole, parts = folder / f"{name}.json", folder / name
+    whole, parts = folder / f"{name}.npz", folder / name
     if fresh:
         whole.unlink(missing_ok=True)
         shutil.rmtree(parts, ignore_errors=True)
-    if whole.exists():
-        return Result.from_json(whole.read_bytes())
+    with suppress(FormatError, OSError):  # none, or damaged: run again
+        return Result.from_json(store.read(whole)[_RESULT].tobytes())
     folder.mkdir(parents=True, exist_ok=True)
     result = _run(one, Context(quick, parts, tell))
     if not result.error:
-        write_bytes(whole, result.to_json())
+        store.write(whole, {_RESULT: np.frombuffer(result.to_json(), np.uint8)})
         shutil.rmtree(parts, ignore_errors=True)
     return result
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lumigraph import store
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import FormatError, LumigraphError
 
@@ -56,7 +57,7 @@ def existing(path: str | os.PathLike[str]) -> Path:
         No such file, or a folder on the way that does not exist.
     """
     path = as_path(path)
-    if path.exists():
+    if path.exists() or store.restored(path):
         return path
     if not path.parent.is_dir():
         raise FormatError(f"{path} does not exist: there is no folder {path.parent}. Check the path.")

@@ -1,18 +1,12 @@
-"""Where a result may be written, and atomic writing: a kill leaves the old file or the new one."""
+"""Where a result may be written; it is written atomically."""
 
-import ctypes
 import os
-import secrets
-import shutil
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
+from lumigraph import store
 from lumigraph.errors import FormatError
-
-_EXCHANGE = 2  # RENAME_EXCHANGE of Linux' renameat2
-_HERE = -100  # AT_FDCWD
-
 
 VIEWS = "views.json"
 """What marks a folder of views that lumigraph wrote."""
@@ -62,63 +56,12 @@ def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
 
 @contextmanager
 def replacing(path: str | os.PathLike[str], *, folder: bool = False) -> Iterator[Path]:
-    """Context that gives a temporary path beside `path`, which takes its place at the end.
+    """Context that gives a temporary path, which takes the place of `path` at the end; see `store.replacing`.
 
-    The temporary path does not exist yet: write a file there, or make a folder. If the block fails it
-    is removed and what was at `path` stays.
+    Raises
+    ------
+    FormatError
+        As `check_target`; the disk is full or may not be written to, and the old file stays.
     """
-    target = check_target(path, folder=folder)
-    if target.is_symlink():
-        target = target.resolve()
-    temporary = target.with_name(f".{target.name}.{secrets.token_hex(6)}.tmp")
-    try:
+    with store.replacing(check_target(path, folder=folder)) as temporary:
         yield temporary
-        _flush(temporary)
-        _take_place(temporary, target)
-    except BaseException:
-        _remove(temporary)
-        raise
-    _flush_entry(target.parent)
-
-
-def _take_place(temporary: Path, target: Path) -> None:
-    if not temporary.is_dir() or not target.exists():
-        temporary.replace(target)  # for files this replaces an old one in one step
-    elif _exchanged(temporary, target):
-        _remove(temporary)
-    else:  # no renameat2 here: two steps, and the old store is kept until the second
-        old = temporary.with_suffix(".old")
-        target.rename(old)
-        temporary.rename(target)
-        _remove(old)
-
-
-def _exchanged(one: Path, other: Path) -> bool:
-    """Swap two paths in one step where the system can."""
-    try:
-        swap = ctypes.CDLL(None, use_errno=True).renameat2
-    except (AttributeError, OSError):
-        return False
-    return swap(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE) == 0
-
-
-def _flush(path: Path) -> None:
-    for file in path.rglob("*") if path.is_dir() else [path]:
-        if file.is_file():
-            _flush_entry(file)
-
-
-def _flush_entry(path: Path) -> None:
-    with suppress(OSError):  # some file systems cannot flush a folder
-        descriptor = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)

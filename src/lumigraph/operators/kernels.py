@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lumigraph.core import memory, store
+from lumigraph import store
+from lumigraph.core import memory
 from lumigraph.core.cache import ByteCache
 from lumigraph.errors import SamplingError
 from lumigraph.operators.blocks import Part, Progress, build, build_bytes
@@ -41,7 +42,7 @@ class Matrix:
         return parts + self.glare.spectra.nbytes + self.glare.pictures.nbytes
 
 
-_MATRICES = ByteCache(limit=2**31)
+_MATRICES = ByteCache()
 
 
 def matrix(optics: Optics, progress: Progress | None = None) -> Matrix:
@@ -52,28 +53,18 @@ def matrix(optics: Optics, progress: Progress | None = None) -> Matrix:
     SamplingError
         It does not fit in memory.
     """
-    key = optics.key
 
-    def found() -> Matrix:
-        arrays = store.load(key, _ARRAYS)
-        if arrays is None:
-            memory.require(
-                build_bytes(optics),
-                "the periodic operator",
-                "Use slower lenslets, a lower accuracy, or Snapshots.",
-                SamplingError,
-            )
-            built = _build(optics, progress)
-            if store.folder() is not None:
-                store.save(key, _packed(built))
-            return built
-        return _unpacked(arrays)
+    def built() -> dict[str, np.ndarray]:
+        memory.require(
+            build_bytes(optics),
+            "the periodic operator",
+            "Use slower lenslets, a lower accuracy, or Snapshots.",
+            SamplingError,
+        )
+        return _packed(_build(optics, progress))
 
-    return _MATRICES.get(key, found)
-
-
-_ARRAYS = ("places", "offsets", "left", "right", "spectra", "pictures", "shape")
-"""What `_packed` makes of a matrix."""
+    # Packed and unpacked, built or found: products with other strides would round otherwise.
+    return _MATRICES.get(optics.key, lambda: _unpacked(store.kept(optics.key, built)))
 
 
 def _packed(matrix: Matrix) -> dict[str, np.ndarray]:

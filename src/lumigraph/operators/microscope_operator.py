@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lumigraph import store
 from lumigraph.core import arrays, checks, memory, picture
 from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache
@@ -39,7 +40,7 @@ GATHERED = 2**27
 SHARE = 0.3
 """Part of the free memory that matrices of the lenslets' frequencies may take."""
 
-_MATRICES = ByteCache(limit=3 * 2**29)
+_MATRICES = ByteCache()
 
 Progress = Callable[[int, int], None]
 """Called with the slices that are done and how many there are."""
@@ -311,19 +312,15 @@ def _kept(
     if folder is None:
         return slice_kernel(objectives, lenslet, sampling, dz, dropped)
     told = repr((tuple(objectives), lenslet, sampling, dz, dropped))
-    path = Path(folder) / f"slice-{hashlib.sha256(told.encode()).hexdigest()[:20]}"
-    places, blocks = path.with_suffix(".offsets.npy"), path.with_suffix(".npy")
-    if not blocks.exists():
+    key = f"slice-{hashlib.sha256(told.encode()).hexdigest()[:20]}"
+
+    def built() -> dict[str, np.ndarray]:
         kernel = slice_kernel(objectives, lenslet, sampling, dz, dropped)
-        blocks.parent.mkdir(parents=True, exist_ok=True)
-        for target, values in ((places, kernel.offsets), (blocks, kernel.blocks)):
-            partial = target.with_suffix(".part")
-            with partial.open("wb") as file:
-                np.save(file, values, allow_pickle=False)
-            partial.replace(target)
+        return {"offsets": kernel.offsets, "blocks": kernel.blocks}
+
+    found = store.kept(key, built, Path(folder))
     symmetric = all(one.is_round for one in objectives)
-    mapped = np.load(blocks, mmap_mode="r", allow_pickle=False)
-    return SliceKernel(np.load(places, allow_pickle=False), mapped, sampling, symmetric)
+    return SliceKernel(found["offsets"], found["blocks"], sampling, symmetric)
 
 
 def _products(

@@ -233,7 +233,7 @@ def periodic_operator(
 ) -> PeriodicOperator:
     """Operator from planes sampled on `grid` to the raw image of a camera with lenslets.
 
-    What it takes to compute is kept, in memory and on disk (see `core.store`), for the same camera and
+    What it takes to compute is kept, in memory and on disk (see `store`), for the same camera and
     depth, whatever the grid and the sensor.
 
     Parameters

@@ -49,7 +49,7 @@ FINEST_PUPIL = 1500
 PERIOD = 3.0
 """The pupil's samples make h repeat itself after this many times its largest offset from the axis."""
 
-_TRANSFERS = ByteCache(limit=2**29)
+_TRANSFERS = ByteCache()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,5 +2,5 @@
 
 from lumigraph.core.cache import ByteCache
 
-CACHE = ByteCache(limit=1 << 30)
+CACHE = ByteCache()
 """The one cache of this package: 1 GiB."""

@@ -10,7 +10,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 from lumigraph.sensor.sensor import Sensor
 
-_MATRICES = ByteCache(limit=2**29)
+_MATRICES = ByteCache()
 
 
 def integrate(intensity: Array, grid: Grid, sensor: Sensor | Grid, *, turned: bool = True) -> Array:

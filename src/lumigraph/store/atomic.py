@@ -1,0 +1,220 @@
+"""Atomic writing: a kill leaves the old file or the new one; what else it leaves goes at the next start.
+
+What is new is written in a workplace, a hidden folder beside the target that its writer holds locked. The
+system gives the lock back when the writer ends, however it ends: an unlocked workplace is a dead writer's.
+"""
+
+import ctypes
+import errno
+import os
+import secrets
+import shutil
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from lumigraph.errors import FormatError
+
+try:
+    import fcntl
+except ImportError:  # Windows: what a killed writer left stays
+    fcntl = None
+
+PREFIX = ".lumigraph-"
+"""Names of workplaces begin with it."""
+
+_NEW, _OLD = "new", "old"
+_EXCHANGE = 2  # RENAME_EXCHANGE of Linux' renameat2, RENAME_SWAP of macOS' renamex_np
+_HERE = -100  # AT_FDCWD
+_SWEPT: set[Path] = set()
+"""Folders that this process has cleared of dead writers' workplaces."""
+
+_PATIENCE = 2.0
+"""Longest time between the two steps of a living writer [s]."""
+
+
+def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file atomically.
+
+    Raises
+    ------
+    FormatError
+        The disk is full or may not be written to; the old file stays.
+    """
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Context that gives a temporary path, which takes the place of `path` at the end.
+
+    The temporary path does not exist yet: write a file there, or make a folder. If the block fails it
+    is removed and what was at `path` stays. The new file takes over the old one's mode and group.
+
+    Raises
+    ------
+    FormatError
+        The disk is full or may not be written to; the old file stays.
+    """
+    target = Path(path)
+    if target.is_symlink():
+        target = target.resolve()
+    with _told(target), _workplace(target.parent) as place:
+        # A folder in between: encoders read the ending, and a name of 255 bytes cannot be lengthened.
+        temporary = place / _NEW
+        yield temporary
+        _take_over(target, temporary)
+        _flush(temporary)
+        _take_place(temporary, target)
+    _flush_entry(target.parent)
+
+
+def sweep(folder: Path) -> None:
+    """Remove the workplaces of dead writers; what they had set aside and not yet replaced goes back."""
+    with suppress(OSError):
+        for place in [Path(entry.path) for entry in os.scandir(folder) if entry.name.startswith(PREFIX)]:
+            with suppress(OSError):
+                _clear(place)
+
+
+def restored(path: Path) -> bool:
+    """Whether something lies at `path` after all: a writer may stand, or have died, between two steps."""
+    end = time.monotonic() + _PATIENCE
+    while not path.exists() and _set_aside(path) and time.monotonic() < end:
+        sweep(path.parent)
+        time.sleep(0.01)
+    return path.exists()
+
+
+def _set_aside(path: Path) -> bool:
+    try:
+        return any((place / _OLD / path.name).exists() for place in path.parent.glob(f"{PREFIX}*"))
+    except OSError:  # a writer has ended meanwhile
+        return True
+
+
+@contextmanager
+def _told(target: Path) -> Iterator[None]:
+    """Context in which what the system refuses becomes one `FormatError` naming the target."""
+    try:
+        yield
+    except OSError as error:
+        raise FormatError(f"{target} was not written: {_reason(error, target.parent)}") from error
+
+
+def _reason(error: OSError, folder: Path) -> str:
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    with suppress(OSError):  # NumPy gives no number: "120000 requested and 73436 written"
+        full = full or (error.errno is None and shutil.disk_usage(folder).free < 1 << 20)
+    if full:
+        return f"the disk of {folder} is full. Free some space, or choose another folder."
+    if error.errno == errno.EFBIG or "requested and" in str(error):
+        return "the system takes no file as large as that. Raise the limit, or choose another folder."
+    return f"{error.strerror or error}. Choose another folder."
+
+
+@contextmanager
+def _workplace(folder: Path) -> Iterator[Path]:
+    if folder not in _SWEPT:
+        _SWEPT.add(folder)
+        sweep(folder)
+    place, lock = _locked_folder(folder)
+    try:
+        yield place
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
+def _locked_folder(folder: Path) -> tuple[Path, int | None]:
+    """A new folder, and the descriptor that holds its lock; None where the file system has no locks."""
+    place, lock = folder, None
+    for _ in range(3):  # another process may clear it before it is locked
+        place = folder / f"{PREFIX}{secrets.token_hex(6)}"
+        place.mkdir(mode=0o700)
+        lock = _lock(place)
+        if lock is not None or place.exists():
+            break
+    return place, lock
+
+
+def _lock(place: Path) -> int | None:
+    """A descriptor that holds a folder's lock; None where it is held, gone, or locks do not exist."""
+    if fcntl is None:
+        return None
+    with suppress(OSError):
+        lock = os.open(place, os.O_RDONLY)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.path.samestat(os.fstat(lock), os.stat(place)):  # noqa: PTH116 - beside fstat
+                return lock
+        except OSError:
+            pass
+        os.close(lock)
+    return None
+
+
+def _clear(place: Path) -> None:
+    """Remove a workplace if its writer is dead."""
+    lock = _lock(place)
+    if lock is None:
+        return
+    try:
+        for old in place.glob(f"{_OLD}/*"):
+            target = place.parent / old.name
+            if not target.exists():
+                old.rename(target)
+        shutil.rmtree(place, ignore_errors=True)
+    finally:
+        os.close(lock)
+
+
+def _take_over(target: Path, temporary: Path) -> None:
+    """Give what is new the mode and, where this user may, the group of what it replaces."""
+    with suppress(OSError):
+        old, new = target.stat(), temporary.stat()
+        if old.st_gid != new.st_gid:
+            with suppress(OSError):
+                os.chown(temporary, -1, old.st_gid)
+        temporary.chmod(old.st_mode & 0o7777)
+
+
+def _take_place(temporary: Path, target: Path) -> None:
+    if not temporary.is_dir() or not target.exists():
+        temporary.replace(target)  # for files this replaces an old one in one step
+    elif not _exchanged(temporary, target):  # two steps, and the old folder is kept until the second
+        old = temporary.with_name(_OLD) / target.name
+        old.parent.mkdir()
+        target.rename(old)
+        temporary.rename(target)
+
+
+def _exchanged(one: Path, other: Path) -> bool:
+    """Swap two paths in one step where the system can."""
+    first, second = os.fsencode(one), os.fsencode(other)
+    try:
+        system = ctypes.CDLL(None, use_errno=True)
+        if sys.platform == "darwin":
+            return system.renamex_np(first, second, _EXCHANGE) == 0
+        return system.renameat2(_HERE, first, _HERE, second, _EXCHANGE) == 0
+    except (AttributeError, OSError):
+        return False
+
+
+def _flush(path: Path) -> None:
+    for file in path.rglob("*") if path.is_dir() else [path]:
+        if file.is_file():
+            _flush_entry(file)
+
+
+def _flush_entry(path: Path) -> None:
+    with suppress(OSError):  # some file systems cannot flush a folder
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)

@@ -1,0 +1,135 @@
+"""One file of arrays with a checksum over every byte: an uncompressed .npz, which NumPy reads as well.
+
+Arrays begin at multiples of 64 bytes, so that they are read as memory maps. The comment at the end of the
+archive is the seal: a word and the CRC-32 of all bytes before its eight digits.
+"""
+
+import os
+import struct
+import zipfile
+import zlib
+from collections.abc import Mapping
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+
+from lumigraph.errors import FormatError
+from lumigraph.store.atomic import replacing
+
+_WORD = b"lumigraph sealed 1 "
+_DIGITS = 8
+_ALIGNED = 64
+_PADDING = 0xD935
+"""Kind of a ZIP extra field that only fills up, as zipalign writes it."""
+
+_HEADER, _ZIP64 = 30, 20
+"""Bytes of a ZIP entry's header without name and extra fields, and of the field for large entries."""
+
+_PIECE = 1 << 24
+
+
+class DamagedError(FormatError):
+    """A sealed file that is not as it was written."""
+
+
+def write(path: str | os.PathLike[str], arrays: Mapping[str, np.ndarray]) -> None:
+    """Write arrays into one file, atomically.
+
+    Parameters
+    ----------
+    path
+        Of the file; its folder exists.
+    arrays
+        By name. Values, type and order in memory (C or Fortran) are kept; an array that is neither is
+        written in C order.
+
+    Raises
+    ------
+    FormatError
+        The disk is full or may not be written to.
+    ValueError
+        An array of Python objects.
+    """
+    with replacing(path) as temporary:
+        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
+            for name, array in arrays.items():
+                _add(archive, f"{name}.npy", np.asarray(array))
+            archive.comment = _WORD + b"0" * _DIGITS
+        with temporary.open("r+b") as file:
+            checksum = _checksum(np.memmap(file, mode="r")[:-_DIGITS])
+            file.seek(-_DIGITS, os.SEEK_END)
+            file.write(b"%08x" % checksum)
+
+
+def read(path: str | os.PathLike[str], *, mapped: bool = False) -> dict[str, np.ndarray]:
+    """The arrays of a sealed file, compared with its checksum first.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    mapped
+        Whether the arrays are read-only memory maps; else they are copies.
+
+    Raises
+    ------
+    DamagedError
+        It was cut short, or a bit has changed.
+    FormatError
+        Not a sealed file.
+    OSError
+        There is none, or it may not be read.
+    """
+    path = Path(path)
+    with path.open("rb") as file:
+        whole = np.memmap(file, mode="r") if path.stat().st_size else np.empty(0, np.uint8)
+        end = bytes(whole[-len(_WORD) - _DIGITS :])
+        if end != _WORD + b"%08x" % _checksum(whole[:-_DIGITS]):
+            if end.startswith(_WORD) or _WORD in bytes(whole[:256]):  # one damage spares one of the two
+                raise DamagedError(f"{path} is damaged: its checksum is another one. Remove it.")
+            raise FormatError(f"{path} is not a sealed file of arrays. Give another name.")
+        try:
+            with zipfile.ZipFile(file) as archive:
+                found = {_name(entry): _array(whole, entry) for entry in archive.infolist()}
+        except Exception as error:  # a checksum is no proof that the rest was written by `write`
+            raise DamagedError(f"{path} is damaged ({error}). Remove it.") from error
+    return found if mapped else {name: np.array(array, order="K") for name, array in found.items()}
+
+
+def _add(archive: zipfile.ZipFile, name: str, array: np.ndarray) -> None:
+    entry = zipfile.ZipInfo(name)
+    fixed = _HEADER + len(name.encode()) + _ZIP64 + 4 + len(_WORD)
+    assert archive.fp is not None  # the archive is open
+    fill = -(archive.fp.tell() + fixed) % _ALIGNED
+    entry.extra = struct.pack("<HH", _PADDING, len(_WORD) + fill) + _WORD + bytes(fill)
+    with archive.open(entry, "w", force_zip64=True) as file:
+        np.lib.format.write_array(file, array, allow_pickle=False)
+
+
+def _name(entry: zipfile.ZipInfo) -> str:
+    return entry.filename.removesuffix(".npy")
+
+
+def _array(whole: np.ndarray, entry: zipfile.ZipInfo) -> np.ndarray:
+    """An array as a view of the mapped file."""
+    at = entry.header_offset
+    name, extra = struct.unpack("<HH", bytes(whole[at + 26 : at + _HEADER]))
+    start = at + _HEADER + name + extra
+    head = BytesIO(bytes(whole[start : start + min(entry.file_size, 1 << 16)]))
+    version = np.lib.format.read_magic(head)
+    read_header = (
+        np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    )
+    shape, fortran, dtype = read_header(head)
+    if dtype.hasobject:
+        raise FormatError("Python objects are not read")
+    data = whole[start + head.tell() : start + entry.file_size].view(dtype)
+    return data.reshape(shape, order="F" if fortran else "C")
+
+
+def _checksum(data: np.ndarray) -> int:
+    total = 0
+    for start in range(0, len(data), _PIECE):
+        total = zlib.crc32(data[start : start + _PIECE], total)
+    return total
