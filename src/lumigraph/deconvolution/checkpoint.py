@@ -67,8 +67,8 @@ class Checkpoint:
         if not now and time.monotonic() - self._written < self.every:
             return
         content = {f"{_PREFIX}{name}": arrays.to_numpy(array) for name, array in state.memory.items()}
-        content |= {"estimate": arrays.to_numpy(state.estimate), "done": np.int64(state.done)}
-        content |= {"key": np.str_(key), "sensitivity": _trace(problem)}
+        content |= {"estimate": arrays.to_numpy(state.estimate), "done": np.asarray(state.done)}
+        content |= {"key": np.asarray(key), "sensitivity": _trace(problem)}
         try:
             store.write(self.path, content)
         except FormatError as error:

@@ -131,5 +131,5 @@ def _array(whole: np.ndarray, entry: zipfile.ZipInfo) -> np.ndarray:
 def _checksum(data: np.ndarray) -> int:
     total = 0
     for start in range(0, len(data), _PIECE):
-        total = zlib.crc32(data[start : start + _PIECE], total)
+        total = zlib.crc32(data[start : start + _PIECE].data, total)
     return total
