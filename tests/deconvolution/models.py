@@ -1,45 +1,13 @@
 """Small forward models whose matrices can be written down."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from lumigraph.core import arrays
-from lumigraph.core.grid import Grid
+from lumigraph.core.matrix import Matrix
 
 
-@dataclass(frozen=True)
-class Matrix:
-    """Any matrix (pixels, samples) as a forward model."""
-
-    matrix: np.ndarray
-    raw_shape: tuple[int, int]
-    object_shape: tuple[int, ...]
-
-    @property
-    def shape(self):
-        return self.raw_shape, self.object_shape
-
-    def forward(self, intensity):
-        xp = arrays.namespace(intensity)
-        flat = arrays.like(self.matrix, intensity) @ xp.reshape(intensity, (-1,))
-        return xp.reshape(flat, self.raw_shape)
-
-    def adjoint(self, raw):
-        xp = arrays.namespace(raw)
-        flat = xp.reshape(raw, (-1,)) @ arrays.like(self.matrix, raw)
-        return xp.reshape(flat, self.object_shape)
-
-    def psf(self, index):
-        return self.matrix[:, np.ravel_multi_index(index, self.object_shape)].reshape(self.raw_shape)
-
-
-@dataclass(frozen=True)
-class Placed(Matrix):
-    """One whose object stands on a grid, at depths."""
-
-    object_grid: Grid
-    depths: tuple[float, ...] | None = None
+def placed(matrix, raw_shape, object_shape, grid, depths=None):
+    """A matrix whose object stands on a grid, at depths."""
+    return Matrix(matrix, raw_shape, object_shape, object_grid=grid, depths=depths)
 
 
 def blur(n, sigma):

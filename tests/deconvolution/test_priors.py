@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import minimize
 
 import lumigraph as lg
-from deconvolution.models import Matrix, Placed, blur, blurred, disc
+from deconvolution.models import Matrix, blur, blurred, disc, placed
 from lumigraph.deconvolution import (
     Exposure,
     LeastSquares,
@@ -104,7 +104,7 @@ def test_voxels_that_are_far_apart_are_smoothed_less_along_that_axis(rng):
     stack = np.ones(shape) * np.array([10.0, 20.0, 10.0])[:, None, None]
     jumps = []
     for step in (1e-6, 20e-6):
-        model = Placed(np.eye(192), (8, 24), shape, grid, (-step, 0.0, step))
+        model = placed(np.eye(192), (8, 24), shape, grid, (-step, 0.0, step))
         found = lg.deconvolve(stack.reshape(8, 24), model, 40, method=RichardsonLucy(TotalVariation(0.4)))
         jumps.append(float((found[1] - found[0]).mean()))
     assert jumps[0] < 3

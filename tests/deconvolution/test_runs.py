@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
-from deconvolution.models import Matrix, Placed, blurred, disc
+from deconvolution.models import Matrix, blurred, disc
 from lumigraph.deconvolution import (
     Checkpoint,
     Exposure,
@@ -171,13 +171,13 @@ def test_a_series_needs_one_sensitivity_and_one_frame_at_a_time(rng):
     """A hundred frames: Aᵀ1 once, each frame read only when its turn has come, results as of one by one."""
     grid, calls, alive = lg.Grid.square(6, 1e-6), [], []
 
-    class Counting(Placed):
+    class Counting(Matrix):
         def adjoint(self, raw):
             calls.append(1)
             return super().adjoint(raw)
 
     matrix = np.abs(rng.normal(size=(36, 72)))
-    operator = Counting(matrix, (6, 6), (2, 6, 6), grid, (0.0, 1e-6))
+    operator = Counting(matrix, (6, 6), (2, 6, 6), object_grid=grid, depths=(0.0, 1e-6))
     pictures = [lg.RawImage(rng.uniform(1, 2, (6, 6))) for _ in range(100)]
 
     def frames():

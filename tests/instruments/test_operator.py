@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import cameras
-from lumigraph.deconvolution import ForwardModel
+from lumigraph.core.linear import Linear, stack
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators import Slices
 from lumigraph.units import mm, um
 
 
@@ -22,7 +21,7 @@ def volume(camera):
 
 def test_it_is_a_forward_model_of_the_arrays_field(camera, volume):
     plane = camera.operator(None, 5, accuracy=1e-2)
-    assert isinstance(plane, ForwardModel)
+    assert isinstance(plane, Linear)
     assert plane.shape == (camera.sensor.shape, (20, 15))
     assert volume.shape == (camera.sensor.shape, (2, 20, 15))
     scale = camera.object_distance / camera.separation
@@ -42,7 +41,7 @@ def test_depths_add_up(camera, volume, rng):
     planes = [camera.operator((dz,), 5, accuracy=1e-2) for dz in (0.0, 2 * mm)]
     parts = [plane.forward(intensity[k : k + 1]) for k, plane in enumerate(planes)]
     np.testing.assert_allclose(volume.forward(intensity), sum(parts), rtol=1e-5, atol=1e-6)
-    many = Slices([camera.operator(None, 5, accuracy=1e-2)], volume.object_grid, (0.0,))
+    many = stack([camera.operator(None, 5, accuracy=1e-2)], depths=(0.0,))
     np.testing.assert_allclose(many.forward(intensity[:1]), parts[0], rtol=1e-5, atol=1e-6)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lumigraph.deconvolution import ForwardModel
+from lumigraph.core.linear import Linear
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.instruments import LightFieldMicroscope
 
@@ -24,7 +24,7 @@ def operator(scope):
 
 
 def test_it_is_what_a_deconvolution_asks_for(operator):
-    assert isinstance(operator, ForwardModel)
+    assert isinstance(operator, Linear)
     assert operator.shape[1][0] == 3
     assert operator.object_grid.pitch[0] == pytest.approx(6.5e-6 / (20 / 3))
 
@@ -83,7 +83,7 @@ def test_a_pupil_without_lenslets_is_refused(scope):
 def test_what_cannot_be_is_refused(scope, operator, monkeypatch):
     with pytest.raises(GeometryError, match="there are no depths"):
         scope.operator(())
-    with pytest.raises(GeometryError, match=r"the volume has shape \(2,\)"):
+    with pytest.raises(GeometryError, match=r"an object has shape \(2,\)"):
         operator.forward(np.ones(2))
     monkeypatch.setattr("lumigraph.core.memory.available", lambda: 1000)
     with pytest.raises(SamplingError, match=r"the images of points needs .* Use fewer slices"):

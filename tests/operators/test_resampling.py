@@ -9,7 +9,7 @@ from lumigraph.operators.resampling import Banded, averaged, banded, represented
 
 
 def dense(matrix: Banded) -> np.ndarray:
-    return matrix.forward(np.eye(matrix.columns))
+    return matrix.down(np.eye(matrix.columns))
 
 
 @pytest.fixture
@@ -36,11 +36,13 @@ def test_descending_rows_are_as_good(rng):
 
 def test_adjoints_are_transposes(matrix, xp, rng):
     x, y = (rng.random(shape).astype(np.float32) for shape in ((48, 5), (150, 5)))
-    forward, back = matrix.forward(xp.asarray(x)), matrix.adjoint(xp.asarray(y))
+    forward, back = matrix.down(xp.asarray(x)), matrix.up(xp.asarray(y))
     assert str(forward.dtype).endswith("float32")
     assert str(back.dtype).endswith("float32")
     np.testing.assert_allclose(to_numpy(back), dense(matrix).T @ y, rtol=1e-5)
     np.testing.assert_allclose(to_numpy(forward), dense(matrix) @ x, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(to_numpy(matrix.right(xp.asarray(x.T))), dense(matrix).dot(x).T, atol=1e-5)
+    np.testing.assert_allclose(to_numpy(matrix.left(xp.asarray(y.T))), (dense(matrix).T @ y).T, atol=1e-5)
 
 
 @pytest.mark.parametrize("map_of", [represented, averaged])

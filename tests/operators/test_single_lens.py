@@ -8,7 +8,7 @@ from scipy.special import j1
 
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
-from lumigraph.deconvolution.forward import ForwardModel
+from lumigraph.core.linear import Linear
 from lumigraph.elements import CircularAperture, ZernikePlate
 from lumigraph.errors import SamplingError
 from lumigraph.instruments import FocusedPlenopticCamera, SingleLensCamera
@@ -121,7 +121,7 @@ def test_a_point_is_the_airy_pattern():
 def test_the_transfer_is_the_overlap_of_two_discs():
     """Goodman's equation 6-31; beyond D/(λL) there is nothing."""
     camera = TWO_F.replace(sensor={"shape": (240, 240)})
-    operator = single_lens_operator(camera, Grid.square(121, 10 * um))
+    _, operator, _ = single_lens_operator(camera, Grid.square(121, 10 * um)).maps
     transfer = np.abs(operator.transfer[0]) / np.abs(operator.transfer[0, 0])
     pitch = single_lens.image_pitch(camera)
     cutoff = camera.pupil_diameter / (camera.wavelength * camera.separation)
@@ -153,7 +153,7 @@ def test_an_even_scene_gives_one_and_nothing_wraps_round():
 def test_the_adjoint_is_the_transpose(dtype, xp):
     grid = Grid((9, 7), (31 * um, 43 * um), (20 * um, 0))
     operator = single_lens_operator(TWO_F, grid, 5 * mm)
-    assert isinstance(operator, ForwardModel)
+    assert isinstance(operator, Linear)
     rng = np.random.default_rng(2)
     o, r = (rng.random(shape).astype(dtype) for shape in reversed(operator.shape))
     image, back = operator.forward(xp.asarray(o)), operator.adjoint(xp.asarray(r))
@@ -188,11 +188,8 @@ def test_the_kernel_brings_a_band_limited_wave_anywhere():
     span = band.Span.around(-40.0, 40.0, 1.0)
     places, k = rng.uniform(-38, 38, 50), span.first + np.arange(span.count)
     edge = 1 / (2 * band.OVERSAMPLING)
-    brought = band.placed(places, span).matrix.T @ np.cos(2 * np.pi * edge * k)
+    brought = band.placed(places, span).T @ np.cos(2 * np.pi * edge * k)
     assert np.abs(brought - np.cos(2 * np.pi * edge * places)).max() < 3e-5
-    pixels = np.arange(-9, 10) * 3.7
-    mean = band.integrated(pixels, 3.7, span).along(np.cos(2 * np.pi * edge * k))
-    assert np.abs(mean - np.sinc(3.7 * edge) * np.cos(2 * np.pi * edge * pixels)).max() < 3e-5
 
 
 def test_what_it_does_not_take_is_refused(monkeypatch):

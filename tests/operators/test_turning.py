@@ -7,7 +7,7 @@ import pytest
 
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
-from lumigraph.operators.turning import Chain, Crop, Turn, turn_margin
+from lumigraph.operators.turning import Crop, Turn, turn_margin
 
 GRID = Grid((70, 83), (1.0, 1.2), (3.0, -2.0))
 
@@ -58,28 +58,15 @@ def test_the_margin_is_enough_for_the_corners():
         np.testing.assert_allclose(turned, expected, atol=1e-4)
 
 
-@pytest.mark.parametrize("outward", [False, True])
-def test_a_crop_and_its_transpose(xp, rng, outward):
-    crop = Crop((2, 3), outward)
-    small, large = rng.random((5, 6)), rng.random((9, 12))
-    x, y = (small, large) if outward else (large, small)
-    forward, back = to_numpy(crop.forward(xp.asarray(x))), to_numpy(crop.adjoint(xp.asarray(y)))
-    assert forward.shape == y.shape
-    assert back.shape == x.shape
-    np.testing.assert_array_equal(forward[2:7, 3:9] if outward else forward, x if outward else x[2:7, 3:9])
+def test_a_crop_and_its_transpose(xp, rng):
+    crop = Crop((9, 12), (2, 3))
+    x, y = rng.random((9, 12)), rng.random((5, 6))
+    forward, back = to_numpy(crop.forward(xp.asarray(x))), to_numpy(crop.T.forward(xp.asarray(y)))
+    np.testing.assert_array_equal(forward, x[2:7, 3:9])
     assert (forward * y).sum() == pytest.approx((x * back).sum(), rel=1e-12)
 
 
 def test_no_margin_is_no_crop(rng):
     plane = rng.random((5, 6))
-    for crop in (Crop((0, 0)), Crop((0, 0), outward=True)):
+    for crop in (Crop((5, 6), (0, 0)), Crop((5, 6), (0, 0)).T):
         np.testing.assert_array_equal(crop.forward(plane), plane)
-
-
-def test_a_chain_goes_forth_in_order_and_back_in_reverse(rng):
-    grid = Grid((14, 16), 1.0)
-    chain = Chain((Crop((2, 2), outward=True), Turn(grid, 0.2), Crop((1, 3))))
-    x, y = rng.random((10, 12)), rng.random((12, 10))
-    once = Crop((1, 3)).forward(Turn(grid, 0.2).forward(Crop((2, 2), outward=True).forward(x)))
-    np.testing.assert_array_equal(chain.forward(x), once)
-    assert (chain.forward(x) * y).sum() == pytest.approx((x * chain.adjoint(y)).sum(), rel=1e-12)

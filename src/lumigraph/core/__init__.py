@@ -11,8 +11,10 @@
 - `picture`: thumbnails and tables for notebooks
 - `volume`: `Volume`, reconstructed intensities (z, y, x)
 - `stack`: `Stack`, pictures in an order; `cloud`: `PointCloud`, points in space
+- `linear`: `Linear`, maps from objects to raw images and back; `matrix`: `Matrix`, one of given numbers
 - `arrays`: the only file that knows array libraries
 - `checks`: one-line refusals of bad numbers
+- `progress`: `Progress`, how far a computation has come
 - `cache`: arrays kept within a bound of memory
 - `coverage`: fractions of samples that shapes cover
 """

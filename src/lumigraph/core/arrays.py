@@ -103,6 +103,30 @@ def turned(values: Array, coefficient: np.ndarray, amount: Array) -> Array:
     return values * xp.exp(1j * as_complex(factor * amount))
 
 
+def framed(array: Array, before: tuple[int, int], shape: tuple[int, int]) -> Array:
+    """Zeros (..., *shape) that hold the array (..., y, x), whose first sample stands at `before`."""
+    result = namespace(array).zeros((*array.shape[:-2], *shape), dtype=array.dtype, device=device(array))
+    y, x = (slice(first, first + n) for first, n in zip(before, array.shape[-2:], strict=True))
+    result[..., y, x] = array
+    return result
+
+
+def tiled(plane: Array, tile: tuple[int, int]) -> Array:
+    """Tiles (..., rows, columns, ky, kx) of ky x kx samples each, of a plane (..., rows ky, columns kx)."""
+    xp, (*batch, height, width), (ky, kx) = namespace(plane), plane.shape, tile
+    k = len(batch)
+    tiles = xp.reshape(plane, (*batch, height // ky, ky, width // kx, kx))
+    return xp.permute_dims(tiles, (*range(k), k, k + 2, k + 1, k + 3))
+
+
+def untiled(tiles: Array) -> Array:
+    """The plane (..., rows ky, columns kx) of tiles (..., rows, columns, ky, kx): undoes `tiled`."""
+    xp, (*batch, rows, columns, ky, kx) = namespace(tiles), tiles.shape
+    k = len(batch)
+    plane = xp.permute_dims(tiles, (*range(k), k, k + 2, k + 1, k + 3))
+    return xp.reshape(plane, (*batch, rows * ky, columns * kx))
+
+
 def as_complex(array: Array) -> Array:
     """The array as complex numbers of its own precision; a complex array is returned as it is."""
     if is_complex(array):

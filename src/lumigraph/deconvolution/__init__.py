@@ -1,7 +1,6 @@
-"""Objects from raw images: what a camera must have seen, from a model of how it sees.
+"""Objects from raw images: what a camera must have seen, from a model of how it sees, a `core.linear.Linear`.
 
 - `deconvolve`: `deconvolve` and, for time series, `deconvolve_series`; `Step`, `Interrupted`
-- `forward`: `ForwardModel`, what a deconvolution asks of a camera
 - `exposure`: `Exposure`, what is known of the raw image besides its values
 - `problem`: the three put together: model, sensitivity, deviance
 - `methods`: `Stop`, and what methods share
@@ -16,7 +15,6 @@ from lumigraph.deconvolution.checkpoint import Checkpoint
 from lumigraph.deconvolution.deconvolve import Interrupted, Step, deconvolve, deconvolve_series
 from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.filters import LowPass
-from lumigraph.deconvolution.forward import ForwardModel
 from lumigraph.deconvolution.least_squares import LeastSquares
 from lumigraph.deconvolution.methods import Stop
 from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
@@ -26,7 +24,6 @@ from lumigraph.deconvolution.wavelets import Wavelets
 __all__ = [
     "Checkpoint",
     "Exposure",
-    "ForwardModel",
     "Interrupted",
     "LeastSquares",
     "LowPass",

@@ -11,11 +11,11 @@ import numpy as np
 
 from lumigraph.core import arrays, checks, memory
 from lumigraph.core.arrays import Array
+from lumigraph.core.linear import Linear
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.deconvolution.checkpoint import Checkpoint, fingerprint
 from lumigraph.deconvolution.exposure import Exposure
-from lumigraph.deconvolution.forward import ForwardModel, depths_of, grid_of
 from lumigraph.deconvolution.methods import Method, State, Stop, check_offers
 from lumigraph.deconvolution.problem import Problem, Scale, values
 from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
@@ -69,7 +69,7 @@ class Interrupted(KeyboardInterrupt):
 
 def deconvolve(
     raw: RawImage | Array,
-    operator: ForwardModel,
+    operator: Linear,
     iterations: int | Stop = 30,
     *,
     method: Method = RichardsonLucy(),  # noqa: B008 - frozen
@@ -131,7 +131,7 @@ def deconvolve(
 
 def deconvolve_series(
     frames: Iterable[RawImage | Array],
-    operator: ForwardModel,
+    operator: Linear,
     iterations: int | Stop = 30,
     *,
     method: Method = RichardsonLucy(),  # noqa: B008 - frozen
@@ -228,13 +228,13 @@ def _finished(run: _Run, raw: RawImage | Array) -> Any:
     return _placed(reached[0].estimate, raw, run.problem.scale.operator)
 
 
-def _placed(estimate: Array, raw: RawImage | Array, operator: ForwardModel) -> Any:
+def _placed(estimate: Array, raw: RawImage | Array, operator: Linear) -> Any:
     """The estimate with its place in space, where the raw image is one and the operator knows it."""
-    grid = grid_of(operator)
+    grid = operator.object_grid
     if not isinstance(raw, RawImage) or grid is None:
         return estimate
     if len(estimate.shape) == 3:
-        depths = depths_of(operator)
+        depths = operator.depths
         return estimate if depths is None else Volume(estimate, grid, depths)
     known = {"center": grid.center, "wavelength": raw.metadata.get("wavelength")}
     return RawImage(estimate, float(np.mean(grid.pitch)), metadata=known)
@@ -247,12 +247,15 @@ def _known(raw: RawImage | Array, exposure: Exposure | None) -> Exposure:
     return Exposure.of(raw) if isinstance(raw, RawImage) else Exposure()
 
 
-def _check(operator: ForwardModel, method: Method) -> None:
-    check_offers("operator", operator, ("shape", "forward", "adjoint"), "Give camera.operator().")
+def _check(operator: Linear, method: Method) -> None:
+    if not isinstance(operator, Linear):
+        raise GeometryError(
+            f"operator is of type {type(operator).__name__} but must be a Linear. Give camera.operator()."
+        )
     check_offers("method", method, ("step", "start"), "Give RichardsonLucy() or LeastSquares().")
 
 
-def _require(operator: ForwardModel, data: Array) -> None:
+def _require(operator: Linear, data: Array) -> None:
     size = math.prod(operator.shape[1]) * (4 if arrays.is_single(data) else 8)
     what = f"a deconvolution into {' x '.join(map(str, operator.shape[1]))} samples"
     memory.require(COPIES * size, what, "Use fewer planes, or coarser samples.", SamplingError)

@@ -6,9 +6,9 @@ import numpy as np
 
 from lumigraph.core import arrays, checks
 from lumigraph.core.arrays import Array
+from lumigraph.core.linear import Linear
 from lumigraph.core.raw import RawImage
 from lumigraph.deconvolution.exposure import Exposure
-from lumigraph.deconvolution.forward import ForwardModel
 from lumigraph.errors import CalibrationError, GeometryError
 
 UNSEEN = 1e-3
@@ -38,7 +38,7 @@ class Scale:
         Electrons per unit of the data.
     """
 
-    operator: ForwardModel
+    operator: Linear
     response: Array | None
     weights: Array | None
     background: Array | float
@@ -47,7 +47,7 @@ class Scale:
     gain: float
 
     @classmethod
-    def of(cls, operator: ForwardModel, exposure: Exposure, like: Array) -> "Scale":
+    def of(cls, operator: Linear, exposure: Exposure, like: Array) -> "Scale":
         """Of an operator, in the library and precision of an array."""
         shape, xp = tuple(operator.shape[0]), arrays.namespace(like)
         response = _plane("response", exposure.response, shape, like)
@@ -160,7 +160,7 @@ class Problem:
         return plane if self.scale.weights is None else plane * self.scale.weights
 
 
-def values(raw: RawImage | Array, operator: ForwardModel, exposure: Exposure) -> Array:
+def values(raw: RawImage | Array, operator: Linear, exposure: Exposure) -> Array:
     """A raw image's values (ny, nx) as real floating-point numbers of its library, shape and kind checked."""
     data = raw.data if isinstance(raw, RawImage) else raw
     checks.array("the raw image", data, CalibrationError)

@@ -20,7 +20,6 @@ import numpy as np
 
 from lumigraph.core import arrays, checks
 from lumigraph.core.arrays import Array
-from lumigraph.deconvolution.forward import depths_of, grid_of
 from lumigraph.deconvolution.methods import State
 from lumigraph.deconvolution.problem import Problem
 from lumigraph.errors import GeometryError
@@ -158,13 +157,13 @@ def _cut(image: Array, axis: int, part: slice) -> Array:
 
 def _spacing_of(problem: Problem, axes: int) -> tuple[float, ...]:
     operator = problem.scale.operator
-    grid = grid_of(operator)
+    grid = operator.object_grid
     if grid is None:
         return (1.0,) * axes
     pitch = grid.pitch
     if axes == 2:
         return pitch
-    depths = depths_of(operator)
+    depths = operator.depths
     if depths is None:
         return (float(np.mean(pitch)), *pitch)
     return (float(np.abs(np.diff(depths)).mean()) if len(depths) > 1 else 1.0, *pitch)

@@ -9,13 +9,14 @@ from lumigraph.core import checks
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
+from lumigraph.core.linear import Linear, Sum
 from lumigraph.design import plenoptic1, plenoptic2, resolution
 from lumigraph.elements import LensletArray, Train
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import grids
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.parts import Lenslets
-from lumigraph.operators import Mixed, PeriodicOperator, periodic_operator
+from lumigraph.operators import periodic_operator
 from lumigraph.operators.blocks import Progress
 from lumigraph.propagation import Propagate
 from lumigraph.simulation import Spectrum
@@ -85,7 +86,7 @@ class LensletCamera(Camera):
         accuracy: float = 1e-3,
         spectrum: Spectrum | None = None,
         progress: Progress | None = None,
-    ) -> PeriodicOperator | Mixed:
+    ) -> Linear:
         """The exact model of how this camera sees incoherent planes, for `lumigraph.deconvolve`.
 
         Parameters
@@ -117,13 +118,12 @@ class LensletCamera(Camera):
             return periodic_operator(self, grid, dz, accuracy=accuracy, progress=progress)
         if len(spectrum.weights[0]) != 1:
             raise GeometryError("an operator is of one channel but the spectrum has three. Take one of them.")
-        return Mixed(
-            [
-                periodic_operator(self.replace(wavelength=w), grid, dz, accuracy=accuracy, progress=progress)
-                for w in spectrum.wavelengths
-            ],
-            [weight for (weight,) in spectrum.weights],
+        maps = tuple(
+            periodic_operator(self.replace(wavelength=w), grid, dz, accuracy=accuracy, progress=progress)
+            for w in spectrum.wavelengths
         )
+        weights = tuple(weight for (weight,) in spectrum.weights)
+        return Sum(maps, weights, object_grid=grid, depths=maps[0].depths)
 
     def _lenslet_samples(self, samples: int | None) -> Grid:
         """Object samples over the array's field, so many along a lenslet's pitch."""

@@ -7,12 +7,13 @@ from typing import ClassVar
 from pydantic import model_validator
 
 from lumigraph.core.grid import Grid
+from lumigraph.core.linear import Linear, stack
 from lumigraph.design import resolution
 from lumigraph.elements import Train
 from lumigraph.errors import FormatError
 from lumigraph.instruments import describe, grids
 from lumigraph.instruments.camera import Camera
-from lumigraph.operators import SingleLensOperator, Slices, single_lens_operator
+from lumigraph.operators import single_lens_operator
 from lumigraph.propagation import Propagate
 
 
@@ -99,9 +100,7 @@ class SingleLensCamera(Camera):
             (self.lens_train(), Propagate(self.image_distance, "band_limited", grid=self.image_grid))
         )
 
-    def operator(
-        self, depths: Sequence[float] | None = None, *, grid: Grid | None = None
-    ) -> SingleLensOperator | Slices:
+    def operator(self, depths: Sequence[float] | None = None, *, grid: Grid | None = None) -> Linear:
         """The exact model of how this camera sees incoherent planes, for `lumigraph.deconvolve`.
 
         Parameters
@@ -122,7 +121,7 @@ class SingleLensCamera(Camera):
         grid = self.object_grid if grid is None else grid
         planes = self._depths(depths)
         operators = [single_lens_operator(self, grid, dz) for dz in planes]
-        return operators[0] if depths is None else Slices(operators, grid, tuple(planes))
+        return operators[0] if depths is None else stack(operators, depths=planes)
 
     def describe(self) -> describe.Description:
         """Distances, f-numbers, cut-offs and sampling, each with its equation."""

@@ -1,11 +1,10 @@
-"""Linear image formers: from objects to raw images, and back.
+"""Linear image formers: from objects to raw images, and back; each is a `core.linear.Linear`.
 
 - `periodic`: `periodic_operator`, incoherent planes before a lenslet array, and its adjoint
 - `kernels`: its matrices; `optics`, what they depend on; `blocks`, how they are made, in factors; `cells`,
   what they are matrices between; `point_images`, where they come from; `cell_response`, what lenslets do to
   light; `glare`, what falls far from a point's image
 - `resampling`, `turning`: from an object's samples to points and from the image's samples to pixels
-- `slices`: `Slices`, operators of several depths as one; `mixed`: `Mixed`, of several wavelengths
 - `single_lens`: `single_lens_operator`, incoherent planes and points before a camera without lenslets
 - `microscope_operator`: volumes before a light-field microscope; `microscope_kernels`, images of a cell's
   points; `microscope_rays`, the same by rays; `microscope_spectrum`, the lenslets' frequencies;
@@ -15,17 +14,13 @@
 """
 
 from lumigraph.operators.camera import Camera
-from lumigraph.operators.mixed import Mixed
 from lumigraph.operators.periodic import PeriodicOperator, periodic_operator
 from lumigraph.operators.single_lens import SingleLensOperator, single_lens_operator
-from lumigraph.operators.slices import Slices
 
 __all__ = [
     "Camera",
-    "Mixed",
     "PeriodicOperator",
     "SingleLensOperator",
-    "Slices",
     "periodic_operator",
     "single_lens_operator",
 ]

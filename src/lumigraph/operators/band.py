@@ -15,9 +15,6 @@ from scipy.interpolate import CubicSpline, PPoly
 from scipy.sparse import csr_array
 from scipy.special import i0
 
-from lumigraph.core import arrays
-from lumigraph.core.arrays import Array
-
 OVERSAMPLING = 1.5
 """How much closer samples stand than the band asks for."""
 
@@ -53,45 +50,7 @@ class Span:
         return self.first + self.count - 1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sparse:
-    """A matrix of few entries per row or column, for arrays of any library."""
-
-    matrix: csr_array
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
-        rows, columns = (int(n) for n in self.matrix.shape or ())
-        return rows, columns
-
-    def along(self, array: Array) -> Array:
-        """The product with the first axis of an array."""
-        if arrays.is_numpy(array):
-            return self.matrix.astype(array.dtype, copy=False) @ array
-        return arrays.like(self.matrix.toarray(), array) @ array
-
-    @property
-    def T(self) -> "Sparse":
-        """The transpose."""
-        return Sparse(self.matrix.T.tocsr())
-
-
-def both(matrices: tuple[Sparse, Sparse], plane: Array) -> Array:
-    """One matrix along y and one along x of (y, x), those first that leave less to do."""
-    turn = arrays.namespace(plane).matrix_transpose
-    along_y, along_x = matrices
-    if along_y.shape[0] * along_x.shape[1] <= along_y.shape[1] * along_x.shape[0]:
-        return turn(along_x.along(turn(along_y.along(plane))))
-    return along_y.along(turn(along_x.along(turn(plane))))
-
-
-def both_adjoint(matrices: tuple[Sparse, Sparse], plane: Array) -> Array:
-    """Transpose of `both`."""
-    return both((matrices[0].T, matrices[1].T), plane)
-
-
-def placed(positions: np.ndarray, span: Span) -> Sparse:
+def placed(positions: np.ndarray, span: Span) -> csr_array:
     """Matrix (samples, points) of points as band-limited points: a sum of sinc functions, cut short.
 
     Parameters
@@ -105,26 +64,7 @@ def placed(positions: np.ndarray, span: Span) -> Sparse:
     values = kernel(at[:, None] - rows)
     columns = np.broadcast_to(np.arange(len(positions))[:, None], rows.shape)
     entries = (values.ravel(), (rows.ravel(), columns.ravel()))
-    return Sparse(csr_array(entries, shape=(span.count, len(positions))))
-
-
-def integrated(centers: np.ndarray, width: float, span: Span) -> Sparse:
-    """Matrix (pixels, samples) of the mean over each pixel of what the samples stand for.
-
-    Parameters
-    ----------
-    centers, width
-        Of the pixels [m].
-    """
-    low = (centers - width / 2) / span.pitch - span.first
-    reach = math.ceil(width / span.pitch) + 2 * HALF_WIDTH + 1
-    columns = np.floor(low).astype(int)[:, None] - HALF_WIDTH + np.arange(reach)
-    offset = low[:, None] - columns
-    values = integral(offset + width / span.pitch) - integral(offset)
-    inside = (columns >= 0) & (columns < span.count)
-    rows = np.broadcast_to(np.arange(len(centers))[:, None], columns.shape)
-    entries = (values[inside] * (span.pitch / width), (rows[inside], columns[inside]))
-    return Sparse(csr_array(entries, shape=(len(centers), span.count)))
+    return csr_array(entries, shape=(span.count, len(positions)))
 
 
 def kernel(offset: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ computed once.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -23,14 +23,13 @@ import numpy as np
 
 from lumigraph.core import memory
 from lumigraph.core.arrays import WORKERS
+from lumigraph.core.progress import Progress
 from lumigraph.core.threads import each
 from lumigraph.elements import LensletArray
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.cell_response import INFINITE, Lenslets, Limits
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.point_images import Apart, Few, Lit, factors, few, lit, mirrored, wave
-
-Progress = Callable[[float], None]
 
 State = tuple[Limits, Limits]
 

@@ -13,13 +13,15 @@ C. Guo et al., "Fourier light-field microscopy", Opt. Express 27, 25573 (2019).
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 import scipy.fft
 
-from lumigraph.core import arrays, checks, memory, picture
+from lumigraph.core import arrays, checks, memory
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
+from lumigraph.core.linear import Linear, Shape
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError, SamplingError
 
@@ -67,8 +69,8 @@ class Mosaic:
         return max(1, math.floor(self.pitch / self.pixel_pitch))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FourierMicroscopeOperator:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class FourierMicroscopeOperator(Linear):
     """A volume (z, y, x) to a raw image (ny, nx) of a Fourier light-field microscope, and back.
 
     Parameters
@@ -77,36 +79,35 @@ class FourierMicroscopeOperator:
         Images of a point on the axis (z, lenslets, w, w), float32, about each lenslet's pixel.
     corners
         Pixel (row, column) (lenslets, 2) where a lenslet's convolution begins.
-    depths
-        From the focused plane (z,) [m].
-    object_grid
-        As fine as the pixels.
-    raw_shape
-        Pixels (ny, nx).
+    raw_shape, plane
+        Pixels (ny, nx) of the raw image; samples (y, x) of the object, as fine as the pixels.
     """
 
     images: np.ndarray
     corners: np.ndarray
-    depths: tuple[float, ...]
-    object_grid: Grid
     raw_shape: tuple[int, int]
-    _spectra: dict = field(default_factory=dict, repr=False)
+    plane: tuple[int, int]
+    _spectra: dict = field(default_factory=dict)
+
+    title: ClassVar[str] = "Operator of a Fourier microscope"
 
     @property
-    def shape(self) -> tuple[tuple[int, int], tuple[int, int, int]]:
-        """Pixels (ny, nx) of the raw image, samples (z, y, x) of the volume."""
-        return self.raw_shape, (len(self.depths), *self.object_grid.shape)
+    def shape(self) -> tuple[Shape, Shape]:
+        """Pixels (ny, nx) of the raw image, samples (y, x) or (z, y, x) of the object."""
+        return self.raw_shape, (() if self.depths is None else (len(self.images),)) + self.plane
 
-    def _repr_html_(self) -> str:
-        return picture.operator_card("Operator of a Fourier microscope", self.shape)
+    @property
+    def memory_bytes(self) -> float:
+        """Of the points' images and their spectra [bytes]."""
+        return self.images.nbytes + 8.0 * math.prod(self.images.shape[:2]) * math.prod(self._size)
 
-    def forward(self, volume: Array) -> Array:
-        """Raw image (ny, nx) of intensities (z, y, x); an even plane of 1 gives 1 behind an open lenslet."""
-        self._check("the volume", volume, self.shape[1])
+    def _forward(self, intensity: Array) -> Array:
+        volume = intensity if self.depths is not None else intensity[None, ...]
         xp, spectra = arrays.namespace(volume), self._of(volume)
         spectrum = 0.0
-        for k in range(len(self.depths)):
-            spectrum = spectrum + spectra[k, ...] * arrays.fft2(self._wide(volume[k, ...]))
+        for k in range(len(self.images)):
+            wide = arrays.as_complex(arrays.framed(volume[k, ...], (0, 0), self._size))
+            spectrum = spectrum + spectra[k, ...] * arrays.fft2(wide)
         pieces = xp.real(arrays.ifft2(spectrum))
         raw = xp.zeros(self.raw_shape, dtype=volume.dtype, device=arrays.device(volume))
         for j, (inside, own) in enumerate(self._windows()):
@@ -114,30 +115,23 @@ class FourierMicroscopeOperator:
             window += pieces[(j, *own)]
         return raw
 
-    def adjoint(self, raw: Array) -> Array:
-        """Transpose of `forward`: (z, y, x) from a raw image (ny, nx)."""
-        self._check("the raw image", raw, self.raw_shape)
+    def _adjoint(self, raw: Array) -> Array:
         xp, spectra = arrays.namespace(raw), self._of(raw)
-        size, shape = self._size, self.object_grid.shape
+        size, shape = self._size, self.plane
         pieces = xp.zeros((len(self.corners), *size), dtype=raw.dtype, device=arrays.device(raw))
         for j, (inside, own) in enumerate(self._windows()):
             pieces[(j, *own)] = raw[inside]
         given = arrays.fft2(arrays.as_complex(pieces))
         planes = []
-        for k in range(len(self.depths)):
+        for k in range(len(self.images)):
             spectrum = xp.sum(xp.conj(spectra[k, ...]) * given, axis=0)
             planes.append(xp.real(arrays.ifft2(spectrum))[: shape[0], : shape[1]])
-        return xp.stack(planes)
-
-    def psf(self, index: tuple[int, ...]) -> Array:
-        """Raw image (ny, nx) of one sample (z, y, x) of intensity 1, float32 of NumPy."""
-        volume = np.zeros(self.shape[1], np.float32)
-        volume[index] = 1
-        return self.forward(volume)
+        return planes[0] if self.depths is None else xp.stack(planes)
 
     def point_image(self, y: float, x: float) -> Array:
         """Raw image (ny, nx) of a point [m] of intensity 1 at the first depth, shared by samples around."""
         grid, volume = self.object_grid, np.zeros(self.shape[1], np.float32)
+        assert grid is not None
         places = [
             (at - middle) / pitch + n // 2
             for at, middle, pitch, n in zip((y, x), grid.center, grid.pitch, grid.shape, strict=True)
@@ -146,14 +140,14 @@ class FourierMicroscopeOperator:
             for column in range(math.floor(places[1]), math.floor(places[1]) + 2):
                 if 0 <= row < grid.shape[0] and 0 <= column < grid.shape[1]:
                     share = (1 - abs(places[0] - row)) * (1 - abs(places[1] - column))
-                    volume[0, row, column] = share
+                    volume[..., row, column].flat[0] = share
         return self.forward(volume)
 
     @property
     def _size(self) -> tuple[int, int]:
         """Of the convolutions: field and image together, rounded up to a smooth number."""
         w = self.images.shape[-1]
-        ny, nx = (scipy.fft.next_fast_len(n + w - 1) or n + w - 1 for n in self.object_grid.shape)
+        ny, nx = (scipy.fft.next_fast_len(n + w - 1) or n + w - 1 for n in self.plane)
         return ny, nx
 
     def _of(self, like: Array) -> Array:
@@ -165,39 +159,24 @@ class FourierMicroscopeOperator:
             self._spectra[key] = arrays.like(arrays.fft2(padded), like)
         return self._spectra[key]
 
-    def _wide(self, plane: Array) -> Array:
-        xp, (ny, nx) = arrays.namespace(plane), self._size
-        like = {"dtype": plane.dtype, "device": arrays.device(plane)}
-        plane = xp.concat([plane, xp.zeros((ny - plane.shape[0], plane.shape[1]), **like)], axis=0)
-        plane = xp.concat([plane, xp.zeros((ny, nx - plane.shape[1]), **like)], axis=1)
-        return arrays.as_complex(plane)
-
     def _windows(self) -> list[tuple[tuple[slice, slice], tuple[slice, slice]]]:
         """For each lenslet the pixels of the raw image, and which of its convolution fall on them."""
         found, w = [], self.images.shape[-1]
         for corner in self.corners:
             raw, own = [], []
             for axis in (0, 1):
-                length = self.object_grid.shape[axis] + w - 1
+                length = self.plane[axis] + w - 1
                 start, stop = max(0, int(corner[axis])), min(self.raw_shape[axis], int(corner[axis]) + length)
                 raw.append(slice(start, max(start, stop)))
                 own.append(slice(start - int(corner[axis]), max(start, stop) - int(corner[axis])))
             found.append(((raw[0], raw[1]), (own[0], own[1])))
         return found
 
-    @staticmethod
-    def _check(name: str, array: Array, shape: tuple[int, ...]) -> None:
-        checks.array(name, array)
-        if tuple(array.shape) != tuple(shape):
-            raise GeometryError(
-                f"{name} has shape {tuple(array.shape)} but the operator's is {tuple(shape)}."
-            )
-
 
 def fourier_operator(
-    objectives: Sequence[Objective], mosaic: Mosaic, depths: Sequence[float]
+    objectives: Sequence[Objective], mosaic: Mosaic, depths: Sequence[float] | None = None
 ) -> FourierMicroscopeOperator:
-    """Operator from slices at `depths` to the raw image of a Fourier light-field microscope.
+    """Operator from slices at `depths`, or from the focused plane, to a Fourier microscope's raw image.
 
     Light is scalar here: each lenslet accepts a small cone.
 
@@ -208,29 +187,32 @@ def fourier_operator(
     GeometryError
         No depths, or none of the lenslets stands in the pupil.
     """
-    depths = tuple(checks.finite("a depth", dz) for dz in depths)
-    if not depths:
+    planes = (0.0,) if depths is None else tuple(checks.finite("a depth", dz) for dz in depths)
+    if not planes:
         raise GeometryError("there are no depths. Give at least one, such as 0.0 for the focused plane.")
-    half = _half_window(objectives[0], mosaic, depths)
+    half = _half_window(objectives[0], mosaic, planes)
     lit = _lit(objectives[0], mosaic)
     # Three times: as complex spectra of a window that holds the field too.
-    needed = 24.0 * len(depths) * len(lit) * (2 * half + 1 + mosaic.field) ** 2
+    needed = 24.0 * len(planes) * len(lit) * (2 * half + 1 + mosaic.field) ** 2
     memory.require(needed, "the images of points", "Use fewer slices or larger pixels.", SamplingError)
-    images = np.zeros((len(depths), len(lit), 2 * half + 1, 2 * half + 1), np.float32)
+    images = np.zeros((len(planes), len(lit), 2 * half + 1, 2 * half + 1), np.float32)
     middle = np.asarray(mosaic.shape) // 2
     # Two images one after the other: upright on the sensor, which is not turned.
     places = lit / mosaic.pixel_pitch + middle
     nearest = np.round(places).astype(int)
     for objective in objectives:
         for j, center in enumerate(lit):
-            for k, dz in enumerate(depths):
+            for k, dz in enumerate(planes):
                 image = _image(objective, mosaic, (center, places[j] - nearest[j]), dz, half)
                 images[k, j] += image / len(objectives)
     n = mosaic.field
     pitch = mosaic.pixel_pitch / mosaic.total_magnification
     # Sample n // 2 of the object stands on the axis, and its image on the lenslet's pixel.
     corners = nearest - half - n // 2
-    return FourierMicroscopeOperator(images, corners, depths, Grid((n, n), (pitch, pitch)), mosaic.shape)
+    return FourierMicroscopeOperator(
+        images, corners, mosaic.shape, (n, n),
+        object_grid=Grid((n, n), (pitch, pitch)), depths=None if depths is None else planes,
+    )  # fmt: skip
 
 
 def _lit(objective: Objective, mosaic: Mosaic) -> np.ndarray:

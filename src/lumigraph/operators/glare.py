@@ -40,7 +40,8 @@ class Glare:
         """Light of the object's cells (rows, columns), to the image's (rows, columns, samples)."""
         xp = arrays.namespace(cells)
         spectra = arrays.like(self.spectra, arrays.as_complex(cells))
-        spread = arrays.ifft2(arrays.fft2(arrays.as_complex(self._padded(cells, (0, 0)))) * spectra)
+        window = arrays.framed(cells, (0, 0), self._window)
+        spread = arrays.ifft2(arrays.fft2(arrays.as_complex(window)) * spectra)
         inside = self._inside()
         parts = xp.permute_dims(xp.real(spread)[:, inside[0], inside[1]], (1, 2, 0))
         return parts @ arrays.like(self.pictures, cells)
@@ -49,7 +50,7 @@ class Glare:
         """Transpose of `forward`: (rows, columns, samples) to (rows, columns)."""
         xp = arrays.namespace(image)
         parts = image @ xp.matrix_transpose(arrays.like(self.pictures, image))
-        parts = self._padded(xp.permute_dims(parts, (2, 0, 1)), self.margin)
+        parts = arrays.framed(xp.permute_dims(parts, (2, 0, 1)), self.margin, self._window)
         spectra = arrays.like(np.conj(self.spectra), arrays.as_complex(parts))
         spread = xp.sum(arrays.fft2(arrays.as_complex(parts)) * spectra, axis=0)
         rows, columns = (n + 2 * m for n, m in zip(self.image, self.margin, strict=True))
@@ -59,13 +60,9 @@ class Glare:
         y, x = (slice(m, m + n) for n, m in zip(self.image, self.margin, strict=True))
         return y, x
 
-    def _padded(self, planes: Array, first: Offset) -> Array:
-        xp = arrays.namespace(planes)
-        shape = (*planes.shape[:-2], *self.spectra.shape[1:])
-        result = xp.zeros(shape, dtype=planes.dtype, device=planes.device)
-        y, x = (slice(f, f + n) for f, n in zip(first, planes.shape[-2:], strict=True))
-        result[..., y, x] = planes
-        return result
+    @property
+    def _window(self) -> Offset:
+        return self.spectra.shape[1], self.spectra.shape[2]
 
 
 def glare(means: dict[Offset, np.ndarray], size: tuple[float, float], image: Offset) -> Glare:

@@ -5,14 +5,16 @@ light there has patterns: over a hundred in front of a lenslet, one or two far f
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from lumigraph import store
 from lumigraph.core import memory
 from lumigraph.core.cache import ByteCache
+from lumigraph.core.progress import Progress
 from lumigraph.errors import SamplingError
-from lumigraph.operators.blocks import Part, Progress, build, build_bytes
+from lumigraph.operators.blocks import Part, build, build_bytes
 from lumigraph.operators.glare import Glare, glare
 from lumigraph.operators.optics import Optics
 
@@ -45,8 +47,17 @@ class Matrix:
 _MATRICES = ByteCache()
 
 
-def matrix(optics: Optics, progress: Progress | None = None) -> Matrix:
+def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None = None) -> Matrix:
     """Of one depth: from memory, from disk, or built.
+
+    Parameters
+    ----------
+    optics
+        What it depends on.
+    progress
+        Of building it.
+    folder
+        Keeps it; None for the user's cache folder (`store`).
 
     Raises
     ------
@@ -64,7 +75,7 @@ def matrix(optics: Optics, progress: Progress | None = None) -> Matrix:
         return _packed(_build(optics, progress))
 
     # Packed and unpacked, built or found: products with other strides would round otherwise.
-    return _MATRICES.get(optics.key, lambda: _unpacked(store.kept(optics.key, built)))
+    return _MATRICES.get(optics.key, lambda: _unpacked(store.kept(optics.key, built, folder)))
 
 
 def _packed(matrix: Matrix) -> dict[str, np.ndarray]:

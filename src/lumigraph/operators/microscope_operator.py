@@ -8,17 +8,20 @@ through the lenslets' frequencies instead (`microscope_spectrum`), with the same
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
 from lumigraph import store
-from lumigraph.core import arrays, checks, memory, picture
+from lumigraph.core import arrays, checks, memory
 from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
+from lumigraph.core.linear import Linear, Shape
+from lumigraph.core.progress import Progress
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import FormatError, GeometryError, SamplingError
 from lumigraph.operators import microscope_spectrum
@@ -42,24 +45,17 @@ SHARE = 0.3
 
 _MATRICES = ByteCache()
 
-Progress = Callable[[int, int], None]
-"""Called with the slices that are done and how many there are."""
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MicroscopeOperator:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class MicroscopeOperator(Linear):
     """A volume (z, y, x) to a raw image (ny, nx), and back.
 
     Parameters
     ----------
     kernels
         Of each depth.
-    depths
-        From the focused plane (z,) [m].
     cells
         Lenslets (rows, columns).
-    object_grid
-        s samples per lenslet along each axis [m].
     placement
         Where the pixels stand; None where they are the N × N samples of each cell.
     by_frequency
@@ -68,19 +64,20 @@ class MicroscopeOperator:
     """
 
     kernels: tuple[SliceKernel, ...]
-    depths: tuple[float, ...]
     cells: tuple[int, int]
-    object_grid: Grid
     placement: PixelPlacement | None = None
     by_frequency: bool = False
-    _spectra: dict = field(default_factory=dict, repr=False)
+    _spectra: dict = field(default_factory=dict)
+
+    title: ClassVar[str] = "Operator of a light-field microscope"
 
     @property
-    def shape(self) -> tuple[tuple[int, int], tuple[int, int, int]]:
-        """Pixels (ny, nx) of the raw image, samples (z, y, x) of the volume."""
-        N = self.kernels[0].sampling.pixels
+    def shape(self) -> tuple[Shape, Shape]:
+        """Pixels (ny, nx) of the raw image, samples (y, x) or (z, y, x) of the object."""
+        s, N = self.kernels[0].sampling.points, self.kernels[0].sampling.pixels
         raw = (self.cells[0] * N, self.cells[1] * N) if self.placement is None else self.placement.shape
-        return raw, (len(self.depths), *self.object_grid.shape)
+        volume = () if self.depths is None else (len(self.kernels),)
+        return raw, (*volume, self.cells[0] * s, self.cells[1] * s)
 
     @property
     def multiply_adds(self) -> int:
@@ -96,18 +93,14 @@ class MicroscopeOperator:
         """Of the stored kernels."""
         return sum(kernel.blocks.nbytes for kernel in self.kernels)
 
-    def _repr_html_(self) -> str:
-        return picture.operator_card("Operator of a light-field microscope", self.shape)
+    @property
+    def memory_bytes(self) -> float:
+        """Of the kernels, of the lenslets' frequencies where they are used, and of an image [bytes]."""
+        spectra = microscope_spectrum.matrix_numbers(self.kernels, self.cells) if self.by_frequency else 0
+        return self.nbytes + 4.0 * (spectra + 3 * sum(math.prod(shape) for shape in self.shape))
 
-    def forward(self, volume: Array) -> Array:
-        """Raw image (ny, nx) of intensities (z, y, x); an even plane of 1 gives 1.
-
-        Raises
-        ------
-        GeometryError
-            Another shape than the operator's.
-        """
-        self._check("the volume", volume, self.shape[1])
+    def _forward(self, intensity: Array) -> Array:
+        volume = intensity if self.depths is not None else intensity[None, ...]
         plane = self._light(volume) if self.by_frequency else self._by_offsets(volume)
         return plane if self.placement is None else self.placement.forward(plane)
 
@@ -135,15 +128,11 @@ class MicroscopeOperator:
         N = self.kernels[0].sampling.pixels
         return _plane(xp.reshape(image, (N * N, *self.cells)), N)
 
-    def adjoint(self, raw: Array) -> Array:
-        """Transpose of `forward`: (z, y, x) from a raw image (ny, nx).
+    def _adjoint(self, raw: Array) -> Array:
+        volume = self._volume(raw)
+        return volume if self.depths is not None else volume[0, ...]
 
-        Raises
-        ------
-        GeometryError
-            Another shape than the operator's.
-        """
-        self._check("the raw image", raw, self.shape[0])
+    def _volume(self, raw: Array) -> Array:
         xp = arrays.namespace(raw)
         plane = raw if self.placement is None else self.placement.adjoint(raw)
         N = self.kernels[0].sampling.pixels
@@ -153,14 +142,8 @@ class MicroscopeOperator:
         flat = xp.reshape(_class_first(plane, N), (N * N, -1))
         return xp.stack([self._back(kernel, flat) for kernel in self.kernels])
 
-    def psf(self, index: tuple[int, ...]) -> Array:
-        """Raw image (ny, nx) of one sample (z, y, x) of intensity 1, float32 of NumPy."""
-        volume = np.zeros(self.shape[1], np.float32)
-        try:
-            volume[index] = 1
-        except IndexError:
-            raise GeometryError(f"index is {index} but the volume has shape {self.shape[1]}.") from None
-        plane = self._by_offsets(volume)  # dark pixels stay 0
+    def _of_point(self, point: np.ndarray) -> np.ndarray:
+        plane = self._by_offsets(point.reshape(-1, *point.shape[-2:]))  # dark pixels stay 0
         return plane if self.placement is None else self.placement.forward(plane)
 
     def _back(self, kernel: SliceKernel, flat: Array) -> Array:
@@ -176,14 +159,6 @@ class MicroscopeOperator:
 
     def _window(self, points: Array, top: int, left: int) -> Array:
         return points[:, top : top + self.cells[0], left : left + self.cells[1]]
-
-    @staticmethod
-    def _check(name: str, array: Array, shape: tuple[int, ...]) -> None:
-        checks.array(name, array)
-        if tuple(array.shape) != tuple(shape):
-            raise GeometryError(
-                f"{name} has shape {tuple(array.shape)} but the operator's is {tuple(shape)}."
-            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +187,7 @@ def microscope_operator(
     objectives: Sequence[Objective],
     lenslet: Lenslet,
     layout: Layout,
-    depths: Sequence[float],
+    depths: Sequence[float] | None = None,
     *,
     dropped: float = DROPPED,
     folder: str | Path | None = None,
@@ -227,14 +202,15 @@ def microscope_operator(
     lenslet, layout
         The array and the pixels.
     depths
-        Of the slices from the focused plane [m], positive farther from the objective.
+        Of the slices from the focused plane [m], positive farther from the objective, for an object
+        (z, y, x); None for the focused plane alone, an object (y, x).
     dropped
         Part of each point's light that may be left out; see `slice_kernel`.
     folder
         Keeps the kernels in files that are mapped into memory, and finds again those that are there: for
         volumes whose kernels do not fit in memory, and for the next run.
     progress
-        Called after each slice.
+        Called as ``progress(fraction)`` after each slice.
 
     Raises
     ------
@@ -245,17 +221,17 @@ def microscope_operator(
     FormatError
         A folder that cannot be made.
     """
-    depths = tuple(checks.finite("a depth", dz) for dz in depths)
-    _check_order(depths)
+    planes = (0.0,) if depths is None else tuple(checks.finite("a depth", dz) for dz in depths)
+    _check_order(planes)
     if not 0 < checks.finite("dropped", dropped, "1") < 0.5:
         raise GeometryError(f"dropped is {dropped:g} but must be above 0 and below 0.5.")
     for one in objectives:
-        require_window(one, lenslet, layout.sampling, max(depths, key=abs))
-    sizes = [kernel_bytes(objectives[0], lenslet, layout.sampling, dz, dropped) for dz in depths]
+        require_window(one, lenslet, layout.sampling, max(planes, key=abs))
+    sizes = [kernel_bytes(objectives[0], lenslet, layout.sampling, dz, dropped) for dz in planes]
     stored = 1 if folder is None else 0
     needed = max(sizes) * 2 + stored * sum(sizes) * (0.25 if objectives[0].is_round else 1)
     remedy = "Use fewer slices or samples, or folder= to keep them on disk."
-    memory.require(needed, f"the images of points at {len(depths)} depths", remedy, SamplingError)
+    memory.require(needed, f"the images of points at {len(planes)} depths", remedy, SamplingError)
     if folder is not None:
         try:
             Path(folder).mkdir(parents=True, exist_ok=True)
@@ -264,13 +240,13 @@ def microscope_operator(
         share = len(octant(layout.sampling.points)) / layout.sampling.classes if objectives[0].is_round else 1
         memory.require_disk(sum(sizes) * share, folder, "the images of points", SamplingError)
     kernels = []
-    for done, dz in enumerate(depths):
+    for done, dz in enumerate(planes):
         kernels.append(_kept(objectives, lenslet, layout.sampling, dz, dropped, folder))
         if progress is not None:
-            progress(done + 1, len(depths))
+            progress((done + 1) / len(planes))
     return MicroscopeOperator(
-        tuple(kernels), depths, layout.cells, _object_grid(lenslet, layout), layout.placement,
-        _suits_frequencies(kernels, layout.cells),
+        tuple(kernels), layout.cells, layout.placement, _suits_frequencies(kernels, layout.cells),
+        object_grid=_object_grid(lenslet, layout), depths=None if depths is None else planes,
     )  # fmt: skip
 
 
@@ -341,25 +317,17 @@ def _reach(kernel: SliceKernel) -> int:
 
 def _class_first(plane: Array, n: int) -> Array:
     """(rows n, columns n) to (n², rows, columns)."""
-    xp = arrays.namespace(plane)
-    rows, columns = plane.shape[0] // n, plane.shape[1] // n
-    cells = xp.permute_dims(xp.reshape(plane, (rows, n, columns, n)), (1, 3, 0, 2))
-    return xp.reshape(cells, (n * n, rows, columns))
+    xp, tiles = arrays.namespace(plane), arrays.tiled(plane, (n, n))
+    return xp.reshape(xp.permute_dims(tiles, (2, 3, 0, 1)), (n * n, *tiles.shape[:2]))
 
 
 def _plane(cells: Array, n: int) -> Array:
     """(n², rows, columns) to (rows n, columns n): the inverse of `_class_first`."""
-    xp, (rows, columns) = arrays.namespace(cells), cells.shape[1:]
-    plane = xp.permute_dims(xp.reshape(cells, (n, n, rows, columns)), (2, 0, 3, 1))
-    return xp.reshape(plane, (rows * n, columns * n))
+    xp = arrays.namespace(cells)
+    return arrays.untiled(xp.permute_dims(xp.reshape(cells, (n, n, *cells.shape[1:])), (2, 3, 0, 1)))
 
 
 def _padded(points: Array, reach: int) -> Array:
     """Zeros around cells (k, rows, columns)."""
-    xp = arrays.namespace(points)
-    like = {"dtype": points.dtype, "device": arrays.device(points)}
-    k, rows, columns = points.shape
-    side = xp.zeros((k, rows, reach), **like)
-    points = xp.concat([side, points, side], axis=2)
-    above = xp.zeros((k, reach, columns + 2 * reach), **like)
-    return xp.concat([above, points, above], axis=1)
+    rows, columns = (n + 2 * reach for n in points.shape[1:])
+    return arrays.framed(points, (reach, reach), (rows, columns))

@@ -240,11 +240,9 @@ def _factors(n: int, planes: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _channels(planes: Array, n: int) -> Array:
     """Planes (z, rows n, columns n) to even and odd parts of each cell (rows, columns, z n²)."""
-    xp, (z, height, width) = arrays.namespace(planes), planes.shape
-    basis = arrays.like(parts(n), planes)
-    cells = xp.reshape(planes, (z, height // n, n, width // n, n))
-    cells = basis @ xp.permute_dims(cells, (1, 3, 0, 2, 4)) @ xp.matrix_transpose(basis)
-    return xp.reshape(cells, (height // n, width // n, z * n * n))
+    xp, basis = arrays.namespace(planes), arrays.like(parts(n), planes)
+    cells = xp.permute_dims(arrays.tiled(planes, (n, n)), (1, 2, 0, 3, 4))
+    return xp.reshape(basis @ cells @ xp.matrix_transpose(basis), (*cells.shape[:2], -1))
 
 
 def _planes(cells: Array, n: int) -> Array:
@@ -252,7 +250,7 @@ def _planes(cells: Array, n: int) -> Array:
     xp, (rows, columns, channels) = arrays.namespace(cells), cells.shape
     basis, z = arrays.like(parts(n), cells), channels // n**2
     whole = xp.matrix_transpose(basis) @ xp.reshape(cells, (rows, columns, z, n, n)) @ basis
-    return xp.reshape(xp.permute_dims(whole, (2, 0, 3, 1, 4)), (z, rows * n, columns * n))
+    return arrays.untiled(xp.permute_dims(whole, (2, 0, 1, 3, 4)))
 
 
 def _window(values: Array, at: tuple[slice, slice], wanted: tuple[slice, slice]) -> Array:

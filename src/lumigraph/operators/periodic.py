@@ -20,21 +20,26 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from os import PathLike
+from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
-from lumigraph.core import arrays, checks, memory, picture
+from lumigraph.core import arrays, memory
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
+from lumigraph.core.linear import Linear, Shape
+from lumigraph.core.progress import Progress
+from lumigraph.core.progress import part as part_of
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators.blocks import Part, Progress
+from lumigraph.operators.blocks import Offset, Part
 from lumigraph.operators.camera import Camera
 from lumigraph.operators.cells import Cells
 from lumigraph.operators.kernels import Matrix, matrix
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.resampling import averaged, represented
-from lumigraph.operators.turning import Chain, Crop, Linear, Turn, turn_margin
-from lumigraph.sensor import Sensor
+from lumigraph.operators.turning import Crop, Turn, turn_margin
 
 PIECE = 600
 """Cells of the image that are computed at a time."""
@@ -56,8 +61,8 @@ class Plane:
     spread: Linear
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PeriodicOperator:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class PeriodicOperator(Linear):
     """Raw image of an incoherent object, and the adjoint; see `periodic_operator`.
 
     Parameters
@@ -67,40 +72,25 @@ class PeriodicOperator:
     planes
         One for each depth.
     readout
-        From the image's samples to pixels.
-    object_grid
-        Samples of the object at every depth.
-    depths
-        Of an object (z, y, x) from the focused plane (z,) [m]; None for one plane (y, x).
-    sensor
-        Pixels.
+        From the image's samples to pixels, turned by 180°.
+    accuracy
+        That it was made for, relative rms.
     """
 
     cells: Cells
     planes: tuple[Plane, ...]
     readout: Linear
-    object_grid: Grid
-    depths: tuple[float, ...] | None
-    sensor: Sensor
+    accuracy: float
+
+    title: ClassVar[str] = "Operator of a camera with lenslets"
 
     @property
-    def shape(self) -> tuple[tuple[int, int], tuple[int, ...]]:
+    def shape(self) -> tuple[Shape, Shape]:
         """Pixels (ny, nx) of the raw image, samples (y, x) or (z, y, x) of the object."""
         volume = () if self.depths is None else (len(self.depths),)
-        return self.sensor.shape, (*volume, *self.object_grid.shape)
+        return self.readout.shape[0], (*volume, *self.planes[0].spread.shape[1])
 
-    def _repr_html_(self) -> str:
-        return picture.operator_card("Operator of a camera with lenslets", self.shape)
-
-    def forward(self, intensity: Array, /) -> Array:
-        """Raw image (ny, nx), turned by 180°, of an object's intensity (y, x) or (z, y, x).
-
-        Raises
-        ------
-        GeometryError
-            Another shape than the object's.
-        """
-        _check("an object", intensity, self.shape[1])
+    def _forward(self, intensity: Array) -> Array:
         xp, layers = (
             arrays.namespace(intensity),
             intensity if self.depths is not None else intensity[None, ...],
@@ -117,15 +107,7 @@ class PeriodicOperator:
             image += plane.matrix.glare.forward(xp.sum(points, axis=2))
         return self.readout.forward(_as_plane(image, self.cells.samples))
 
-    def adjoint(self, raw: Array, /) -> Array:
-        """Transpose of `forward`: (y, x) or (z, y, x) from a raw image (ny, nx).
-
-        Raises
-        ------
-        GeometryError
-            Another shape than the raw image's.
-        """
-        _check("a raw image", raw, self.shape[0])
+    def _adjoint(self, raw: Array) -> Array:
         xp = arrays.namespace(raw)
         image = _by_cell(self.readout.adjoint(raw), self.cells.samples)
         layers = [self._returned(plane, image) for plane in self.planes]
@@ -147,21 +129,14 @@ class PeriodicOperator:
     def memory_bytes(self) -> float:
         """Memory that `forward` and `adjoint` of a single-precision image take, with the matrices [bytes]."""
         cells = math.prod(self.cells.image) * math.prod(self.cells.samples)
-        plane = math.sqrt(cells * math.prod(self.sensor.shape))
+        pixels = math.prod(self.shape[0])
         kept = sum(plane.matrix.nbytes for plane in self.planes)
-        return kept + 4 * (4 * cells + plane + math.prod(self.sensor.shape))
+        return kept + 4 * (4 * cells + math.sqrt(cells * pixels) + pixels)
 
-    def psf(self, index: tuple[int, ...], /) -> np.ndarray:
-        """Raw image (ny, nx), float32, of one object sample of intensity 1."""
-        point = np.zeros(self.shape[1], np.float32)
-        point[index] = 1
-        return self.forward(point)
-
-
-def _check(name: str, array: Array, shape: tuple[int, ...]) -> None:
-    checks.array(name, array)
-    if tuple(array.shape) != shape:
-        raise GeometryError(f"{name} has shape {tuple(array.shape)} but the operator takes {shape}.")
+    @property
+    def error(self) -> float:
+        """The accuracy that was asked for."""
+        return self.accuracy
 
 
 def _pieces(parts: Sequence[Part]) -> Iterator[Part]:
@@ -229,6 +204,7 @@ def periodic_operator(
     dz: float | Sequence[float] = 0.0,
     *,
     accuracy: float = 1e-3,
+    folder: str | PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> PeriodicOperator:
     """Operator from planes sampled on `grid` to the raw image of a camera with lenslets.
@@ -247,6 +223,8 @@ def periodic_operator(
     accuracy
         Relative rms error of the raw image, 1e-2 to 1e-5, of objects inside the array's field; near its
         border the error may be three times as large.
+    folder
+        Keeps what is computed; None for the user's cache folder.
     progress
         Called as ``progress(fraction)``.
 
@@ -265,16 +243,15 @@ def periodic_operator(
     planes, optics = [], None
     for k, depth in enumerate(depths):
         optics = Optics.of(camera, camera.object_distance + depth, accuracy)
-
-        def report(fraction: float, k: int = k) -> None:
-            if progress is not None:
-                progress((k + fraction) / len(depths))
-
-        planes.append(_plane(optics, matrix(optics, report), grid))
+        report = part_of(progress, k, len(depths))
+        planes.append(_plane(optics, matrix(optics, report, None if folder is None else Path(folder)), grid))
+        report(1.0)
     if optics is None:
         raise GeometryError("dz is empty. Give at least one depth.")
     several = depths if np.ndim(dz) else None
-    operator = PeriodicOperator(optics.cells, tuple(planes), _readout(optics), grid, several, camera.sensor)
+    operator = PeriodicOperator(
+        optics.cells, tuple(planes), _readout(optics), accuracy, object_grid=grid, depths=several
+    )
     memory.require(
         operator.memory_bytes, "the raw image", "Use fewer lenslets, or larger pixels.", SamplingError
     )
@@ -289,10 +266,9 @@ def _plane(optics: Optics, matrix: Matrix, grid: Grid) -> Plane:
     if not optics.rotation:
         return Plane(matrix, represented(grid, cells.grid(cells.points, scale, ring)))
     wide = _widened(cells.grid(cells.points, 1.0, ring), optics)
-    margin = tuple((w - m) * n for w, m, n in zip(wide, ring, cells.points, strict=True))
     turn = Turn(cells.grid(cells.points, 1.0, wide), optics.rotation)
     spread = represented(grid, cells.grid(cells.points, scale, wide))
-    return Plane(matrix, Chain((spread, turn, Crop((margin[0], margin[1])))))
+    return Plane(matrix, _cropped(turn.grid, wide, ring, cells.points) @ turn @ spread)
 
 
 def _readout(optics: Optics) -> Linear:
@@ -301,10 +277,15 @@ def _readout(optics: Optics) -> Linear:
     if not optics.rotation:
         return averaged(cells.grid(cells.samples, optics.image_scale, cells.ring), pixels)
     wide = _widened(cells.grid(cells.samples, 1.0, cells.ring), optics)
-    margin = tuple((w - r) * n for w, r, n in zip(wide, cells.ring, cells.samples, strict=True))
     turn = Turn(cells.grid(cells.samples, 1.0, wide), -optics.rotation)
     mean = averaged(cells.grid(cells.samples, optics.image_scale, wide), pixels)
-    return Chain((Crop((margin[0], margin[1]), outward=True), turn, mean))
+    return mean @ turn @ _cropped(turn.grid, wide, cells.ring, cells.samples).T
+
+
+def _cropped(plane: Grid, wide: Offset, ring: Offset, per_cell: Offset) -> Crop:
+    """From cells in a wide ring to those in a narrower one."""
+    y, x = ((w - r) * n for w, r, n in zip(wide, ring, per_cell, strict=True))
+    return Crop(plane.shape, (y, x))
 
 
 def _widened(grid: Grid, optics: Optics) -> tuple[int, int]:
@@ -320,15 +301,10 @@ def _widened(grid: Grid, optics: Optics) -> tuple[int, int]:
 
 def _by_cell(plane: Array, per_cell: tuple[int, int]) -> Array:
     """(rows ky, columns kx) to (rows, columns, ky kx)."""
-    xp, (ky, kx) = arrays.namespace(plane), per_cell
-    rows, columns = plane.shape[0] // ky, plane.shape[1] // kx
-    cells = xp.permute_dims(xp.reshape(plane, (rows, ky, columns, kx)), (0, 2, 1, 3))
-    return xp.reshape(cells, (rows, columns, ky * kx))
+    tiles = arrays.tiled(plane, per_cell)
+    return arrays.namespace(plane).reshape(tiles, (*tiles.shape[:2], math.prod(per_cell)))
 
 
 def _as_plane(cells: Array, per_cell: tuple[int, int]) -> Array:
     """(rows, columns, ky kx) to (rows ky, columns kx): the inverse of `_by_cell`."""
-    xp, (ky, kx) = arrays.namespace(cells), per_cell
-    rows, columns = cells.shape[:2]
-    plane = xp.permute_dims(xp.reshape(cells, (rows, columns, ky, kx)), (0, 2, 1, 3))
-    return xp.reshape(plane, (rows * ky, columns * kx))
+    return arrays.untiled(arrays.namespace(cells).reshape(cells, (*cells.shape[:2], *per_cell)))

@@ -1,13 +1,15 @@
 """Band-limited pictures from one sampling to another: a banded matrix for each axis."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
+from lumigraph.core.linear import Linear, Shape
 from lumigraph.operators.band import HALF_WIDTH, integral, kernel
 
 _ROWS = 64
@@ -29,63 +31,81 @@ class Banded:
     columns: int
     blocks: tuple[tuple[int, np.ndarray], ...]
 
-    def forward(self, plane: Array) -> Array:
-        """``matrix @ plane``: (columns, n) to (rows, n)."""
-        xp, row = arrays.namespace(plane), 0
-        rows = sum(m.shape[0] for _, m in self.blocks)
-        result = xp.empty((rows, plane.shape[1]), dtype=plane.dtype, device=plane.device)
-        for first, m in self.blocks:
-            result[row : row + m.shape[0], :] = arrays.like(m, plane) @ plane[first : first + m.shape[1], :]
-            row += m.shape[0]
-        return result
+    @property
+    def rows(self) -> int:
+        """Their number."""
+        return sum(len(m) for _, m in self.blocks)
 
-    def adjoint(self, plane: Array) -> Array:
-        """``matrix.T @ plane``: (rows, n) to (columns, n)."""
-        xp = arrays.namespace(plane)
-        result = xp.zeros((self.columns, plane.shape[1]), dtype=plane.dtype, device=plane.device)
+    def _parts(self, like: Array) -> Iterator[tuple[slice, slice, Array]]:
+        """Rows, columns and matrix of each block."""
         row = 0
         for first, m in self.blocks:
-            part = xp.matrix_transpose(arrays.like(m, plane)) @ plane[row : row + m.shape[0], :]
-            result[first : first + m.shape[1], :] += part
-            row += m.shape[0]
+            yield slice(row, row + len(m)), slice(first, first + m.shape[1]), arrays.like(m, like)
+            row += len(m)
+
+    def down(self, plane: Array) -> Array:
+        """``matrix @ plane``: (columns, n) to (rows, n)."""
+        result = _zeros(plane, (self.rows, plane.shape[1]))
+        for rows, columns, m in self._parts(plane):
+            result[rows, :] = m @ plane[columns, :]
         return result
 
-    def across(self, plane: Array) -> Array:
+    def up(self, plane: Array) -> Array:
+        """``matrix.T @ plane``: (rows, n) to (columns, n)."""
+        xp, result = arrays.namespace(plane), _zeros(plane, (self.columns, plane.shape[1]))
+        for rows, columns, m in self._parts(plane):
+            result[columns, :] += xp.matrix_transpose(m) @ plane[rows, :]
+        return result
+
+    def right(self, plane: Array) -> Array:
         """``plane @ matrix.T``: (n, columns) to (n, rows)."""
-        xp, row = arrays.namespace(plane), 0
-        rows = sum(m.shape[0] for _, m in self.blocks)
-        result = xp.empty((plane.shape[0], rows), dtype=plane.dtype, device=plane.device)
-        for first, m in self.blocks:
-            turned = xp.matrix_transpose(arrays.like(m, plane))
-            result[:, row : row + m.shape[0]] = plane[:, first : first + m.shape[1]] @ turned
-            row += m.shape[0]
+        xp, result = arrays.namespace(plane), _zeros(plane, (plane.shape[0], self.rows))
+        for rows, columns, m in self._parts(plane):
+            result[:, rows] = plane[:, columns] @ xp.matrix_transpose(m)
         return result
 
-    def across_adjoint(self, plane: Array) -> Array:
+    def left(self, plane: Array) -> Array:
         """``plane @ matrix``: (n, rows) to (n, columns)."""
-        xp, row = arrays.namespace(plane), 0
-        result = xp.zeros((plane.shape[0], self.columns), dtype=plane.dtype, device=plane.device)
-        for first, m in self.blocks:
-            part = plane[:, row : row + m.shape[0]] @ arrays.like(m, plane)
-            result[:, first : first + m.shape[1]] += part
-            row += m.shape[0]
+        result = _zeros(plane, (plane.shape[0], self.columns))
+        for rows, columns, m in self._parts(plane):
+            result[:, columns] += plane[:, rows] @ m
         return result
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Resampling:
+def _zeros(like: Array, shape: tuple[int, int]) -> Array:
+    return arrays.namespace(like).zeros(shape, dtype=like.dtype, device=arrays.device(like))
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Resampling(Linear):
     """Two matrices: one for the rows of a picture (y, x), one for its columns."""
 
     y: Banded
     x: Banded
 
-    def forward(self, plane: Array) -> Array:
-        """(y, x) to (rows of `y`, rows of `x`)."""
-        return self.x.across(self.y.forward(plane))
+    title: ClassVar[str] = "A picture on other samples"
 
-    def adjoint(self, plane: Array) -> Array:
-        """The transpose of `forward`."""
-        return self.y.adjoint(self.x.across_adjoint(plane))
+    @property
+    def shape(self) -> tuple[Shape, Shape]:
+        """Rows of both matrices, and columns of both."""
+        return (self.y.rows, self.x.rows), (self.y.columns, self.x.columns)
+
+    def _forward(self, intensity: Array) -> Array:
+        if self.y.rows * self.x.columns > self.y.columns * self.x.rows:  # what leaves less to do comes first
+            return self.y.down(self.x.right(intensity))
+        return self.x.right(self.y.down(intensity))
+
+    def _adjoint(self, raw: Array) -> Array:
+        if self.y.rows * self.x.columns > self.y.columns * self.x.rows:
+            return self.x.left(self.y.up(raw))
+        return self.y.up(self.x.left(raw))
+
+    @property
+    def memory_bytes(self) -> float:
+        """Of the matrices and of a picture on the way [bytes]."""
+        held = sum(m.nbytes for axis in (self.y, self.x) for _, m in axis.blocks)
+        between = min(self.y.rows * self.x.columns, self.y.columns * self.x.rows)
+        return held + 4.0 * (between + self.y.rows * self.x.rows)
 
 
 def represented(source: Grid, points: Grid) -> Resampling:

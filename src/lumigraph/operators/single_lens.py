@@ -14,9 +14,9 @@ D/(λL), so that samples λL/(2D) apart hold the image, whatever the object's ow
    nothing wraps round;
 3. the band-limited image is integrated over each pixel.
 
-Steps 1 and 3 are sparse matrices along each axis (`band`). The whole is exact to 1e-4 of the image's rms, but
-for light farther from its point than some 600 λL/D, where a point has 3e-4 of its light: what is nearer is
-made brighter by as much.
+Steps 1 and 3 are banded matrices along each axis (`resampling`). The whole is exact to 1e-4 of the image's
+rms, but for light farther from its point than some 600 λL/D, where a point has 3e-4 of its light: what is
+nearer is made brighter by as much.
 
 Goodman, *Introduction to Fourier Optics*, sections 6.1 to 6.3.
 """
@@ -24,18 +24,21 @@ Goodman, *Introduction to Fourier Optics*, sections 6.1 to 6.3.
 import math
 import warnings
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
-from lumigraph.core import arrays, memory, picture
+from lumigraph.core import arrays, memory
 from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
+from lumigraph.core.linear import Chain, Linear, Shape
 from lumigraph.elements import ThinLens
 from lumigraph.errors import SamplingError, SamplingWarning
 from lumigraph.operators import band
 from lumigraph.operators.band import Span
 from lumigraph.operators.camera import Camera
+from lumigraph.operators.resampling import Resampling, averaged, represented
 from lumigraph.propagation import propagate
 from lumigraph.propagation.window import smooth_size
 from lumigraph.scene import Points, Slice, sources
@@ -51,10 +54,13 @@ PERIOD = 3.0
 
 _TRANSFERS = ByteCache()
 
+ERROR = 1e-4
+"""Relative rms error of an image: kernels and pupil, against twice as much of each."""
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SingleLensOperator:
-    """Raw image of an incoherent plane at one depth, and its adjoint: a `ForwardModel`.
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Convolution(Linear):
+    """A point's image at every sample, on the samples that the sensor sees.
 
     Parameters
     ----------
@@ -62,57 +68,52 @@ class SingleLensOperator:
         DFT (ny, nx // 2 + 1) of a point's image over all offsets between object and sensor.
     window
         Samples (ny, nx) of those DFTs.
-    spread
-        Matrices that bring the object onto the image's samples, along y and along x.
-    collect
-        Matrices that integrate the image over the pixels, along y and along x.
-    object_grid
-        Samples of the object.
+    samples, seen
+        Of the image that the object covers, and that the sensor does (y, x).
     """
 
     transfer: np.ndarray
     window: tuple[int, int]
-    spread: tuple[band.Sparse, band.Sparse]
-    collect: tuple[band.Sparse, band.Sparse]
-    object_grid: Grid
+    samples: tuple[int, int]
+    seen: tuple[int, int]
+
+    title: ClassVar[str] = "Convolution with a point's image"
 
     @property
-    def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Pixels (ny, nx) of the raw image, samples (y, x) of the object."""
-        pixels = self.collect[0].shape[0], self.collect[1].shape[0]
-        return pixels, self.object_grid.shape
+    def shape(self) -> tuple[Shape, Shape]:
+        """Of `seen` and `samples`."""
+        return self.seen, self.samples
 
-    def _repr_html_(self) -> str:
-        return picture.operator_card("Operator of a single lens", self.shape)
-
-    def forward(self, intensity: Array, /) -> Array:
-        """Raw image (ny, nx), turned by 180°, of an object's intensity (y, x) on `object_grid`."""
-        return self.imaged(band.both(self.spread, intensity))
-
-    def adjoint(self, raw: Array, /) -> Array:
-        """Transpose of `forward`: (y, x) on `object_grid` from a raw image (ny, nx)."""
-        xp, (rows, columns) = arrays.namespace(raw), self._samples
-        arrived = _framed(band.both_adjoint(self.collect, raw), (rows - 1, columns - 1))
-        spectrum = arrays.rfft2(arrived, self.window) * xp.conj(arrays.like(self.transfer, raw))
-        return band.both_adjoint(self.spread, arrays.irfft2(spectrum, self.window)[:rows, :columns])
-
-    def psf(self, index: tuple[int, ...], /) -> Array:
-        """Raw image (ny, nx) of one object sample (y, x) of intensity 1."""
-        point = np.zeros(self.object_grid.shape, np.float32)
-        point[index] = 1
-        return self.forward(point)
-
-    @property
-    def _samples(self) -> tuple[int, int]:
-        """Of the image that the object covers."""
-        return self.spread[0].shape[0], self.spread[1].shape[0]
-
-    def imaged(self, samples: Array) -> Array:
-        """Raw image of what was brought onto the image's samples."""
-        spectrum = arrays.rfft2(samples, self.window) * arrays.like(self.transfer, samples)
-        (top, left), (rows, columns) = self._samples, (matrix.shape[1] for matrix in self.collect)
+    def _forward(self, intensity: Array) -> Array:
+        spectrum = arrays.rfft2(intensity, self.window) * arrays.like(self.transfer, intensity)
         image = arrays.irfft2(spectrum, self.window)
-        return band.both(self.collect, image[top - 1 : top - 1 + rows, left - 1 : left - 1 + columns])
+        rows, columns = (slice(n - 1, n - 1 + m) for n, m in zip(self.samples, self.seen, strict=True))
+        return image[rows, columns]
+
+    def _adjoint(self, raw: Array) -> Array:
+        xp, (rows, columns) = arrays.namespace(raw), self.samples
+        spectrum = arrays.rfft2(arrays.framed(raw, (rows - 1, columns - 1), self.window), self.window)
+        spectrum = spectrum * xp.conj(arrays.like(self.transfer, raw))
+        return arrays.irfft2(spectrum, self.window)[:rows, :columns]
+
+    @property
+    def memory_bytes(self) -> float:
+        """Of the transfer, and of two spectra and two windows on the way [bytes]."""
+        return self.transfer.nbytes + 4.0 * 4 * math.prod(self.window)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SingleLensOperator(Chain):
+    """Raw image, turned by 180°, of an incoherent plane at one depth: samples brought onto the image's, a
+    `Convolution`, and means over the pixels.
+    """
+
+    title: ClassVar[str] = "Operator of a single lens"
+
+    @property
+    def error(self) -> float:
+        """What kernels and pupil leave, of the image's rms."""
+        return ERROR
 
 
 def fits(camera: Camera) -> bool:
@@ -137,7 +138,18 @@ def single_lens_operator(camera: Camera, grid: Grid, dz: float = 0.0) -> SingleL
     SamplingError
         The camera has lenslets, or the image's samples do not fit in memory.
     """
-    return _operator(camera, (grid.y, grid.x), grid, dz)
+    if not fits(camera):
+        raise SamplingError("the camera has lenslets: use periodic_operator.")
+    scale, pitch = -camera.separation / (camera.object_distance + dz), image_pitch(camera)
+    here = _covering((scale * grid.y, scale * grid.x), pitch)
+    points = [span.pitch / scale for span in here]  # descending in the object
+    samples = Grid(
+        (here[0].count, here[1].count),
+        (-points[0], -points[1]),
+        ((here[0].first + here[0].count // 2) * points[0], (here[1].first + here[1].count // 2) * points[1]),
+    )
+    maps = represented(grid, samples), *_imaging(camera, here, dz)
+    return SingleLensOperator(maps, object_grid=grid)
 
 
 def slice_image(camera: Camera, part: Slice) -> np.ndarray:
@@ -151,40 +163,42 @@ def points_image(camera: Camera, points: Points) -> np.ndarray:
     total = np.zeros(camera.sensor.shape, np.float32)
     for dz in np.unique(points.positions[:, 2]):
         chosen = points.positions[:, 2] == dz
-        y, x, _ = points.positions[chosen].T
+        scale, pitch = -camera.separation / (camera.object_distance + dz), image_pitch(camera)
+        y, x = scale * points.positions[chosen, :2].T
+        here = _covering((y, x), pitch)
+        along_y, along_x = band.placed(y, here[0]), band.placed(x, here[1])
         # A point of intensity 1 counts as one sample of the camera's own object grid.
-        operator = _operator(camera, (y, x), camera.object_grid, float(dz))
-        along_y, along_x = (matrix.matrix for matrix in operator.spread)
-        samples = (along_y * points.intensities[chosen]) @ along_x.T
-        total += operator.imaged(samples.toarray().astype(np.float32))
+        light = points.intensities[chosen] * math.prod(camera.object_grid.pitch) * (scale / pitch) ** 2
+        samples = ((along_y * light) @ along_x.T).toarray().astype(np.float32)
+        total += Chain(_imaging(camera, here, float(dz))).forward(samples)
     return total
 
 
-def _operator(
-    camera: Camera, places: tuple[np.ndarray, np.ndarray], grid: Grid, dz: float
-) -> SingleLensOperator:
-    """Operator from points at `places` along y and x; `grid` says how large a sample is."""
-    if not fits(camera):
-        raise SamplingError("the camera has lenslets: use periodic_operator.")
-    distance, pitch = camera.object_distance + dz, image_pitch(camera)
-    scale, pixels = -camera.separation / distance, camera.sensor.grid
-    spans, spread, collect = [], [], []
-    for at, centers, width in zip(places, (pixels.y, pixels.x), pixels.pitch, strict=True):
-        here = Span.around(scale * float(at.max()), scale * float(at.min()), pitch)  # scale is below 0
-        there = Span.around(-centers[-1] - width / 2, -centers[0] + width / 2, pitch)
-        spans.append((here, there))
-        spread.append(band.placed(scale * at, here))
-        collect.append(band.integrated(-centers, width, there))  # a readout is turned by 180°
-    rows, columns = (smooth_size(here.count + there.count - 1) for here, there in spans)
-    window = rows, columns
+def _covering(places: tuple[np.ndarray, np.ndarray], pitch: float) -> tuple[Span, Span]:
+    """Samples of the image around places along y and x [m]."""
+    y, x = (Span.around(float(at.min()), float(at.max()), pitch) for at in places)
+    return y, x
+
+
+def _imaging(camera: Camera, here: tuple[Span, Span], dz: float) -> tuple[Convolution, Resampling]:
+    """From samples that stand for their own area of the object to the pixels."""
+    distance, pitch, pixels = camera.object_distance + dz, image_pitch(camera), camera.sensor.grid
+    half_y, half_x = (np.array([-p / 2, p / 2]) for p in pixels.pitch)
+    edges = -pixels.y[[-1, 0]] + half_y, -pixels.x[[-1, 0]] + half_x  # a readout is turned by 180°
+    there = _covering(edges, pitch)
+    offsets = [
+        Span(out.first - own.last, own.count + out.count - 1, pitch)
+        for own, out in zip(here, there, strict=True)
+    ]
+    window = smooth_size(offsets[0].count), smooth_size(offsets[1].count)
     _check_memory(window, camera)
-    offsets = [Span(there.first - here.last, here.count + there.count - 1, pitch) for here, there in spans]
-    light = math.prod(grid.pitch) * camera.separation**2 / (math.pi * camera.pupil_diameter**2 / 4)
-    key = repr((offsets, distance, light, camera.wavelength, camera.separation, camera.lens_train()))
+    light = (pitch * distance) ** 2 / (math.pi * camera.pupil_diameter**2 / 4)
+    key = repr((offsets, distance, camera.wavelength, camera.separation, camera.lens_train()))
     transfer = _TRANSFERS.get(
         key, lambda: arrays.rfft2(_point_image(camera, distance, offsets, light), window)
     )
-    return SingleLensOperator(transfer, window, (spread[0], spread[1]), (collect[0], collect[1]), grid)
+    samples, seen = ((y.count, x.count) for y, x in (here, there))
+    return Convolution(transfer, window, samples, seen), averaged(_grid(list(there)), pixels)
 
 
 def image_pitch(camera: Camera) -> float:
@@ -240,14 +254,6 @@ def _grid(spans: list[Span]) -> Grid:
     shape = tuple(span.count for span in spans)
     center = tuple((span.first + span.count // 2) * span.pitch for span in spans)
     return Grid((shape[0], shape[1]), (spans[0].pitch, spans[1].pitch), (center[0], center[1]))
-
-
-def _framed(array: Array, before: tuple[int, int]) -> Array:
-    """(y, x) with so many rows of zeros above and columns of zeros to the left."""
-    xp = arrays.namespace(array)
-    kind = {"dtype": array.dtype, "device": array.device}
-    array = xp.concat([xp.zeros((array.shape[0], before[1]), **kind), array], axis=1)
-    return xp.concat([xp.zeros((before[0], array.shape[1]), **kind), array], axis=0)
 
 
 def _check_memory(window: tuple[int, int], camera: Camera) -> None:

@@ -7,75 +7,49 @@ of images", IEEE Trans. Image Process. 4, 1371 (1995).
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar
 
 import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
+from lumigraph.core.linear import Linear, Shape
 
 
-class Linear(Protocol):
-    """A linear map of planes (y, x), and its transpose."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Crop(Linear):
+    """A plane without its margin.
 
-    def forward(self, plane: Array) -> Array:
-        """The map."""
-        ...
+    Parameters
+    ----------
+    whole
+        Samples (y, x) of the plane.
+    margin
+        Samples (y, x) that go on each side.
+    """
 
-    def adjoint(self, plane: Array) -> Array:
-        """Its transpose."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class Chain:
-    """Linear maps one after the other."""
-
-    maps: tuple[Linear, ...]
-
-    def forward(self, plane: Array) -> Array:
-        """From the first to the last."""
-        for part in self.maps:
-            plane = part.forward(plane)
-        return plane
-
-    def adjoint(self, plane: Array) -> Array:
-        """The transpose: from the last to the first."""
-        for part in reversed(self.maps):
-            plane = part.adjoint(plane)
-        return plane
-
-
-@dataclass(frozen=True, slots=True)
-class Crop:
-    """The plane without a margin of (y, x) samples on each side; `outward`: with zeros around it instead."""
-
+    whole: tuple[int, int]
     margin: tuple[int, int]
-    outward: bool = False
 
-    def forward(self, plane: Array) -> Array:
-        """(y, x) to what is left, or to what it becomes."""
-        return self._wider(plane) if self.outward else self._narrower(plane)
+    title: ClassVar[str] = "A plane without its margin"
 
-    def adjoint(self, plane: Array) -> Array:
-        """The other of the two."""
-        return self._narrower(plane) if self.outward else self._wider(plane)
+    @property
+    def shape(self) -> tuple[Shape, Shape]:
+        """Of what is left, and of the plane."""
+        y, x = (n - 2 * m for n, m in zip(self.whole, self.margin, strict=True))
+        return (y, x), self.whole
 
-    def _narrower(self, plane: Array) -> Array:
-        y, x = self.margin
-        return plane[y : plane.shape[0] - y, x : plane.shape[1] - x]
+    def _forward(self, intensity: Array) -> Array:
+        (y, x), (ny, nx) = self.margin, self.whole
+        return intensity[y : ny - y, x : nx - x]
 
-    def _wider(self, plane: Array) -> Array:
-        xp, (y, x) = arrays.namespace(plane), self.margin
-        shape = (plane.shape[0] + 2 * y, plane.shape[1] + 2 * x)
-        result = xp.zeros(shape, dtype=plane.dtype, device=plane.device)
-        result[y : y + plane.shape[0], x : x + plane.shape[1]] = plane
-        return result
+    def _adjoint(self, raw: Array) -> Array:
+        return arrays.framed(raw, self.margin, self.whole)
 
 
-@dataclass(frozen=True, slots=True)
-class Turn:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Turn(Linear):
     """A plane seen in coordinates that are turned by `angle` [rad], from +x towards +y, about (0, 0).
 
     The value at (y', x') is that of the plane at x = x' cos - y' sin, y = x' sin + y' cos.
@@ -92,17 +66,22 @@ class Turn:
     grid: Grid
     angle: float
 
-    def forward(self, plane: Array) -> Array:
-        """The plane (y, x), turned."""
-        for shifts, axis in self._shears():
-            plane = _shifted(plane, shifts, axis)
-        return plane
+    title: ClassVar[str] = "A plane turned by shears"
 
-    def adjoint(self, plane: Array) -> Array:
-        """Transpose of `forward`."""
+    @property
+    def shape(self) -> tuple[Shape, Shape]:
+        """Of the plane, twice."""
+        return self.grid.shape, self.grid.shape
+
+    def _forward(self, intensity: Array) -> Array:
+        for shifts, axis in self._shears():
+            intensity = _shifted(intensity, shifts, axis)
+        return intensity
+
+    def _adjoint(self, raw: Array) -> Array:
         for shifts, axis in reversed(list(self._shears())):
-            plane = _shifted(plane, -shifts, axis)
-        return plane
+            raw = _shifted(raw, -shifts, axis)
+        return raw
 
     def _shears(self) -> Iterator[tuple[np.ndarray, int]]:
         slant = math.tan(self.angle / 2)

@@ -68,7 +68,9 @@ def bead(
     raw = exposed(truth, operators[0], rng)
     found = found_by(bench.sampling_distances(depths), operators[-1], raw, 30)
     around = found[:, middle[1] - 4 : middle[1] + 5, middle[2] - 4 : middle[2] + 5].sum((1, 2))
-    pitch = operators[0].object_grid.pitch[1]
+    grid = operators[0].object_grid
+    assert grid is not None
+    pitch = grid.pitch[1]
     return np.array(
         [
             width(found[int(around.argmax()), middle[1]], pitch), width(around, STEP),
@@ -118,6 +120,7 @@ def _vesicle(
     depths = tuple(np.arange(-22, 22.1, 4 if context.quick else 2) * um)
     operator = bench.operator(depths, samples, pixels=PIXELS)
     grid = operator.object_grid
+    assert grid is not None
     radius = np.sqrt(np.asarray(depths)[:, None, None] ** 2 + grid.y[:, None] ** 2 + grid.x**2)
     truth = (200 * np.exp(-(((radius - SHELL) / (2 * um)) ** 2))).astype(np.float32)
     raw = exposed(truth, operator, rng)

@@ -40,6 +40,7 @@ def run(context: Context) -> Outcome:
         context.progress(done / len(depths), f"target at {dz / um:g} um")
         found = context.cached(f"usaf-{done}", lambda dz=dz: _found(bench, dz, (groups, samples), rng))
         grid = bench.operator((dz,), samples, pixels=PIXELS).object_grid
+        assert grid is not None
         contrasts = {f: contrast(found, grid, corner, w) for f, corner, w in elements(groups)}
         finest.append(finest_resolved(contrasts))
         limits.append(1 / (2 * bench.sampling_distances((dz,))[0]))
