@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from lumigraph import analysis, depth, design, plots, units
+    from lumigraph import analysis, depth, design, plots, samples, units
     from lumigraph.calibration import calibrate, devignette
     from lumigraph.core.calibration import Calibration
     from lumigraph.core.cloud import PointCloud
@@ -75,7 +75,7 @@ if TYPE_CHECKING:
     from lumigraph.viewer import view_inline
 
 _HOMES = {
-    "lumigraph": ("analysis", "depth", "design", "plots", "units"),
+    "lumigraph": ("analysis", "depth", "design", "plots", "samples", "units"),
     "lumigraph.calibration": ("calibrate", "devignette"),
     "lumigraph.core.calibration": ("Calibration",),
     "lumigraph.core.cloud": ("PointCloud",),
@@ -199,6 +199,7 @@ __all__ = [
     "refocus_stack",
     "render",
     "render_stack",
+    "samples",
     "save",
     "simulate",
     "super_resolve",

@@ -34,6 +34,7 @@ VERBS = (
         "depth",
         "deconvolve",
         "view",
+        "samples",
     ),
     "reproduce",
 )
@@ -258,8 +259,9 @@ def test_render_takes_the_patch_from_a_camera_or_by_itself(lumigraph, bench):
 
 
 def test_demo_is_run_in_the_folder(lumigraph, monkeypatch):
-    def run(output, progress):
+    def run(output, progress, living):
         progress("white image", 0.5)
+        assert callable(living)
         return Path(output) / "report.html"
 
     monkeypatch.setattr("lumigraph.demo.run", run)

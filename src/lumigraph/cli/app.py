@@ -20,6 +20,7 @@ from lumigraph.cli.refocus import refocus
 from lumigraph.cli.render import render
 from lumigraph.cli.reporting import COMMAND
 from lumigraph.cli.reproduce import reproduce
+from lumigraph.cli.samples import samples
 from lumigraph.cli.simulate import simulate
 from lumigraph.cli.view import view
 from lumigraph.errors import LumigraphError
@@ -27,7 +28,20 @@ from lumigraph.errors import LumigraphError
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
 """Exit codes: something went wrong, the command was written wrongly, Ctrl-C."""
 
-VERBS = (demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, view, reproduce)
+VERBS = (
+    demo,
+    design,
+    simulate,
+    calibrate,
+    decode,
+    render,
+    refocus,
+    depth,
+    deconvolve,
+    view,
+    samples,
+    reproduce,
+)
 """In the order of their use."""
 
 

@@ -11,7 +11,7 @@ def demo(*, output: Output = Path("demo"), common: Common = COMMON) -> None:
     """Run the whole path on two small cameras and write a report.
 
     Simulates raw and white images, calibrates, decodes or renders, refocuses, and writes
-    report.html beside the pictures. Takes about a minute.
+    report.html, which begins with a living picture, beside the files. Takes about a minute.
 
     Example: `lumigraph demo -o demo`
 
@@ -27,7 +27,11 @@ def demo(*, output: Output = Path("demo"), common: Common = COMMON) -> None:
             f"the folder {output.parent} for --output {output.name} does not exist. Make it first."
         )
     from lumigraph import demo
+    from lumigraph.io.target import write_bytes
+    from lumigraph.viewer import view_inline
 
     with stages("demo") as shown:
-        page = demo.run(output, shown)
+        page = demo.run(
+            output, shown, living=lambda views, file: write_bytes(file, view_inline(views).page.encode())
+        )
     report(common, f"Open {page}", {"output": str(output), "report": str(page)})

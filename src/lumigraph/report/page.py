@@ -33,12 +33,24 @@ class Table:
     caption: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Another page inside this one, from a file in the same folder."""
+
+    file: str
+    title: str
+
+
 @dataclass(slots=True)
 class Section:
-    """A part of a page under a heading; neighbouring figures stand side by side."""
+    """A part of a page under a heading; neighbouring figures stand side by side.
+
+    A folded one shows its heading until it is clicked.
+    """
 
     title: str
-    parts: list[Text | Table | Picture] = field(default_factory=list)
+    folded: bool = False
+    parts: list[Text | Table | Picture | Frame] = field(default_factory=list)
 
     def text(self, text: str) -> "Section":
         """Add paragraphs, parted by empty lines."""
@@ -76,6 +88,11 @@ class Section:
         self.parts.append(picture(image, caption, **options))
         return self
 
+    def frame(self, file: str, title: str) -> "Section":
+        """Show another page, a file that lies beside this one."""
+        self.parts.append(Frame(file, title))
+        return self
+
     @property
     def groups(self) -> list[tuple[str, list[Any]]]:
         """Parts in order, as (kind, parts); neighbouring figures make one group."""
@@ -100,9 +117,14 @@ class Page:
     introduction: str = ""
     sections: list[Section] = field(default_factory=list)
 
-    def section(self, title: str) -> Section:
+    @property
+    def framed(self) -> bool:
+        """Whether the page shows another."""
+        return any(isinstance(part, Frame) for section in self.sections for part in section.parts)
+
+    def section(self, title: str, *, folded: bool = False) -> Section:
         """Add a section and return it."""
-        self.sections.append(Section(title))
+        self.sections.append(Section(title, folded))
         return self.sections[-1]
 
     def made_by(self, command: str) -> Section:

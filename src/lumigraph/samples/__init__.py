@@ -1,0 +1,26 @@
+"""Sample data with truth, made by lumigraph itself; nothing is downloaded.
+
+- `scene`: a light field of opaque things at known depths, with its disparity map
+- `still_life`: what stands there, painted by functions of the place
+- `bench`: white and raw image of a plenoptic camera (1.0 or 2.0), with camera, scene and depths
+- `volume`: raw image of a light-field microscope, with the volume that it shows
+- `files`: their camera files; `folder`: all of them as files
+"""
+
+from lumigraph.samples.bench import BenchSample, bench
+from lumigraph.samples.files import camera_file
+from lumigraph.samples.folder import NAMES, write
+from lumigraph.samples.scene import SceneSample, scene
+from lumigraph.samples.volume import VolumeSample, volume
+
+__all__ = [
+    "NAMES",
+    "BenchSample",
+    "SceneSample",
+    "VolumeSample",
+    "bench",
+    "camera_file",
+    "scene",
+    "volume",
+    "write",
+]
