@@ -67,10 +67,10 @@ def placed(positions: np.ndarray, span: Span) -> csr_array:
     return csr_array(entries, shape=(span.count, len(positions)))
 
 
-def kernel(offset: np.ndarray) -> np.ndarray:
-    """Interpolation kernel at offsets [samples]: a sinc in a Kaiser window of half width `HALF_WIDTH`."""
-    inside = np.clip(1 - (offset / HALF_WIDTH) ** 2, 0, None)
-    window = np.where(np.abs(offset) <= HALF_WIDTH, i0(KAISER_BETA * np.sqrt(inside)) / i0(KAISER_BETA), 0)
+def kernel(offset: np.ndarray, half_width: float = HALF_WIDTH) -> np.ndarray:
+    """Interpolation kernel at offsets [samples]: a sinc in a Kaiser window of a half width [samples]."""
+    inside = np.clip(1 - (offset / half_width) ** 2, 0, None)
+    window = np.where(np.abs(offset) <= half_width, i0(KAISER_BETA * np.sqrt(inside)) / i0(KAISER_BETA), 0)
     return np.sinc(offset) * window
 
 

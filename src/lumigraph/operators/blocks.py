@@ -93,9 +93,10 @@ def bands(optics: Optics, axis: int) -> list[Band]:
     result = [Band((first, first + n), INFINITE)]
     if extent is None:
         return result
+    fineness, fresnel = optics.fineness, _cells.fresnel_number(optics.camera)
     far, close = (
         size / 2 + border * pitch * (1 + 1e-9) + optics.spill
-        for border in (optics.fineness.border, optics.fineness.corner)
+        for border in (fineness.border(fresnel), fineness.corner(fresnel))
     )
     for row in range(cells.image[axis]):
         middle = cells.edge[axis] + (row - first + 0.5) * size

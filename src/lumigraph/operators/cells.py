@@ -15,9 +15,11 @@ from lumigraph.elements.train import Element
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators.camera import Camera
 
-OVERSAMPLING = 1.5
-"""How much closer than λL/(2D) the points of a cell stand, so that a short kernel interpolates them."""
+OVERSAMPLING = 1.2
+"""How much closer than λL/(2D) the points of a cell stand: a kernel of `HALF_WIDTH` interpolates them."""
 
+HALF_WIDTH = 20
+"""Of that kernel [points]: its spectrum falls to nothing between OVERSAMPLING and 2 - 1/OVERSAMPLING."""
 
 COARSEST, FINEST = 1e-2, 1e-5
 """Accuracies that can be asked for."""
@@ -108,25 +110,22 @@ class Fineness:
         """
         return (6 * fresnel_number + 6 + 2 * blur) * (1e-3 / self.accuracy) ** 0.2
 
-    @property
-    def neighbours(self) -> int:
+    def neighbours(self, fresnel_number: float) -> int:
         """Lenslets on each side of an image's cell whose light is followed into it."""
-        return math.ceil(5 * (1e-3 / self.accuracy) ** 0.23)
+        return math.ceil(5 * (1e-3 / self.accuracy) ** 0.23 * _tail(fresnel_number))
 
     @property
     def rank(self) -> float:
         """Part of the kernels' norm that their factors may leave out."""
         return self.accuracy / 6
 
-    @property
-    def border(self) -> float:
+    def border(self, fresnel_number: float) -> float:
         """Lenslets that are missing farther than this from a cell [pitches] are not missed."""
-        return 4 * (1e-3 / self.accuracy) ** 0.25
+        return 4 * (1e-3 / self.accuracy) ** 0.25 * _tail(fresnel_number)
 
-    @property
-    def corner(self) -> float:
+    def corner(self, fresnel_number: float) -> float:
         """The same for what is missing on two sides of a corner: farther, each counts by itself."""
-        return 1.5 * (1e-3 / self.accuracy) ** 0.3
+        return 1.5 * (1e-3 / self.accuracy) ** 0.3 * _tail(fresnel_number)
 
     @property
     def ring(self) -> float:
@@ -148,6 +147,11 @@ class Fineness:
             Width λL/D of the diffraction at the main lens, in the same unit as `blur` and the result.
         """
         return blur + 12 * airy * (1e-3 / self.accuracy) ** 0.45
+
+
+def _tail(fresnel_number: float) -> float:
+    """How far a lenslet's edges send light aside, over those that the constants were found on."""
+    return min(1.0, math.sqrt(3 / fresnel_number))
 
 
 def fits(camera: Camera) -> bool:
@@ -205,10 +209,10 @@ def cells_of(camera: Camera, array: LensletArray, fineness: Fineness) -> Cells:
         _nearest(-n * s / 2, o - s / 2, s) for n, s, o in zip(count, size, lattice.origin, strict=True)
     )
     finest = airy(camera) / 2 / OVERSAMPLING
-    pitch, squared = lattice.pitch, camera.wavelength * telecentric_distance(camera)
+    pitch = lattice.pitch
     widest, beyond = blur(camera, camera.object_distance) / pitch, spill(camera)
     # Where micro-images overlap, light of more lenslets interferes.
-    image = pitch / fineness.samples(pitch * (pitch + 2 / 3 * beyond) / squared, widest)
+    image = pitch / fineness.samples(fresnel_number(camera) * (1 + 2 / 3 * beyond / pitch), widest)
     points = tuple(2 * math.ceil(s / finest / 2) for s in size)
     samples = tuple(math.ceil(s / image) for s in size)
     lit, ring = beyond + fineness.ring * pitch, []
@@ -244,6 +248,12 @@ def spill(camera: Camera) -> float:
     assert camera.lattice is not None  # `fits` has been asked
     width = camera.pupil_diameter * lenslet_distance(camera) / camera.separation
     return max(0.0, width - 1.25 * camera.lattice.pitch) / 2
+
+
+def fresnel_number(camera: Camera) -> float:
+    """p²/(λb) of the telecentric camera: light goes aside the less, the larger it is."""
+    assert camera.lattice is not None  # `fits` has been asked
+    return camera.lattice.pitch**2 / (camera.wavelength * telecentric_distance(camera))
 
 
 def airy(camera: Camera) -> float:

@@ -12,7 +12,7 @@ from lumigraph.operators.camera import Camera
 from lumigraph.operators.cell_response import SLACK, Axis
 from lumigraph.operators.cells import Cells, Fineness
 
-VERSION = 4
+VERSION = 5
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 
@@ -70,7 +70,8 @@ class Optics:
     def axes(self) -> tuple[Axis, Axis]:
         """Sampling of a cell along y and along x."""
         band = SLACK / 2 / _cells.airy(self.camera)
-        neighbourhood = self.fineness.neighbours * self.array.lattice.pitch + self.spill
+        neighbours = self.fineness.neighbours(_cells.fresnel_number(self.camera))
+        neighbourhood = neighbours * self.array.lattice.pitch + self.spill
         y, x = (
             Axis(size, points, samples, neighbourhood, band)
             for size, points, samples in zip(

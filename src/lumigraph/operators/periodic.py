@@ -35,7 +35,7 @@ from lumigraph.core.progress import part as part_of
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators.blocks import Offset, Part
 from lumigraph.operators.camera import Camera
-from lumigraph.operators.cells import Cells
+from lumigraph.operators.cells import HALF_WIDTH, Cells
 from lumigraph.operators.kernels import Matrix, matrix
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.resampling import averaged, represented
@@ -264,10 +264,10 @@ def _plane(optics: Optics, matrix: Matrix, grid: Grid) -> Plane:
     ring = (cells.ring[0] + matrix.margin[0], cells.ring[1] + matrix.margin[1])
     scale = -optics.distance / camera.separation
     if not optics.rotation:
-        return Plane(matrix, represented(grid, cells.grid(cells.points, scale, ring)))
+        return Plane(matrix, represented(grid, cells.grid(cells.points, scale, ring), HALF_WIDTH))
     wide = _widened(cells.grid(cells.points, 1.0, ring), optics)
     turn = Turn(cells.grid(cells.points, 1.0, wide), optics.rotation)
-    spread = represented(grid, cells.grid(cells.points, scale, wide))
+    spread = represented(grid, cells.grid(cells.points, scale, wide), HALF_WIDTH)
     return Plane(matrix, _cropped(turn.grid, wide, ring, cells.points) @ turn @ spread)
 
 

@@ -108,15 +108,18 @@ class Resampling(Linear):
         return held + 4.0 * (between + self.y.rows * self.x.rows)
 
 
-def represented(source: Grid, points: Grid) -> Resampling:
-    """Samples of an object as band-limited light on points turned by 180°; what they sum up to is kept."""
+def represented(source: Grid, points: Grid, half_width: float = HALF_WIDTH) -> Resampling:
+    """Samples of an object as band-limited light on points turned by 180°; what they sum up to is kept.
+
+    The closer the points stand to what the band asks for, the longer the kernel must be.
+    """
     matrices = []
     for axis in (0, 1):
         pitch = points.pitch[axis]
         at = _descending(points, axis) / pitch
         samples = (source.y, source.x)[axis] / pitch
         scale = source.pitch[axis] / pitch
-        matrices.append(banded(at, samples, lambda d, s=scale: kernel(d) * s, HALF_WIDTH))
+        matrices.append(banded(at, samples, lambda d, s=scale: kernel(d, half_width) * s, half_width))
     return Resampling(matrices[0], matrices[1])
 
 
