@@ -3,9 +3,17 @@
 Every message says what is wrong, with both values and their units, then what to do.
 """
 
+_LONGEST, _END = 400, 120  # characters of a message, and those of its end that are kept in any case
+
 
 class LumigraphError(ValueError):
-    """Base of everything lumigraph raises on purpose."""
+    """Base of everything lumigraph raises on purpose; a message of over 400 characters loses its middle."""
+
+    def __init__(self, message: object = "") -> None:
+        text = str(message)
+        if len(text) > _LONGEST:  # what a file or a command line says is part of it
+            text = f"{text[: _LONGEST - _END - 5]} ... {text[-_END:]}"
+        super().__init__(text)
 
 
 class SamplingError(LumigraphError):

@@ -25,6 +25,7 @@ ms = 1e-3
 _SI_UNIT = {"length": "m", "angle": "rad", "time": "s"}
 _EXAMPLE = {"length": "150 um", "angle": "2 deg", "time": "10 ms"}
 # A number, then one unit name. Expressions are refused: "9**9**9 m" would keep the parser busy for ever.
+_LONGEST = 100
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d_]*|°)\s*")
 
 
@@ -61,9 +62,11 @@ def parse(text: str | float, dimension: str = "length") -> float:
     import pint
 
     hint = f"Write a number and a unit, such as {_EXAMPLE[dimension]!r}."
-    match = _QUANTITY.fullmatch(str(text))
+    # Longer ones would keep the pattern busy: the time it takes grows with the square of the length.
+    written = text if isinstance(text, str) else repr(text) if isinstance(text, float) else str(text)[:1000]
+    match = _QUANTITY.fullmatch(written) if len(written) <= _LONGEST else None
     if match is None:
-        raise FormatError(f"{text!r} is not a quantity. {hint}")
+        raise FormatError(f"{written[:60]!r} is not a quantity. {hint}")
     number, unit = float(match[1]), match[2]
     if not math.isfinite(number):
         raise FormatError(f"{text!r} is not finite. {hint}")

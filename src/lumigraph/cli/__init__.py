@@ -12,6 +12,16 @@
 Modules of verbs import what is slow inside their functions, so that `--help` answers at once.
 """
 
-from lumigraph.cli.app import main
+from collections.abc import Sequence
 
 __all__ = ["main"]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code, see `app.main`; Ctrl-C while it starts is quiet, too."""
+    try:
+        from lumigraph.cli import app
+
+        return app.main(arguments)
+    except KeyboardInterrupt:
+        return 130

@@ -5,6 +5,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib.metadata import version
 
 from cyclopts import App, Parameter
@@ -16,9 +17,9 @@ from lumigraph.cli.deconvolve import deconvolve
 from lumigraph.cli.demo import demo
 from lumigraph.cli.depth import depth
 from lumigraph.cli.design import design
+from lumigraph.cli.options import COMMAND
 from lumigraph.cli.refocus import refocus
 from lumigraph.cli.render import render
-from lumigraph.cli.reporting import COMMAND
 from lumigraph.cli.reproduce import reproduce
 from lumigraph.cli.samples import samples
 from lumigraph.cli.simulate import simulate
@@ -28,20 +29,11 @@ from lumigraph.errors import LumigraphError
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
 """Exit codes: something went wrong, the command was written wrongly, Ctrl-C."""
 
+_LONGEST = 400  # characters of a line on standard error
+
 VERBS = (
-    demo,
-    design,
-    simulate,
-    calibrate,
-    decode,
-    render,
-    refocus,
-    depth,
-    deconvolve,
-    view,
-    samples,
-    reproduce,
-)
+    demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, view, samples, reproduce
+)  # fmt: skip
 """In the order of their use."""
 
 
@@ -79,16 +71,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         warnings.showwarning = _show_warning
         try:
             app(words, exit_on_error=False, print_error=False)
-            sys.stdout.flush()
+            if sys.stdout is not None:  # closed by the shell: `>&-`
+                sys.stdout.flush()
             return 0
         except BrokenPipeError:  # the reader, such as `head`, has seen enough
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _discard_output()
             return 0
         except (Exception, KeyboardInterrupt) as error:
             if debug:
                 traceback.print_exc()
+            if isinstance(error, OSError):  # the output may be what failed, and Python would write it again
+                _discard_output()
             code, text = _explained(error)
-            print(f"lumigraph: {' '.join(text.split())}", file=sys.stderr)
+            _say(text)
             return code
 
 
@@ -118,4 +113,20 @@ def _usage(error: CycloptsError) -> str:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"lumigraph: warning: {' '.join(str(message).split())}", file=sys.stderr)
+    _say(f"warning: {message}")
+
+
+def _say(text: str) -> None:
+    """One line on standard error, of at most 400 characters: the start and the end of a longer one."""
+    line = f"lumigraph: {' '.join(text.split())}"
+    if len(line) > _LONGEST:
+        line = f"{line[: _LONGEST - 125]} ... {line[-120:]}"
+    if sys.stderr is not None:
+        with suppress(OSError):
+            print(line.encode("utf-8", "replace").decode(), file=sys.stderr)
+
+
+def _discard_output() -> None:
+    """Let what is still to be written go nowhere."""
+    with suppress(AttributeError, OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,9 +1,11 @@
 """Reading inputs, checking outputs before a computation, writing them."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lumigraph.cli.options import COMMAND
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -27,10 +29,25 @@ def check_output(path: Path, endings: Sequence[str]) -> None:
     """
     from lumigraph.io.target import check_target
 
+    _check_inputs(path)
     if endings == VIEWS and not path.suffix:
         check_target(path, folder=True)
     else:
         check_target(path, endings)
+
+
+def _check_inputs(path: Path) -> None:
+    """Refuse an output that would take the place of an input, or of another output."""
+    place, same = path.resolve(), 0
+    for word in COMMAND.get():
+        other = Path(word.partition("=")[2] if word.startswith("--") else word).absolute()
+        with suppress(OSError):
+            other = other.resolve()
+        same += other == place
+        if same > 1 or (place in other.parents and other.exists() and place.is_dir()):
+            raise FormatError(
+                f"writing {path} would destroy {word}, which the command names too. Choose another."
+            )
 
 
 def read_raw(path: Path) -> "RawImage":

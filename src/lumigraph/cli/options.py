@@ -1,6 +1,7 @@
 """What verbs share: `--json`, `--debug`, and quantities with units."""
 
 import math
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +10,9 @@ from cyclopts import Parameter
 
 from lumigraph.errors import FormatError
 from lumigraph.units import parse
+
+COMMAND: ContextVar[tuple[str, ...]] = ContextVar("COMMAND", default=())
+"""Words after "lumigraph" of the command that runs."""
 
 
 @Parameter(name="*")

@@ -2,7 +2,6 @@
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,13 +9,10 @@ from typing import TYPE_CHECKING, Any
 from cyclopts import Parameter
 
 from lumigraph.cli import console, files
-from lumigraph.cli.options import Common
+from lumigraph.cli.options import COMMAND, Common
 
 if TYPE_CHECKING:
     from lumigraph.report import Page
-
-COMMAND: ContextVar[tuple[str, ...]] = ContextVar("COMMAND", default=())
-"""Words after "lumigraph" of the command that runs."""
 
 
 @Parameter(name="*")

@@ -10,6 +10,8 @@ from lumigraph.errors import FormatError, GeometryError
 
 BAYER_PATTERNS = ("RGGB", "GRBG", "GBRG", "BGGR")
 
+_MOST_BITS = 64
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RawImage:
@@ -51,8 +53,9 @@ class RawImage:
             raise GeometryError(f"a raw image has shape (y, x) or (y, x, c), not {shape}.")
         if self.pixel_pitch is not None:
             checks.positive("pixel_pitch", self.pixel_pitch)
-        if self.bit_depth is not None:
-            checks.whole("bit_depth", self.bit_depth, error=FormatError)
+        bits = self.bit_depth
+        if bits is not None and checks.whole("bit_depth", bits, error=FormatError) > _MOST_BITS:
+            raise FormatError(f"bit_depth is {bits} but must be at most {_MOST_BITS}.")
         if self.bayer is not None:
             checks.choice("bayer", self.bayer, BAYER_PATTERNS, FormatError)
         if not isinstance(self.metadata, Mapping):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lumigraph.errors import FormatError
+from lumigraph.io.source import toml
 
 MOST_BYTES = 2**20
 """A camera file has some 20 lines; whatever is larger than 1 MiB is something else."""
@@ -40,12 +41,9 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
             f"{str(path)!r} is larger than 1 MiB, too large for a camera file. Give a TOML file."
         )
     try:
-        return tomllib.loads(content.decode("utf-8"))
+        return toml(path, content.decode("utf-8"))
     except UnicodeDecodeError:
         raise FormatError(f"{str(path)!r} is not text. Give a camera file in TOML.") from None
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        reason = str(error) or "nested too deeply"
-        raise FormatError(f"{str(path)!r} is damaged TOML: {reason}. Correct that line.") from None
 
 
 _CATALOGUE = resources.files("lumigraph.instruments") / "catalogue"

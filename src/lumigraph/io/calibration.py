@@ -3,7 +3,6 @@
 import json
 import math
 import os
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -89,8 +88,8 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
             f"{path} has {path.stat().st_size} bytes, too many for a calibration. Check the path."
         )
     try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        found = source.toml(path, path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError as error:
         raise FormatError(f"{path} is not TOML: {error}.") from error
     _check_kind(path, found)
     try:
@@ -195,7 +194,7 @@ def _numbers(found: dict[str, Any], name: str, shape: tuple[int, ...]) -> np.nda
         raise FormatError(f"{name} is missing. Make the calibration again.")
     try:
         values = np.asarray(found[key], dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         values = np.array(np.nan)
     values = values.reshape(0, 2) if values.shape == (0,) and len(shape) == 2 else values
     fits = values.ndim == len(shape) and all(w in (-1, n) for w, n in zip(shape, values.shape, strict=True))

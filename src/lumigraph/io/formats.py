@@ -189,7 +189,8 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
             raise FormatError(f"{name}= means nothing for {path}, a {row.name} file. Leave it out.")
     if row.module == "png" and views is not None:
         return import_module("lumigraph.io.eslf").load(path, views=views, max_pixels=max_pixels)
-    return row.imported().load(path, max_pixels=max_pixels, **options)
+    with source.ours(path, row.name):
+        return row.imported().load(path, max_pixels=max_pixels, **options)
 
 
 def contents(path: str | os.PathLike[str]) -> tuple[Part, ...]:
@@ -213,7 +214,8 @@ def contents(path: str | os.PathLike[str]) -> tuple[Part, ...]:
     row = format_of(path)
     listed = getattr(row.imported(), "contents", None)
     if listed is not None:
-        return tuple(Part(*part) for part in listed(path))
+        with source.ours(path, row.name):
+            return tuple(Part(*part) for part in listed(path))
     thing = open(path)
     data = getattr(thing, "data", None)
     if data is None:

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import FileIO
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -70,7 +71,7 @@ def save(thing: RawImage | LightField | Volume, path: Path) -> None:
     else:
         fields, names = header.describe_volume(thing), "zyxc"
         scales = {"z": np.asarray(thing.depths), "y": thing.grid.y, "x": thing.grid.x}
-    with target.replacing(path) as temporary, h5py.File(temporary, "w", track_order=True) as file:
+    with target.replacing(path) as temporary, _writing(temporary) as file:
         # Bytes, not a string attribute: libhdf5 keeps those in heaps, which it follows for ever when damaged.
         file[_KEY] = np.frombuffer(json.dumps(fields).encode("ascii"), np.uint8)
         dataset = file.create_dataset(_DATA, data=data, chunks=_chunks(data), **_PACKING)
@@ -84,6 +85,44 @@ def save(thing: RawImage | LightField | Volume, path: Path) -> None:
                 scale.attrs["units"] = np.bytes_("m")
                 scale.make_scale(name)
                 dataset.dims[k].attach_scale(scale)
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[h5py.File]:
+    with _Spool(path, "w+") as spool:
+        with h5py.File(spool, "w", track_order=True) as file:
+            yield file
+        spool.settle()
+
+
+class _Spool(FileIO):
+    """A file whose failures libhdf5 does not see: it crashes where the disk is full."""
+
+    failure: OSError | None = None
+
+    def write(self, content: Any) -> int:
+        """Write all of it, or remember why not."""
+        rest = memoryview(content).cast("B")
+        size = len(rest)
+        try:
+            while len(rest) and self.failure is None:
+                rest = rest[super().write(rest) :]
+        except OSError as error:
+            self.failure = error
+        return size
+
+    def truncate(self, size: int | None = None) -> int:
+        """Cut or extend the file, or remember why not."""
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.failure = error
+            return size or 0
+
+    def settle(self) -> None:
+        """Raise what went wrong."""
+        if self.failure is not None:
+            raise self.failure
 
 
 def contents(path: Path) -> list[tuple[str, str, str]]:
@@ -170,6 +209,7 @@ def _values(path: Path, dataset: h5py.Dataset, max_pixels: int) -> np.ndarray:
         raise FormatError(f"{path} is packed by filters {sorted(filters)}; only Deflate is read.")
     stored = min(dataset.id.get_storage_size(), path.stat().st_size)
     source.check_stored(path, needed, stored, 1 if not filters else source.MOST_INFLATED)
+    source.check_held(path, needed, stored, max_pixels)
     if dataset.chunks is not None:
         _check_chunks(path, dataset, dataset.chunks, deflated=h5py.h5z.FILTER_DEFLATE in filters)
     return np.asarray(dataset[...])

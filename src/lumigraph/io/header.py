@@ -61,11 +61,12 @@ def restore(data: np.ndarray, found: Mapping[str, Any] | None, bit_depth: int | 
         raise FormatError(
             f"the header has format {found['lumigraph']!r} but this lumigraph reads {FORMAT}. Update it."
         )
+    metadata = found.get("metadata", {})
+    if not isinstance(metadata, Mapping):
+        raise FormatError(f"the lumigraph header is damaged: its metadata is a {type(metadata).__name__}.")
     try:
-        return RawImage(
-            data, *(found.get(name) for name in _FIELDS), metadata=dict(found.get("metadata", {}))
-        )
-    except (LumigraphError, TypeError) as error:
+        return RawImage(data, *(found.get(name) for name in _FIELDS), metadata=dict(metadata))
+    except (LumigraphError, TypeError, ValueError, OverflowError) as error:
         raise FormatError(f"the lumigraph header is damaged: {error}") from error
 
 
@@ -129,7 +130,7 @@ def restore_planes(data: np.ndarray, found: Mapping[str, Any]) -> Stack | Volume
         if found.get("kind") == "Stack":
             fields = ("quantity", "pixel_pitch", "bit_depth", "metadata")
             return Stack(data, tuple(found["positions"]), *(found[name] for name in fields))
-    except (LumigraphError, TypeError, KeyError, ValueError) as error:
+    except (LumigraphError, TypeError, KeyError, ValueError, OverflowError) as error:
         raise FormatError(f"the lumigraph header is damaged: {error}") from error
     raise FormatError(f"the lumigraph header is of a {found.get('kind')!r}, not of planes. Update lumigraph.")
 

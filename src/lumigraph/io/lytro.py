@@ -25,7 +25,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.errors import FormatError
 from lumigraph.io import bits, lytro_metadata, source
-from lumigraph.io.jpeg import MOST_PIXELS
+from lumigraph.io.jpeg import MOST_PIXELS, check_scans
 from lumigraph.io.lytro_metadata import field, parse, whole
 
 _MAGIC = re.compile(rb"\x89LF[PMC]\r\n\x1a\n")
@@ -217,7 +217,8 @@ def _bare(path: Path, max_pixels: int) -> RawImage:
     beside = next((p for end in (".txt", ".TXT", ".json") if (p := path.with_suffix(end)).is_file()), None)
     known: dict[str, Any] = {}
     if beside is not None:
-        found = lytro_metadata.frame(parse(beside.read_bytes()))
+        with source.regular_file(beside).open("rb") as file:
+            found = lytro_metadata.frame(parse(file.read(16 << 20)))
         shape, depth, order, bayer = found.shape, found.bits, found.endianness, found.bayer
         pitch, known = found.pixel_pitch, found.known
     elif size in _BARE:
@@ -267,6 +268,7 @@ def _thumbnail(container: Container, row: dict[str, Any], max_pixels: int) -> Ra
 def _jpeg(container: Container, row: Any, size: tuple[int, int]) -> np.ndarray:
     """A picture (y, x, 3) of the size that was declared."""
     content = container.content(field(row, "imageRef"))
+    check_scans(content)
     with JpegImagePlugin.JpegImageFile(io.BytesIO(content)) as image:
         if image.size != (size[1], size[0]) or size[0] * size[1] > _LARGEST_PICTURE:
             found = f"{image.size[1]} x {image.size[0]}"

@@ -62,7 +62,7 @@ def load(
 
 def _length(path: Path, found: dict[str, float], name: str) -> float:
     value = found.get(name, math.nan)
-    if not 0 < value < 1e9:
+    if not 1e-12 < value < 1e9:
         section, _, key = name.partition(".")
         raise FormatError(f"{path} has no {key} above 0 in [{section}]. Is it plenoptomos' geometry file?")
     return value * _MM

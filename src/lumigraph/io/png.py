@@ -5,6 +5,7 @@ Fields of the raw image stand in a text chunk.
 
 import io
 import struct
+import zlib
 from math import ceil
 from pathlib import Path
 
@@ -43,6 +44,7 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> RawImage:
     _check_chunks(path)
     needed = ceil(shape[0] * shape[1] * _SAMPLES.get(colour, 1) * depth / 8)
     source.check_stored(path, needed, path.stat().st_size)
+    source.check_held(path, needed, path.stat().st_size, max_pixels)
     if depth == 16 and colour in _WIDE:
         return _wide(path, colour)
     # The class is called itself, not Image.open, which has a size limit of its own for the whole process.
@@ -135,17 +137,29 @@ def _encoded(data: np.ndarray, fields: RawImage | None) -> bytes:
 
 
 def _check_chunks(path: Path) -> None:
-    """Refuse chunks that end behind the file: Pillow would allocate what they declare."""
-    size, at = path.stat().st_size, 8
+    """Refuse chunks that end behind the file, which Pillow would allocate, or differ from their checksums."""
+    size, at, kind = path.stat().st_size, 8, b""
     with path.open("rb") as file:
-        while at < size:
-            file.seek(at)
+        file.seek(at)
+        while kind != b"IEND":
             start = file.read(8)
-            at += 12 + int.from_bytes(start[:4], "big")
+            length, kind = int.from_bytes(start[:4], "big"), start[4:]
+            at += 12 + length
             if at > size or len(start) < 8:
                 raise FormatError(f"{path} is cut short: a chunk ends at byte {at} of {size}. Copy it again.")
-            if start[4:] == b"IEND":
-                break
+            if _checksum(file, kind, length) != int.from_bytes(file.read(4), "big"):
+                raise FormatError(
+                    f"{path} is damaged: its chunk {kind!r} differs from its checksum. Copy it again."
+                )
+
+
+def _checksum(file: io.BufferedReader, kind: bytes, length: int) -> int:
+    total = zlib.crc32(kind)
+    while length > 0:
+        piece = file.read(min(length, 1 << 20))
+        length -= len(piece)
+        total = zlib.crc32(piece, total)
+    return total
 
 
 def _read_header(path: Path) -> tuple[tuple[int, int], int, int]:

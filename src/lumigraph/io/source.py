@@ -2,15 +2,19 @@
 
 import difflib
 import os
+import re
+import tomllib
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import ceil, prod
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from lumigraph import store
+from lumigraph.core import memory
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import FormatError, LumigraphError
 
@@ -35,6 +39,11 @@ _SIGNATURES = (
 )
 
 _MOST_LENSLETS = 1_000_000
+
+_PLAUSIBLE, _SMALL = 1000, 64 << 20
+"""Bytes of pixels for one stored byte that are believed, and bytes of pixels that always are."""
+
+_MOST_PARTS, _BREAKS = 100, re.compile(r"[\n,=\[\]{}]")
 
 MOST_INFLATED = 1032
 """Bytes that one byte of Deflate can become at most (P. Deutsch, RFC 1951: 258 bytes from two bits)."""
@@ -166,6 +175,92 @@ def check_stored(path: Path, needed: float, stored: int, most: float = MOST_INFL
         )
 
 
+def check_held(path: Path, needed: float, stored: int, max_pixels: int) -> None:
+    """Refuse pixels that do not fit in memory, or that a file a thousand times smaller declares.
+
+    The latter only of files that declare more than 64 MiB, and only as long as the caller has not asked for
+    more than `MAX_PIXELS`: constant pictures pack as tightly.
+
+    Parameters
+    ----------
+    path
+        The file.
+    needed
+        Bytes of the pixels.
+    stored
+        Bytes there are for them.
+    max_pixels
+        What the caller allows.
+
+    Raises
+    ------
+    FormatError
+        Both sizes, and what to do.
+    """
+    if needed > max(_PLAUSIBLE * stored, _SMALL) and max_pixels <= MAX_PIXELS:
+        raise FormatError(
+            f"{path} declares {needed:.3g} bytes of pixels from {stored}, over {_PLAUSIBLE} times as many: "
+            f"made to fill the memory? If not, call lumigraph.io.open(path, max_pixels={MAX_PIXELS + 1})."
+        )
+    memory.require(needed, f"{path}: its picture", "Crop it, or use a larger machine.", FormatError)
+
+
+def unlinked(path: Path) -> Path:
+    """The path of a file inside a folder, refused where it is a link, or no plain file.
+
+    Raises
+    ------
+    FormatError
+        Which of them it is.
+    """
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        what = "a link" if path.is_symlink() else "no plain file"
+        raise FormatError(f"{path} is {what}, which is not followed. Copy what it leads to.")
+    return path
+
+
+def check_folder(path: Path, most: int) -> None:
+    """Refuse a folder that holds links, devices or pipes, or more than `most` files, at any depth.
+
+    Raises
+    ------
+    FormatError
+        The first of them.
+    """
+    folders, count = [path], 0
+    while folders:
+        with os.scandir(folders.pop()) as entries:
+            for entry in entries:
+                count += 1
+                if entry.is_dir(follow_symlinks=False):
+                    folders.append(Path(entry.path))
+                else:
+                    unlinked(Path(entry.path))
+                if count > most:
+                    raise FormatError(f"{path} holds more than {most} files. Check the path.")
+
+
+def toml(path: Path, text: str) -> dict[str, Any]:
+    """The table in a TOML text, in a time that grows with its length.
+
+    Raises
+    ------
+    FormatError
+        No TOML, keys of over a hundred parts, or tables nested without end.
+    """
+    run = 0
+    for part in text.split("."):  # tomllib takes time with the square of a key's parts
+        run = 0 if _BREAKS.search(part) else run + 1
+        if run > _MOST_PARTS:
+            raise FormatError(f"{path} is damaged TOML: a key has over {_MOST_PARTS} parts. Check the file.")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise FormatError(f"{path} is damaged TOML: nested too deeply. Check the file.") from None
+    except ValueError as error:  # TOMLDecodeError, and whole numbers of over 4,300 digits
+        raise FormatError(f"{path} is damaged TOML: {error}. Correct that line.") from error
+
+
 def check_inflated(path: Path, packed: bytes, limit: int) -> None:
     """Refuse Deflate data (zlib or gzip) that becomes more than `limit` bytes; little memory is used.
 
@@ -191,16 +286,28 @@ def check_inflated(path: Path, packed: bytes, limit: int) -> None:
 def decoding(path: Path, kind: str) -> Iterator[None]:
     """Context in which every failure of a decoder becomes one `FormatError` naming the file."""
     try:
-        yield
+        with ours(path, kind):
+            yield
     except FormatError as error:
         message = str(error)
         raise (error if str(path) in message else FormatError(f"{path}: {message}")) from error.__cause__
     except LumigraphError as error:
         raise FormatError(f"{path} is damaged: {error}") from error
+
+
+@contextmanager
+def ours(path: Path, kind: str) -> Iterator[None]:
+    """Context in which what is not raised on purpose becomes one `FormatError` naming the file."""
+    try:
+        yield
+    except LumigraphError:
+        raise
     except MemoryError as error:
         raise FormatError(f"{path} does not fit into memory. Crop it, or use a larger machine.") from error
     except Exception as error:
         reason = " ".join(str(error).split())[:160] or type(error).__name__
+        if isinstance(error, OSError) and error.strerror and error.filename:
+            raise FormatError(f"{path} cannot be read: {error.strerror}. Check its permissions.") from error
         raise FormatError(f"{path} is damaged or is not {kind} that can be read: {reason}.") from error
 
 

@@ -28,6 +28,7 @@ _TYPES = frozenset(f"{kind}{bits}" for kind in ("uint", "int") for bits in (8, 1
     "float64",
 }
 _MOST_PAGES = 100_000
+_FIRST = 8  # byte at which pixels can begin at the earliest
 # tifffile logs what it finds odd; whoever wants that adds a handler, others get our one-line errors.
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
@@ -175,6 +176,8 @@ def _check_page(path: Path, image: tifffile.TiffPage, max_pixels: int) -> None:
     if image.is_tiled:
         source.check_size(path, (image.tilelength, image.tilewidth), max(max_pixels, 1 << 24))
     size = path.stat().st_size
+    if min(image.dataoffsets, default=0) < _FIRST or min(image.databytecounts, default=0) < 1:
+        raise FormatError(f"{path} is damaged: a strip of its pixels has no place in it. Copy it again.")
     last = max((a + n for a, n in zip(image.dataoffsets, image.databytecounts, strict=False)), default=0)
     stored = min(sum(image.databytecounts), size * max(1, len(image.databytecounts)))
     expected = ceil(image.imagelength * image.imagewidth * image.samplesperpixel * image.bitspersample / 8)
@@ -185,6 +188,7 @@ def _check_page(path: Path, image: tifffile.TiffPage, max_pixels: int) -> None:
         )
     # LZW makes at most 1365 bytes from one; JPEG has no bound, its decoder stops at the picture's size.
     source.check_stored(path, expected, size if image.compression == 1 else stored, 1 << 16)
+    source.check_held(path, expected, stored, max_pixels)
 
 
 def _save_raw(raw: RawImage, path: Path) -> None:

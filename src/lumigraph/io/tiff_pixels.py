@@ -1,6 +1,9 @@
 """The pixels of one TIFF page: by tifffile, by Pillow (LZW, JPEG), or unpacked here (odd bit depths)."""
 
+import os
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import ceil
 from pathlib import Path
 
@@ -118,8 +121,25 @@ def _packed(path: Path, image: tifffile.TiffPage) -> np.ndarray:
     return data.reshape(image.imagelength, image.imagewidth, samples) if samples > 1 else data
 
 
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Context in which libtiff's own lines on standard error go nowhere: its failures are raised."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # closed
+        yield
+        return
+    try:
+        with open(os.devnull, "wb") as nowhere:  # noqa: PTH123
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
 def _by_pillow(path: Path, image: tifffile.TiffPage) -> np.ndarray:
-    with TiffImagePlugin.TiffImageFile(path) as file:
+    with _quiet(), TiffImagePlugin.TiffImageFile(path) as file:
         file.seek(image.index)
         shape = (file.size[1], file.size[0])
         mode = "I;16" if file.mode in ("I;16B", "I;16L") else file.mode

@@ -6,10 +6,10 @@ numbers, row and column (`view_03_05.png`). Written: `view_RR_CC.png` (`.tif` fo
 Row 0, column 0 is the camera top left; `cameras` tells how that becomes (v, u).
 """
 
-import configparser
 import json
 import math
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ _POSITION = r"(-?\d{1,9}(?:\.\d{1,12})?)"
 _STANFORD = re.compile(rf"out_(\d{{1,4}})_(\d{{1,4}})_{_POSITION}_{_POSITION}_?\.png", re.I)
 _PLACED = re.compile(r".*?(\d{1,4})[_x\-](\d{1,4})\.(?:png|tiff?)", re.I)
 _MOST = 10_000  # views
+_LONGEST_NUMBER = 400  # characters
 Files = dict[tuple[int, int], Path]
 
 
@@ -40,11 +41,11 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> LightField:
     """
     files, spacing = _files(path)
     rows, columns = (max(place[k] for place in files) + 1 for k in (0, 1))
-    missing = [(r, c) for r in range(rows) for c in range(columns) if (r, c) not in files]
+    missing = next(((r, c) for r in range(rows) for c in range(columns) if (r, c) not in files), None)
     if missing:
         raise FormatError(
-            f"{path} holds {len(files)} of {rows} x {columns} views: row {missing[0][0]}, column "
-            f"{missing[0][1]} is missing. Copy the folder again."
+            f"{path} holds {len(files)} of {rows} x {columns} views: row {missing[0]}, column "
+            f"{missing[1]} is missing. Copy the folder again."
         )
     data = None
     for (row, column), file in sorted(files.items()):
@@ -96,7 +97,7 @@ def parameters(path: str | Path) -> dict[str, float]:
     FormatError
         A damaged or oversized file.
     """
-    file = Path(path) / "parameters.cfg"
+    file = source.unlinked(Path(path) / "parameters.cfg")
     if not file.is_file():
         return {}
     return {name: value for name, value in numbers(file).items() if math.isfinite(value)}
@@ -112,18 +113,23 @@ def numbers(file: Path) -> dict[str, float]:
     """
     if file.stat().st_size > 1 << 20:
         raise FormatError(f"{file} has {file.stat().st_size} bytes, too many for parameters. Check the path.")
-    parser = configparser.ConfigParser(interpolation=None, strict=False)
     try:
-        parser.read_string(file.read_text(encoding="utf-8"))
-    except (configparser.Error, UnicodeDecodeError) as error:
-        raise FormatError(f"{file} is not an INI file: {str(error).splitlines()[0]}.") from error
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except UnicodeDecodeError as error:
+        raise FormatError(f"{file} is not an INI file: {error}.") from error
     found: dict[str, float] = {}
-    for section in parser.sections():
-        for name, text in parser.items(section):
-            try:
-                found[name] = found[f"{section}.{name}"] = float(text)
-            except ValueError:
-                continue
+    section = None
+    for number, whole in enumerate(lines, 1):
+        line = whole.strip()
+        if line.startswith("[") and line.endswith("]"):
+            section = line[1:-1].strip()
+        elif line and line[0] not in "#;" and not whole[0].isspace():  # the rest of a longer value
+            name, equals, value = line.replace(":", "=", 1).partition("=")
+            if not equals or section is None:
+                raise FormatError(f"{file} is not an INI file: line {number} is {line[:40]!r}.")
+            with suppress(ValueError):
+                name = name.strip().lower()
+                found[name] = found[f"{section}.{name}"] = float(value[:_LONGEST_NUMBER])
     return found
 
 
@@ -184,14 +190,14 @@ def _stanford(path: Path, found: list[re.Match[str]]) -> tuple[Files, tuple[floa
 
 def _picture(file: Path, max_pixels: int) -> np.ndarray:
     load_one = png.load if file.suffix.lower() == ".png" else tiff.load
-    raw = load_one(file, max_pixels=max_pixels)
+    raw = load_one(source.unlinked(file), max_pixels=max_pixels)
     if not isinstance(raw, RawImage):
         raise FormatError(f"{file} holds several pages where one view is needed.")
     return raw.data
 
 
 def _restored(path: Path, data: np.ndarray, spacing: tuple[float, float]) -> LightField:
-    file = path / target.VIEWS
+    file = source.unlinked(path / target.VIEWS)
     if not file.is_file():
         return from_cameras(data, spacing)
     with source.decoding(file, "the views.json of a folder of views"):

@@ -5,6 +5,7 @@ Volumes are OME-Zarr (NGFF 0.5), which microscopy programs open; those by other 
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -149,7 +150,8 @@ def _values(path: Path, group: zarr.Group, name: str, max_pixels: int) -> np.nda
     source.check_size(path, array.chunks, max(max_pixels, 1 << 24))
     if array.dtype.kind not in "biufc":
         raise FormatError(f"{path} holds {array.dtype}, no numbers. Save it again.")
-    zarr_chunks.check_chunks(path, array, name)
+    needed = prod(array.shape) * array.dtype.itemsize
+    source.check_held(path, needed, zarr_chunks.check_chunks(path, array, name), max_pixels)
     if array.nchunks_initialized != array.nchunks:
         raise FormatError(
             f"{path} is incomplete: {array.nchunks_initialized} of {array.nchunks} chunks are there. Copy it."

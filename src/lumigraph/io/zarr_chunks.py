@@ -19,6 +19,7 @@ _MOST_CHUNKS = 1_000_000
 def check_entries(path: Path, limit: int) -> None:
     """Refuse a zipped store with entries that inflate to more than `limit` bytes or more than they can."""
     if path.is_dir():
+        source.check_folder(path, 2 * _MOST_CHUNKS)
         for file in [path / "zarr.json", *path.glob("*/zarr.json")][:1000]:
             _check_metadata(path, file.stat().st_size if file.exists() else 0)
         return
@@ -37,8 +38,8 @@ def check_entries(path: Path, limit: int) -> None:
                 _check_metadata(path, entry.file_size)
 
 
-def check_chunks(path: Path, array: zarr.Array[Any], name: str) -> None:
-    """Refuse codecs that are not known to be bounded, and chunks that inflate to more than a chunk.
+def check_chunks(path: Path, array: zarr.Array[Any], name: str) -> int:
+    """Bytes of the chunks; codecs that may be unbounded and chunks that inflate to more are refused.
 
     Raises
     ------
@@ -51,8 +52,9 @@ def check_chunks(path: Path, array: zarr.Array[Any], name: str) -> None:
         raise FormatError(f"{path} is packed by {', '.join(codecs)}; only zstd or gzip is read.")
     if array.nchunks > _MOST_CHUNKS:
         raise FormatError(f"{path} declares {array.nchunks} chunks, at most {_MOST_CHUNKS} are read.")
-    limit = prod(array.chunks) * array.dtype.itemsize
+    limit, stored = prod(array.chunks) * array.dtype.itemsize, 0
     for content in _contents(path, name):
+        stored += len(content)
         inner = content[:-4] if codecs[-1:] == ["crc32c"] else content
         size = len(inner) if not packed else _declared(inner, packed[0])
         if packed == ["gzip"]:
@@ -62,6 +64,7 @@ def check_chunks(path: Path, array: zarr.Array[Any], name: str) -> None:
                 f"{path} is damaged: a chunk becomes {size or 'an unknown number of'} bytes where {limit} "
                 "are declared. Copy it again."
             )
+    return stored
 
 
 def _contents(path: Path, name: str) -> Iterator[bytes]:

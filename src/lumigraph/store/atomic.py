@@ -101,8 +101,12 @@ def _told(target: Path) -> Iterator[None]:
     """Context in which what the system refuses becomes one `FormatError` naming the target."""
     try:
         yield
-    except OSError as error:
-        raise FormatError(f"{target} was not written: {_reason(error, target.parent)}") from error
+    except (OSError, FormatError) as error:
+        cause = error if isinstance(error, OSError) else error.__cause__
+        if not isinstance(cause, OSError):
+            raise
+        # A file inside a folder that is written goes by the folder's name.
+        raise FormatError(f"{target} was not written: {_reason(cause, target.parent)}") from cause
 
 
 def _reason(error: OSError, folder: Path) -> str:
