@@ -231,6 +231,8 @@ def depths(option: str, text: str) -> tuple[float, ...]:
 
     >>> [round(dz * 1e6, 6) for dz in depths("--z", "-2 um:3 um:2 um")]
     [-2.0, 0.0, 2.0]
+    >>> depths("--z", "-20 um:20 um:2 um")[10]
+    0.0
     """
     if ":" not in text:
         found = sorted(length(option, part.strip()) or 0.0 for part in text.split(","))
@@ -248,7 +250,8 @@ def depths(option: str, text: str) -> tuple[float, ...]:
     count = (last - first) / step * (1 + 1e-9) + 1
     if count > MOST_DEPTHS:
         raise FormatError(f"{option} {text!r} asks for {count:.3g} depths; at most {MOST_DEPTHS} are taken.")
-    return tuple(first + k * step for k in range(int(count)))
+    planes = (first + k * step for k in range(int(count)))
+    return tuple(0.0 if abs(dz) < 1e-9 * step else dz for dz in planes)  # no 1.7e-21 for the focused plane
 
 
 def operator_of(

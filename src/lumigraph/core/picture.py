@@ -64,15 +64,16 @@ def thumbnail(image: Any, size: int = THUMBNAIL) -> str:
 
 
 def length(value: float | None) -> str:
-    """A length [m] in a unit that suits it; "unknown" for None.
+    """A length [m] in a unit that suits it; "unknown" for None, 0 for less than a picometre.
 
     Examples
     --------
-    >>> length(1.5e-4), length(-0.2), length(0.0)
+    >>> length(1.5e-4), length(-0.2), length(1.7e-21)
     ('150 µm', '-200 mm', '0 m')
     """
     if value is None:
         return "unknown"
+    value = 0.0 if abs(value) < 1e-12 else value
     size, unit = next((u for u in _UNITS if abs(value) >= u[0] * 0.99999), _UNITS[-1] if value else _UNITS[0])
     return f"{value / size:.4g} {unit}"
 

@@ -11,6 +11,7 @@ from lumigraph.calibration import calibrate, devignette
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
+from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.plots import layout
 from lumigraph.rendering import decode, reduce_aperture, refocus, render, view
 from lumigraph.samples import BenchSample, bench, camera_file
@@ -137,6 +138,7 @@ def _focused(page: report.Page, folder: Path, tell: Progress) -> _Shown:
     shown = _exposed("Plenoptic 2.0", "focused-plenoptic", tell)
     sample, camera, depths = shown.sample, shown.sample.camera, shown.sample.depths
     tell("rendering", 0.96)
+    assert isinstance(camera, FocusedPlenopticCamera)  # as its file says
     raw = devignette(sample.raw, sample.white)
     patches = [camera.patch_at(dz) for dz in depths]
     pictures = {

@@ -26,11 +26,14 @@ export function middleView(views, fraction, view) {
     view === null ? Math.floor(views.shape[axis] / 2) : Math.min(high, Math.max(low, view[axis])));
 }
 
-/** Weights (v, u): those of the kept views, shared linearly between neighbours where the middle is between. */
+/**
+ * Weights (v, u): those of the kept views, shared linearly between neighbours where the middle is between.
+ * One view alone is the nearest as it was recorded: a mean of two would show every edge twice.
+ */
 export function viewWeights(views, { aperture, shape, view }) {
   const [nv, nu] = views.shape, kept = keptViews(views, aperture), middle = middleView(views, aperture, view);
   const weights = new Float32Array(nv * nu);
-  const start = middle.map((m, axis) => m - Math.floor(kept[axis] / 2));
+  const alone = kept.every((n) => n === 1), start = middle.map((m, axis) => (alone ? Math.round(m) : m - Math.floor(kept[axis] / 2)));
   const whole = start.map(Math.floor), rest = start.map((s, axis) => s - whole[axis]);
   for (let j = 0; j < kept[0]; j++) for (let i = 0; i < kept[1]; i++) {
     const y = (j - (kept[0] - 1) / 2) / (kept[0] / 2), x = (i - (kept[1] - 1) / 2) / (kept[1] / 2);

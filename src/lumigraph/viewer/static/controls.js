@@ -8,7 +8,7 @@ import { cachedMap } from "./tone.js";
 
 const by = (id) => document.getElementById(id);
 const SELECTS = { shape: String, detail: Number, projection: String, map: String, channel: String };
-const RANGES = ["focus", "trust", "plane", "ev", "gamma"];
+const RANGES = ["focus", "trust", "plane", "ev", "black", "gamma"];
 const CHECKS = ["epi", "lattice", "smooth"];
 
 /** Writes into an output only what is new: the browser lays a page out afresh after every write. */
@@ -110,8 +110,9 @@ export class Controls {
     document.querySelector('[data-colour="channel"]').hidden = channels !== 3 || state.mode === "depth";
     document.querySelector('[data-colour="map"]').hidden = channels === 3 && state.channel === "colour" && state.mode !== "depth";
     for (const part of document.querySelectorAll("[data-light]")) part.hidden = state.mode === "depth";
-    for (const id of ["ev", "gamma"]) by(id).value = state[id];
+    for (const id of ["ev", "black", "gamma"]) by(id).value = state[id];
     tell("ev-out", `${state.ev > 0 ? "+" : ""}${state.ev.toFixed(2)} EV`);
+    tell("black-out", `${Math.round(100 * state.black)} %`);
     tell("gamma-out", state.gamma.toFixed(2));
     for (const id of ["shape", "projection", "channel"]) by(id).value = state[id];
     by("map").value = state.mode === "depth" ? depthMap(state) : state.map;

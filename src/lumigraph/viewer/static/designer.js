@@ -146,6 +146,7 @@ class Designer {
     at("point").classList.toggle("old", Boolean(error));
     if (found) {
       at("point").src = found.png;
+      at("point").hidden = false;
       at("point").style.aspectRatio = `${found.shape[1]} / ${found.shape[0]}`;
       const size = found.shape.map((n) => Number((n * found.pixel_pitch * 1e3).toPrecision(3))).join(" × ");
       const lenslets = found.lenslets ? `${found.lenslets.join(" × ")} lenslets, ` : "";
@@ -158,6 +159,7 @@ class Designer {
 
   drawn(found, error) {
     at("layout").hidden = Boolean(found && !found.svg);
+    at("drawing").hidden = !found?.svg && !at("drawing").src;
     if (found?.svg) at("drawing").src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(found.svg)}`;
     this.errors.layout = error?.message;
   }

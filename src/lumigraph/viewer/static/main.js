@@ -33,6 +33,14 @@ class App {
     document.getElementById("title").textContent = models.map((model) => model.about.name).join(" and ");
   }
 
+  /** Opens on the subject, unless the link or the user has chosen a focus. */
+  settle() {
+    const { model } = this.main;
+    if (!model.views || this.state.focus !== this.base.focus || "focus" in parseLink(location.hash)) return;
+    this.base.focus = this.state.focus = Number(model.subjectFocus().toFixed(5));
+    this.touched();
+  }
+
   /** Settings out of the link; a mode that is not there is left out. */
   read() {
     const found = parseLink(location.hash);
@@ -172,6 +180,7 @@ async function open() {
     wire(app);
     app.schedule();
     await Promise.all(app.panes.filter(({ model }) => model.views).map((pane) => pane.model.loadViews(pane.device, isExported())));
+    app.settle();
     window.lumigraph.ready = true;
     app.schedule();
   } catch (error) {

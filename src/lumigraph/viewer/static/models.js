@@ -1,6 +1,7 @@
 // One exhibit: its arrays as they come, and the image that the settings ask for.
 
 import { middleView, viewWeights } from "./aperture.js";
+import { sharpestAlpha, subject } from "./focusing.js";
 import { Refocuser } from "./refocus.js";
 import { loadArray } from "./source.js";
 import { cachedMap } from "./tone.js";
@@ -27,6 +28,11 @@ export class Model {
   get startFocus() {
     if (this.views) return 1;
     return this.about.stack ? this.about.stack.positions[Math.floor(this.about.stack.positions.length / 2)] : 1;
+  }
+
+  /** Focus on what has the most detail near the middle, once the views are there. */
+  subjectFocus() {
+    return sharpestAlpha(this.views, this.views.numbers, subject(this.views, this.views.numbers));
   }
 
   /** An array when it is there; null, and asked for, when not yet. */

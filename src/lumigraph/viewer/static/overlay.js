@@ -84,7 +84,7 @@ export function drawScaleBar(context, metresPerPixel, { width, height }) {
 
 /** A length [m] for people. */
 export function lengthText(metres) {
-  if (metres === 0) return "0 µm";
+  if (Math.abs(metres) < 1e-12) return "0 µm";
   const size = Math.abs(metres);
   const [unit, value] = size >= 1 ? ["m", 1] : size >= 1e-3 ? ["mm", 1e3] : size >= 1e-6 ? ["µm", 1e6] : ["nm", 1e9];
   return `${Number((metres * value).toPrecision(4))} ${unit}`;

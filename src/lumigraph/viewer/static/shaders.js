@@ -16,7 +16,7 @@ vec4 cubic(float f) {
 export const SHEAR_ROW = `#version 300 es
 precision highp float; precision highp int; precision highp usampler2DArray;
 uniform usampler2DArray views, valid;
-uniform bool masked;      // whether some samples are not valid
+uniform bool masked, alone; // whether some samples are not valid; whether there is one view only
 uniform sampler2D weights;
 uniform int row, count;   // row of the aperture, views in it
 uniform ivec2 size;       // of a view: columns, rows
@@ -37,7 +37,9 @@ void main() {
     ivec2 corner = ivec2(tile % tiles.x, tile / tiles.x) * size;
     for (int i = 0; i < 4; i++) {
       int column = left + i;
-      if (column < 0 || column >= size.x || k[i] == 0.0) continue; // beyond the edge nothing is seen
+      if (k[i] == 0.0) continue;
+      if (alone) column = clamp(column, 0, size.x - 1); // nothing else shows what is beyond the edge
+      else if (column < 0 || column >= size.x) continue; // beyond the edge nothing is seen
       ivec3 from = ivec3(corner + ivec2(column, place.y), index / (tiles.x * tiles.y));
       if (masked && texelFetch(valid, from, 0).r == 0u) continue;
       total += k[i] * vec4(vec3(texelFetch(views, from, 0).rgb), 1.0);
@@ -50,6 +52,7 @@ export const SHEAR_COLUMN = `#version 300 es
 precision highp float; precision highp int; precision highp sampler2DArray;
 uniform sampler2DArray rows;
 uniform sampler2D weights;
+uniform bool alone;
 uniform int count;
 uniform int height;
 uniform float first, step_, detail;
@@ -65,8 +68,9 @@ void main() {
     vec4 k = cubic(y - below);
     int top = int(below) - 1;
     for (int i = 0; i < 4; i++) {
-      if (top + i < 0 || top + i >= height) continue;
-      total += k[i] * texelFetch(rows, ivec3(place.x, top + i, v), 0);
+      int line = alone ? clamp(top + i, 0, height - 1) : top + i;
+      if (line < 0 || line >= height) continue;
+      total += k[i] * texelFetch(rows, ivec3(place.x, line, v), 0);
     }
   }
   picture = total.a > 0.05 ? vec4(total.rgb / total.a, 1.0) : vec4(0.0);

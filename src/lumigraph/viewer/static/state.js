@@ -30,6 +30,7 @@ const FIELDS = {
   projection: ["plane", choice("plane", "max-z", "max-y", "max-x"), String],
   trust: [0.1, number(0, 1), plain(2)],
   ev: [0, number(-12, 12), plain(2)],
+  black: [0, number(-2, 0.98), plain(3)],
   gamma: [1, number(0.2, 5), plain(2)],
   map: ["grey", choice(...MAPS), String],
   channel: ["colour", choice(...CHANNELS), String],

@@ -14,9 +14,9 @@ export function cachedMap(name) {
 
 /** What tone settings mean for numbers that stand for offset + scale * number. */
 export function toneOf(state, image) {
-  const gain = (2 ** state.ev) / (image.white || 1);
+  const white = image.white || 1, gain = (2 ** state.ev) / (white * (1 - state.black));
   return {
-    gain: gain * image.scale, lift: gain * image.offset, power: 1 / state.gamma,
+    gain: gain * image.scale, lift: gain * (image.offset - state.black * white), power: 1 / state.gamma,
     map: state.map, channel: image.channels === 3 ? state.channel : "mono",
   };
 }
