@@ -6,6 +6,7 @@
 - `halves`: the paraxial kernel onto other points by even and odd halves, on NumPy arrays
 - `zoom`: angular spectrum onto any grid, by matrix DFT or chirp-z
 - `sampling`: validity ranges and sampling rules, in closed form
+- `dropped`: what a band limit's dropped frequencies would have brought
 - `window`: the window of a calculation: size, quick FFT sizes, memory
 - `pruned`: convolution without the transforms that see only zeros
 - `cache`: transfer functions that were built before

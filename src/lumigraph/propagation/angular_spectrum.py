@@ -19,6 +19,7 @@ from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.propagation import sampling
 from lumigraph.propagation.cache import CACHE
+from lumigraph.propagation.dropped import dropped_light
 from lumigraph.propagation.pruned import Band, Transfer, convolve, convolved_intensity
 from lumigraph.propagation.window import check_memory, reach, samples_between, window_shape
 
@@ -100,17 +101,24 @@ def kept_frequencies(method: str, grid: Grid, window: Grid, distance: float, wav
 def band_limited_intensity(field: Field, distance: Distance, pad: float, grid: Grid | None) -> Array:
     """Intensity (..., y, x) of `band_limited`, without the field itself: a fifth quicker."""
     output = grid or field.grid
-    transfer = _transfer(field, distance, "band_limited", pad, output)
-    return convolved_intensity(field.data, transfer, output.shape)
+    transfer, band = _transfer(field, distance, "band_limited", pad, output)
+    intensity = convolved_intensity(field.data, transfer, output.shape)
+    _check_dropped("band_limited", band, (field, output, intensity), distance)
+    return intensity
 
 
 def _propagate(field: Field, way: Distance, method: str, pad: float, output: Grid) -> Field:
-    transfer = _transfer(field, way, method, pad, output)
-    return replace(field, data=convolve(field.data, transfer, output.shape), grid=output)
+    transfer, band = _transfer(field, way, method, pad, output)
+    found = replace(field, data=convolve(field.data, transfer, output.shape), grid=output)
+    if method.startswith("band_limited"):
+        _check_dropped(method, band, (field, output, found.intensity), way)
+    return found
 
 
-def _transfer(field: Field, way: Distance, method: str, pad: float, output: Grid) -> Transfer:
-    """The transfer function from the field to `output`, whose sampling is checked first."""
+def _transfer(
+    field: Field, way: Distance, method: str, pad: float, output: Grid
+) -> tuple[Transfer, tuple[Grid, Pair] | None]:
+    """The transfer function to `output`, and its window and highest frequencies where those alias nowhere."""
     distance = arrays.number(way)
     step, between = samples_between(output, field.grid)
     first = between.samples_to(field.grid)
@@ -119,7 +127,7 @@ def _transfer(field: Field, way: Distance, method: str, pad: float, output: Grid
     rows, columns = Band.below(window.fy, limits[0]), Band.below(window.fx, limits[1])
     _check_memory(field, rows, columns, output)
     farthest = tuple(map(reach, field.grid.shape, first, between.shape))
-    _check_sampling(method, field, window, limits, (distance, (farthest[0], farthest[1])))
+    aliases = _check_sampling(method, field, window, limits, (distance, (farthest[0], farthest[1])))
     circle = limits if method in CIRCULAR else None
     key = ("spectral", window, first, step, distance, field.wavelength, rows, columns, circle)
     values = CACHE.get(
@@ -134,7 +142,7 @@ def _transfer(field: Field, way: Distance, method: str, pad: float, output: Grid
         across, up = rows.take(window.fy), columns.take(window.fx)  # values are (columns, rows)
         waves = wave_numbers(up, across, field.wavelength)
         values = arrays.turned(values, waves, arrays.parameter(way) - distance)
-    return Transfer(values, rows, columns, step)
+    return Transfer(values, rows, columns, step), None if aliases else (window, limits)
 
 
 def _on_band(
@@ -177,11 +185,20 @@ def _check_memory(field: Field, rows: Band, columns: Band, output: Grid) -> None
 
 def _check_sampling(
     method: str, field: Field, window: Grid, limits: Pair, target: tuple[float, tuple[int, int]]
-) -> None:
+) -> bool:
     distance, wavelength = target[0], field.wavelength
     message = None
     if method == "angular_spectrum":
         message = sampling.unlimited_aliases(method, window, distance, wavelength)
     elif method == "corrected_band_limited":
         message = sampling.kept_alias(method, limits, window, distance, wavelength)
-    sampling.warn(message or sampling.light_wraps(window, limits, target[1], distance, wavelength))
+    message = message or sampling.light_wraps(window, limits, target[1], distance, wavelength)
+    sampling.warn(message)
+    return message is not None
+
+
+def _check_dropped(
+    method: str, band: tuple[Grid, Pair] | None, fields: tuple[Field, Grid, Array], distance: Distance
+) -> None:
+    if band is not None:
+        sampling.warn(dropped_light(method, *band, fields, arrays.number(distance)))

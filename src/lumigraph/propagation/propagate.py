@@ -19,6 +19,7 @@ from lumigraph.propagation.angular_spectrum import (
     band_limited_intensity,
     corrected_band_limited,
 )
+from lumigraph.propagation.dropped import FEWEST_FREQUENCIES
 from lumigraph.propagation.fresnel import fresnel, multi_step_fresnel
 from lumigraph.propagation.window import samples_between
 from lumigraph.propagation.zoom import zoom
@@ -43,9 +44,6 @@ DIFFERENTIABLE = ("angular_spectrum", "band_limited", "band_limited_circular", "
 
 SHORTEST = 1e-100
 """Distances nearer to zero count as zero [m]."""
-FEWEST_FREQUENCIES = 100
-"""With fewer in the band, "auto" takes zoom: band-limited has 51 dB with 158 of them, 45 dB with 63."""
-
 LARGEST_PHASE_ERROR = 1e-3
 """Phase [rad] that "auto" lets the Fresnel approximation leave out."""
 MOST_POINTS = 1000
@@ -143,7 +141,8 @@ def propagate(
     Warns
     -----
     SamplingWarning
-        The result is defined but aliases, or light wraps round; the message gives the numbers.
+        The result is defined but aliases, light wraps round, or the band limit drops light that belongs to
+        the output; the message gives the numbers.
 
     References
     ----------
