@@ -451,10 +451,10 @@ def test_what_comes_as_it_comes_is_right_or_warns_with_the_error(shape, distance
 def test_an_output_two_windows_aside_warns_or_is_right(distance):
     """Light of a square falls there from frequencies near the limit, or from such as the samples lack."""
     field = lit("square")
-    with pytest.warns(SamplingWarning, match="light that it drops makes some"):
-        propagate(
-            field, distance, grid=Grid(field.grid.shape, field.grid.pitch, (0.0, 2 * field.grid.size[1]))
-        )
+    aside = Grid(field.grid.shape, field.grid.pitch, (0.0, 2 * field.grid.size[1]))
+    share = "100" if distance == 0.03 else ".*"  # there all is missing that a square would send
+    with pytest.warns(SamplingWarning, match=f"light that it drops makes some {share} % rms"):
+        propagate(field, distance, grid=aside)
     beam = lit("beam")
     aside = Grid(beam.grid.shape, beam.grid.pitch, (0.0, beam.grid.size[1]))
     found = propagate(beam, 0.3, grid=aside)  # silent, and right
