@@ -10,6 +10,7 @@ from PIL import Image
 import lumigraph as lg
 from lumigraph import viewer
 from lumigraph.errors import FormatError, GeometryError, LumigraphError, SamplingError
+from lumigraph.viewer.designer import designed
 from lumigraph.viewer.designer_curves import trade_offs
 from lumigraph.viewer.designer_parameters import changed, parameters
 from lumigraph.viewer.designer_point import point_image
@@ -76,10 +77,31 @@ def test_curves_pass_through_the_camera_and_follow_the_closed_forms():
         between = np.interp(np.log(0.5), np.log(found["positions"]), np.log(curve["values"]))
         assert np.exp(between) == pytest.approx(curve["here"], rel=0.02)  # between two of 41 positions
     table = FOCUSED.describe().as_dict()
-    assert curves["Cut-off at the object"]["here"] * 1e3 == pytest.approx(
+    assert curves["Picture cut-off at the object"]["here"] * 1e3 == pytest.approx(
         table["rendered cut-off at the object"]
     )
     assert curves["Depth of field"]["here"] / 1e3 == pytest.approx(table["depth of field"])
+
+
+@pytest.mark.parametrize("name", lg.catalogue())
+def test_the_table_and_the_curves_of_a_page_say_the_same(name):
+    """A camera 1.0 had 31.25 views per axis in its table, its pixels, and 2.91 in its curve."""
+    camera = lg.load_camera(name)
+    page = designed(camera)
+    table = {row[0]: row[1:] for section in page["sections"] for row in section["rows"]}
+    assert page["curves"]["curves"]
+    for curve in page["curves"]["curves"]:
+        text, equation = table[curve["name"][0].lower() + curve["name"][1:]]
+        told = f"{curve['here']:.5g} {curve['unit'].replace('µm', 'um')}".strip()
+        assert (text, equation) == (told, curve["equation"])
+    names = [row.name for row in camera.quantities()]
+    assert len(names) == len(set(names))
+
+
+def test_views_of_a_camera_1_are_no_more_than_diffraction_leaves():
+    known = lg.load_camera("thesis-plenoptic-1").describe().as_dict()
+    assert known["pixels per micro-image"] == pytest.approx(31.25)
+    assert known["views per axis"] == known["resolvable directions"] == pytest.approx(2.914, abs=1e-3)
 
 
 def test_the_axial_resolution_of_a_plenoptic_1_moves_the_outermost_views_by_one_lenslet():

@@ -8,12 +8,13 @@
 - `loading`: `load_camera` for every kind
 - `instrument`, `camera`, `lenslet_camera`: what the kinds share
 - `grids`: how finely and widely planes are sampled
-- `describe`, `describe_microscope`: the table of everything that follows from a description
+- `describe`, `describe_microscope`: the table of everything that follows from a description, a `Description`
+  of rows (`row`); `trade_offs`: those that change with the magnification
 - `quantities`, `problems`, `files`: numbers with units, errors in one line, TOML and the `catalogue`
 """
 
 from lumigraph.instruments.camera import Camera
-from lumigraph.instruments.describe import Description, Row
+from lumigraph.instruments.description import Description
 from lumigraph.instruments.files import catalogue
 from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.loading import load_camera
@@ -21,6 +22,7 @@ from lumigraph.instruments.microscope import LightFieldMicroscope, MicroscopeObj
 from lumigraph.instruments.parts import Lenslets, MainLens, Pixels
 from lumigraph.instruments.plenoptic1 import PlenopticCamera
 from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
+from lumigraph.instruments.row import Row
 from lumigraph.instruments.single_lens import SingleLensCamera
 
 __all__ = [

@@ -16,6 +16,7 @@ from lumigraph.instruments.grids import Sampling
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.parts import MainLens, Pixels
 from lumigraph.instruments.quantities import Length, Wavelength
+from lumigraph.instruments.trade_offs import Range
 from lumigraph.propagation import Propagate
 from lumigraph.sensor import Sensor
 
@@ -124,6 +125,14 @@ class Camera(Instrument):
         # The plate is also the stop: two grey edges would be darker than one.
         plate = ZernikePlate({j: 2 * math.pi * rms for j, rms in waves.items()}, diameter)
         return Train((plate, ThinLens(focal_length)))
+
+    def magnifications(self) -> Range:
+        """Of the main lens, by the distance of the object."""
+        focal_length, own = self.main_lens.focal_length, self.magnification
+        return Range(
+            "z2/z1, of the main lens", own, (own / 5, own * 5),
+            lambda m: self.replace(object_distance=focal_length * (1 + 1 / m)),
+        )  # fmt: skip
 
     def defocused(self, dz: float) -> float:
         """Object distance of a depth `dz` from the focused plane [m]; positive is farther.

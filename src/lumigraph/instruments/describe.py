@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from lumigraph.design import plenoptic1 as design1
 from lumigraph.design import plenoptic2 as design2
 from lumigraph.design import resolution
 from lumigraph.errors import SamplingError
+from lumigraph.instruments.description import TRADE_OFFS, Description
+from lumigraph.instruments.row import Row
 from lumigraph.sensor import Sensor
 
 if TYPE_CHECKING:
@@ -18,67 +19,13 @@ if TYPE_CHECKING:
     from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
     from lumigraph.instruments.single_lens import SingleLensCamera
 
-_PREFIXES = {
-    "m": ((1.0, "m"), (1e-3, "mm"), (1e-6, "um"), (1e-9, "nm")),
-    "1/m": ((1e3, "/mm"), (1.0, "/m")),
-    "rad": ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "urad")),
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One line: a name, a value in SI, its SI unit ("" for a number), and where it comes from."""
-
-    name: str
-    value: Any
-    unit: str = ""
-    source: str = ""
-
-    @property
-    def text(self) -> str:
-        """The value in a unit that suits its size."""
-        if isinstance(self.value, tuple):
-            return " x ".join(Row("", each, self.unit).text for each in self.value)
-        if isinstance(self.value, str | int):
-            return str(self.value)
-        prefixes = _PREFIXES.get(self.unit, ((1.0, self.unit),))
-        size, unit = next((p for p in prefixes if abs(self.value) >= p[0] * 0.99999), prefixes[-1])
-        return f"{self.value / size:.5g} {unit}".strip()
-
-
-@dataclass(frozen=True, slots=True)
-class Description:
-    """A camera's table: rows by section, and warnings; `str` gives it as text."""
-
-    title: str
-    sections: tuple[tuple[str, tuple[Row, ...]], ...]
-    warnings: tuple[str, ...]
-
-    @property
-    def rows(self) -> tuple[Row, ...]:
-        """All rows, section after section."""
-        return tuple(row for _, rows in self.sections for row in rows)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Values in SI by name, for programs; "warnings" holds the warnings."""
-        return {**{row.name: row.value for row in self.rows}, "warnings": list(self.warnings)}
-
-    def __str__(self) -> str:
-        name, value = (max(len(getattr(row, part)) for row in self.rows) for part in ("name", "text"))
-        lines = [self.title]
-        for section, rows in self.sections:
-            lines += ["", section]
-            lines += [f"  {row.name:<{name}}  {row.text:>{value}}   {row.source}".rstrip() for row in rows]
-        if self.warnings:
-            lines += ["", "Warnings", *(f"  {warning}" for warning in self.warnings)]
-        return "\n".join(lines)
-
 
 def single_lens(camera: "SingleLensCamera") -> Description:
     """The table of a camera without lenslets."""
     sections = (
         ("Geometry", tuple(_geometry(camera))),
         ("Main lens", tuple(_main_lens(camera))),
+        (TRADE_OFFS, camera.trade_offs()),
         ("Sensor", tuple(_sensor(camera))),
         ("Simulation", tuple(_sampling(camera))),
     )
@@ -91,7 +38,7 @@ def plenoptic1(camera: "PlenopticCamera") -> Description:
     width = pitch * camera.lenslets.fill_factor
     pixels = camera.micro_image_pitch / camera.pixels.pixel_pitch
     directions = (
-        Row("views per axis", pixels, "", "pixels per micro-image, p (1 + b/F) / pixel"),
+        Row("pixels per micro-image", pixels, "px", "p (1 + b/F) / pixel"),
         Row(
             "resolvable directions",
             design1.resolvable_directions(wavelength, width, f),
@@ -124,7 +71,6 @@ def plenoptic2(camera: "FocusedPlenopticCamera") -> Description:
     cutoff = design2.rendered_cutoff(wavelength, pitch, m, b)
     rendered = (
         Row("lenslet magnification", m, "", "m = b/a; " + ("Keplerian" if m > 0 else "Galilean")),
-        Row("views per axis", design2.views_per_axis(m), "", "1/|m|"),
         Row("patch", camera.patch, "px", "m p z2 / L / pixel; " + ("turned" if m > 0 else "not turned")),
         Row("rendered cut-off", cutoff, "1/m", "|m| p / (λ b), on the main-lens image"),
         Row("rendered cut-off at the object", cutoff * camera.magnification, "1/m", "times z2/z1"),
@@ -144,6 +90,7 @@ def _with_lenslets(camera: "LensletCamera", own: tuple[str, tuple[Row, ...]]) ->
         ("Main lens", tuple(_main_lens(camera))),
         ("Lenslets", tuple(_lenslets(camera))),
         own,
+        (TRADE_OFFS, camera.trade_offs()),
         ("Sensor", tuple(_sensor(camera))),
         ("Simulation", tuple(_sampling(camera))),
     )
@@ -184,7 +131,6 @@ def _main_lens(camera: "Camera") -> Iterator[Row]:
         "cut-off at the object", resolution.incoherent_cutoff(wavelength, at_object), "1/m", "D / (λ z1)"
     )
     yield Row("Airy radius", resolution.airy_first_zero(wavelength, f_number), "m", "1.22 λ F#, first zero")
-    yield Row("depth of field", resolution.depth_of_field(wavelength, at_object), "m", "4 λ (z1/D)²")
     for index, waves in camera.main_lens.aberrations.items():
         yield Row(f"Noll {index}", float(waves), "waves rms", "given")
 

@@ -4,7 +4,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from lumigraph.design import microscope as design
-from lumigraph.instruments.describe import Description, Row, readout
+from lumigraph.instruments.describe import readout
+from lumigraph.instruments.description import TRADE_OFFS, Description
+from lumigraph.instruments.row import Row
 
 if TYPE_CHECKING:
     from lumigraph.instruments.microscope import LightFieldMicroscope
@@ -20,6 +22,7 @@ def microscope(scope: "LightFieldMicroscope") -> Description:
         sections.append(("Fourier configuration", tuple(_fourier(scope))))
     else:
         sections.append(("Reconstruction", tuple(_reconstruction(scope))))
+    sections.append((TRADE_OFFS, scope.trade_offs()))
     sections.append(("Sensor", tuple(_sensor(scope))))
     title = f"light-field microscope {scope.configuration} at {Row('', scope.wavelength, 'm').text}"
     return Description(title, tuple(sections), tuple(_warnings(scope)))
@@ -38,7 +41,6 @@ def _objective(scope: "LightFieldMicroscope") -> Iterator[Row]:
     yield Row(
         "lateral resolution", design.lateral_resolution(wave, number), "m", "0.61 λ/NA, of the objective"
     )
-    yield Row("axial resolution", design.axial_resolution(wave, number, n), "m", "λ / (n - sqrt(n² - NA²))")
     yield Row("depth of field", design.depth_of_field(wave, number, n), "m", "λ n/NA², of the objective")
     yield Row("point images", scope.optics[0].model, "", "Debye integral")
     for index, waves in part.aberrations.items():
@@ -60,15 +62,9 @@ def _lenslets(scope: "LightFieldMicroscope") -> Iterator[Row]:
 
 
 def _reconstruction(scope: "LightFieldMicroscope") -> Iterator[Row]:
-    number, n = scope.objective.numerical_aperture, scope.objective.immersion_index
     M, pitch, wave = scope.magnification, scope.lenslets.pitch, scope.wavelength
     size = scope.lenslet_size
-    directions = design.directions(wave, number, M, pitch)
     yield Row("lenslet in object space", size, "m", "d/M: the focused plane's sampling")
-    yield Row("directions per axis", directions, "", "N = d NA / (0.47 λ M)")
-    yield Row(
-        "refocus range", design.refocus_range(wave, number, n, directions), "m", "(2 + N²) λ n / (2 NA²)"
-    )
     near = design.near_field(wave, M, pitch)
     yield Row("near field", near, "m", "d² / (2 M² λ) on either side: one lenslet per point")
     for dz in DEPTHS:

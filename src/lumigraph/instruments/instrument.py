@@ -9,9 +9,12 @@ from pydantic import ValidationError
 from lumigraph.core import picture
 from lumigraph.errors import FormatError
 from lumigraph.instruments import files
+from lumigraph.instruments.description import Description
 from lumigraph.instruments.parts import Part
 from lumigraph.instruments.problems import readable
 from lumigraph.instruments.quantities import FROM_FILE
+from lumigraph.instruments.row import Row
+from lumigraph.instruments.trade_offs import Range
 
 
 class Instrument(Part):
@@ -70,8 +73,20 @@ class Instrument(Part):
         rows = [(row.name, f"{row.text}   {row.source and f'({row.source})'}".rstrip()) for row in chosen]
         return picture.card(f"{table.title[0].upper()}{table.title[1:]}", [*warned, *rows])
 
-    def describe(self) -> Any:
+    def describe(self) -> Description:
         """The table of everything that follows from the description."""
+        raise NotImplementedError
+
+    def quantities(self) -> tuple[Row, ...]:
+        """All that follows from the description: names, values in SI, units and equations."""
+        return self.describe().rows
+
+    def trade_offs(self) -> tuple[Row, ...]:
+        """Those of the `quantities` that change with the magnification, to first order."""
+        raise NotImplementedError
+
+    def magnifications(self) -> Range:
+        """Magnifications over which the trade-offs are worth a look."""
         raise NotImplementedError
 
     def replace(self, **changes: Any) -> Self:

@@ -16,10 +16,12 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.design import microscope as closed_forms
 from lumigraph.elements.objective import Mismatch, Model, Objective
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import describe, describe_microscope
+from lumigraph.instruments import describe_microscope, trade_offs
+from lumigraph.instruments.description import Description
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.parts import Lenslets, Part, Pixels
 from lumigraph.instruments.quantities import Aberrations, Displacement, Fraction, Length, Positive, Wavelength
+from lumigraph.instruments.row import Row
 from lumigraph.operators.fourier_microscope import FourierMicroscopeOperator, Mosaic, fourier_operator
 from lumigraph.operators.microscope_kernels import DROPPED, CellSampling, Lenslet
 from lumigraph.operators.microscope_operator import Layout, MicroscopeOperator, Progress, microscope_operator
@@ -369,7 +371,20 @@ class LightFieldMicroscope(Instrument):
             self.fourier_lens, self.magnification, pitch, self.sensor.shape, part.pitch,
         )  # fmt: skip
 
-    def describe(self) -> describe.Description:
+    def magnifications(self) -> trade_offs.Range:
+        """Of the objective."""
+        own = self.objective.magnification
+        return trade_offs.Range(
+            "M, of the objective", own, (own / 4, own * 4),
+            lambda m: self.replace(objective={"magnification": m}),
+        )  # fmt: skip
+
+    def trade_offs(self) -> tuple[Row, ...]:
+        """Resolution, directions and cross-talk, to first order."""
+        fourier = self.configuration == "fourier"
+        return tuple((trade_offs.fourier_microscope if fourier else trade_offs.microscope)(self))
+
+    def describe(self) -> Description:
         """Magnification, resolution, depth of field, directions and band limits, each with its equation."""
         return describe_microscope.microscope(self)
 

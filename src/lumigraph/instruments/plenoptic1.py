@@ -5,8 +5,10 @@ from typing import ClassVar
 from pydantic import model_validator
 
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import describe
+from lumigraph.instruments import describe, trade_offs
+from lumigraph.instruments.description import Description
 from lumigraph.instruments.lenslet_camera import LensletCamera
+from lumigraph.instruments.row import Row
 
 
 class PlenopticCamera(LensletCamera):
@@ -68,6 +70,10 @@ class PlenopticCamera(LensletCamera):
         """Lenslets to sensor, b = f_µ [m]."""
         return self.lenslets.focal_length[0]
 
-    def describe(self) -> describe.Description:
+    def trade_offs(self) -> tuple[Row, ...]:
+        """Resolution, depth of field and views, to first order."""
+        return tuple(trade_offs.plenoptic(self))
+
+    def describe(self) -> Description:
         """Distances, f-numbers, cut-offs, directions and sampling, each with its equation."""
         return describe.plenoptic1(self)

@@ -7,8 +7,10 @@ from pydantic import model_validator
 from lumigraph.design import plenoptic2 as closed_forms
 from lumigraph.design import thin_lens
 from lumigraph.errors import FormatError, GeometryError
-from lumigraph.instruments import describe
+from lumigraph.instruments import describe, trade_offs
+from lumigraph.instruments.description import Description
 from lumigraph.instruments.lenslet_camera import LensletCamera
+from lumigraph.instruments.row import Row
 
 
 class FocusedPlenopticCamera(LensletCamera):
@@ -129,6 +131,18 @@ class FocusedPlenopticCamera(LensletCamera):
             sizes.append(width / self.pixels.pixel_pitch)
         return tuple(sizes)
 
-    def describe(self) -> describe.Description:
+    def magnifications(self) -> trade_offs.Range:
+        """Of the lenslets."""
+        m = self.lenslet_magnification
+        ends = (min(0.05, m), max(1.5, m)) if m > 0 else (min(0.05, -m), max(0.95, -m))
+        return trade_offs.Range(
+            "|m| = b/|a|, of the lenslets", m, ends, lambda m: self.replace(lenslets={"magnification": m})
+        )
+
+    def trade_offs(self) -> tuple[Row, ...]:
+        """Resolution, depth of field and views, to first order."""
+        return tuple(trade_offs.focused(self))
+
+    def describe(self) -> Description:
         """Distances, f-numbers, cut-offs, views and sampling, each with its equation."""
         return describe.plenoptic2(self)

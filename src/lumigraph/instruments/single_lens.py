@@ -11,8 +11,10 @@ from lumigraph.core.linear import Linear, stack
 from lumigraph.design import resolution
 from lumigraph.elements import Train
 from lumigraph.errors import FormatError
-from lumigraph.instruments import describe, grids
+from lumigraph.instruments import describe, grids, trade_offs
 from lumigraph.instruments.camera import Camera
+from lumigraph.instruments.description import Description
+from lumigraph.instruments.row import Row
 from lumigraph.operators import single_lens_operator
 from lumigraph.propagation import Propagate
 
@@ -123,6 +125,10 @@ class SingleLensCamera(Camera):
         operators = [single_lens_operator(self, grid, dz) for dz in planes]
         return operators[0] if depths is None else stack(operators, depths=planes)
 
-    def describe(self) -> describe.Description:
+    def trade_offs(self) -> tuple[Row, ...]:
+        """Resolution, depth of field and views, to first order."""
+        return tuple(trade_offs.single_lens(self))
+
+    def describe(self) -> Description:
         """Distances, f-numbers, cut-offs and sampling, each with its equation."""
         return describe.single_lens(self)

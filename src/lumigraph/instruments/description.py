@@ -1,0 +1,37 @@
+"""`Description`: rows of quantities by section, with warnings."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from lumigraph.instruments.row import Row
+
+TRADE_OFFS = "Trade-offs"
+"""Title of the section whose rows change with the magnification."""
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A camera's table: rows by section, and warnings; `str` gives it as text."""
+
+    title: str
+    sections: tuple[tuple[str, tuple[Row, ...]], ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """All rows, section after section."""
+        return tuple(row for _, rows in self.sections for row in rows)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Values in SI by name, for programs; "warnings" holds the warnings."""
+        return {**{row.name: row.value for row in self.rows}, "warnings": list(self.warnings)}
+
+    def __str__(self) -> str:
+        name, value = (max(len(getattr(row, part)) for row in self.rows) for part in ("name", "text"))
+        lines = [self.title]
+        for section, rows in self.sections:
+            lines += ["", section]
+            lines += [f"  {row.name:<{name}}  {row.text:>{value}}   {row.source}".rstrip() for row in rows]
+        if self.warnings:
+            lines += ["", "Warnings", *(f"  {warning}" for warning in self.warnings)]
+        return "\n".join(lines)
