@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from lumigraph.experiments import Context, find
 from lumigraph.experiments.beyond.deconvolution import PARTS, _Bench, _main_transfer
-from lumigraph.experiments.registry import Context, find
 
 
 @pytest.fixture(scope="module")

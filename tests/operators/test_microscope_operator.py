@@ -9,7 +9,8 @@ from lumigraph.core.linear import Linear
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import FormatError, GeometryError, SamplingError
 from lumigraph.operators import microscope_operator as module
-from lumigraph.operators.microscope_kernels import CellSampling, Lenslet, octant, slice_kernel
+from lumigraph.operators.microscope_cell import CellSampling, Lenslet
+from lumigraph.operators.microscope_kernels import octant, slice_kernel
 from lumigraph.operators.microscope_operator import Layout, microscope_operator
 from lumigraph.operators.microscope_pixels import PixelPlacement
 

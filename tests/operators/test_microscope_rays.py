@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from lumigraph.elements.objective import Objective
-from lumigraph.operators.microscope_kernels import CellSampling, Lenslet, slice_kernel
+from lumigraph.operators.microscope_cell import CellSampling, Lenslet
+from lumigraph.operators.microscope_kernels import slice_kernel
 from lumigraph.operators.microscope_operator import Layout, microscope_operator
 
 RAYS = Objective(500e-9, 1.2, 1.35, "rays")

@@ -7,7 +7,7 @@ import pytest
 
 from lumigraph.elements.objective import Objective
 from lumigraph.operators import microscope_spectrum as module
-from lumigraph.operators.microscope_kernels import CellSampling, Lenslet
+from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_operator import Layout, _suits_frequencies, microscope_operator
 
 SCOPE = Objective(525e-9, 0.5)

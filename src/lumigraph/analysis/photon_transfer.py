@@ -10,6 +10,7 @@ import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import to_numpy
+from lumigraph.core.brief import brief
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError, SamplingWarning
 
@@ -65,6 +66,8 @@ class PhotonTransfer:
     means: np.ndarray
     variances: np.ndarray
     fitted: np.ndarray
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, slots=True)

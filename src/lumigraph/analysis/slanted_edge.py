@@ -9,6 +9,7 @@ from scipy.signal.windows import tukey
 from lumigraph.analysis.transfer import cutoff
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.brief import brief
 from lumigraph.errors import SamplingError
 
 BIN = 0.25
@@ -43,6 +44,8 @@ class SlantedEdge:
     levels: tuple[float, float]
     position: np.ndarray
     spread: np.ndarray
+
+    __repr__ = brief
 
     def at(self, contrast: float) -> float:
         """Frequency at which the MTF first falls to `contrast`: MTF50 at 0.5, MTF10 at 0.1.

@@ -13,6 +13,7 @@
 - `stack`: `Stack`, pictures in an order; `cloud`: `PointCloud`, points in space
 - `linear`: `Linear`, maps from objects to raw images and back; `matrix`: `Matrix`, one of given numbers
 - `arrays`: the only file that knows array libraries
+- `brief`: what a large object shows of itself in a few lines
 - `checks`: one-line refusals of bad numbers
 - `progress`: `Progress`, how far a computation has come
 - `cache`: arrays kept within a bound of memory

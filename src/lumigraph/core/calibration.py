@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from lumigraph.core import checks, picture
+from lumigraph.core.brief import brief
 from lumigraph.core.lattice import Lattice, Vector
 from lumigraph.core.warp import Warp
 from lumigraph.errors import CalibrationError
@@ -71,6 +72,8 @@ class Calibration:
     missing: np.ndarray = field(default_factory=_none)
     sharpness: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         checks.instance("lattice", self.lattice, Lattice, CalibrationError)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.brief import brief
 from lumigraph.errors import GeometryError
 
 
@@ -31,6 +32,8 @@ class PointCloud:
     points: Array
     colours: Array | None = None
     confidence: Array | None = None
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         checks.array("points", self.points)

@@ -8,6 +8,7 @@ import numpy as np
 
 from lumigraph.core import checks, picture
 from lumigraph.core.arrays import Array, like, to_numpy
+from lumigraph.core.brief import brief
 from lumigraph.errors import GeometryError
 
 QUANTITIES: Mapping[str, str] = MappingProxyType(
@@ -51,6 +52,8 @@ class DepthMap:
     values: Array
     confidence: Array
     quantity: str
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         checks.array("values", self.values)

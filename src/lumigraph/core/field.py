@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, as_complex, intensity, namespace
+from lumigraph.core.brief import brief
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 
@@ -37,6 +38,8 @@ class Field:
     data: Array
     grid: Grid
     wavelength: float
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         checks.positive("wavelength", self.wavelength)

@@ -5,6 +5,7 @@ from typing import Any
 
 from lumigraph.core import checks, picture
 from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.brief import brief
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 
@@ -41,6 +42,8 @@ class LightField:
     lenslets: Grid
     separation: float
     valid: Array | None = None
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         checks.positive("separation", self.separation)

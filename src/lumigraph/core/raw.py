@@ -6,6 +6,7 @@ from typing import Any
 
 from lumigraph.core import checks, picture
 from lumigraph.core.arrays import Array
+from lumigraph.core.brief import brief
 from lumigraph.errors import FormatError, GeometryError
 
 BAYER_PATTERNS = ("RGGB", "GRBG", "GBRG", "BGGR")
@@ -45,6 +46,8 @@ class RawImage:
     bit_depth: int | None = None
     bayer: str | None = None
     metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         checks.array("a raw image", self.data, FormatError)

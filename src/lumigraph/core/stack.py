@@ -8,6 +8,7 @@ import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
+from lumigraph.core.brief import brief
 from lumigraph.errors import GeometryError
 
 
@@ -48,6 +49,8 @@ class Stack:
     pixel_pitch: float | None = None
     bit_depth: int | None = None
     metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         checks.array("a stack", self.data)

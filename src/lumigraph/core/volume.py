@@ -6,6 +6,7 @@ import numpy as np
 
 from lumigraph.core import checks, picture
 from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.brief import brief
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 
@@ -42,6 +43,8 @@ class Volume:
     data: Array
     grid: Grid
     depths: tuple[float, ...]
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         checks.array("data", self.data)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lumigraph.core import checks
+from lumigraph.core.brief import brief
 from lumigraph.core.lattice import Vector
 from lumigraph.errors import CalibrationError
 
@@ -47,6 +48,8 @@ class Warp:
     center: Vector
     tilt: Vector = (0.0, 0.0)
     radial: float = 0.0
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         for name in ("center", "tilt"):

@@ -7,6 +7,7 @@ import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.brief import brief
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 
@@ -48,6 +49,8 @@ class Exposure:
     gain: float | None = None
     read_noise: float = 0.0
     black_level: float = 0.0
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         for name in ("background", "response", "weights"):

@@ -1,6 +1,7 @@
 """Experiments: what the thesis printed, what is right, and what lumigraph computes, side by side.
 
-- `registry`: `Row`, `Outcome`, `Context`, the decorator `experiment`, and `find`
+- `registry`: `Row`, `Outcome`, `Context`, the decorator `experiment`
+- `collected`: all `experiments`, and `find`
 - `run`: runs experiments, resumes what was interrupted
 - `pages`: the report of a run
 - `thesis`: one table or figure, one file, one function
@@ -8,14 +9,7 @@
 - `beyond`: what the thesis does not have, such as deconvolution
 """
 
-from lumigraph.experiments.registry import (
-    Context,
-    Experiment,
-    Outcome,
-    Row,
-    experiment,
-    experiments,
-    find,
-)
+from lumigraph.experiments.collected import experiments, find
+from lumigraph.experiments.registry import Context, Experiment, Outcome, Row, experiment
 
 __all__ = ["Context", "Experiment", "Outcome", "Row", "experiment", "experiments", "find"]

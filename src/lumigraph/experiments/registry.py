@@ -1,14 +1,10 @@
 """What an experiment is, what it is given, what it answers, and how it is found by its id."""
 
-import difflib
 import re
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
-from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
 from typing import Any
 
 import numpy as np
@@ -205,7 +201,7 @@ class Experiment:
         return self.function(context)
 
 
-_EXPERIMENTS: dict[str, Experiment] = {}
+REGISTERED: dict[str, Experiment] = {}
 
 Function = Callable[[Context], Outcome]
 
@@ -227,66 +223,12 @@ def experiment(
     """
 
     def register(function: Function) -> Function:
-        known = _EXPERIMENTS.get(id)
+        known = REGISTERED.get(id)
         if known is not None and known.module != function.__module__:
             raise LumigraphError(
                 f"experiment {id!r} is defined in {known.module} and in {function.__module__}. Rename one."
             )
-        _EXPERIMENTS[id] = Experiment(id, title, question, thesis, function, camera)
+        REGISTERED[id] = Experiment(id, title, question, thesis, function, camera)
         return function
 
     return register
-
-
-@cache
-def _discover() -> None:
-    from lumigraph.experiments import beyond, microscope, thesis
-
-    for package in (thesis, beyond, microscope):
-        for module in iter_modules(package.__path__):
-            import_module(f"{package.__name__}.{module.name}")
-
-
-def experiments() -> tuple[Experiment, ...]:
-    """All experiments, by chapter and number."""
-    _discover()
-    return tuple(sorted(_EXPERIMENTS.values(), key=lambda one: natural_order(one.id)))
-
-
-def natural_order(id: str) -> tuple[tuple[int, ...], str]:  # noqa: A002
-    """Sorting key of an id: its numbers, then its words.
-
-    Examples
-    --------
-    >>> sorted(["table-3.1", "2.11", "2.4", "figure-3.2"], key=natural_order)
-    ['2.4', '2.11', 'table-3.1', 'figure-3.2']
-    """
-    return tuple(int(number) for number in re.findall(r"\d+", id)), id
-
-
-def find(ids: Iterable[str]) -> tuple[Experiment, ...]:
-    """The experiments with these ids or endings of ids ("5.4" finds "table-5.4"); all for no ids.
-
-    Raises
-    ------
-    LumigraphError
-        An id that nothing matches; the message names the nearest ones.
-    """
-    known = {one.id: one for one in experiments()}
-    wanted: dict[str, Experiment] = {}
-    for text in ids:
-        matches = [name for name in known if name == text or name.endswith(f"-{text}")]
-        if not matches:
-            near = _near(text, list(known))
-            raise LumigraphError(f"there is no experiment {text!r}. Near ones: {', '.join(near)}.")
-        wanted |= {name: known[name] for name in matches}
-    chosen = wanted or known
-    return tuple(chosen[name] for name in sorted(chosen, key=natural_order))
-
-
-def _near(text: str, known: list[str]) -> list[str]:
-    """Three ids that look or count like the text."""
-    close = difflib.get_close_matches(text, known, n=3, cutoff=0.5)
-    numbers = re.findall(r"\d+", text)
-    same = [name for name in known if numbers and re.findall(r"\d+", name)[:1] == numbers[:1]]
-    return list(dict.fromkeys([*close, *same, *known]))[:3]

@@ -19,7 +19,8 @@ import numpy as np
 
 from lumigraph import store
 from lumigraph.errors import FormatError
-from lumigraph.experiments.registry import Context, Experiment, Outcome, Row, experiments
+from lumigraph.experiments.collected import experiments
+from lumigraph.experiments.registry import Context, Experiment, Outcome, Row
 from lumigraph.io.target import write_bytes
 from lumigraph.report.pictures import Picture, picture
 

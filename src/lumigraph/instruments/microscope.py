@@ -23,7 +23,8 @@ from lumigraph.instruments.parts import Lenslets, Part, Pixels
 from lumigraph.instruments.quantities import Aberrations, Displacement, Fraction, Length, Positive, Wavelength
 from lumigraph.instruments.row import Row
 from lumigraph.operators.fourier_microscope import FourierMicroscopeOperator, Mosaic, fourier_operator
-from lumigraph.operators.microscope_kernels import DROPPED, CellSampling, Lenslet
+from lumigraph.operators.microscope_cell import CellSampling, Lenslet
+from lumigraph.operators.microscope_kernels import DROPPED
 from lumigraph.operators.microscope_operator import Layout, MicroscopeOperator, Progress, microscope_operator
 from lumigraph.operators.microscope_pixels import PixelPlacement, narrowed
 from lumigraph.sensor import Sensor

@@ -6,9 +6,9 @@
   light; `glare`, what falls far from a point's image
 - `resampling`, `turning`: from an object's samples to points and from the image's samples to pixels
 - `single_lens`: `single_lens_operator`, incoherent planes and points before a camera without lenslets
-- `microscope_operator`: volumes before a light-field microscope; `microscope_kernels`, images of a cell's
-  points; `microscope_rays`, the same by rays; `microscope_spectrum`, the lenslets' frequencies;
-  `microscope_pixels`, real pixels; `fourier_microscope`
+- `microscope_operator`: volumes before a light-field microscope; `microscope_cell`, a lenslet and its cell;
+  `microscope_kernels`, images of its points; `microscope_rays`, the same by rays; `microscope_spectrum`, the
+  lenslets' frequencies; `microscope_pixels`, real pixels; `fourier_microscope`
 - `band`: band-limited samples along an axis, to and from points and pixels
 - `camera`: `Camera`, what an operator asks of an instrument
 """

@@ -16,6 +16,7 @@ from lumigraph.core import arrays, memory
 from lumigraph.core.threads import single_products
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import SamplingError
+from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_rays import ray_images
 
 MARGIN = 1.15
@@ -23,54 +24,6 @@ MARGIN = 1.15
 
 DROPPED = 0.01
 """Part of the light in the faintest offsets between cells, which are left out."""
-
-
-@dataclass(frozen=True, slots=True)
-class Lenslet:
-    """A lenslet and what stands behind it, in lengths at the lenslets.
-
-    Parameters
-    ----------
-    pitch, focal_length, distance
-        d, f_µ, and b from the lenslets to the sensor [m].
-    magnification
-        M, from the object to the lenslets.
-    width
-        Of the open part [m].
-    is_round
-        Whether that is a disc, not a square.
-    """
-
-    pitch: float
-    focal_length: float
-    distance: float
-    magnification: float
-    width: float
-    is_round: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class CellSampling:
-    """Points and pixels of a lenslet's cell, symmetric about its centre.
-
-    Parameters
-    ----------
-    points
-        s: object points along each side.
-    pixels
-        N: samples of the image along each side.
-    width
-        Of the square that each sample averages, over the lenslet's pitch.
-    """
-
-    points: int
-    pixels: int
-    width: float
-
-    @property
-    def classes(self) -> int:
-        """Points of a cell, s²."""
-        return self.points**2
 
 
 @dataclass(frozen=True, slots=True, eq=False)

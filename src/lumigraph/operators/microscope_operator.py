@@ -25,10 +25,9 @@ from lumigraph.core.progress import Progress
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import FormatError, GeometryError, SamplingError
 from lumigraph.operators import microscope_spectrum
+from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_kernels import (
     DROPPED,
-    CellSampling,
-    Lenslet,
     SliceKernel,
     kernel_bytes,
     octant,

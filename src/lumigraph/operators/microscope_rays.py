@@ -8,14 +8,11 @@ M. Levoy et al., ACM Trans. Graph. 25, 924 (2006).
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lumigraph.elements.objective import Objective
-
-if TYPE_CHECKING:
-    from lumigraph.operators.microscope_kernels import CellSampling, Lenslet
+from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 
 PER_PIXEL = 4
 """Rays along each side of a pixel."""
@@ -26,8 +23,8 @@ PER_POINT = 5
 
 def ray_images(
     objective: Objective,
-    lenslet: "Lenslet",
-    sampling: "CellSampling",
+    lenslet: Lenslet,
+    sampling: CellSampling,
     points: Sequence[tuple[float, float]],
     dz: float,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -68,7 +65,7 @@ def ray_images(
     return images, passed
 
 
-def _rays(sampling: "CellSampling", outer: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _rays(sampling: CellSampling, outer: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of each ray along an axis: pixel, cell from the lenslet's own, and place from its centre [cells]."""
     N = sampling.pixels
     index = np.arange(-outer * N, (outer + 1) * N).repeat(PER_PIXEL)
@@ -76,7 +73,7 @@ def _rays(sampling: "CellSampling", outer: int) -> tuple[np.ndarray, np.ndarray,
     return index % N, index // N, (index + 0.5) / N - 0.5 + within * sampling.width
 
 
-def _open(lenslet: "Lenslet", y: np.ndarray, x: np.ndarray) -> np.ndarray:
+def _open(lenslet: Lenslet, y: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Whether light at (y, x) from a lenslet's centre [pitches] falls on its open part."""
     half = lenslet.width / lenslet.pitch / 2
     away = np.hypot(y, x) if lenslet.is_round else np.maximum(np.abs(y), np.abs(x))

@@ -57,6 +57,7 @@ def volume(photons: float = 200.0, *, seed: int = 1) -> VolumeSample:
     depths = tuple(z * um for z in range(16, 65, 8))
     operator = camera.operator(depths, 3)
     grid = operator.object_grid
+    assert grid is not None
     radius = np.sqrt((np.array(depths)[:, None, None] - 40 * um) ** 2 + grid.y[:, None] ** 2 + grid.x**2)
     shell = (photons * np.exp(-(((radius - 20 * um) / (2 * um)) ** 2))).astype(np.float32)
     counts = np.random.default_rng(seed).poisson(np.maximum(operator.forward(shell), 0) + 1)

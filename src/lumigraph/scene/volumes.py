@@ -11,6 +11,7 @@ import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, is_complex, namespace, to_numpy
+from lumigraph.core.brief import brief
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, LumigraphError
 
@@ -46,6 +47,8 @@ class Slice:
     intensity: Array
     grid: Grid
     dz: float = 0.0
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         checks.array("a slice", self.intensity)
@@ -109,6 +112,8 @@ class Points:
 
     positions: np.ndarray
     intensities: np.ndarray
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         positions, intensities = (_floats(name, getattr(self, name)) for name in ("positions", "intensities"))
@@ -185,6 +190,8 @@ class Scene:
     """
 
     parts: tuple[Part, ...]
+
+    __repr__ = brief
 
     def __init__(self, parts: Iterable[Part] = ()) -> None:
         if not isinstance(parts, Iterable):

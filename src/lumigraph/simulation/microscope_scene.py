@@ -14,7 +14,8 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.raw import RawImage
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError
-from lumigraph.operators.microscope_kernels import DROPPED, Lenslet, point_cells, require_window
+from lumigraph.operators.microscope_cell import Lenslet
+from lumigraph.operators.microscope_kernels import DROPPED, point_cells, require_window
 from lumigraph.operators.microscope_operator import Layout, MicroscopeOperator
 from lumigraph.scene import Diffuser, Points, Scene, Slice
 from lumigraph.sensor import Sensor

@@ -1,0 +1,51 @@
+"""One lenslet of a light-field microscope, and how its cell is sampled."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Lenslet:
+    """A lenslet and what stands behind it, in lengths at the lenslets.
+
+    Parameters
+    ----------
+    pitch, focal_length, distance
+        d, f_µ, and b from the lenslets to the sensor [m].
+    magnification
+        M, from the object to the lenslets.
+    width
+        Of the open part [m].
+    is_round
+        Whether that is a disc, not a square.
+    """
+
+    pitch: float
+    focal_length: float
+    distance: float
+    magnification: float
+    width: float
+    is_round: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class CellSampling:
+    """Points and pixels of a lenslet's cell, symmetric about its centre.
+
+    Parameters
+    ----------
+    points
+        s: object points along each side.
+    pixels
+        N: samples of the image along each side.
+    width
+        Of the square that each sample averages, over the lenslet's pitch.
+    """
+
+    points: int
+    pixels: int
+    width: float
+
+    @property
+    def classes(self) -> int:
+        """Points of a cell, s²."""
+        return self.points**2
