@@ -99,6 +99,26 @@ def test_the_deviance_of_the_truth_is_one_in_electrons(rng):
     assert steps[0].deviance == pytest.approx(1, abs=0.15)  # 3 standard deviations of 900 pixels
 
 
+def test_one_step_is_written_down_with_background_and_read_noise():
+    """o A'((r + c)/(A o + b + c)) / A'1 with c = σ²/g; without c in the model the step is a third larger."""
+    matrix, start = np.array([[2.0, 1.0], [1.0, 3.0], [0.5, 0.5]]), np.array([4.0, 6.0])
+    raw, b, c = np.array([20.0, 30.0, 9.0]), 3.0, 6.0**2 / 4.0
+    found = lg.deconvolve(
+        raw[:, None], Matrix(matrix, (3, 1), (2, 1)), 1,
+        method=RichardsonLucy(start=start[:, None]), exposure=Exposure(b, gain=4.0, read_noise=6.0),
+    )  # fmt: skip
+    expected = start * (matrix.T @ ((raw + c) / (matrix @ start + b + c))) / matrix.sum(0)
+    np.testing.assert_allclose(found[:, 0], expected, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("part", "seen"), [(2e-3, True), (5e-4, False)])
+def test_samples_of_a_thousandth_of_the_light_are_the_faintest_that_count(part, seen):
+    """What sends less is left dark: its few photons would be amplified without end."""
+    matrix = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 2 * part]])
+    found = lg.deconvolve(np.array([[5.0], [5.0], [5.0]]), Matrix(matrix, (3, 1), (2, 1)), 3)
+    assert (found[1, 0] > 0) == seen
+
+
 def test_it_stops_where_noise_would_be_fitted(rng):
     """The stopped estimate is nearer to the truth than one of ten times as many iterations."""
     operator = blurred((24, 24), 1.6)

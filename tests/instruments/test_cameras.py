@@ -127,6 +127,20 @@ def test_rows_of_a_hexagonal_array(count, total):
     assert len(lenslets.indices()) == total
 
 
+@pytest.mark.parametrize("rotation", [0.0, 0.02])
+@pytest.mark.parametrize("count", [(5, 6), (4, 6), (5, 5)])
+def test_the_corners_of_hexagonal_lenslets_lie_within_their_reach_and_touch_it(count, rotation):
+    """Corners at p/√3 from each centre: the reach holds them all, with less than .3 of a pitch to spare."""
+    pitch = 100 * um
+    lenslets = Lenslets(pitch=pitch, focal_length=1 * mm, count=count, layout="hex", rotation=rotation)
+    centers = lenslets.lattice().position(lenslets.indices())
+    angles = np.pi / 6 + np.pi / 3 * np.arange(6) + rotation
+    corners = centers[:, None] + pitch / np.sqrt(3) * np.stack([np.sin(angles), np.cos(angles)], -1)
+    farthest = np.abs(corners).max((0, 1))
+    assert (farthest <= np.array(lenslets.reach) * (1 + 1e-9)).all(), (farthest, lenslets.reach)
+    assert (np.array(lenslets.reach) - farthest < 0.3 * pitch).all(), (farthest, lenslets.reach)
+
+
 @pytest.mark.parametrize("layout", ["square", "hex"])
 @pytest.mark.parametrize("count", [(5, 6), (4, 5)])
 @pytest.mark.parametrize("offset", [(0.0, 0.0), (20e-6, -30e-6)])
