@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import lumigraph
 
 ROOT = Path(__file__).parents[1]
@@ -41,10 +43,51 @@ def test_import_floors_hold():
     assert out.returncode == 0, out.stdout
 
 
-def test_the_lock_names_no_host():
-    lines = (ROOT / "requirements.lock").read_text().splitlines()
+@pytest.mark.parametrize("name", ["requirements.lock", ".ci/oracles.txt"])
+def test_the_locks_name_no_host(name):
+    lines = (ROOT / name).read_text().splitlines()
     assert not [line for line in lines if re.search(r"https?:|--(extra-)?index|--find-links", line)]
     assert sum(line.lstrip().startswith("--hash=sha256:") for line in lines) > 100
+
+
+def test_the_oracles_leave_the_packages_of_the_lock_alone():
+    names = [
+        set(re.findall(r"(?m)^([\w.-]+)==", (ROOT / n).read_text()))
+        for n in ("requirements.lock", ".ci/oracles.txt")
+    ]
+    assert {"hcipy", "poppy"} <= names[1]
+    assert not names[0] & names[1]
+
+
+@pytest.mark.parametrize(
+    ("case", "told", "code"),
+    [
+        (
+            'classname="tests.sensor" name="test_a"><skipped message="PyTorch is not installed"/>',
+            "skipped 1: PyTorch",
+            0,
+        ),
+        (
+            'classname="" name="tests.crosscheck.test_poppy"><skipped message="collection skipped"/>',
+            "poppy",
+            1,
+        ),
+        (
+            'classname="tests.viewer" name="test_b"><skipped message="no Chromium here: none"/>',
+            "must not be",
+            1,
+        ),
+        ('classname="tests.core" name="test_c">', "", 0),
+    ],
+)
+def test_ci_fails_where_crosschecks_or_the_page_were_skipped(tmp_path, case, told, code):
+    report = tmp_path / "report.xml"
+    report.write_text(f"<testsuites><testsuite><testcase {case}</testcase></testsuite></testsuites>")
+    run = subprocess.run(
+        [sys.executable, ROOT / ".ci" / "skipped.py", report], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == code
+    assert told in run.stdout + run.stderr
 
 
 def test_every_module_has_a_docstring_that_opens_it():
