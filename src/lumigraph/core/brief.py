@@ -14,7 +14,7 @@ MANY = 6
 _LONG = 200
 
 
-def brief(thing: Any) -> str:
+def brief(self: Any) -> str:
     """A dataclass with its fields, for its ``__repr__``: some lines, however large its arrays are.
 
     Examples
@@ -25,9 +25,9 @@ def brief(thing: Any) -> str:
     RawImage(data=float32 (480, 640), pixel_pitch=5e-06, bit_depth=None, bayer=None, metadata={})
     """
     shown = ", ".join(
-        f"{field.name}={_short(getattr(thing, field.name))}" for field in fields(thing) if field.repr
+        f"{field.name}={_short(getattr(self, field.name))}" for field in fields(self) if field.repr
     )
-    lines = textwrap.wrap(f"{type(thing).__name__}({shown})", WIDTH, subsequent_indent="    ")
+    lines = textwrap.wrap(f"{type(self).__name__}({shown})", WIDTH, subsequent_indent="    ")
     return "\n".join(lines if len(lines) <= LINES else [*lines[: LINES - 1], "    ...)"])
 
 
