@@ -15,9 +15,9 @@ computed once.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain, product
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from lumigraph.elements import LensletArray
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.cell_response import INFINITE, Lenslets, Limits
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.point_images import Apart, Few, Lit, factors, few, lit, mirrored, wave
+from lumigraph.operators.point_images import Apart, Few, Line, Lit, factors, few, lit, mirrored, wave
 
 State = tuple[Limits, Limits]
 
@@ -38,6 +38,11 @@ Offset = tuple[int, int]
 Factors = tuple[np.ndarray, np.ndarray]
 
 Blocks = dict[Offset, Factors]
+
+BORDER = 3.0
+"""How much stronger than elsewhere factors are that are looked at in the border's blocks."""
+
+Job = tuple[int, tuple[int, ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,8 +189,27 @@ class _Found:
         return self.left[:, kept], self.right[kept]
 
 
-def build(optics: Optics, progress: Progress | None = None) -> tuple[list[Part], dict[Offset, np.ndarray]]:
-    """All parts, the periodic one first, and the mean images (samples,) of a cell's points at each offset.
+@dataclass(frozen=True, slots=True)
+class Built:
+    """All parts, the periodic one first.
+
+    Parameters
+    ----------
+    ranks
+        Columns of the factors of all parts together.
+    parts
+        One after the other: those that mirror another one are copies, made when they are asked for.
+    means
+        Mean images (samples,) of a cell's points at each offset.
+    """
+
+    ranks: int
+    parts: Iterator[Part]
+    means: dict[Offset, np.ndarray]
+
+
+def build(optics: Optics, progress: Progress | None = None) -> Built:
+    """All parts of one depth.
 
     As many threads work at it as there are processors and as half of the memory that is free allows.
     """
@@ -195,13 +219,18 @@ def build(optics: Optics, progress: Progress | None = None) -> tuple[list[Part],
     builder = _Builder(optics, progress or (lambda _: None), workers)
     inside, means = builder.periodic()
     rows, columns = (band[0].cells for band in (bands(optics, 0), bands(optics, 1)))
-    return [_part(rows, columns, inside), *builder.border()], means
+    ranks, border = builder.border()
+    return Built(_ranks(inside) + ranks, chain([_part(rows, columns, inside)], border), means)
+
+
+def _ranks(blocks: Blocks) -> int:
+    return sum(left.shape[1] for left, _ in blocks.values())
 
 
 def _part(rows: tuple[int, int], columns: tuple[int, int], blocks: Blocks) -> Part:
     order = sorted(key for key, (left, _) in blocks.items() if left.shape[1])
     offsets = tuple((dy, dx, blocks[dy, dx][0].shape[1]) for dy, dx in order)
-    left = np.concatenate([blocks[key][0] for key in order], axis=1, dtype=np.float32)
+    left = np.concatenate([blocks[key][0].T for key in order], axis=0, dtype=np.float32).T
     right = np.concatenate([blocks[key][1] for key in order], axis=0, dtype=np.float32)
     return Part(rows, columns, offsets, left, right)
 
@@ -213,7 +242,7 @@ class _Builder:
         self.optics, self.axes, self.progress, self.workers = optics, optics.axes, progress, workers
         distance = _cells.telecentric_distance(optics.camera)
         self.lenslets = Lenslets(self.axes, optics.array, optics.camera.wavelength, distance)
-        self.light = wave(optics.camera, optics.distance, self.axes, optics.reach)
+        self.light = wave(optics.camera, optics.distance, self.axes, optics.reach).dimmed(optics.image_scale)
         self.even = self.light.even and _symmetric(optics.array)
         y, x = self.axes
         self.square = y == x and bool(np.allclose(self.light.data, self.light.data.T))
@@ -222,24 +251,31 @@ class _Builder:
     def periodic(self) -> tuple[Blocks, dict[Offset, np.ndarray]]:
         """Blocks inside the array, and the mean images (samples,) of a cell's points."""
         inside, reach = (INFINITE, INFINITE), self.optics.reach
-        known = self._images([inside], reach)
-        own = next(iter(self._row(known[inside], 0, range(1))))
+        images = self._images([inside], reach)[inside]
+        own = images.line(0)(0)
         self.least = 0.02 * self.optics.fineness.rank * float(np.linalg.norm(own))
-        columns = self._columns(self.even, reach[1])
 
-        def row(dy: int) -> tuple[float, dict[Offset, _Found]]:
-            found, norm = {}, 0.0
-            for dx, block in zip(columns, self._row(known[inside], dy, columns), strict=True):
-                copies = 2 ** ((dy != 0) + (dx != 0)) if self.even else 1
+        def piece(job: Job) -> tuple[float, dict[Offset, _Found]]:
+            (dy, across), found, norm = job, {}, 0.0
+            line = images.line(dy)
+            for dx in across if self.even else _signed(across):
+                block, copies = line(dx), 2 ** ((dy != 0) + (dx != 0)) if self.even else 1
                 norm += copies * float(np.linalg.norm(block)) ** 2
                 found[dy, dx] = self._factored(block, copies)
             return norm, found
 
-        rows = list(each(row, self._columns(self.even, reach[0]), self.workers))
-        self.norm = sum(norm for norm, _ in rows)
-        found = {key: f for _, part in rows for key, f in part.items()}
+        pieces = list(each(piece, self._jobs(self.even, reach), self.workers))
+        self.norm = sum(norm for norm, _ in pieces)
+        found = {key: f for _, part in pieces for key, f in part.items()}
         self.progress(0.1)
         return self._completed(found)
+
+    def _jobs(self, folded: bool, reach: tuple[int, int]) -> list[Job]:
+        """Offsets that share work, those of dx and -dx together."""
+        rows, across = self._columns(folded, reach[0]), tuple(range(reach[1] + 1))
+        if self.optics.straight:
+            return [(dy, (dx,)) for dy in rows for dx in across]
+        return [(dy, across) for dy in rows]
 
     def _completed(self, found: dict[Offset, _Found]) -> tuple[Blocks, dict[Offset, np.ndarray]]:
         least = _least(found.values(), self.optics.fineness.rank**2 * self.norm)
@@ -252,45 +288,47 @@ class _Builder:
             result[key] = np.hstack([left, even]), np.vstack([right, left_out])
         return result, {key: mean[0] for key, (_, mean) in means.items()}
 
-    def border(self) -> Iterator[Part]:
-        """What differs from `periodic` where lenslets are missing; all of it in the ring."""
+    def border(self) -> tuple[int, Iterator[Part]]:
+        """Ranks and parts of what differs where lenslets are missing, and of all in the ring."""
         sources = _alike(places(self.optics), self.even, self.square)
         blocks = self._border_blocks([place for place, source, _ in sources if place is source])
-        for place, source, turn in sources:
-            mine = blocks[source] if place is source else self._copied(blocks[source], *turn)
-            if any(left.shape[1] for left, _ in mine.values()):
-                yield _part(place[0].cells, place[1].cells, mine)
+        lit = [found for found in sources if _ranks(blocks[found[1]])]
+
+        def parts() -> Iterator[Part]:
+            for (y, x), source, turn in lit:
+                yield _part(y.cells, x.cells, self._copied(blocks[source], *turn))
+
+        return sum(_ranks(blocks[source]) for _, source, _ in lit), parts()
 
     def _border_blocks(self, wanted: Sequence[Place]) -> dict[Place, Blocks]:
         """Of some places: row after row of cells, so that what they share is computed once."""
         reach = self.optics.near
         known = self._images({state for place in wanted for state in terms(place)}, reach)
 
-        def row(dy: int) -> dict[tuple[Place, Offset], _Found]:
-            rows: dict[State, np.ndarray] = {}
-            found = {}
-            for place in wanted:
-                if dy < 0 and self._folds(place)[0]:
-                    continue
-                for state in terms(place):
-                    if state not in rows:
-                        columns = self._columns(self._folded(state[1]), reach[1])
-                        rows[state] = self._row(known[state], dy, columns)
-                for dx in self._columns(self._folds(place)[1], reach[1]):
-                    block = sum(sign * self._picked(rows[s], s, dx) for s, sign in terms(place).items())
-                    found[place, (dy, dx)] = self._factored(np.asarray(block), 1)
-                rows = {s: row for s, row in rows.items() if INFINITE in s}  # those of corners serve once
+        def piece(job: Job) -> dict[tuple[Place, Offset], _Found]:
+            (dy, across), found = job, {}
+            shared = _Shared(self, known, dy)
+            for dx in across:
+                for place in wanted:
+                    up, left = self._folds(place)
+                    for signed in [] if up and dy < 0 else [dx] if left else _signed((dx,)):
+                        block = shared.total(terms(place), signed)
+                        found[place, (dy, signed)] = self._factored(block, 1, BORDER)
+                    shared.forget(lambda s: INFINITE not in s)  # those of corners serve once
+                shared.forget_blocks()
             return found
 
         found: dict[Place, dict[Offset, _Found]] = {place: {} for place in wanted}
-        for done, part in enumerate(each(row, self._columns(False, reach[0]), self.workers)):
+        jobs = self._jobs(False, reach)
+        for done, part in enumerate(each(piece, jobs, self.workers)):
             for (place, offset), block in part.items():
                 found[place][offset] = block
-            self.progress(0.1 + 0.9 * (done + 1) / (2 * reach[0] + 1))
+            self.progress(0.1 + 0.9 * (done + 1) / len(jobs))
         # A row of cells is a small part of the picture: its error may be larger.
         budget = (2 * self.optics.fineness.rank) ** 2 * self.norm
         result = {}
-        for place, blocks in found.items():
+        for place in wanted:
+            blocks = found.pop(place)
             least = _least(blocks.values(), budget)
             cut = {key: f.cut(least) for key, f in blocks.items()}
             result[place] = self._unfolded(cut, self._folds(place))
@@ -309,37 +347,22 @@ class _Builder:
             if response.core is not None:
                 return few(light, response, self.axes, reach)
             if state[1] not in behind:
-                columns = self._columns(self._folded(state[1]), reach[1])
+                columns = self._columns(self.folded(state[1]), reach[1])
                 behind[state[1]] = lit(light, response.across, self.axes[1], columns)
             return Apart(behind[state[1]], response.down, self.axes)
 
         states = list(states)
         return dict(zip(states, each(of, states, self.workers), strict=True))
 
-    def _row(self, images: Apart | Few, dy: int, columns: range) -> np.ndarray:
-        """Blocks (columns, points, samples) of one row of cells."""
-        row = images.row(dy, columns)
-        row /= self.optics.image_scale**2
-        return row
-
-    def _picked(self, row: np.ndarray, state: State, dx: int) -> np.ndarray:
-        """The block at `dx` of a row, which may hold only those that are not negative."""
-        if not self._folded(state[1]):
-            return row[dx + len(row) // 2]
-        if dx >= 0:
-            return row[dx]
-        cells = self.optics.cells
-        return mirrored(mirrored(row[-dx], cells.points, False, True).T, cells.samples, False, True).T
-
     def _columns(self, folded: bool, reach: int) -> range:
         return range(0 if folded else -reach, reach + 1)
 
-    def _folded(self, limits: Limits) -> bool:
+    def folded(self, limits: Limits) -> bool:
         """Whether what is on one side mirrors what is on the other."""
         return self.even and _flipped(limits) == limits
 
     def _folds(self, place: Place) -> tuple[bool, bool]:
-        return self._folded(place[0].limits), self._folded(place[1].limits)
+        return self.folded(place[0].limits), self.folded(place[1].limits)
 
     def _copied(self, blocks: Blocks, across: bool, up: bool, left: bool) -> Blocks:
         result = {}
@@ -367,9 +390,53 @@ class _Builder:
                         result[key] = self._turned(pair, up, left)
         return result
 
-    def _factored(self, block: np.ndarray, copies: int) -> _Found:
-        left, right, strength = factors(block, self.least)
+    def _factored(self, block: np.ndarray, copies: int, coarser: float = 1.0) -> _Found:
+        left, right, strength = factors(block, coarser * self.least)
         return _Found(left, right, strength, copies, block.mean(0, dtype=np.float64))
+
+
+class _Shared:
+    """Blocks of one row of cells with the lenslets of some states, each computed once."""
+
+    def __init__(self, builder: _Builder, known: dict[State, Apart | Few], dy: int) -> None:
+        self.builder, self.known, self.dy = builder, known, dy
+        self.lines: dict[State, Line] = {}
+        self.blocks: dict[tuple[State, int], np.ndarray] = {}
+
+    def total(self, signs: dict[State, int], dx: int) -> np.ndarray:
+        """Sum of the states' blocks at `dx`, each times its sign."""
+        (first, sign), *others = signs.items()
+        total = sign * self._block(first, dx)
+        for state, sign in others:
+            (np.add if sign > 0 else np.subtract)(total, self._block(state, dx), out=total)
+        return total
+
+    def forget(self, unwanted: Callable[[State], bool]) -> None:
+        """Let go what some states left."""
+        self.lines = {s: line for s, line in self.lines.items() if not unwanted(s)}
+        self.blocks = {key: block for key, block in self.blocks.items() if not unwanted(key[0])}
+
+    def forget_blocks(self) -> None:
+        """Let go all blocks."""
+        self.blocks = {}
+
+    def _block(self, state: State, dx: int) -> np.ndarray:
+        if (state, dx) not in self.blocks:
+            self.blocks[state, dx] = self._computed(state, dx)
+        return self.blocks[state, dx]
+
+    def _computed(self, state: State, dx: int) -> np.ndarray:
+        if dx < 0 and self.builder.folded(state[1]):
+            cells, block = self.builder.optics.cells, self._block(state, -dx)
+            return mirrored(mirrored(block, cells.points, False, True).T, cells.samples, False, True).T
+        if state not in self.lines:
+            self.lines[state] = self.known[state].line(self.dy)
+        return self.lines[state](dx)
+
+
+def _signed(across: Sequence[int]) -> list[int]:
+    """Both signs of each number that is not 0."""
+    return [*across, *(-dx for dx in across if dx)]
 
 
 def _alike(wanted: Sequence[Place], even: bool, square: bool) -> list[tuple[Place, Place, Turn]]:

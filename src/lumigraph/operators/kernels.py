@@ -4,6 +4,7 @@ The block between two cells, (points, samples), is ``left @ right`` with as many
 light there has patterns: over a hundred in front of a lenslet, one or two far from it. `blocks` finds them.
 """
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,28 +73,37 @@ def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None
             "Use slower lenslets, a lower accuracy, or Snapshots.",
             SamplingError,
         )
-        return _packed(_build(optics, progress))
+        return _build(optics, progress)
 
     # Packed and unpacked, built or found: products with other strides would round otherwise.
     return _MATRICES.get(optics.key, lambda: _unpacked(store.kept(optics.key, built, folder)))
 
 
-def _packed(matrix: Matrix) -> dict[str, np.ndarray]:
-    """The matrix as a few arrays."""
-    places = [(*part.rows, *part.columns, len(part.offsets)) for part in matrix.parts]
+def _build(optics: Optics, progress: Progress | None = None) -> dict[str, np.ndarray]:
+    """The matrix as a few arrays: the factors of all parts side by side."""
+    found, per = build(optics, progress), optics.cells
+    rest = glare(found.means, per.size, per.image)
+    left = np.empty((found.ranks, math.prod(per.points)), np.float32)
+    right = np.empty((found.ranks, math.prod(per.samples)), np.float32)
+    places, offsets, start = [], [], 0
+    for part in found.parts:
+        places.append((*part.rows, *part.columns, len(part.offsets)))
+        offsets += part.offsets
+        mine = slice(start, start + part.left.shape[1])
+        left[mine], right[mine], start = part.left.T, part.right, mine.stop
     return {
         "places": np.array(places),
-        "offsets": np.concatenate([np.array(part.offsets).reshape(-1, 3) for part in matrix.parts]),
-        "left": np.concatenate([part.left for part in matrix.parts], axis=1),
-        "right": np.concatenate([part.right for part in matrix.parts]),
-        "spectra": matrix.glare.spectra,
-        "pictures": matrix.glare.pictures,
-        "shape": np.array([*matrix.glare.image, *matrix.glare.margin, *matrix.margin]),
+        "offsets": np.array(offsets),
+        "left": left.T,
+        "right": right,
+        "spectra": rest.spectra,
+        "pictures": rest.pictures,
+        "shape": np.array([*rest.image, *rest.margin, *optics.reach]),
     }
 
 
 def _unpacked(arrays: dict[str, np.ndarray]) -> Matrix:
-    """The inverse of `_packed`."""
+    """The matrix of what `_build` returns."""
     parts, first, column = [], 0, 0
     for top, bottom, left, right, count in arrays["places"].tolist():
         offsets = [(int(dy), int(dx), int(rank)) for dy, dx, rank in arrays["offsets"][first : first + count]]
@@ -107,8 +117,3 @@ def _unpacked(arrays: dict[str, np.ndarray]) -> Matrix:
     rows, columns, *margins = arrays["shape"].tolist()
     glare = Glare(arrays["spectra"], arrays["pictures"], (rows, columns), (margins[0], margins[1]))
     return Matrix(tuple(parts), glare, (margins[2], margins[3]))
-
-
-def _build(optics: Optics, progress: Progress | None = None) -> Matrix:
-    parts, means = build(optics, progress)
-    return Matrix(tuple(parts), glare(means, optics.cells.size, optics.cells.image), optics.reach)

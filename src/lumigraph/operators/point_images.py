@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,9 @@ PUPIL = 1024
 _BLOCK = 2**21
 """Numbers worked on at a time."""
 
+Line = Callable[[int], np.ndarray]
+"""Blocks (points, samples) of the cells of one row, by their column."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wave:
@@ -40,6 +43,10 @@ class Wave:
 
     data: np.ndarray
     first: tuple[int, int]
+
+    def dimmed(self, factor: float) -> "Wave":
+        """The amplitude divided by a factor."""
+        return Wave(self.data / np.float32(factor), self.first)
 
     @property
     def even(self) -> bool:
@@ -152,18 +159,19 @@ class Apart:
     down: np.ndarray
     axes: tuple[Axis, Axis]
 
-    def row(self, dy: int, columns: range) -> np.ndarray:
-        """Intensity (columns, points, samples) in a cell of the points of the cells (dy, columns)."""
+    def line(self, dy: int) -> "Line":
+        """Intensity (points, samples) in a cell of the points of the cell (dy, dx), as a function of dx."""
+        return lambda dx: self._block(dy, dx)
+
+    def _block(self, dy: int, dx: int) -> np.ndarray:
         y, x = self.axes
-        down, start = self.down.astype(np.complex64), columns[0] - self.lit.columns[0]
-        mine = slice(start * x.points, (start + len(columns)) * x.points)
-        result = np.empty((len(columns), y.points, x.points, y.samples, x.samples), np.float32)
-        for k in range(y.points):
+        down, start = self.down.astype(np.complex64), (dx - self.lit.columns[0]) * x.points
+        result = np.empty((y.points, x.points, y.samples, x.samples), np.float32)
+        for k, image in enumerate(result):
             top = -y.margin - (dy * y.points + k) - self.lit.first
-            rows = self.lit.rows[top % STEP][top // STEP :, mine][: down.shape[1]]
-            for column, lit_there in enumerate(np.split(rows, len(columns), axis=1)):
-                _intensity(down @ lit_there.transpose(1, 0, 2), result[column, k])
-        return result.reshape(len(columns), y.points * x.points, -1)
+            rows = self.lit.rows[top % STEP][top // STEP :, start : start + x.points]
+            _intensity(down @ rows[: down.shape[1]].transpose(1, 0, 2), image)
+        return result.reshape(y.points * x.points, -1)
 
 
 def _intensity(field: np.ndarray, out: np.ndarray) -> None:
@@ -194,16 +202,21 @@ class Few:
     across: np.ndarray
     reach: tuple[int, int]
 
-    def row(self, dy: int, columns: range) -> np.ndarray:
-        """As `Apart.row`."""
+    def line(self, dy: int) -> "Line":
+        """As `Apart.line`."""
         y, x = (len(m) // (2 * r + 1) for m, r in zip((self.down, self.across), self.reach, strict=True))
         parts, samples = self.fields.view(np.float32), self.fields.shape[2]
         down = self.down[(dy + self.reach[0]) * y :][:y]
-        across = self.across[(columns[0] + self.reach[1]) * x :][: len(columns) * x]
         rows = (down @ parts.reshape(len(parts), -1)).reshape(y, *parts.shape[1:])
-        field = (across @ rows).reshape(y, len(columns), x, samples, 2)
-        intensity = field[..., 0] ** 2 + field[..., 1] ** 2
-        return intensity.transpose(1, 0, 2, 3).reshape(len(columns), y * x, samples)
+
+        def block(dx: int) -> np.ndarray:
+            across = self.across[(dx + self.reach[1]) * x :][:x]
+            result = np.empty((y, x, samples), np.float32)
+            for row, image in zip(rows, result, strict=True):
+                _intensity((across @ row).view(np.complex64), image)
+            return result.reshape(y * x, samples)
+
+        return block
 
 
 def few(light: Wave, lenslets: Response, axes: tuple[Axis, Axis], reach: tuple[int, int]) -> Few:
@@ -256,12 +269,17 @@ def factors(block: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np
         return np.zeros((points, 0)), np.zeros((0, block.shape[1])), np.zeros(0)
     sketch = np.random.default_rng(0).standard_normal((points, math.ceil(points / 5)), np.float32)
     for basis in (np.linalg.qr(block @ (block.T @ sketch))[0], None):
-        seen = (block if basis is None else basis.T @ block).astype(np.float64)
-        strength, vectors = np.linalg.eigh(seen @ seen.T)
+        seen = block if basis is None else basis.T @ block
+        strength, vectors = np.linalg.eigh(_products(seen))
         strength = np.sqrt(np.maximum(strength, 0))
         if strength[0] < least / 2:
             break
     kept = strength > least
     left = vectors[:, kept].astype(np.float32)
-    right = vectors[:, kept].T @ seen
-    return left if basis is None else basis @ left, right.astype(np.float32), strength[kept]
+    return left if basis is None else basis @ left, left.T @ seen, strength[kept]
+
+
+def _products(rows: np.ndarray) -> np.ndarray:
+    """``rows @ rows.T`` in double precision, from some columns at a time."""
+    parts = np.array_split(rows, math.ceil(rows.size / _BLOCK), axis=1)
+    return np.sum([part @ part.T for part in (p.astype(np.float64) for p in parts)], axis=0)
