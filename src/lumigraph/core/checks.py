@@ -24,8 +24,15 @@ def finite(name: str, value: float, unit: str = "m", error: type[LumigraphError]
             number = float(value)
     if not math.isfinite(number):
         told = "" if unit == "1" else f" [{unit}]"
-        raise error(f"{name} is {value!r} but must be a finite number{told}.")
+        raise error(f"{name} is {shown(value)} but must be a finite number{told}.")
     return number
+
+
+def shown(value: Any) -> str:
+    """A value as messages show it; Python refuses to write whole numbers of thousands of digits."""
+    if isinstance(value, int) and value.bit_length() > 200:
+        return f"a whole number of {value.bit_length()} bits"
+    return repr(value)
 
 
 def positive(name: str, value: float, unit: str = "m", error: type[LumigraphError] = GeometryError) -> float:
@@ -76,7 +83,7 @@ def _both(value: Any) -> tuple[Any, ...]:
 def whole(name: str, value: int, lowest: int = 1, error: type[LumigraphError] = GeometryError) -> int:
     """`value` as an int, refused unless it is a whole number of at least `lowest`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < lowest:
-        raise error(f"{name} is {value!r} but must be a whole number of at least {lowest}.")
+        raise error(f"{name} is {shown(value)} but must be a whole number of at least {lowest}.")
     return int(value)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import BeforeValidator, PlainSerializer, ValidationInfo
 
 from lumigraph import units
+from lumigraph.core import checks
 from lumigraph.errors import FormatError, GeometryError
 
 FROM_FILE = {"file": True}
@@ -19,6 +20,8 @@ FROM_FILE = {"file": True}
 
 SHORTEST, LONGEST = 1e-9, 1e5
 """Lengths outside 1 nm to 100 km are mistakes, and would overflow further down [m]."""
+
+_LARGEST = 1e12  # of numbers without a unit; those above zero are at least one over it
 
 _EXAMPLE = {"length": "150 um", "angle": "2 deg", "time": "10 ms"}
 _SI_UNIT = {"length": "m", "angle": "rad", "time": "s"}
@@ -32,13 +35,13 @@ def _quantity(value: Any, info: ValidationInfo, dimension: str) -> float:
         raise FormatError(f"{value!r} is not a {dimension}. {hint}")
     if info.context and info.context.get("file") and value != 0:
         raise FormatError(f"{value!r} has no unit. {hint}")
-    if not math.isfinite(value):
-        raise GeometryError(f"{value!r} {_SI_UNIT[dimension]} is not finite. {hint}")
+    if not -1e300 < value < 1e300:
+        raise GeometryError(f"{_shown(value, _SI_UNIT[dimension])} is not finite. {hint}")
     return float(value)
 
 
 def _shown(value: Any, unit: str) -> str:
-    return value if isinstance(value, str) else f"{value!r} {unit}".strip()
+    return value if isinstance(value, str) else f"{checks.shown(value)} {unit}".strip()
 
 
 def _length(value: Any, info: ValidationInfo) -> float:
@@ -81,8 +84,11 @@ def _time(value: Any, info: ValidationInfo) -> float:
 
 
 def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        raise GeometryError(f"{value!r} is not a finite number. Give a number without a unit.")
+    if isinstance(value, bool) or not isinstance(value, Real) or not -_LARGEST <= value <= _LARGEST:
+        raise GeometryError(
+            f"{checks.shown(value)} is not a finite number of at most {_LARGEST:g}. "
+            "Give a number without a unit."
+        )
     return float(value)
 
 
@@ -90,6 +96,10 @@ def _positive(value: Any) -> float:
     number = _number(value)
     if number <= 0:
         raise GeometryError(f"{value!r} is not above zero. Give a positive number.")
+    if number < 1 / _LARGEST:
+        raise GeometryError(
+            f"{value!r} is below {1 / _LARGEST:g}. Give a number that an instrument can have."
+        )
     return number
 
 

@@ -2,11 +2,11 @@
 
 import io
 import json
-import math
 import threading
 from importlib.metadata import version
 from typing import Any
 
+from lumigraph.core import checks
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments.loading import AnyCamera
 from lumigraph.viewer.designer_curves import trade_offs
@@ -90,8 +90,7 @@ def _depth_slider(camera: Any) -> dict[str, Any]:
 
 def _depth(given: dict[str, Any]) -> float:
     dz = given.get("dz", 0.0)
-    if isinstance(dz, bool) or not isinstance(dz, int | float) or not math.isfinite(dz):
-        raise FormatError(f"dz is {str(dz)[:60]!r} but must be a finite number of metres.")
+    checks.finite("dz", dz, error=FormatError)
     if abs(dz) > _FARTHEST:
         raise GeometryError(f"dz is {dz:g} m, beyond {_FARTHEST:g} m. Use a nearer point.")
     return float(dz)

@@ -1,10 +1,10 @@
 """What can be changed of each kind of camera: sliders with units and ranges, and cameras from values."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from lumigraph.core import checks
 from lumigraph.errors import FormatError
 from lumigraph.instruments.loading import AnyCamera
 
@@ -181,8 +181,7 @@ def _checked(parameter: Parameter, value: Any) -> Any:
         if value not in parameter.choices:
             raise FormatError(f"{name} is {str(value)[:60]!r} but must be {' or '.join(parameter.choices)}.")
         return value
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise FormatError(f"{name} is {str(value)[:60]!r} but must be a number.")
+    checks.finite(name, value, "1", FormatError)
     if parameter.kind != "whole":
         return float(value)
     if value != int(value) or not 1 <= value <= MOST_LENSLETS:

@@ -182,10 +182,12 @@ def serve(site: Site, *, port: int = 0, host: str = LOOPBACK, ready: Callable[[s
 def _server(app: Any) -> Any:
     import uvicorn
 
+    from lumigraph.viewer.connections import Connection
+
     return uvicorn.Server(
         uvicorn.Config(
             app, log_level="critical", access_log=False, server_header=False, lifespan="off", ws="none",
-            http="h11", limit_concurrency=256,
+            http=Connection,
             timeout_graceful_shutdown=1, h11_max_incomplete_event_size=16384,
         )
     )  # fmt: skip
@@ -197,7 +199,7 @@ def _listener(host: str, port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
-        listener.listen(64)
+        listener.listen(256)
     except (OSError, OverflowError) as error:
         listener.close()
         reason = getattr(error, "strerror", None) or str(error)
