@@ -267,3 +267,11 @@ def test_the_real_vesicle_is_a_ring_without_blocks():
     )
     assert np.arange(0, 20, 0.5)[profile.argmax()] == pytest.approx(13.0, abs=1.0)
     assert profile.max() > 3 * profile[:16].mean()
+
+
+@pytest.mark.parametrize("value", [1e-320, 5e-324, 1e308, 10**400, pytest.param(10**5000, id="long")])
+@pytest.mark.parametrize("name", ["magnification", "numerical_aperture"])
+def test_numbers_that_no_objective_has_are_refused(name, value):
+    """They ended in ZeroDivisionError and OverflowError, some only in `describe`."""
+    with pytest.raises(GeometryError, match=f"objective.{name}: .*(finite number of at most|is below|above)"):
+        LightFieldMicroscope.from_catalogue("lfm-fourier").replace(objective={name: value}).describe()

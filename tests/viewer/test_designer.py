@@ -46,7 +46,7 @@ def test_a_slider_changes_one_value_and_the_file_says_so():
         ({"lenslets.pitch": "wide"}, FormatError, "must be a finite number"),
         ({"lenslets.pitch": float("nan")}, FormatError, "must be a finite number"),
         ({"lenslets.pitch": 10**400}, FormatError, "must be a finite number"),
-        ({"lenslets.count.0": 10**5000}, FormatError, "must be a finite number"),
+        pytest.param({"lenslets.count.0": 10**5000}, FormatError, "must be a finite number", id="long"),
         ({"lenslets.count.0": 1000}, FormatError, "must be a whole number from 1 to 301"),
         ({"matching": "none"}, FormatError, "must be views or full"),
         ({"object_distance": 50.0}, GeometryError, "inside the main lens' focal length"),

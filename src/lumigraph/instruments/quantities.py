@@ -27,6 +27,14 @@ _EXAMPLE = {"length": "150 um", "angle": "2 deg", "time": "10 ms"}
 _SI_UNIT = {"length": "m", "angle": "rad", "time": "s"}
 
 
+def _float(value: Real) -> float:
+    """The value as a float; a whole number beyond the largest one is infinite."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
 def _quantity(value: Any, info: ValidationInfo, dimension: str) -> float:
     hint = f"Write a number and a unit, such as {_EXAMPLE[dimension]!r}."
     if isinstance(value, str):
@@ -35,7 +43,7 @@ def _quantity(value: Any, info: ValidationInfo, dimension: str) -> float:
         raise FormatError(f"{value!r} is not a {dimension}. {hint}")
     if info.context and info.context.get("file") and value != 0:
         raise FormatError(f"{value!r} has no unit. {hint}")
-    if not -1e300 < value < 1e300:
+    if not -1e300 < _float(value) < 1e300:
         raise GeometryError(f"{_shown(value, _SI_UNIT[dimension])} is not finite. {hint}")
     return float(value)
 
@@ -84,7 +92,7 @@ def _time(value: Any, info: ValidationInfo) -> float:
 
 
 def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real) or not -_LARGEST <= value <= _LARGEST:
+    if isinstance(value, bool) or not isinstance(value, Real) or not -_LARGEST <= _float(value) <= _LARGEST:
         raise GeometryError(
             f"{checks.shown(value)} is not a finite number of at most {_LARGEST:g}. "
             "Give a number without a unit."

@@ -20,7 +20,11 @@ class Connection(H11Protocol):
         super().connection_made(transport)
         self._since, self._unsent = self.loop.time(), (0, 0.0)
         if len(self.connections) > MOST:
-            waiting = [each for each in self.connections if each is not self and each.waiting]
+            waiting = [
+                each
+                for each in self.connections
+                if isinstance(each, Connection) and each is not self and each.waiting
+            ]
             if waiting:
                 min(waiting, key=lambda each: each._since).transport.abort()
         self._watch()

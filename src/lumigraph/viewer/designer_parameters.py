@@ -175,15 +175,17 @@ def changed(camera: AnyCamera, values: Any) -> AnyCamera:
 
 def _checked(parameter: Parameter, value: Any) -> Any:
     name = parameter.key
-    if value is None and parameter.optional:
-        return None
+    if value is None:
+        if parameter.optional:
+            return None
+        raise FormatError(f"{name} is None but must be a finite number.")
     if parameter.kind == "choice":
         if value not in parameter.choices:
             raise FormatError(f"{name} is {str(value)[:60]!r} but must be {' or '.join(parameter.choices)}.")
         return value
-    checks.finite(name, value, "1", FormatError)
+    number = checks.finite(name, value, "1", FormatError)
     if parameter.kind != "whole":
-        return float(value)
-    if value != int(value) or not 1 <= value <= MOST_LENSLETS:
-        raise FormatError(f"{name} is {value:g} but must be a whole number from 1 to {MOST_LENSLETS}.")
-    return int(value)
+        return number
+    if number != int(number) or not 1 <= number <= MOST_LENSLETS:
+        raise FormatError(f"{name} is {number:g} but must be a whole number from 1 to {MOST_LENSLETS}.")
+    return int(number)
