@@ -218,7 +218,7 @@ OPTIONS = {
         ("decode", "raw.tiff", "--calibration", "c.toml", "--devignette", "-o", "v.zarr"), ["--white"],
     ),
     "white image of another size": (
-        ("decode", "raw.tiff", "--white", "small.tiff", "-o", "v.zarr"), ["139 x 151", "100 x 100"],
+        ("decode", "raw.tiff", "--white", "small.tiff", "-o", "v.zarr"), ["(139, 151)", "(100, 100)"],
     ),
     "calibration of another size": (
         ("decode", "small.tiff", "--calibration", "good.toml", "-o", "v.zarr"), ["100 x 100", "139 x 151"],

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
-from lumigraph.cli.deconvolve import depths, vignetting
+from lumigraph.cli.deconvolve import depths
+from lumigraph.preparation import vignetting
 
 FOCUSED = """
 kind = "focused-plenoptic"
@@ -162,7 +163,7 @@ def test_vignetting_is_what_a_white_image_shows_over_many_lenslets():
         (("--deviance", "-1"), "--deviance is -1"),
         (("--background", "-1"), "--background is -1"),
         (("--background", "1", "--dark", "raw.tiff"), "say the same"),
-        (("--dark", "small.tiff"), "--dark small.tiff has shape (4, 4)"),
+        (("--dark", "small.tiff"), "the dark image has shape (4, 4)"),
         (("--report", "page.txt"), "wrong extension"),
         (("--checkpoint", "state.txt"), "must end in .npz"),
         (("--camera", "thesis-2f"), "error:"),

@@ -38,7 +38,7 @@ def test_disparities_are_written_with_their_confidence(lumigraph, views, tmp_pat
 def test_lengths_make_metres_and_points(lumigraph, views, tmp_path):
     found = lumigraph("depth", "views.zarr", "-o", "points.ply", "--focal-length", "120 mm")
     assert found.code == 0, found.err
-    assert found.out.startswith("depth of 40 x 44 places: -0.0")
+    assert found.out.startswith("depth of 40 x 44 places: -11.")
     points = lg.open(tmp_path / "points.ply")
     # 0.5 lenslets of 0.1 mm per view of 1 mm: α' = 0.95, the image at 240/0.95 mm.
     expected = 1 / (1 / 0.12 - 0.95 / 0.24)

@@ -24,7 +24,7 @@ def test_pictures_and_maps_of_a_container_are_written(lumigraph, tmp_path, conta
     assert sorted(path.stem for path in (tmp_path / "out").iterdir()) == names
     np.testing.assert_array_equal(io.open(tmp_path / "out" / "depth.tiff").data, container)
     np.testing.assert_allclose(io.open(tmp_path / "out" / "stack-000-lambda-1.5000.png").data, 60, atol=2)
-    assert "written out/depth.tiff: 4 x 3 px, -8 to 3 lambda" in result.out
+    assert "depth.tiff: 4 x 3 px, -8 to 3 lambda" in result.out
 
 
 @pytest.mark.usefixtures("container")

@@ -8,9 +8,10 @@ import pytest
 import lumigraph as lg
 from lumigraph import viewer
 from lumigraph.calibration import calibrate
-from lumigraph.cli.deconvolve import Seen
 from lumigraph.cli.origin import Origin
-from lumigraph.errors import CalibrationError
+from lumigraph.core.prepared import Reason
+from lumigraph.deconvolution import Exposure
+from lumigraph.errors import CalibrationError, SamplingWarning
 
 PITCH, OFFSET = 12.4, 50.0
 
@@ -29,47 +30,83 @@ def bench(tmp_path):
     return tmp_path
 
 
-def test_verbs_subtract_the_dark_divide_by_the_white_and_demosaic(bench):
-    origin = Origin(white=bench / "white.tiff", dark=bench / "dark.tiff")
-    raw, calibration = origin.prepared(lg.open(bench / "raw.tiff"))
-    centres = np.rint(calibration.centers_within((20, 180), (20, 200))).astype(int)
+def expected(shape=(200, 220)):
+    y, x = np.indices(shape)
+    return 0.5 + 0.3 * np.sin(y / 40) * np.sin(x / 30)
+
+
+@pytest.mark.parametrize("kind", ["", "-bayer"])
+def test_python_verbs_and_viewer_see_the_same_picture(kind, bench):
+    ending = "zarr" if kind else "tiff"
+    raw, white, dark = (bench / f"{name}{kind}.{ending}" for name in ("raw", "white", "dark"))
+    ready = lg.prepare(lg.open(raw), white=lg.open(white), dark=lg.open(dark))
+    verb = Origin(white=white, dark=dark).prepared(lg.open(raw))
+    shown = viewer.open_exhibit(raw, viewer.Origin(white=white, dark=dark))
+    np.testing.assert_array_equal(verb.data, ready.data)
+    np.testing.assert_array_equal(shown.raw.data, ready.data)
+    np.testing.assert_array_equal(shown.views.data, lg.decode(ready).data)
+    assert ready.data.shape == ((200, 220, 3) if kind else (200, 220))
+    centres = np.rint(ready.calibration.centers_within((20, 180), (20, 200))).astype(int)
     y, x = centres.T
-    seen = raw.data[y, x]
-    np.testing.assert_allclose(seen / (0.5 + 0.3 * np.sin(y / 40) * np.sin(x / 30)), 4000, rtol=0.06)
-    origin = Origin(white=bench / "white-bayer.zarr", dark=bench / "dark-bayer.zarr")
-    raw, _ = origin.prepared(lg.open(bench / "raw-bayer.zarr"))
-    assert raw.data.shape == (200, 220, 3)
+    seen = ready.data[y, x].reshape(len(y), -1).mean(-1) / expected()[y, x]
+    np.testing.assert_allclose(seen, 4000 / ((3200 + OFFSET) if kind else 1), rtol=0.12)
 
 
-def test_the_viewer_divides_grey_pictures_and_leaves_mosaics_alone(bench):
-    origin = viewer.Origin(white=bench / "white.tiff")
-    shown = viewer.open_exhibit(bench / "raw.tiff", origin)
-    assert shown.views is not None
-    shown = viewer.open_exhibit(bench / "raw-bayer.zarr", viewer.Origin(white=bench / "white-bayer.zarr"))
-    assert shown.views is None, "a mosaic is shown as it is"
-    assert shown.raw.bayer == "RGGB"
-    assert shown.raw.data.max() == pytest.approx(3000 + OFFSET, rel=0.1), "and it keeps its offset"
-    assert not hasattr(origin, "dark")
-
-
-def test_deconvolution_takes_dark_and_white_into_its_model_and_leaves_the_raw_image(bench):
-    raw = lg.open(bench / "raw.tiff")
-    seen = Seen(white=bench / "white.tiff", dark=bench / "dark.tiff")
-    calibration = seen.lenslets(raw)
-    exposure = seen.exposure(raw, calibration)
+def test_a_deconvolution_takes_dark_and_white_into_its_model_and_leaves_the_raw_image(bench):
+    raw, white, dark = (lg.open(bench / f"{name}.tiff") for name in ("raw", "white", "dark"))
+    ready = lg.prepare(raw, white=white, dark=dark, divide=False)
+    np.testing.assert_array_equal(ready.data, raw.data)
+    exposure = Exposure.of(ready)
     assert np.all(exposure.background == OFFSET)
     assert 0.6 < exposure.response.min() < exposure.response.max() == 1
-    assert calibration.lattice.pitch == pytest.approx(PITCH, abs=0.01)
+    assert ready.calibration.lattice.pitch == pytest.approx(PITCH, abs=0.01)
 
 
-def test_all_refuse_a_calibration_that_does_not_fit_but_the_viewer(bench):
+def test_a_calibration_that_does_not_fit_is_refused_by_each(bench):
     raw = lg.open(bench / "raw.tiff")
     found = calibrate(lg.open(bench / "white.tiff"))
     lattice = replace(found.lattice, basis=tuple((1.1 * y, 1.1 * x) for y, x in found.lattice.basis))
-    lg.save(replace(found, lattice=lattice, residual_px=0.0), bench / "wrong.toml")
-    for prepare in (
-        Origin(calibration=bench / "wrong.toml").prepared,
-        Seen(calibration=bench / "wrong.toml").lenslets,
-    ):
+    wrong = replace(found, lattice=lattice, residual_px=0.0)
+    lg.save(wrong, bench / "wrong.toml")
+    with pytest.raises(CalibrationError, match="slip by"):
+        Origin(calibration=bench / "wrong.toml").prepared(raw)
+    with pytest.raises(CalibrationError, match="slip by"):
+        viewer.open_exhibit(bench / "raw.tiff", viewer.Origin(calibration=bench / "wrong.toml"))
+    for verb in (lg.prepare, lg.decode, lg.depth.correlation):
         with pytest.raises(CalibrationError, match="slip by"):
-            prepare(raw)
+            verb(raw, wrong)
+
+
+def test_each_pixel_and_lenslet_that_does_not_count_has_its_reason(bench):
+    raw, white, dark = (np.array(lg.open(bench / f"{name}.tiff").data) for name in ("raw", "white", "dark"))
+    full = np.minimum(raw, 1000).astype(np.uint16)
+    full[60:90, 60:90] = 1023
+    full[-20:] = 0
+    dark[100, 110] += 500
+    white[130:170, 130:170] = OFFSET
+    ready = lg.prepare(lg.RawImage(full, bit_depth=10), white=white, dark=dark)
+    for place, reason in (
+        ((75, 75), Reason.SATURATED), ((190, 20), Reason.DEAD), ((100, 110), Reason.DEAD),
+        ((150, 150), Reason.DARK), ((100, 0), Reason.OUTSIDE), ((100, 122), Reason.GOOD),
+    ):  # fmt: skip
+        assert ready.reasons[place] == reason, place
+    verdict = dict(zip(map(tuple, ready.lenslets.indices), ready.lenslets.reasons, strict=True))
+    for place, reason in (((75, 75), Reason.SATURATED), ((195, 110), Reason.DEAD), ((150, 150), Reason.DARK)):
+        i, j = ready.calibration.index(*map(np.array, place))
+        assert verdict[int(i), int(j)] == reason, place
+    assert any(note.startswith("saturated: 900 of 44000 pixels") for note in ready.notes)
+    views = lg.decode(ready)
+    assert not views.valid.all(), "dark and dead lenslets are left out"
+    assert views.valid.mean() > 0.7
+
+
+def test_a_camera_file_that_contradicts_the_picture_is_told_with_both_pitches(bench):
+    scope = lg.LightFieldMicroscope.from_catalogue("lfm-guv")
+    lengths = {"pixel_pitch": f"{scope.lenslets.pitch / PITCH * 1.02 * 1e6} um"}
+    scope = scope.replace(sensor=lengths)
+    raw, white = (lg.open(bench / f"{name}.tiff") for name in ("raw", "white"))
+    with pytest.warns(SamplingWarning, match=r"12\.40\d px.*12\.157 px .* a relay of 1\.02 instead of 1\."):
+        ready = lg.prepare(raw, white=white, camera=scope)
+    assert ready.calibration.pixel_pitch == scope.sensor.pixel_pitch
+    agreeing = scope.replace(relay_magnification=1.02)
+    assert any("they agree" in note for note in lg.prepare(raw, white=white, camera=agreeing).notes)

@@ -61,6 +61,7 @@ def aligned(calibration: Calibration, raw: RawImage | Array) -> Calibration:
         lattice=calibration.lattice.moved(y, x),
         centers=calibration.centers + found.move,
         notes=(*calibration.notes, note),
+        by_maker=False,
     )
 
 

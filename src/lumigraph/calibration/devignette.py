@@ -51,16 +51,35 @@ def devignette(
     if dark is not None:
         pictures["dark"] = as_raw(dark)
     for name, picture in pictures.items():
-        _check(name, picture, raw)
+        check_alike(name, picture, raw)
     data = namespace(raw.data).astype(raw.data, namespace(raw.data).float32)
-    level = np.array(to_numpy(white.data), np.float64)
     if dark is not None:
-        black = np.asarray(to_numpy(pictures["dark"].data), np.float64)
-        data, level = data - like(_aligned(black, raw), data), level - _aligned(black, white)
-    divisor = np.maximum(_normalised(level, white.bayer or raw.bayer), floor)
+        data = data - like(_aligned(np.asarray(to_numpy(pictures["dark"].data), np.float64), raw), data)
+    divisor = np.maximum(light_of(white, pictures.get("dark"), raw.bayer), floor)
     return RawImage(
         data / like(_aligned(divisor, raw), data), raw.pixel_pitch, None, raw.bayer, dict(raw.metadata)
     )
+
+
+def light_of(white: RawImage, dark: RawImage | None = None, bayer: str | None = None) -> np.ndarray:
+    """White image above its dark one (y, x[, c]), each colour 1 at its 99th percentile.
+
+    Parameters
+    ----------
+    white, dark
+        Pictures of one size.
+    bayer
+        Colours of the white image's pixels where it does not say so itself.
+
+    Raises
+    ------
+    CalibrationError
+        A white image without light.
+    """
+    level = np.array(to_numpy(white.data), np.float64)
+    if dark is not None:
+        level = level - _aligned(np.asarray(to_numpy(dark.data), np.float64), white)
+    return _normalised(level, white.bayer or bayer)
 
 
 def as_raw(image: RawImage | Array) -> RawImage:
@@ -93,7 +112,8 @@ def _phases(bayer: str | None) -> list[tuple[slice, slice]]:
     return [(slice(row, None, 2), slice(column, None, 2)) for row in (0, 1) for column in (0, 1)]
 
 
-def _check(name: str, picture: RawImage, raw: RawImage) -> None:
+def check_alike(name: str, picture: RawImage, raw: RawImage) -> None:
+    """Refuse a white or dark image of another size than the raw image's, complex, or not finite."""
     shape, expected = tuple(picture.data.shape), tuple(raw.data.shape)
     if shape not in (expected, expected[:2]):
         raise CalibrationError(

@@ -20,6 +20,7 @@ from lumigraph.cli.design import design
 from lumigraph.cli.options import COMMAND
 from lumigraph.cli.refocus import refocus
 from lumigraph.cli.render import render
+from lumigraph.cli.reporting import telling
 from lumigraph.cli.reproduce import reproduce
 from lumigraph.cli.samples import samples
 from lumigraph.cli.simulate import simulate
@@ -53,7 +54,7 @@ app = App(
     default_parameter=Parameter(negative=(), show_default=_telling),
 )
 for _number, _verb in enumerate(VERBS):
-    app.command(_verb, sort_key=_number)
+    app.command(telling(_verb), sort_key=_number)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -10,10 +10,13 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, above_zero, length
-from lumigraph.cli.reporting import REPORTED, Reported, told
+from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import CalibrationError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from lumigraph.core.calibration import Calibration
     from lumigraph.core.raw import RawImage
 
@@ -55,6 +58,14 @@ class Bench:
             known[name] = known[name] if given is None else given
         return known
 
+    def compared(self, found: "Calibration") -> tuple[str, ...]:
+        """What the picture says about the camera of --camera, in a line."""
+        from lumigraph.instruments import SingleLensCamera, load_camera
+        from lumigraph.preparation import implied
+
+        camera = None if self.camera is None else load_camera(self.camera)
+        return () if camera is None or isinstance(camera, SingleLensCamera) else (implied(found, camera)[0],)
+
 
 def calibrate(
     *white: Path,
@@ -66,7 +77,7 @@ def calibrate(
     overlay: Path | None = None,
     bench: Bench = Bench(),
     common: Reported = REPORTED,
-) -> None:
+) -> Result:
     """Find the micro-images on a white image, or on a raw image alone, and write their lattice.
 
     Example: `lumigraph calibrate white.png -o calibration.toml --overlay lattice.png`
@@ -91,6 +102,7 @@ def calibrate(
     """
     from lumigraph import calibration as verbs
     from lumigraph import io
+    from lumigraph.preparation import read_raw
 
     common.check()
     files.check_output(output, (".toml",))
@@ -104,7 +116,7 @@ def calibrate(
     if explain and bench.camera is None:
         raise CalibrationError("--explain compares with what was meant: give the camera file, --camera FILE.")
     known = bench.lengths()
-    pictures = [files.read_raw(path) for path in white]
+    pictures = [read_raw(path) for path in white]
     picture = pictures[0]
     turn = None if rotation is None else math.radians(rotation)
     with progress("calibrate"):
@@ -113,16 +125,21 @@ def calibrate(
             from lumigraph import plots
 
             files.save_figure(plots.lattice(picture, found), overlay)
-        advice = _advice(picture, bench) if explain else {}
+        advice = _advice(picture, bench) if explain else None
+        compared = bench.compared(found)
     io.save(found, output)
-    lines = [found.report(), *(f"note        {note}" for note in found.notes), *advice.get("advice", ())]
-    text = "\n".join([*lines, f"written     {output}"])
-    values = {**_values(found), **advice, "output": str(output)}
-    told(common, text, values, lambda: _page(picture, found, advice), _numbers(found))
+    faults = () if advice is None else (Quantity("faults", list(advice.faults)),)
+    lines = () if advice is None else tuple(advice.report().splitlines())
+    told = () if advice is None else (Quantity("advice", list(lines)),)
+    return Result(
+        "Calibrate", "Where the micro-images stand on the sensor.", found,
+        (*found.report().splitlines(), *lines), (*_quantities(found), *told, *faults),
+        lambda: _figures(picture, found), (*found.notes, *compared), (output,),
+    )  # fmt: skip
 
 
-def _advice(white: "RawImage", bench: Bench) -> dict[str, Any]:
-    """What to turn, one line each, and the numbers behind it."""
+def _advice(white: "RawImage", bench: Bench) -> Any:
+    """What to turn on the bench."""
     from lumigraph.calibration import diagnose
     from lumigraph.instruments import load_camera
     from lumigraph.instruments.lenslet_camera import LensletCamera
@@ -132,67 +149,44 @@ def _advice(white: "RawImage", bench: Bench) -> dict[str, Any]:
         raise CalibrationError(
             f"{bench.camera} is a {camera.KIND}: --explain is for plenoptic cameras. Leave it out."
         )
-    found = diagnose(white, camera)
-    return {"advice": found.report().splitlines(), "faults": list(found.faults)}
+    return diagnose(white, camera)
 
 
-def _numbers(found: "Calibration") -> list[tuple[str, str]]:
-    from lumigraph.core.picture import length
-
-    lines = [(line[:12].strip(), line[12:]) for line in found.report().splitlines()]
-    known = ("pixel_pitch", "separation", "lenslet_distance")
-    return [*lines, *((name.replace("_", " "), length(getattr(found, name))) for name in known)]
-
-
-def _page(white: "RawImage", found: "Calibration", advice: dict[str, Any]) -> Any:
+def _figures(white: "RawImage", found: "Calibration") -> "Iterator[Figure]":
     import numpy as np
 
     from lumigraph import plots
-    from lumigraph.report import Page
 
-    page = Page("Calibrate", "Where the micro-images stand on the sensor.")
-    page.section("Lattice").figure(
-        plots.lattice(white, found), "The lattice over the white image.", wide=True
-    )
+    drawn = plots.lattice(white, found)
+    yield Figure(drawn, "The lattice over the white image.", "Lattice", {"wide": True})
     distance = np.sort(np.hypot(*found.residuals.T))
-    if not found.measured:
-        page.section("Residuals").text("Not measured: the centres are the lattice points themselves.")
-    elif len(distance):
-        share = np.arange(1, len(distance) + 1) / len(distance)
-        drawn = plots.curves(distance, {"": share}, xlabel="distance from the lattice [px]", ylabel="share")
-        page.section("Residuals").figure(
-            drawn, "Share of the micro-images that stand as near to their place."
-        )
-        maps = [
-            (np.nan_to_num(found.residual_map), "residual [px]"),
-            (np.nan_to_num(found.light_map), "light"),
-        ]
-        page.section("Lenslet by lenslet").figure(
-            plots.images(maps, columns=2, label="0: none found"),
-            "How far each micro-image stands from the lattice, and its brightness: the vignetting.",
-        )
-    if found.notes or advice:
-        page.section("What to know").text("\n\n".join([*found.notes, *advice.get("advice", ())]))
-    return page
+    if not found.measured or not len(distance):
+        return
+    share = np.arange(1, len(distance) + 1) / len(distance)
+    drawn = plots.curves(distance, {"": share}, xlabel="distance from the lattice [px]", ylabel="share")
+    yield Figure(drawn, "Share of the micro-images that stand as near to their place.", "Residuals")
+    maps = [(np.nan_to_num(found.residual_map), "residual [px]"), (np.nan_to_num(found.light_map), "light")]
+    drawn = plots.images(maps, columns=2, label="0: none found")
+    caption = "How far each micro-image stands from the lattice, and its brightness: the vignetting."
+    yield Figure(drawn, caption, "Lenslet by lenslet")
 
 
-def _values(found: "Calibration") -> dict[str, Any]:
+def _quantities(found: "Calibration") -> tuple[Quantity, ...]:
     lattice = found.lattice
-    return {
-        "layout": lattice.layout,
-        "lenslets": len(found.centers),
-        "shape": found.shape,
-        "pitch_px": lattice.pitch,
-        "pitches_px": lattice.pitches,
-        "rotation_rad": lattice.rotation,
-        "origin_px": lattice.origin,
-        "basis_px": lattice.basis,
-        "residual_px": found.residual_px if found.measured else None,
-        "missing": len(found.missing),
-        "fill": found.fill,
-        "sharpness": found.sharpness,
-        "notes": found.notes,
-        "pixel_pitch": found.pixel_pitch,
-        "separation": found.separation,
-        "lenslet_distance": found.lenslet_distance,
-    }
+    return (
+        Quantity("layout", lattice.layout),
+        Quantity("lenslets", len(found.centers)),
+        Quantity("shape", found.shape, "px"),
+        Quantity("pitch_px", lattice.pitch, "px"),
+        Quantity("pitches_px", lattice.pitches, "px"),
+        Quantity("rotation_rad", lattice.rotation, "rad"),
+        Quantity("origin_px", lattice.origin, "px"),
+        Quantity("basis_px", lattice.basis),
+        Quantity("residual_px", found.residual_px if found.measured else None, "px"),
+        Quantity("missing", len(found.missing)),
+        Quantity("fill", found.fill),
+        Quantity("sharpness", found.sharpness),
+        Quantity("pixel_pitch", found.pixel_pitch, "m"),
+        Quantity("separation", found.separation, "m"),
+        Quantity("lenslet_distance", found.lenslet_distance, "m"),
+    )

@@ -10,10 +10,13 @@ from lumigraph.cli import files, pictures
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output
 from lumigraph.cli.origin import NO_ORIGIN, PLENOPTIC, Origin
-from lumigraph.cli.reporting import REPORTED, Reported, enlarged, told
+from lumigraph.cli.reporting import REPORTED, Reported, enlarged
+from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from lumigraph.core.raw import RawImage
 
 _MOST_SAMPLES = 64
@@ -33,7 +36,7 @@ class Sampling:
     interpolation
         Between pixels, and between lenslets.
     hot_pixels
-        Find pixels that shine by themselves, leave them out and mark what rests on them.
+        Find pixels that shine by themselves without --dark too, leave them out and mark what rests on them.
     """
 
     directions: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
@@ -63,7 +66,7 @@ def decode(
     devignette: Annotated[bool | None, Parameter(negative="--no-devignette")] = None,
     sampling: Sampling = Sampling(),
     common: Reported = REPORTED,
-) -> None:
+) -> Result:
     """Decode a raw image of a plenoptic camera 1.0 into views.
 
     Example: `lumigraph decode raw.png --white white.png -o views.zarr`
@@ -82,7 +85,7 @@ def decode(
     devignette
         Whether to divide by the white image; done where there is one.
     """
-    from lumigraph import io, rendering
+    from lumigraph import io, preparation, rendering
 
     common.check()
     if parts := pictures.parts_of(raw):
@@ -90,61 +93,46 @@ def decode(
             raise FormatError(
                 f"{raw} holds pictures, which need neither --calibration nor --white. Leave them out."
             )
-        return pictures.unpack(raw, parts, output, common)
+        return pictures.unpack(raw, parts, output)
     files.check_output(output, files.VIEWS)
     options = sampling.chosen()
-    picture = files.read_raw(raw)
-    bad = _hot(picture, origin) if sampling.hot_pixels else None
+    picture = origin.read(raw)
     with progress("decode"):
-        ready, found = origin.prepared(picture, kind=PLENOPTIC, devignette=devignette)
-        views = rendering.decode(ready, found, bad=bad, **options)
+        ready = origin.prepared(picture, kind=PLENOPTIC, devignette=devignette)
+        bad = ready.dead if sampling.hot_pixels else None
+        if bad is not None and origin.dark is None:
+            bad = bad | rendering.hot_pixels(picture)
+        views = preparation.decode(ready, bad=bad, **options)
     io.save(views, output)
-    nv, nu, nt, ns = views.data.shape[:4]
-    lines = [f"{nv} x {nu} views of {nt} x {ns} px", f"written {output}"]
-    values = {"shape": views.data.shape, "separation": views.separation, "output": str(output)}
+    (nv, nu, nt, ns), values = views.data.shape[:4], _quantities(views)
+    lines = [f"{nv} x {nu} views of {nt} x {ns} px"]
     if bad is not None:
-        share = 0.0 if views.valid is None else 1 - float(views.valid.mean())
-        lines.insert(1, f"{int(bad.sum())} hot pixels, {100 * share:.2g} % of the samples are not valid")
-        values |= {"hot_pixels": int(bad.sum()), "invalid": share}
-    told(common, "\n".join(lines), values, lambda: _page(picture, views), _numbers(views))
+        lost = 0.0 if views.valid is None else 1 - float(views.valid.mean())
+        lines.append(f"{int(bad.sum())} hot pixels, {100 * lost:.2g} % of the samples are not valid")
+        values += (Quantity("hot_pixels", int(bad.sum())), Quantity("invalid", lost))
+    return Result(
+        "Decode", "A raw image of a plenoptic camera 1.0, and its views.", views, tuple(lines), values,
+        lambda: _figures(picture, views), ready.notes, (output,),
+    )  # fmt: skip
 
 
-def _numbers(views: Any) -> list[tuple[str, str]]:
-    from lumigraph.core.picture import length
-
-    nv, nu, nt, ns = views.data.shape[:4]
-    return [
-        ("views", f"{nv} x {nu}"), ("samples of a view", f"{nt} x {ns} px"),
-        ("main lens to lenslets", length(views.separation)),
-        ("views apart", length(views.aperture.pitch[1])), ("samples apart", length(views.lenslets.pitch[1])),
-    ]  # fmt: skip
+def _quantities(views: Any) -> tuple[Quantity, ...]:
+    return (
+        Quantity("shape", views.data.shape),
+        Quantity("separation", views.separation, "m"),
+        Quantity("views_apart", views.aperture.pitch[1], "m"),
+        Quantity("samples_apart", views.lenslets.pitch[1], "m"),
+    )
 
 
-def _page(raw: "RawImage", views: Any) -> Any:
-    from lumigraph.report import Page
-
+def _figures(raw: "RawImage", views: Any) -> "Iterator[Figure]":
     nv, nu = views.data.shape[:2]
-    page = Page("Decode", "A raw image of a plenoptic camera 1.0, and its views.")
-    section = page.section("Views")
     middle = views.view(nv // 2, nu // 2)
-    zoom = enlarged(middle)
-    section.figure(middle, "The middle view.", zoom=zoom)
-    section.figure(
-        views.view(nv // 2, nu - 1 - nu // 8),
-        "A view from the side: what is near or far has moved.",
-        zoom=zoom,
-    )
-    section.figure(
-        views.data[nv // 2, :, views.data.shape[2] // 2],
-        "Epipolar-plane image: the middle row of lenslets (across) from each view (down).",
-        zoom=zoom,
-    )
-    page.section("Raw image").figure(raw, "As it was read.")
-    return page
-
-
-def _hot(picture: "RawImage", origin: Origin) -> Any:
-    from lumigraph import rendering
-
-    dark = None if origin.dark is None else files.read_raw(origin.dark)
-    return rendering.hot_pixels(picture, dark=dark)
+    zoom = {"zoom": enlarged(middle)}
+    yield Figure(middle, "The middle view.", "Views", zoom)
+    side = views.view(nv // 2, nu - 1 - nu // 8)
+    yield Figure(side, "A view from the side: what is near or far has moved.", "Views", zoom)
+    lines = views.data[nv // 2, :, views.data.shape[2] // 2]
+    caption = "Epipolar-plane image: the middle row of lenslets (across) from each view (down)."
+    yield Figure(lines, caption, "Views", zoom)
+    yield Figure(raw, "As it was read.", "Raw image")

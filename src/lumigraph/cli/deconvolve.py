@@ -1,23 +1,26 @@
 """`lumigraph deconvolve`."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import stages
+from lumigraph.cli.console import Stages, stages
 from lumigraph.cli.options import Output, above_zero, length
-from lumigraph.cli.reporting import REPORTED, Reported, told
+from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import numpy as np
 
     from lumigraph.core.calibration import Calibration
-    from lumigraph.core.raw import RawImage
+    from lumigraph.core.prepared import PreparedImage
     from lumigraph.deconvolution import Step
 
 MOST_DEPTHS = 1000
@@ -33,50 +36,67 @@ class Seen:
     white
         White image: a microscope's lenslets are found on it, and its vignetting is taken into account.
     dark
-        Dark image: what pixels read without light.
+        Dark image: what pixels read without light, and which shine by themselves.
     background
         Value that every pixel reads without light, if there is no dark image.
     calibration
-        File made by 'lumigraph calibrate', instead of the lenslets found on the white image.
+        File made by 'lumigraph calibrate', or by the camera's maker, instead of the lenslets found on the
+        white image.
+    region
+        Part of the raw image that counts, 'rows:columns' in pixels, such as '100-500:80-640'; the rest is
+        neither fitted nor cut off.
+    page
+        Of a stack: one, such as 3, some as 'first:last', or 'all'; counted from 0.
     """
 
     white: Path | None = None
     dark: Path | None = None
     background: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
     calibration: Path | None = None
+    region: str | None = None
+    page: str | None = None
 
-    def lenslets(self, raw: "RawImage") -> "Calibration | None":
-        """Where the micro-images are, compared with what the raw image shows; None if nothing tells."""
-        from lumigraph import calibration as verbs
-        from lumigraph.core.drift import check_drift
-
-        if self.calibration is not None:
-            found = files.read_calibration(self.calibration)
-        elif self.white is not None:
-            found = verbs.calibrate(files.read_raw(self.white))
-        else:
-            return None
-        found.check_fits(raw.shape)
-        check_drift(raw.data, found)
-        return found
-
-    def exposure(self, raw: "RawImage", calibration: "Calibration | None") -> Any:
-        """Background and vignetting, and the noise that the file tells."""
-        from lumigraph.deconvolution import Exposure
-
+    def check(self) -> None:
+        """Refuse what can be seen to be wrong before anything is read."""
         if self.dark is not None and self.background is not None:
             raise FormatError("--dark and --background say the same. Give one of them.")
-        known: dict[str, Any] = {}
-        if self.background is not None:
-            if not (math.isfinite(self.background) and self.background >= 0):
-                raise FormatError(f"--background is {self.background:g} but must be at least 0.")
-            known["background"] = self.background
-        if self.dark is not None:
-            known["background"] = _plane("--dark", self.dark, raw)
-        if self.white is not None and calibration is not None:
-            white = _plane("--white", self.white, raw)
-            known["response"] = vignetting(white - known.get("background", 0.0), calibration.lattice.pitch)
-        return Exposure.of(raw, **known)
+        if self.background is not None and not (math.isfinite(self.background) and self.background >= 0):
+            raise FormatError(f"--background is {self.background:g} but must be at least 0.")
+
+    def prepared(self, raw: Any, camera: Any) -> "PreparedImage":
+        """The raw image as it was read, with what the model of a deconvolution takes."""
+        from lumigraph.instruments import SingleLensCamera
+        from lumigraph.preparation import Given
+
+        lenslets = None if isinstance(camera, SingleLensCamera) else camera
+        given = Given(self.calibration, self.white, self.dark)
+        ready = given.prepared(raw, camera=lenslets, mask=self._mask(raw.shape), divide=False)
+        return ready if self.background is None else replace(ready, background=self.background)
+
+    def _mask(self, shape: tuple[int, int]) -> "np.ndarray | None":
+        import numpy as np
+
+        if self.region is None:
+            return None
+        try:
+            (top, bottom), (left, right) = (
+                map(int, part.split("-")) for part in self.region.split(":")
+            )  # fmt: skip
+        except ValueError:
+            raise FormatError(f"--region is {self.region!r} but must be like '100-500:80-640'.") from None
+        mask = np.zeros(shape, bool)
+        mask[top : bottom + 1, left : right + 1] = True
+        if not mask.any():
+            raise FormatError(f"--region {self.region} has no pixel of {shape[0]} x {shape[1]}.")
+        return mask
+
+    def frames(self, path: Path) -> "list[tuple[str, Any]]":
+        """Raw images and what to add to the output's name for each."""
+        from lumigraph.preparation import read_pages
+
+        found = read_pages(path, self.page)
+        digits = len(str(max(found)))
+        return [("" if len(found) == 1 else f"-page-{k:0{digits}}", raw) for k, raw in found.items()]
 
 
 @Parameter(name="*")
@@ -120,7 +140,7 @@ class Way:
         Momentum: as likely in a third of the iterations.
     deviance
         Stop where the deviance per pixel falls to this: to 1 for raw images of 'simulate --noise', whose
-        electrons are known.
+        electrons are known; refused where they are not.
     raw_lattice
         Leave out the low-pass that keeps squares as large as lenslets out of a microscope's volumes.
     checkpoint
@@ -148,11 +168,12 @@ class Way:
         """`RichardsonLucy` with what was asked for."""
         from lumigraph.deconvolution import LowPass, RichardsonLucy, TotalVariation, Wavelets
         from lumigraph.deconvolution.filters import widths_of
+        from lumigraph.instruments import LightFieldMicroscope
 
         given: dict[str, Any] = {} if self.strength is None else {"strength": self.strength}
         prior = {"none": None, "tv": TotalVariation(**given), "wavelets": Wavelets(**given)}[self.prior]
         smooth = None
-        if hasattr(camera, "low_pass_distances") and not self.raw_lattice:
+        if isinstance(camera, LightFieldMicroscope) and not self.raw_lattice:
             distances = camera.low_pass_distances(operator.depths)
             smooth = LowPass(widths_of(distances, operator.object_grid.pitch[0]))
         return RichardsonLucy(prior, smooth, accelerated=self.accelerated)
@@ -168,57 +189,97 @@ def deconvolve(
     wanted: Wanted = Wanted(),
     way: Way = Way(),
     common: Reported = REPORTED,
-) -> None:
-    """Reconstruct what was in front of a microscope or a camera from one raw image.
+) -> Result:
+    """Reconstruct what was in front of a microscope or a camera from one raw image, or a time series.
 
     A light-field microscope gives a volume, a focused camera the picture of its main lens, or one for each
-    of several depths. Ctrl-C writes what was reached.
+    of several depths. The object is followed as far beyond the picture as light comes from, and cut
+    afterwards. Ctrl-C writes what was reached.
 
     Example: `lumigraph deconvolve raw.tif --white white.tif --dark dark.tif --camera scope.toml --z "-20 um:20 um:2 um" -o volume.ome.tif`
+
+    Example: `lumigraph deconvolve film.tif --page 0:9 --camera scope.toml --z "-20 um:20 um:2 um" -o volume.ome.tif`
 
     Parameters
     ----------
     raw
-        Raw image (TIFF, PNG, Zarr), as it was read.
+        Raw image (TIFF, PNG, Zarr), as it was read, or a stack of them.
     output
-        Volume (.ome.tif, .ome.zarr, .h5) or picture (.tiff, .png, .zarr).
+        Volume (.ome.tif, .ome.zarr, .h5) or picture (.tiff, .png, .zarr); of several pages one file each.
     camera
         Camera file (TOML), or the name of a bundled one.
     """  # noqa: E501 - an example is one line
     from lumigraph import io
-    from lumigraph.deconvolution import Interrupted, Stop
-    from lumigraph.deconvolution import deconvolve as run
     from lumigraph.instruments import load_camera
 
     files.check_output(output, (*files.PICTURES, ".h5", ".hdf5"))
-    common.check()
-    way.check()
+    for options in (common, seen, way):
+        options.check()
     wanted_depths, described = wanted.depths(), load_camera(camera)
-    picture = files.read_raw(raw)
-    steps: list[Step] = []
+    frames = seen.frames(raw)
+    if len(frames) > 1 and way.checkpoint is not None:
+        raise FormatError("--checkpoint keeps one run, not several pages. Give one --page.")
+    written, steps, found = [], [], None
     with stages("deconvolve") as shown:
-        calibration = seen.lenslets(picture)
-        exposure = seen.exposure(picture, calibration)
+        ready = seen.prepared(frames[0][1], described)
         shown("point images", 0.0)
-        operator = operator_of(described, wanted_depths, wanted.samples, calibration)
+        operator = operator_of(described, wanted_depths, wanted.samples, ready.calibration)
+        task = _Task(operator, way, way.method(described, operator), output)
+        for name, frame in frames:
+            if frame is not frames[0][1]:
+                ready = replace(ready, data=frame.data)
+            found = task.run(ready, name, (steps, shown))
+            written.append(_named(output, name))
+            io.save(found, written[-1])
+    return _result(found, ready, steps, tuple(written))
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What the pages of a series share."""
+
+    operator: Any
+    way: Way
+    method: Any
+    output: Path
+
+    def run(self, ready: "PreparedImage", name: str, followed: "tuple[list[Step], Stages]") -> Any:
+        """The object of one page; steps are kept, and shown."""
+        from lumigraph import deconvolution, io
+
+        exposure, (steps, shown) = deconvolution.Exposure.of(ready), followed
+        if self.way.deviance is not None and exposure.gain is None:
+            raise FormatError(
+                "--deviance counts electrons, but the raw image does not say how many make a value. "
+                "Leave it out and use --iterations."
+            )
+        steps.clear()
 
         def follow(step: "Step") -> None:
             steps.append(step)
-            shown(f"deviance {step.deviance:.4g} per pixel", step.iteration / step.iterations)
+            shown(f"{name[1:]} {_reached(step, exposure.gain)}".strip(), step.iteration / step.iterations)
 
         try:
-            found = run(
-                picture, operator, Stop(way.iterations, way.deviance), method=way.method(described, operator),
-                exposure=exposure, progress=follow, checkpoint=way.checkpoint,
+            return deconvolution.deconvolve(
+                ready, self.operator, deconvolution.Stop(self.way.iterations, self.way.deviance),
+                method=self.method, exposure=exposure, progress=follow, checkpoint=self.way.checkpoint,
             )  # fmt: skip
-        except Interrupted as stopped:
-            kept = output.with_name(f"{output.name.split('.')[0]}.partial{''.join(output.suffixes)}")
+        except deconvolution.Interrupted as stopped:
+            kept = _named(self.output, f"{name}.partial")
             io.save(stopped.partial, kept)
             raise KeyboardInterrupt(f"{stopped.iterations} iterations are in {kept}.") from None
-    io.save(found, output)
-    values = _values(found, steps, output)
-    numbers = [(name.replace("_", " "), _shown(name, value)) for name, value in values.items()]
-    told(common, _text(values), values, lambda: _page(found, picture, steps), numbers)
+
+
+def _named(output: Path, name: str) -> Path:
+    """The output with something between its name and its endings."""
+    return output.with_name(f"{output.name.split('.')[0]}{name}{''.join(output.suffixes)}")
+
+
+def _reached(step: "Step", gain: float | None) -> str:
+    """How well it fits: in electrons where they are counted, else how much the last step changed."""
+    if gain is None:
+        return f"the last step changed {100 * step.change:.2g} %"
+    return f"deviance {step.deviance:.4g} per pixel"
 
 
 def depths(option: str, text: str) -> tuple[float, ...]:
@@ -258,101 +319,56 @@ def operator_of(
     camera: Any, planes: tuple[float, ...] | None, samples: int | None, calibration: "Calibration | None"
 ) -> Any:
     """The camera's model of how it sees planes [m]."""
-    if camera.KIND == "single-lens":
+    from lumigraph.instruments import LightFieldMicroscope, SingleLensCamera
+
+    if isinstance(camera, SingleLensCamera):
         if samples is not None:
             raise FormatError(f"a {camera.KIND} camera has no lenslets to count --samples by. Leave it out.")
         return camera.operator(planes)
-    known: dict[str, Any] = {}
-    if calibration is not None and hasattr(camera, "sampling_distances"):
-        known["pixels"] = calibration
-    return camera.operator(planes, samples, **known)
+    if isinstance(camera, LightFieldMicroscope):
+        return camera.operator(planes, samples, pixels=calibration)
+    return camera.operator(planes, samples)
 
 
-def vignetting(white: "np.ndarray", pitch: float) -> "np.ndarray":
-    """How much light reaches each micro-image (ny, nx), up to 1: a white image smoothed over lenslets.
-
-    The micro-images' own shape is left to the model. `pitch` in pixels.
-    """
-    import numpy as np
-    from scipy.ndimage import gaussian_filter
-
-    smooth = gaussian_filter(np.maximum(white, 0), 1.5 * pitch, mode="nearest")
-    top = float(np.percentile(smooth, 99))
-    if top <= 0:
-        raise FormatError("--white has no light above the dark. Take a picture of an evenly lit surface.")
-    return np.clip(smooth / top, 0.0, 1.0)
-
-
-def _plane(option: str, path: Path, raw: "RawImage") -> "np.ndarray":
-    import numpy as np
-
-    from lumigraph.core.arrays import to_numpy
-
-    data = np.asarray(to_numpy(files.read_raw(path).data), np.float64)
-    if data.shape != tuple(raw.data.shape):
-        raise FormatError(
-            f"{option} {path} has shape {data.shape} but the raw image {tuple(raw.data.shape)}."
-        )
-    return data
-
-
-def _values(found: Any, steps: "list[Step]", output: Path) -> dict[str, Any]:
+def _result(found: Any, raw: "PreparedImage", steps: "list[Step]", written: tuple[Path, ...]) -> Result:
     from lumigraph.core.volume import Volume
+    from lumigraph.deconvolution import Exposure
 
-    values: dict[str, Any] = {"shape": tuple(found.data.shape), "output": str(output)}
+    values = [Quantity("shape", tuple(found.data.shape), "samples")]
+    text = " x ".join(map(str, values[0].value)) + " samples"
     if isinstance(found, Volume):
-        values |= {"spacing": found.spacing, "depths": found.depths}
-    elif getattr(found, "pixel_pitch", None):
-        values["pixel_pitch"] = found.pixel_pitch
+        values += [Quantity("spacing", found.spacing, "m"), Quantity("depths", found.depths, "m")]
+        text += " of " + " x ".join(f"{1e6 * step:.4g}" for step in found.spacing) + " um"
+    elif found.pixel_pitch:
+        values.append(Quantity("pixel_pitch", found.pixel_pitch, "m"))
+        text += f" of {1e6 * found.pixel_pitch:.4g} um"
+    lines = [text, "the checkpoint was finished already"]
     if steps:
-        last = steps[-1]
-        values |= {"iterations": last.iteration, "deviance": last.deviance, "stopped": last.stopped}
-    return values
+        last, gain = steps[-1], Exposure.of(raw).gain
+        values += [Quantity("iterations", last.iteration), Quantity("change", last.change)]
+        values += [] if gain is None else [Quantity("deviance", last.deviance)]
+        values.append(Quantity("stopped", last.stopped))
+        lines[1] = f"{last.iteration} iterations, {_reached(last, gain)}"
+    return Result(
+        "Deconvolution", "A raw image, and what was in front of the camera.", found, tuple(lines),
+        tuple(values), lambda: _figures(found, raw, steps), raw.notes, written,
+    )  # fmt: skip
 
 
-def _text(values: dict[str, Any]) -> str:
-    shape = " x ".join(map(str, values["shape"]))
-    text = f"{shape} samples"
-    if "spacing" in values:
-        text += " of " + " x ".join(f"{1e6 * step:.4g}" for step in values["spacing"]) + " um"
-    elif "pixel_pitch" in values:
-        text += f" of {1e6 * values['pixel_pitch']:.4g} um"
-    if "deviance" in values:
-        text += f"\n{values['iterations']} iterations, deviance {values['deviance']:.4g} per pixel"
-    else:
-        text += "\nthe checkpoint was finished already"
-    return text + "".join(f"\nwritten {values[key]}" for key in ("output",))
-
-
-def _shown(name: str, value: Any) -> str:
-    """A number as the report tells it, with its unit."""
-    from lumigraph.core.picture import length
-
-    if name in ("depths", "pitch", "object_pitch", "grid_pitch", "spacing"):
-        each = value if isinstance(value, list | tuple) else [value]
-        return ", ".join(length(float(one)) for one in each)
-    return f"{value:.5g}" if isinstance(value, float) else str(value)
-
-
-def _page(found: Any, raw: "RawImage", steps: "list[Step]") -> Any:
-    """Likelihood, pictures, numbers."""
+def _figures(found: Any, raw: "PreparedImage", steps: "list[Step]") -> "Iterator[Figure]":
     from lumigraph import plots
     from lumigraph.core.volume import Volume
-    from lumigraph.report import Page
 
-    page = Page("Deconvolution", "A raw image, and what was in front of the camera.")
-    section = page.section("Result")
     if isinstance(found, Volume) and len(found.depths) > 1:
-        section.figure(plots.projections(found), "The brightest sample along each axis.")
-        section.figure(plots.slices(found), "Planes through the brightest sample.")
+        yield Figure(plots.projections(found), "The brightest sample along each axis.")
+        yield Figure(plots.slices(found), "Planes through the brightest sample.")
     else:
-        section.figure(found.data[0] if isinstance(found, Volume) else found, "Reconstructed picture.")
-    section.figure(raw, "Raw image.")
+        yield Figure(found.data[0] if isinstance(found, Volume) else found, "Reconstructed picture.")
+    yield Figure(raw, "Raw image.")
     if len(steps) > 1:
         numbers = [step.iteration for step in steps]
         drawn = plots.curves(
-            numbers, {"": [step.deviance for step in steps]}, xlabel="iteration", ylabel="deviance per pixel",
-            log=True,
+            numbers, {"": [step.deviance for step in steps]}, xlabel="iteration",
+            ylabel="Poisson deviance per pixel", log=True,
         )  # fmt: skip
-        page.section("Convergence").figure(drawn, "Poisson deviance per pixel: less is likelier.")
-    return page
+        yield Figure(drawn, "Less deviance is likelier; its scale needs the gain.", "Convergence")

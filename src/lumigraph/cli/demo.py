@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
-from lumigraph.cli.console import report, stages
+from lumigraph.cli.console import stages
 from lumigraph.cli.options import COMMON, Common, Output
+from lumigraph.core.result import Result
 from lumigraph.errors import FormatError
 
 
-def demo(*, output: Output = Path("demo"), common: Common = COMMON) -> None:
+def demo(*, output: Output = Path("demo"), common: Common = COMMON) -> Result:
     """Run the whole path on two small cameras and write a report.
 
     Simulates raw and white images, calibrates, decodes or renders, refocuses, and writes
@@ -34,4 +35,4 @@ def demo(*, output: Output = Path("demo"), common: Common = COMMON) -> None:
         page = demo.run(
             output, shown, living=lambda views, file: write_bytes(file, view_inline(views).page.encode())
         )
-    report(common, f"Open {page}", {"output": str(output), "report": str(page)})
+    return Result("Demo", "", page, (f"Open {page}",), extra={"output": str(output), "report": str(page)})

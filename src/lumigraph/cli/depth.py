@@ -12,10 +12,13 @@ from lumigraph.cli.console import Count, progress
 from lumigraph.cli.options import Output, above_zero, length
 from lumigraph.cli.origin import FOCUSED, NO_ORIGIN, PLENOPTIC, Origin
 from lumigraph.cli.refocus import range_of
-from lumigraph.cli.reporting import REPORTED, Reported, enlarged, told
+from lumigraph.cli.reporting import REPORTED, Reported, enlarged
+from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from lumigraph.core.calibration import Calibration
     from lumigraph.core.lightfield import LightField
     from lumigraph.core.raw import RawImage
@@ -130,7 +133,7 @@ class Lengths:
 
         focal = above_zero("--focal-length", length("--focal-length", self.focal_length), "m")
         distance = above_zero("--object-distance", length("--object-distance", self.object_distance), "m")
-        if hasattr(camera, "main_lens"):  # of a microscope disparities are told
+        if camera is not None:
             focal, distance = focal or camera.main_lens.focal_length, distance or camera.object_distance
         if focal is None:
             return None
@@ -150,7 +153,7 @@ def depth(
     search: Search = Search(),
     lengths: Lengths = Lengths(),
     common: Reported = REPORTED,
-) -> None:
+) -> Result:
     """Measure the depth of what views or a raw image show.
 
     Example: `lumigraph depth views.zarr -o disparity.pfm`
@@ -165,7 +168,8 @@ def depth(
         Views (.zarr, .h5, a folder), or a raw image.
     output
         Map (.pfm, .tiff, .zarr), its picture, near to far as white to black (.png), or points in space
-        (.ply). With a camera file or --focal-length depths from the focused plane [m], positive farther;
+        (.ply). With a camera file (a microscope's too) or --focal-length depths from the focused plane [m],
+        positive farther from the objective;
         else disparities [px per view], positive nearer, refocus factors, or patches [px].
     confidence
         Where to write the confidence of each place, from 0 to 1.
@@ -180,124 +184,57 @@ def depth(
         raise FormatError("points need the camera's lengths. Give --camera FILE, or --focal-length.")
     if search.correct and getattr(origin.described(PLENOPTIC), "KIND", None) != PLENOPTIC:
         raise FormatError("--correct simulates a camera. Give --camera FILE of a plenoptic camera 1.0.")
+    camera = origin.described()
     with progress("depth") as shown:
-        found, grounds, picture = _measured(source, (origin, search), shown)
-        found = _corrected(found, grounds, (origin, search), shown) if search.correct else found
-    found, distance = _in_metres(found, grounds, lengths, origin.described())
+        found, grounds, picture, notes = _measured(source, (origin, search), shown)
+        if search.correct:
+            found = _corrected(found, grounds, (camera, search), shown)
+    found, distance = _in_metres(found, grounds, lengths, camera)
     _save(found, output, (grounds, picture), (distance, lowest))
     if confidence is not None:
         from lumigraph import io
 
         io.save(found.confidence, confidence)
-    text, values = _told(found)
-    written = [str(path) for path in (output, confidence) if path is not None]
-    text = "\n".join([text, *(f"written {path}" for path in written)])
-    numbers = [
-        (name, f"{value:.4g} {unit}".strip() if isinstance(value, float) else str(value))
-        for name, value in values.items()
-        for unit in [found.unit if name in ("low", "median", "high") and found.unit != "1" else ""]
-    ]
-    told(common, text, {**values, "output": written}, lambda: _page(found, picture), numbers)
+    return _result(found, picture, notes, tuple(path for path in (output, confidence) if path is not None))
 
 
-def _page(found: "DepthMap", picture: Any) -> Any:
-    from lumigraph import plots
-    from lumigraph.report import Page
-
-    page = Page("Depth", "How far what is seen stands, and how sure that is.")
-    section = page.section("Map")
-    section.figure(plots.show(found.values), f"{found.quantity.capitalize()} [{found.unit}].")
-    section.figure(plots.show(found.confidence), "Confidence, 0 to 1.")
-    if picture is not None:
-        section.figure(picture, "The picture of the same places.", zoom=enlarged(picture))
-    return page
-
-
-def _measured(source: Path, how: tuple[Origin, Search], shown: Count) -> "tuple[DepthMap, Any, Any]":
-    """The map, what it was measured on, and the picture of the same places or None."""
-    from lumigraph import rendering
+def _measured(
+    source: Path, how: tuple[Origin, Search], shown: Count
+) -> "tuple[DepthMap, Any, Any, tuple[str, ...]]":
+    """The map, what it was measured on, the picture of the same places or None, and notes."""
+    from lumigraph import preparation
     from lumigraph.core.lightfield import LightField
 
     origin, search = how
-    found = files.read_views(source)
-    if isinstance(found, LightField):
-        if origin.is_given:
-            raise FormatError(
-                f"{source} holds views, which need no --calibration or --white. Leave them out."
-            )
-        views = found
-    else:
-        camera = origin.described()
-        raw, calibration = origin.prepared(found)
-        if search.method == "correlation" or (search.method == "auto" and _is_focused(camera, calibration)):
-            return search.of_raw(raw, calibration, shown), calibration, None
-        views = rendering.decode(raw, calibration)
-    v, u = (n // 2 for n in views.aperture.shape)
-    return search.of_views(views, shown), views, views.view(v, u)
+    found, notes = origin.views(source), ()
+    if not isinstance(found, LightField):
+        raw = origin.prepared(found)
+        calibration: Any = raw.calibration
+        if search.method == "correlation" or (
+            search.method == "auto" and _is_focused(origin.described(), calibration)
+        ):
+            return search.of_raw(raw, calibration, shown), calibration, None, raw.notes
+        found, notes = preparation.decode(raw), raw.notes
+    v, u = (n // 2 for n in found.aperture.shape)
+    return search.of_views(found, shown), found, found.view(v, u), notes
 
 
 def _is_focused(camera: Any, calibration: "Calibration") -> bool:
     return calibration.lattice.kinds > 1 if camera is None else camera.KIND == FOCUSED
 
 
-def _corrected(found: "DepthMap", views: Any, how: tuple[Origin, Search], shown: Count) -> "DepthMap":
+def _corrected(found: "DepthMap", views: Any, how: tuple[Any, Search], shown: Count) -> "DepthMap":
     """Refocus factors without the bias of diffraction, which planes of known depth tell."""
-    import numpy as np
-
     from lumigraph import depth as verbs
+    from lumigraph.simulation import plane_views
 
-    origin, search = how
-    camera = origin.described(PLENOPTIC)
-    alpha = np.asarray(verbs.alpha_of(found, views).values, float)
-    low, high = np.nanquantile(alpha, (0.02, 0.98))
-    spare = 0.05 + 0.25 * (high - low)
-    true = np.linspace(max(low - spare, 0.5), min(high + spare, _farthest(camera)), _KNOTS)
-    ends = [0]
-
-    def measured(known: "LightField") -> float:
-        ends[0] += 1
-        shown(ends[0], _KNOTS)
-        again = verbs.alpha_of(search.of_views(known, lambda done, total: None), known)
-        rows, columns = (slice(n // 4, n - n // 4) for n in again.shape)
-        return float(np.nanmedian(np.asarray(again.values)[rows, columns]))
-
-    curve = verbs.BiasCurve.simulated(lambda known: _plane(camera, known), true, measured)
-    return verbs.DepthMap(curve(alpha), np.where(np.isfinite(curve(alpha)), found.confidence, 0), "alpha")
-
-
-_KNOTS = 7
-_MOST_LENSLETS = 33  # of the camera that is simulated: a part of it tells
-
-
-def _farthest(camera: Any) -> float:
-    """Refocus factor of objects at ten times the distance in focus."""
-    from lumigraph.design import plenoptic1
-
-    distance = camera.object_distance
-    return plenoptic1.refocus_factor(camera.main_lens.focal_length, distance, 9 * distance)
-
-
-def _plane(camera: Any, alpha: float) -> "LightField":
-    """Views of a textured plane before the middle of a camera, by wave optics."""
-    import numpy as np
-
-    from lumigraph import rendering, scene, simulation
-    from lumigraph.design import plenoptic1
-
-    lenslets = camera.lenslets.model_dump(exclude_unset=True)
-    lenslets["count"] = tuple(min(n, _MOST_LENSLETS) for n in camera.lenslets.count)
-    small = camera.replace(lenslets=lenslets, sensor={"pixel_pitch": camera.sensor.pixel_pitch})
-    grid, dz = (
-        small.object_grid,
-        plenoptic1.defocus(camera.main_lens.focal_length, camera.object_distance, alpha),
-    )
-    rng = np.random.default_rng(1)
-    unit = small.lenslets.pitch * camera.object_distance / camera.separation
-    ky, kx = rng.uniform(-0.6, 0.6, (2, 40))
-    phases = ky[:, None, None] * (grid.y[:, None] / unit) + kx[:, None, None] * (grid.x / unit)
-    picture = 1 + 0.15 * np.cos(phases + rng.uniform(0, 6, (40, 1, 1))).sum(0)
-    target = scene.Scene((scene.Slice(np.maximum(picture, 0), grid, dz),))
-    return rendering.decode(simulation.simulate(small, target), small.calibration)
+    camera, search = how
+    return verbs.unbiased(
+        verbs.alpha_of(found, views),
+        lambda alpha: plane_views(camera, alpha),
+        lambda known: verbs.alpha_of(search.of_views(known, lambda done, total: None), known),
+        farthest=camera.alpha(9 * camera.object_distance), progress=shown,
+    )  # fmt: skip
 
 
 def _in_metres(
@@ -306,7 +243,10 @@ def _in_metres(
     """The map in metres where the lens is known, and the distance of the plane in focus."""
     from lumigraph import depth as verbs
     from lumigraph.core.lightfield import LightField
+    from lumigraph.instruments import LightFieldMicroscope
 
+    if isinstance(camera, LightFieldMicroscope):
+        return verbs.defocus(found, grounds, camera.depth_per_alpha), None
     lens = lengths.known(camera, grounds if isinstance(grounds, LightField) else None)
     if lens is None:
         return found, None
@@ -339,21 +279,35 @@ def _save(
         io.save(found, output)
 
 
-def _told(found: "DepthMap") -> tuple[str, dict[str, Any]]:
+def _result(found: "DepthMap", picture: Any, notes: tuple[str, ...], written: tuple[Path, ...]) -> Result:
     import numpy as np
 
     values, trust = np.asarray(found.values, float), np.asarray(found.confidence, float)
     ends = np.nanquantile(values, (0.01, 0.5, 0.99)) if np.isfinite(values).any() else np.full(3, np.nan)
-    unit = "" if found.unit == "1" else f" {found.unit}"
-    rows, columns = found.shape
+    unit, (rows, columns) = "" if found.unit == "1" else found.unit, found.shape
+    low, middle, high = (Quantity(name, float(v), unit) for name, v in zip(_ENDS, ends, strict=True))
     text = (
-        f"{found.quantity} of {rows} x {columns} places: {ends[0]:.4g} to {ends[2]:.4g}{unit}, "
-        f"median {ends[1]:.4g}{unit}; half of them with a confidence above {np.median(trust):.2f}"
+        f"{found.quantity} of {rows} x {columns} places: {low} to {high}, median {middle}; half of them "
+        f"with a confidence above {np.median(trust):.2f}"
     )
-    told = {
-        "quantity": found.quantity,
-        "unit": found.unit,
-        "shape": found.shape,
-        "confidence": np.median(trust),
-    }
-    return text, {**told, "low": ends[0], "median": ends[1], "high": ends[2]}
+    values = (
+        Quantity("quantity", found.quantity), Quantity("unit", found.unit), Quantity("shape", found.shape),
+        Quantity("confidence", float(np.median(trust))), low, middle, high,
+    )  # fmt: skip
+    return Result(
+        "Depth", "How far what is seen stands, and how sure that is.", found, (text,), values,
+        lambda: _figures(found, picture), notes, written,
+    )  # fmt: skip
+
+
+_ENDS = ("low", "median", "high")
+
+
+def _figures(found: "DepthMap", picture: Any) -> "Iterator[Figure]":
+    from lumigraph import plots
+
+    yield Figure(plots.show(found.values), f"{found.quantity.capitalize()} [{found.unit}].", "Map")
+    yield Figure(plots.show(found.confidence), "Confidence, 0 to 1.", "Map")
+    if picture is not None:
+        zoom = {"zoom": enlarged(picture)}
+        yield Figure(picture, "The picture of the same places.", "Map", zoom)

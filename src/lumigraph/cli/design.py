@@ -7,12 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.reporting import REPORTED, Reported, told
+from lumigraph.cli.reporting import REPORTED, Reported, tell
 from lumigraph.cli.serving import Port, announce, check_port
+from lumigraph.core.result import Figure, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
-    from lumigraph.report import Page
+    from collections.abc import Iterator
+
+if TYPE_CHECKING:
+    pass
 
 
 @Parameter(name="*")
@@ -43,7 +47,7 @@ class Web:
 
 def design(
     camera: str, /, *, plot: Path | None = None, page: Web = Web(), common: Reported = REPORTED
-) -> None:
+) -> Result | None:
     """Print everything that follows from a camera's description, with its equations.
 
     With --web it opens a page in which the camera can be changed, and ends with Ctrl-C.
@@ -71,14 +75,18 @@ def design(
         from lumigraph import plots
 
         files.save_figure(plots.layout(_with_rays(described)), plot)
-    told(common, str(table), table.as_dict(), lambda: _page(described, table))
-    if page.web:
-        from lumigraph import viewer
+    found = Result(
+        "Design", f"{table.title[0].upper()}{table.title[1:]}, and all that follows in closed form.",
+        described, (str(table),), figures=lambda: _figures(described, table), extra=table.as_dict(),
+    )  # fmt: skip
+    if not page.web:
+        return found
+    from lumigraph import viewer
 
-        site = viewer.designer_site(described, Path(camera).name)
-        viewer.serve(
-            site, port=page.port, ready=lambda address: announce(address, common, no_open=page.no_open)
-        )
+    tell(common, found)
+    site = viewer.designer_site(described, Path(camera).name)
+    viewer.serve(site, port=page.port, ready=lambda address: announce(address, common, no_open=page.no_open))
+    return None
 
 
 def _with_rays(camera: Any) -> Any:
@@ -87,18 +95,14 @@ def _with_rays(camera: Any) -> Any:
     return camera
 
 
-def _page(camera: Any, table: Any) -> "Page":
+def _figures(camera: Any, table: Any) -> "Iterator[Figure]":
     from lumigraph import plots
-    from lumigraph.report import Page
 
-    page = Page("Design", f"{table.title[0].upper()}{table.title[1:]}, and all that follows in closed form.")
     if table.warnings:
-        page.section("Warnings").text("\n\n".join(table.warnings))
+        yield Figure("\n".join(table.warnings), section="Warnings")
     if hasattr(camera, "main_lens"):
-        page.section("Layout").figure(plots.layout(camera), "Rays through the camera.", wide=True)
+        yield Figure(plots.layout(camera), "Rays through the camera.", "Layout", {"wide": True})
     for title, rows in table.sections:
-        page.section(title).table(
-            [(row.name, row.text, row.source) for row in rows], header=("quantity", "value", "equation")
-        )
-    page.section("Camera file").lines(camera.to_toml())
-    return page
+        cells = [(row.name, row.text, row.source) for row in rows]
+        yield Figure([("quantity", "value", "equation"), *cells], section=title)
+    yield Figure(camera.to_toml(), section="Camera file")

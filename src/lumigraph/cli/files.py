@@ -3,15 +3,10 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lumigraph.cli.options import COMMAND
 from lumigraph.errors import FormatError
-
-if TYPE_CHECKING:
-    from lumigraph.core.calibration import Calibration
-    from lumigraph.core.lightfield import LightField
-    from lumigraph.core.raw import RawImage
 
 PICTURES = (".png", ".tif", ".tiff", ".zarr", ".zarr.zip")
 VIEWS = (".zarr", ".zarr.zip", ".h5", ".hdf5", "_eslf.png")
@@ -48,64 +43,6 @@ def _check_inputs(path: Path) -> None:
             raise FormatError(
                 f"writing {path} would destroy {word}, which the command names too. Choose another."
             )
-
-
-def read_raw(path: Path) -> "RawImage":
-    """A raw image of finite values.
-
-    Raises
-    ------
-    FormatError
-        Something else, or NaN.
-    """
-    import lumigraph.io as io
-    from lumigraph.core import checks
-    from lumigraph.core.raw import RawImage
-
-    raw = io.open(path)
-    if not isinstance(raw, RawImage):
-        raise FormatError(f"{path} holds a {type(raw).__name__} where a raw image is needed.")
-    checks.finite_array(str(path), raw.data, FormatError)
-    return raw
-
-
-def read_views(path: Path) -> "LightField | RawImage":
-    """A light field, or the raw image it can be decoded from.
-
-    Raises
-    ------
-    FormatError
-        Something else, or NaN.
-    """
-    import lumigraph.io as io
-    from lumigraph.core import checks
-    from lumigraph.core.lightfield import LightField
-    from lumigraph.core.raw import RawImage
-
-    found = io.open(path)
-    if not isinstance(found, LightField | RawImage):
-        held = type(found).__name__.lower()
-        raise FormatError(f"{path} holds a {held} where views or a raw image are needed.")
-    checks.finite_array(str(path), found.data, FormatError)
-    return found
-
-
-def read_calibration(path: Path, shape: tuple[int, int] | None = None) -> "Calibration":
-    """A calibration: our own, or one by a camera's maker, which needs the raw images' shape.
-
-    Raises
-    ------
-    FormatError
-        Another kind of file.
-    """
-    import lumigraph.io as io
-
-    ending = path.suffix.lower()
-    if ending in (".xml", ".ini"):
-        return io.open(path, shape=shape)
-    if ending in (".lfp", ".lfr", ".lfx"):
-        return io.open(path, what="calibration")
-    return io.open(path) if ending == ".json" else io.load_calibration(path)
 
 
 def save_figure(figure: Any, path: Path) -> None:

@@ -1,16 +1,16 @@
-"""From a raw image to one that is ready: calibration, white and dark image, camera file, colours."""
+"""What a raw image comes with: calibration, white and dark image, camera file."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from lumigraph.cli import files
-from lumigraph.errors import CalibrationError, FormatError, SamplingWarning
+from lumigraph.errors import CalibrationError, FormatError
 
 if TYPE_CHECKING:
-    from lumigraph.core.calibration import Calibration
+    from lumigraph.core.lightfield import LightField
+    from lumigraph.core.prepared import PreparedImage
     from lumigraph.core.raw import RawImage
 
 FOCUSED, PLENOPTIC = "focused-plenoptic", "plenoptic"
@@ -19,7 +19,7 @@ FOCUSED, PLENOPTIC = "focused-plenoptic", "plenoptic"
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Origin:
-    """What a raw image needs to become views or a picture.
+    """What a raw image needs to become views, a picture or a volume.
 
     Parameters
     ----------
@@ -28,50 +28,91 @@ class Origin:
     white
         White image, for a raw image: it is divided by it, and calibrated from it without --calibration.
     dark
-        Image with the lens covered: subtracted with --white; tells which pixels are hot.
+        Image with the lens covered: subtracted; tells which pixels are hot.
     camera
         Camera file, or a name of the catalogue: gives the calibration if no other is given, and depths.
+    page
+        Of a stack of raw images: which one, counted from 0.
     """
 
     calibration: Path | None = None
     white: Path | None = None
     dark: Path | None = None
     camera: str | None = None
+    page: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
 
     @property
     def is_given(self) -> bool:
         """Whether there is anything that only a raw image needs."""
-        return self.calibration is not None or self.white is not None or self.dark is not None
+        given = (self.calibration, self.white, self.dark, self.page)
+        return any(one is not None for one in given)
+
+    def read(self, path: Path) -> "RawImage":
+        """The raw image in a file, or on the page of a stack."""
+        from lumigraph.preparation import read_pages
+
+        (found,) = read_pages(path, None if self.page is None else str(self.page)).values()
+        return found
+
+    def views(self, path: Path) -> "LightField | RawImage":
+        """The views in a file, or the raw image that they can be decoded from.
+
+        Raises
+        ------
+        FormatError
+            Something else, NaN, or views with something that only a raw image needs.
+        """
+        from lumigraph import io
+        from lumigraph.core import checks
+        from lumigraph.core.lightfield import LightField
+        from lumigraph.core.raw import RawImage
+        from lumigraph.core.stack import Stack
+        from lumigraph.core.volume import Volume
+
+        found = io.open(path)
+        if isinstance(found, Stack | Volume | RawImage):
+            return self.read(path)
+        if not isinstance(found, LightField):
+            held = type(found).__name__.lower()
+            raise FormatError(f"{path} holds a {held} where views or a raw image are needed.")
+        checks.finite_array(str(path), found.data, FormatError)
+        if self.is_given:
+            raise FormatError(
+                f"{path} holds views, which need no --calibration, --white, --dark or --page. Leave them out."
+            )
+        return found
 
     def described(self, kind: str | None = None) -> Any:
         """The camera, or None; refused if it is of another kind than the verb is for."""
         if self.camera is None:
             return None
-        from lumigraph.instruments import load_camera
+        from lumigraph.instruments import SingleLensCamera, load_camera
 
         camera: Any = load_camera(self.camera)
-        if not hasattr(camera, "lenslets"):
-            raise FormatError(
-                f"--camera {self.camera} is a {camera.KIND}, which has no lenslets: "
-                "use 'lumigraph deconvolve'."
-            )
+        told = f"--camera {self.camera} is a {camera.KIND}, which"
+        if isinstance(camera, SingleLensCamera):
+            raise FormatError(f"{told} has no lenslets: use 'lumigraph deconvolve'.")
         if kind == FOCUSED != camera.KIND:
-            raise FormatError(
-                f"--camera {self.camera} is a {camera.KIND}, which is decoded: use 'lumigraph decode'."
-            )
+            raise FormatError(f"{told} is decoded: use 'lumigraph decode'.")
         if kind == PLENOPTIC and camera.KIND == FOCUSED:
-            raise FormatError(
-                f"--camera {self.camera} is a {camera.KIND}, which is rendered: use 'lumigraph render'."
-            )
+            raise FormatError(f"{told} is rendered: use 'lumigraph render'.")
         return camera
 
     def prepared(
         self, raw: "RawImage", *, kind: str | None = None, devignette: bool | None = None
-    ) -> "tuple[RawImage, Calibration]":
-        """The raw image, devignetted and in colour, and its calibration; refused where they do not fit."""
-        from lumigraph import calibration as verbs
-        from lumigraph import sensor
-        from lumigraph.core.drift import check_drift, vouch
+    ) -> "PreparedImage":
+        """The raw image, ready to use; refused where nothing tells where its micro-images stand.
+
+        Parameters
+        ----------
+        raw
+            As it was read.
+        kind
+            Of cameras that the verb is for; None for all.
+        devignette
+            Whether to divide by the white image; None for yes where there is one.
+        """
+        from lumigraph.preparation import Given
 
         camera = self.described(kind)
         if camera is None and self.calibration is None and self.white is None:
@@ -80,49 +121,9 @@ class Origin:
             )
         if devignette and self.white is None:
             raise CalibrationError("--devignette needs the white image. Give --white FILE.")
-        white = None if self.white is None else files.read_raw(self.white)
-        dark = None if self.dark is None else files.read_raw(self.dark)
-        if self.calibration is not None:
-            found = files.read_calibration(self.calibration, raw.shape)
-            if self.calibration.suffix.lower() != ".toml":
-                found = _aligned(found, raw)
-        elif white is not None:
-            found = verbs.calibrate(white)
-        else:
-            assert camera is not None  # one of the three is given
-            found = camera.calibration
-        found.check_fits(raw.shape)
-        check_drift(raw.data, found)
-        if white is not None and devignette is not False:
-            raw = verbs.devignette(raw, white, dark=dark)
-        if camera is not None:
-            found = _with_lengths(found, camera)
-        ready = raw if raw.bayer is None else sensor.demosaic(raw)
-        vouch(ready.data, found)
-        return ready, found
+        return Given(self.calibration, self.white, self.dark).prepared(
+            raw, camera=camera, even=devignette is not False
+        )
 
 
 NO_ORIGIN = Origin()
-
-
-def _aligned(calibration: "Calibration", raw: "RawImage") -> "Calibration":
-    """A maker's calibration, moved to the micro-images of the raw image where they show; told if so."""
-    import warnings
-
-    from lumigraph.calibration import aligned
-
-    found = aligned(calibration, raw)
-    if found is not calibration:
-        warnings.warn(f"the maker's lattice was {found.notes[-1]}", SamplingWarning, stacklevel=2)
-    return found
-
-
-def _with_lengths(calibration: "Calibration", camera: Any) -> "Calibration":
-    """The calibration with the lengths of a camera where it has none; a microscope has no separation."""
-    pairs = (
-        ("pixel_pitch", camera.sensor.pixel_pitch),
-        ("separation", getattr(camera, "separation", None)),
-        ("lenslet_distance", camera.lenslet_distance),
-    )
-    missing = {name: value for name, value in pairs if getattr(calibration, name) is None}
-    return replace(calibration, **missing) if missing else calibration

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lumigraph.cli.refocus import MOST_SHOWN
-from lumigraph.cli.reporting import Reported, told
+from lumigraph.core.result import Figure, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def parts_of(path: Path) -> list[str]:
     return [] if "raw" in names else [name for name in names if name in _MADE]
 
 
-def unpack(path: Path, parts: list[str], output: Path, common: Reported) -> None:
+def unpack(path: Path, parts: list[str], output: Path) -> Result:
     """Write the pictures (.png) and maps (.tiff) of a container into a folder.
 
     Raises
@@ -52,10 +52,13 @@ def unpack(path: Path, parts: list[str], output: Path, common: Reported) -> None
     output.mkdir(exist_ok=True)
     for name, picture in found.items():
         io.save(picture, output / name)
-    numbers = [(name, _size(name, picture)) for name, picture in found.items()]
-    lines = [f"written {output / name}: {size}" for name, size in numbers]
-    values = {"output": [str(output / name) for name in found]}
-    told(common, "\n".join(lines), values, lambda: _page(found), numbers)
+    sizes = {name: _size(name, picture) for name, picture in found.items()}
+    return Result(
+        "Decode", "Pictures and maps of a Lytro container, as its software made them.", found,
+        tuple(f"{name}: {size}" for name, size in sizes.items()), (),
+        lambda: [Figure(picture, name) for name, picture in list(found.items())[:MOST_SHOWN]],
+        written=tuple(output / name for name in found),
+    )  # fmt: skip
 
 
 def _named(part: str, thing: Any) -> "list[tuple[str, RawImage]]":
@@ -78,15 +81,3 @@ def _size(name: str, picture: "RawImage") -> str:
         return size
     unit = "" if name.startswith("confidence") else " lambda"
     return f"{size}, {picture.data.min():.4g} to {picture.data.max():.4g}{unit}"
-
-
-def _page(found: "dict[str, RawImage]") -> Any:
-    from lumigraph.report import Page
-
-    page = Page("Decode", "Pictures and maps of a Lytro container, as its software made them.")
-    section = page.section("Pictures")
-    for name, picture in list(found.items())[:MOST_SHOWN]:
-        section.figure(picture, name)
-    if len(found) > MOST_SHOWN:
-        section.text(f"{len(found) - MOST_SHOWN} more are not shown.")
-    return page

@@ -11,10 +11,13 @@ from lumigraph.cli import files
 from lumigraph.cli.console import Count, progress
 from lumigraph.cli.options import Output, length
 from lumigraph.cli.origin import NO_ORIGIN, PLENOPTIC, Origin
-from lumigraph.cli.reporting import REPORTED, Reported, enlarged, told
+from lumigraph.cli.reporting import REPORTED, Reported, enlarged
+from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from lumigraph.core.arrays import Array
     from lumigraph.core.lightfield import LightField
 
@@ -36,31 +39,50 @@ class Focus:
     alphas
         A range 'first:last:count', such as 0.9:1.1:9.
     depth
-        From the focused plane, such as '5 mm' (farther) or '-5 mm'; may be repeated; needs --camera.
+        From the focused plane, such as '5 mm' (farther) or '-5 um'; may be repeated; needs --camera, which
+        may be a microscope.
     """
 
     alpha: Annotated[list[float] | None, Parameter(consume_multiple=True)] = None
     alphas: str | None = None
     depth: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True)] = None
 
-    def chosen(self, camera: Any) -> list[float]:
+    def check(self, camera: Any) -> None:
+        """Refuse what can be seen to be wrong before anything is read."""
+        if not (self.alpha or self.alphas or self.depth):
+            raise FormatError("where to focus is not known. Give --alpha 0.95 or --alphas 0.9:1.1:9.")
+        if self.depth and camera is None:
+            raise FormatError("--depth needs the camera's geometry. Give --camera FILE, or --alpha.")
+        for alpha in self.alpha or []:
+            _check_alpha(alpha)
+
+    @property
+    def count(self) -> int:
+        """Pictures that are asked for."""
+        several = range_of("--alphas", self.alphas) if self.alphas else []
+        return len(self.alpha or []) + len(several) + len(self.depth or [])
+
+    def chosen(self, camera: Any, views: "LightField") -> list[float]:
         """All factors, as given."""
         found = [*(self.alpha or []), *(range_of("--alphas", self.alphas) if self.alphas else [])]
-        if self.depth:
-            if camera is None:
-                raise FormatError("--depth needs the camera's geometry. Give --camera FILE, or --alpha.")
-            if not hasattr(camera, "alpha"):
-                raise FormatError(
-                    f"--depth has no refocus factor in a {camera.KIND}. Give --alpha, or use "
-                    "'lumigraph deconvolve --z'."
-                )
-            found += [camera.alpha(length("--depth", text) or 0.0) for text in self.depth]
-        if not found:
-            raise FormatError("where to focus is not known. Give --alpha 0.95 or --alphas 0.9:1.1:9.")
+        depths = [length("--depth", text) or 0.0 for text in self.depth or []]
+        found += [_factor(camera, dz, views) for dz in depths]
         for alpha in found:
-            if not math.isfinite(alpha) or alpha <= 0:
-                raise FormatError(f"--alpha is {alpha:g} but must be a finite number above 0.")
+            _check_alpha(alpha)
         return found
+
+
+def _factor(camera: Any, dz: float, views: "LightField") -> float:
+    from lumigraph.instruments import LightFieldMicroscope
+
+    if isinstance(camera, LightFieldMicroscope):
+        return 1 + dz / camera.depth_per_alpha(views.separation)
+    return camera.alpha(dz)
+
+
+def _check_alpha(alpha: float) -> None:
+    if not math.isfinite(alpha) or alpha <= 0:
+        raise FormatError(f"--alpha is {alpha:g} but must be a finite number above 0.")
 
 
 @Parameter(name="*")
@@ -127,7 +149,7 @@ def refocus(
     origin: Origin = NO_ORIGIN,
     quality: Quality = Quality(),
     common: Reported = REPORTED,
-) -> None:
+) -> Result:
     """Focus afresh on one or more depths.
 
     Example: `lumigraph refocus views.zarr --alpha 0.95 -o near.png`
@@ -146,60 +168,45 @@ def refocus(
     """
     common.check()
     quality.check()
-    alphas = focus.chosen(origin.described(PLENOPTIC) if focus.depth else None)
-    _check_output(output, alphas)
+    camera = origin.described(PLENOPTIC) if focus.depth else None
+    focus.check(camera)
+    _check_output(output, focus.count)
     with progress("refocus") as shown:
-        images = quality.pictures(light_field(views, origin), alphas, shown)
-    written = _write(images, alphas, output)
+        source = light_field(views, origin)
+        alphas = focus.chosen(camera, source)
+        images = quality.pictures(source, alphas, shown)
     shape = images[0].shape[:2]
-    lines = [f"alpha {alpha:g}: {shape[0]} x {shape[1]} px" for alpha in alphas]
-    text = "\n".join([*lines, *(f"written {path}" for path in written)])
-    values = {"alphas": alphas, "shape": shape, "output": [str(path) for path in written]}
-    told(common, text, values, lambda: _page(images, alphas), _numbers(shape, quality))
+    values = (
+        Quantity("alphas", alphas), Quantity("shape", shape, "px"), Quantity("method", quality.method),
+        Quantity("aperture", quality.aperture), Quantity("aperture_shape", quality.shape),
+    )  # fmt: skip
+    return Result(
+        "Refocus", "Pictures focused afresh; α' above 1 is farther.", images,
+        tuple(f"alpha {alpha:g}: {shape[0]} x {shape[1]} px" for alpha in alphas), values,
+        lambda: _figures(images, alphas), written=tuple(_write(images, alphas, output)),
+    )  # fmt: skip
 
 
-def _numbers(shape: tuple[int, ...], quality: Quality) -> list[tuple[str, str]]:
-    return [
-        ("picture", f"{shape[0]} x {shape[1]} px"), ("method", quality.method),
-        ("aperture", f"{100 * quality.aperture:g} %, {quality.shape}"),
-    ]  # fmt: skip
-
-
-def _page(images: list[Any], alphas: list[float]) -> Any:
-    from lumigraph.report import Page
-
-    page, shown = Page("Refocus", "Pictures focused afresh; α' above 1 is farther."), images[:MOST_SHOWN]
+def _figures(images: list[Any], alphas: list[float]) -> "Iterator[Figure]":
     white = max(float(image.max()) for image in images) or None
-    section = page.section("Pictures")
-    for image, alpha in zip(shown, alphas, strict=False):
-        section.figure(image, f"α' = {alpha:g}", white=white, zoom=enlarged(image))
-    if len(images) > len(shown):
-        section.text(f"{len(images) - len(shown)} more are not shown.")
-    return page
+    for image, alpha in list(zip(images, alphas, strict=True))[:MOST_SHOWN]:
+        yield Figure(image, f"α' = {alpha:g}", options={"white": white, "zoom": enlarged(image)})
 
 
 def light_field(path: Path, origin: Origin) -> "LightField":
-    """The views in a file, or those of the raw image in it.
-
-    Raises
-    ------
-    FormatError
-        Views, with something that only a raw image needs.
-    """
-    from lumigraph import rendering
+    """The views in a file, or those of the raw image in it."""
+    from lumigraph import preparation
     from lumigraph.core.lightfield import LightField
 
-    found = files.read_views(path)
+    found = origin.views(path)
     if isinstance(found, LightField):
-        if origin.is_given:
-            raise FormatError(f"{path} holds views, which need no --calibration or --white. Leave them out.")
         return found
-    return rendering.decode(*origin.prepared(found, kind=PLENOPTIC))
+    return preparation.decode(origin.prepared(found, kind=PLENOPTIC))
 
 
-def _check_output(output: Path, alphas: list[float]) -> None:
-    if output.suffix or len(alphas) == 1:
-        files.check_output(output, files.PICTURES if len(alphas) == 1 else (".tif", ".tiff", *files.MOVIES))
+def _check_output(output: Path, count: int) -> None:
+    if output.suffix or count == 1:
+        files.check_output(output, files.PICTURES if count == 1 else (".tif", ".tiff", *files.MOVIES))
     elif output.exists() and not output.is_dir():
         raise FormatError(f"{output} is a file. Give a folder, or a stack that ends in .tiff.")
     elif not output.parent.is_dir():

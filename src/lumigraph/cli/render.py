@@ -11,11 +11,15 @@ from lumigraph.cli.console import Count, progress
 from lumigraph.cli.options import Output, length
 from lumigraph.cli.origin import FOCUSED, NO_ORIGIN, Origin
 from lumigraph.cli.refocus import MOST_SHOWN, range_of
-from lumigraph.cli.reporting import REPORTED, Reported, told
+from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from lumigraph.core.calibration import Calibration
+    from lumigraph.core.depth_map import DepthMap
     from lumigraph.core.lightfield import LightField
     from lumigraph.core.raw import RawImage
 
@@ -177,7 +181,7 @@ def render(
     tiles: Tiles = Tiles(),
     look: Look = Look(),
     common: Reported = REPORTED,
-) -> None:
+) -> Result:
     """Render pictures of a focused plenoptic camera 2.0 from its raw image, or out of views.
 
     Example: `lumigraph render raw.tiff --camera camera.toml --depth "5 mm" -o picture.png`
@@ -195,6 +199,7 @@ def render(
     depth_map
         Where to write the map of patches or refocus factors that was found (.tiff, .pfm, .zarr).
     """
+    from lumigraph import io
     from lumigraph.core.lightfield import LightField
 
     common.check()
@@ -208,68 +213,60 @@ def render(
         tiles = Tiles(depth="auto")
     if not look.all_in_focus and look.path is None:
         tiles.check(origin.camera)
-    found = files.read_views(raw)
+    found = origin.views(raw)
     with progress("render") as shown:
         if isinstance(found, LightField):
-            text, values, extra = _from_views(found, look, output, shown)
+            made = _from_views(found, look, output, shown)
         else:
             if look.path is not None:
                 raise FormatError(f"{raw} holds a raw image but --path needs views. Use 'lumigraph decode'.")
-            text, values, extra = _from_raw(found, (origin, tiles), output, shown)
-    values = {**values, "output": str(output)}
-    text += f"\nwritten {output}"
+            made = _from_raw(found, (origin, tiles), output, shown)
     if depth_map is not None:
-        text, values = text + _save_map(extra, depth_map), {**values, "map": str(depth_map)}
-    told(common, text, values, lambda: _page(output, extra), _numbers(values))
+        io.save(made.depth, depth_map)
+    return Result(
+        "Render", "The picture that was written.", made.pictures, (made.text,),
+        (Quantity("shape", made.shape, "px"), *made.quantities), lambda: _figures(made, output), made.notes,
+        tuple(path for path in (output, depth_map) if path is not None),
+    )  # fmt: skip
 
 
-def _numbers(values: dict[str, Any]) -> list[tuple[str, str]]:
-    rows, columns = values["shape"][:2]
-    found = [("picture", f"{rows} x {columns} px")]
-    for key, name, unit in (
-        ("patch_px", "patch", " px"),
-        ("alpha", "refocus factors", ""),
-        ("frames", "frames", ""),
-    ):
-        if key in values:
-            each = values[key] if isinstance(values[key], list | tuple) else [values[key]]
-            found.append((name, " to ".join(f"{x:.5g}{unit}" for x in sorted({each[0], each[-1]}))))
-    return found
+@dataclass(frozen=True)
+class _Made:
+    """What was rendered: pictures, what is told of them, and the map that was found or None."""
+
+    pictures: list[Any]
+    text: str
+    quantities: tuple[Quantity, ...]
+    depth: "DepthMap | None" = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        rows, columns = self.pictures[0].shape[:2]
+        return rows, columns
 
 
-def _page(output: Path, extra: Any) -> Any:
-    from lumigraph import io
-    from lumigraph.core.stack import Stack
-    from lumigraph.report import Page
-
-    page = Page("Render", "The picture that was written.")
-    section = page.section("Picture")
+def _figures(made: _Made, output: Path) -> "Iterator[Figure]":
     if output.suffix.lower() in files.MOVIES:
-        section.text(f"The film is in {output.name}.")
+        yield Figure(made.pictures[0], f"The first picture of the film in {output.name}.", "Picture")
     else:
-        found = io.open(output)
-        pictures = list(found.data) if isinstance(found, Stack) else [found]
-        for number, image in enumerate(pictures[:MOST_SHOWN], 1):
-            caption = f"Picture {number} of {len(pictures)}." if len(pictures) > 1 else "The picture."
-            section.figure(image, caption)
-    if extra is not None:
+        for number, image in enumerate(made.pictures[:MOST_SHOWN], 1):
+            yield Figure(image, f"Picture {number} of {len(made.pictures)}.", "Picture")
+    if made.depth is not None:
         from lumigraph import plots
 
-        section.figure(plots.show(extra.values), f"{extra.quantity} [{extra.unit}] of each place.")
-    return page
-
-
-_Made = tuple[str, dict[str, Any], Any]
-"""What is told, its values, and the map that was found or None."""
+        drawn = plots.show(made.depth.values)
+        yield Figure(drawn, f"{made.depth.quantity} [{made.depth.unit}] of each place.", "Picture")
 
 
 def _from_raw(found: "RawImage", how: tuple[Origin, Tiles], output: Path, shown: Count) -> _Made:
-    from lumigraph import depth, io, rendering
+    from lumigraph import depth, io, preparation, rendering
 
     origin, tiles = how
     camera = origin.described(FOCUSED)
     size: Any = tiles.known(camera)
-    ready, calibration = origin.prepared(found, kind=FOCUSED)
+    ready = origin.prepared(found, kind=FOCUSED)
+    calibration: Any = ready.calibration
     sharp = tiles.sharp(camera, calibration, origin)
     extra = None
     if tiles.is_auto:
@@ -279,38 +276,34 @@ def _from_raw(found: "RawImage", how: tuple[Origin, Tiles], output: Path, shown:
             sharp = list(rendering.match_kinds(ready, calibration, size, sharp))
     if tiles.patches is not None:
         sizes = range_of("--patches", tiles.patches)
-        return _planes(rendering.render_stack(ready, calibration, sizes, samples=tiles.samples, focus=sharp),
-                       sizes, output)  # fmt: skip
+        stack = preparation.render_stack(ready, calibration, sizes, samples=tiles.samples, focus=sharp)
+        return _planes(stack, sizes, output, ready.notes)
     if tiles.finer > 1:
         known: dict[str, Any] = {} if tiles.smoothness is None else {"smoothness": tiles.smoothness}
-        image = rendering.super_resolve(ready, calibration, size, factor=tiles.finer, progress=shown, **known)
+        image = preparation.super_resolve(
+            ready, calibration, size, factor=tiles.finer, progress=shown, **known
+        )
     else:
         blend = tiles.blend or tiles.is_auto
-        image = rendering.render(
+        image = preparation.render(
             ready, calibration, size, samples=tiles.samples, blend=blend, focus=sharp if blend else None
         )
     io.save(image, output)
+    patch = size if extra is None else [float(size.min()), float(size.max())]
+    told = f"of {size:.4g} px" if extra is None else f"from {patch[0]:.4g} to {patch[1]:.4g} px"
     rows, columns = image.shape[:2]
-    if extra is None:
-        text, patch = f"{rows} x {columns} px with patches of {size:.4g} px", size
-    else:
-        patch = [float(size.min()), float(size.max())]
-        text = f"{rows} x {columns} px with patches from {patch[0]:.4g} to {patch[1]:.4g} px"
-    return text, {"shape": image.shape, "patch_px": patch}, extra
+    text = f"{rows} x {columns} px with patches {told}"
+    return _Made([image], text, (Quantity("patch_px", patch, "px"),), extra, ready.notes)
 
 
-def _planes(stack: Any, sizes: list[float], output: Path) -> _Made:
+def _planes(stack: Any, sizes: list[float], output: Path, notes: tuple[str, ...]) -> _Made:
     from lumigraph import io
     from lumigraph.core.stack import Stack
 
     io.save(Stack(stack, tuple(sizes), "patch"), output)
     count, rows, columns = stack.shape[:3]
-    values = {"shape": (rows, columns), "patch_px": sizes}
-    return (
-        f"{count} pictures of {rows} x {columns} px, patches {sizes[0]:.4g} to {sizes[-1]:.4g} px",
-        values,
-        None,
-    )
+    text = f"{count} pictures of {rows} x {columns} px, patches {sizes[0]:.4g} to {sizes[-1]:.4g} px"
+    return _Made(list(stack), text, (Quantity("patch_px", sizes, "px"),), None, notes)
 
 
 def _from_views(views: "LightField", look: Look, output: Path, shown: Count) -> _Made:
@@ -322,7 +315,8 @@ def _from_views(views: "LightField", look: Look, output: Path, shown: Count) -> 
         stack = rendering.view_path(views, look.frames, path=look.path, radius=look.radius, alpha=look.still)
         io.save(Stack(stack), output)
         count, rows, columns = stack.shape[:3]
-        return f"{count} pictures of {rows} x {columns} px", {"shape": (rows, columns), "frames": count}, None
+        text = f"{count} pictures of {rows} x {columns} px"
+        return _Made(list(stack), text, (Quantity("frames", count),))
     if look.alphas is not None:
         made = rendering.all_in_focus(views, range_of("--alphas", look.alphas), progress=shown)
         extra = depth.DepthMap(made.alpha, made.confidence, "alpha")
@@ -333,11 +327,4 @@ def _from_views(views: "LightField", look: Look, output: Path, shown: Count) -> 
     rows, columns = made.picture.shape[:2]
     ends = [float(made.alpha.min()), float(made.alpha.max())]
     text = f"{rows} x {columns} px, refocus factors from {ends[0]:.4g} to {ends[1]:.4g}"
-    return text, {"shape": (rows, columns), "alpha": ends}, extra
-
-
-def _save_map(found: Any, path: Path) -> str:
-    from lumigraph import io
-
-    io.save(found, path)
-    return f"\nwritten {path}"
+    return _Made([made.picture], text, (Quantity("alpha", ends),), extra)

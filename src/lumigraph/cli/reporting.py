@@ -1,8 +1,9 @@
 """`--report`: every verb's page has its figures, its numbers with units, the command and the versions."""
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import console, files
 from lumigraph.cli.options import COMMAND, Common
+from lumigraph.core.result import Result
 
 if TYPE_CHECKING:
     from lumigraph.report import Page
@@ -40,6 +42,7 @@ class Reported(Common):
 
 REPORTED = Reported()
 
+Verb = Callable[..., Result | None]
 
 _SMALL = 240
 
@@ -50,29 +53,45 @@ def enlarged(image: Any) -> int | None:
     return times if times > 1 else None
 
 
-def told(
-    common: Reported, text: str, values: Mapping[str, Any], page: Callable[[], "Page"],
-    numbers: Sequence[tuple[str, str]] = (),
-) -> None:  # fmt: skip
-    """Print a verb's result, and write its report where one is asked for.
+def telling(verb: Verb) -> Verb:
+    """The verb as the command line runs it: its result is printed, and written as a report where asked."""
 
-    Parameters
-    ----------
-    common
-        Of the command.
-    text, values
-        As `console.report` takes them.
-    page
-        Gives the title and the figures; called only for a report.
-    numbers
-        Names, and values with their units, told under "Numbers".
-    """
-    if common.report is not None:
-        written = page()
-        if numbers:
-            written.section("Numbers").table(list(numbers))
-        written.made_by(shlex.join(("lumigraph", *COMMAND.get())))
-        written.write(common.report)
-        text = f"{text}\nwritten {common.report}"
-        values = {**values, "report": str(common.report)}
+    @wraps(verb)
+    def run(*arguments: Any, **options: Any) -> None:
+        result = verb(*arguments, **options)
+        if result is not None:
+            tell(options.get("common", REPORTED), result)
+
+    return run
+
+
+def tell(common: Common, result: Result) -> None:
+    """Print a result as text or as JSON, and write its report where one is asked for."""
+    text, values = result.text(), result.values()
+    if isinstance(common, Reported) and common.report is not None:
+        _page(result).write(common.report)
+        text, values = f"{text}\nwritten {common.report}", {**values, "report": str(common.report)}
     console.report(common, text, values)
+
+
+def _page(result: Result) -> "Page":
+    from lumigraph.report import Page
+
+    page, sections = Page(result.title, result.about), {}
+    for figure in result.figures():
+        if figure.section not in sections:
+            sections[figure.section] = page.section(figure.section)
+        section = sections[figure.section]
+        match figure.image:
+            case str() as text:
+                section.lines(text)
+            case list() as rows:
+                section.table(rows[1:], header=rows[0])
+            case image:
+                section.figure(image, figure.caption, **figure.options)
+    if result.quantities:
+        page.section("Numbers").table([(one.label, str(one)) for one in result.quantities])
+    if result.notes:
+        page.section("What to know").text("\n\n".join(result.notes))
+    page.made_by(shlex.join(("lumigraph", *COMMAND.get())))
+    return page

@@ -11,10 +11,13 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, length
-from lumigraph.cli.reporting import REPORTED, Reported, told
+from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError, GeometryError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from lumigraph.core.grid import Grid
     from lumigraph.scene import Scene
 
@@ -139,7 +142,7 @@ def simulate(
     seed: int = 0,
     noise: Annotated[bool, Parameter(negative="")] = False,
     common: Reported = REPORTED,
-) -> None:
+) -> Result:
     """Simulate the raw image of a scene by wave optics.
 
     Writes intensities (TIFF and Zarr: floats, 1 for an even scene; PNG: scaled), or with --noise what the
@@ -188,22 +191,22 @@ def simulate(
             {**raw.metadata, **exposed.metadata},
         )
     io.save(raw, output)
-    rows, columns = raw.shape
-    text = (
-        f"{rows} x {columns} px, mean {raw.data.mean():.4g}, largest {raw.data.max():.4g}\nwritten {output}"
-    )
-    error = raw.metadata.get("estimated_error")
+    (rows, columns), error = raw.shape, raw.metadata.get("estimated_error")
+    unit = "" if noise else "of an even scene"
+    mean, largest = float(raw.data.mean()), float(raw.data.max())
+    lines = [f"{rows} x {columns} px, mean {mean:.4g}, largest {largest:.4g}"]
     if error is not None:
-        text = f"{text}\nestimated error {100 * error:.2g} % rms, from the difference of two halves"
-    values = {
-        "shape": raw.shape,
-        "mean": raw.data.mean(),
-        "largest": raw.data.max(),
-        "pixel_pitch": raw.pixel_pitch,
-        "estimated_error": error,
-    }
-    values |= {"coherence": light.coherence, "output": str(output)}
-    told(common, text, values, lambda: _page(raw, scene, described), _numbers(raw, light))
+        lines.append(f"estimated error {100 * error:.2g} % rms, from the difference of two halves")
+    values = (
+        Quantity("shape", raw.shape, "px"), Quantity("mean", mean, unit), Quantity("largest", largest),
+        Quantity("pixel_pitch", raw.pixel_pitch, "m"), Quantity("estimated_error", error),
+        Quantity("coherence", light.coherence),
+    )  # fmt: skip
+    table = described.describe()
+    return Result(
+        "Simulate", f"What the sensor of a {table.title} sees.", raw, tuple(lines), values,
+        lambda: _figures(raw, described), tuple(table.warnings), (output,),
+    )  # fmt: skip
 
 
 def _drawn_on(camera: Any) -> "Grid":
@@ -220,34 +223,15 @@ def _drawn_on(camera: Any) -> "Grid":
     return Grid((ny, nx), (pitch, pitch), (0.0 if ny % 2 else pitch / 2, 0.0 if nx % 2 else pitch / 2))
 
 
-def _numbers(raw: Any, light: Light) -> list[tuple[str, str]]:
-    from lumigraph.core.picture import length
-
-    error = raw.metadata.get("estimated_error")
-    found = [
-        ("raw image", f"{raw.shape[0]} x {raw.shape[1]} px"), ("pixel pitch", length(raw.pixel_pitch)),
-        ("mean", f"{raw.data.mean():.4g} {'of an even scene' if raw.bit_depth is None else 'counts'}"),
-        ("largest", f"{raw.data.max():.4g}"), ("light", light.coherence),
-    ]  # fmt: skip
-    return found if error is None else [*found, ("estimated error", f"{100 * error:.2g} % rms")]
-
-
-def _page(raw: Any, scene: "Scene", camera: Any) -> Any:
+def _figures(raw: Any, camera: Any) -> "Iterator[Figure]":
     from lumigraph import plots
-    from lumigraph.report import Page
 
-    table = camera.describe()
-    page = Page("Simulate", f"What the sensor of a {table.title} sees.")
-    section = page.section("Raw image").figure(raw, "Upright, as a camera reads it out.", wide=True)
-    rows, columns = raw.shape
-    middle = [slice(max(0, n // 2 - 80), n // 2 + 80) for n in (rows, columns)]
-    section.figure(raw.data[middle[0], middle[1]], "The middle, pixel by pixel.", zoom=3)
+    yield Figure(raw, "Upright, as a camera reads it out.", "Raw image", {"wide": True})
+    rows, columns = (slice(max(0, n // 2 - 80), n // 2 + 80) for n in raw.shape)
+    yield Figure(raw.data[rows, columns], "The middle, pixel by pixel.", "Raw image", {"zoom": 3})
     if hasattr(camera, "main_lens"):
-        page.section("Camera").figure(plots.layout(camera), "Rays through the camera.")
-    if table.warnings:
-        page.section("Warnings").text("\n\n".join(table.warnings))
-    page.section("Camera file").lines(camera.to_toml())
-    return page
+        yield Figure(plots.layout(camera), "Rays through the camera.", "Camera")
+    yield Figure(camera.to_toml(), section="Camera file")
 
 
 def _scene(name: str, grid: "Grid") -> "Scene":
@@ -261,7 +245,9 @@ def _scene(name: str, grid: "Grid") -> "Scene":
         return getattr(targets, name)(grid)
     if "." not in name and "/" not in name:
         raise FormatError(f"--scene {name!r} is unknown. Use {', '.join(SCENES)}, or a picture file.")
-    return targets.photo(grid, files.read_raw(Path(name)).data)
+    from lumigraph.preparation import read_raw
+
+    return targets.photo(grid, read_raw(Path(name)).data)
 
 
 def _largest_chart(grid: "Grid") -> "Scene":

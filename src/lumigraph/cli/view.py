@@ -7,15 +7,17 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import report, stages
+from lumigraph.cli.console import stages
 from lumigraph.cli.options import COMMON, Common
+from lumigraph.cli.origin import Origin
 from lumigraph.cli.serving import Port, announce, check_port
+from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Camera:
+class Shown(Origin):
     """What a raw image needs to become views or pictures.
 
     Parameters
@@ -24,12 +26,14 @@ class Camera:
         File made by 'lumigraph calibrate', or the camera maker's (.xml, .ini, .json).
     white
         White image: the raw image is divided by it, and calibrated from it without --calibration.
+    dark
+        Image with the lens covered: subtracted; tells which pixels are hot.
+    camera
+        Camera file, or a name of the catalogue, of the raw image.
     patch
         Of a camera 2.0 [px]: pictures with patches about this size. Found in the raw image if left out.
     """
 
-    calibration: Path | None = None
-    white: Path | None = None
     patch: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
 
 
@@ -69,10 +73,10 @@ def view(
     beside: Path | None = None,
     /,
     *,
-    camera: Camera = Camera(),
+    origin: Shown = Shown(),
     page: Page = Page(),
     common: Common = COMMON,
-) -> None:
+) -> Result | None:
     """Look at a file in the browser: refocus by a click, move the viewpoint, see raw pixels, depth, volumes.
 
     Prints the page's address and ends with Ctrl-C. Only this computer's browser is answered.
@@ -93,27 +97,29 @@ def view(
     from lumigraph import viewer
 
     page.check()
-    exhibits = [_opened(path, camera) for path in (file, beside) if path is not None]
+    exhibits = [_opened(path, origin) for path in (file, beside) if path is not None]
     if page.export is not None:
         with stages("export") as shown:
             written = viewer.export(exhibits, page.export, quality=page.quality, progress=shown)
-        parts = ", ".join(f"{name.split('/')[1]} {_megabytes(size)}" for name, size in written.arrays.items())
-        text = f"written {written.path}: {_megabytes(written.size)} ({parts})"
-        report(common, text, {"output": str(written.path), "bytes": written.size, "arrays": written.arrays})
-        return
+        sizes = {name.split("/")[1]: size for name, size in written.arrays.items()}
+        parts = ", ".join(f"{name} {_megabytes(size)}" for name, size in sizes.items())
+        text = f"{_megabytes(written.size)} ({parts})"
+        values = (Quantity("bytes", written.size), Quantity("arrays", written.arrays))
+        return Result("View", "", exhibits, (text,), values, written=(written.path,))
     viewer.serve(
         viewer.site(exhibits),
         port=page.port,
         ready=lambda address: announce(address, common, no_open=page.no_open),
     )
+    return None
 
 
-def _opened(path: Path, camera: Camera) -> Any:
+def _opened(path: Path, origin: Shown) -> Any:
     from lumigraph import viewer
 
-    origin = viewer.Origin(camera.calibration, camera.white, camera.patch)
+    wanted = viewer.Origin(origin.calibration, origin.white, origin.dark, origin.described(), origin.patch)
     with stages(f"open {path.name}") as shown:
-        return viewer.open_exhibit(path, None if origin == viewer.Origin() else origin, shown)
+        return viewer.open_exhibit(path, wanted, shown)
 
 
 def _megabytes(size: int) -> str:

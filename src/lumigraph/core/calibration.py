@@ -56,6 +56,9 @@ class Calibration:
         Contrast of each of the three kinds of lenslets, `lattice.kind`, over their mean; empty for one kind.
     notes
         What to know before trusting the result, one sentence each.
+    by_maker
+        Whether it is the file of a camera's maker, which tells pitch and rotation well, but not where a
+        picture was cropped: `calibration.aligned` moves it.
     """
 
     lattice: Lattice
@@ -72,6 +75,7 @@ class Calibration:
     missing: np.ndarray = field(default_factory=_none)
     sharpness: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
+    by_maker: bool = False
 
     __repr__ = brief
 

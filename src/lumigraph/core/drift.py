@@ -2,7 +2,6 @@
 
 import math
 import warnings
-import weakref
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -61,6 +60,10 @@ class Drift:
     slip: float
     shift: tuple[float, float] | None
     evidence: float
+
+    def told(self) -> str:
+        """How well the lattices agree, in one line."""
+        return f"the raw image's own lattice slips by {self.slip:.2f} of a pitch towards the border"
 
     def report(self) -> str:
         """Both lattices in one line."""
@@ -127,21 +130,13 @@ def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> tuple[np.n
     return np.linalg.inv(_refined(lines, found, pitch)), found.evidence
 
 
-_LAST: list[tuple["weakref.ref[Any]", Calibration]] = []
-
-
-def vouch(data: Array, calibration: Calibration) -> None:
-    """Let `check_drift` pass a picture made from one that it has looked at, such as a devignetted one."""
-    try:
-        _LAST[:] = [(weakref.ref(data), calibration)]
-    except TypeError:  # an array that knows no weak references
-        _LAST.clear()
-
-
-def check_drift(data: Array, calibration: Calibration) -> None:
+def check_drift(data: Array, calibration: Calibration) -> Drift | None:
     """Refuse a raw image (y, x[, c]) that carries another lattice than the calibration's.
 
-    A picture that has just been looked at is not looked at again.
+    Returns
+    -------
+    Drift or None
+        As `drift` found it.
 
     Warns
     -----
@@ -154,14 +149,10 @@ def check_drift(data: Array, calibration: Calibration) -> None:
     CalibrationError
         They slip by more than half a pitch, so that pixels belong to other lenslets; both are told.
     """
-    if _LAST and _LAST[0][0]() is data:
-        known = _LAST[0][1]
-        if known.lattice == calibration.lattice and known.warp == calibration.warp:
-            return
     found = drift(data, calibration)
     if found is not None:
         _tell(found)
-    vouch(data, calibration)
+    return found
 
 
 def _tell(found: Drift) -> None:

@@ -1,6 +1,7 @@
 """Objects from raw images: what a camera must have seen, from a model of how it sees, a `core.linear.Linear`.
 
 - `deconvolve`: `deconvolve` and, for time series, `deconvolve_series`; `Step`, `Interrupted`
+- `beyond`: objects that reach beyond the picture, as far as light comes from
 - `exposure`: `Exposure`, what is known of the raw image besides its values
 - `problem`: the three put together: model, sensitivity, deviance
 - `methods`: `Stop`, and what methods share

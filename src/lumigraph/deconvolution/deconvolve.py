@@ -14,6 +14,7 @@ from lumigraph.core.arrays import Array
 from lumigraph.core.linear import Linear
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
+from lumigraph.deconvolution.beyond import Inside, beyond, continued, cut, least_seen
 from lumigraph.deconvolution.checkpoint import Checkpoint, fingerprint
 from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.methods import Method, State, Stop, check_offers
@@ -79,6 +80,9 @@ def deconvolve(
 ) -> Any:
     """What was in front of the camera: intensities (y, x) or (z, y, x), at least 0.
 
+    Where the operator can look beyond the picture (`beyond.Widening`), the object reaches as far as light
+    comes from, and is cut to the operator's own afterwards: else its border would take up that light.
+
     Parameters
     ----------
     raw
@@ -119,10 +123,11 @@ def deconvolve(
     _check(operator, method)
     exposure = _known(raw, exposure)
     data = values(raw, operator, exposure)
-    _require(operator, data)
-    scale = Scale.of(operator, exposure, data)
+    wide, inside = beyond(operator)
+    _require(wide, data)
+    scale = Scale.of(wide, exposure, data, least_seen(operator))
     problem = Problem.of(raw, exposure, scale)
-    run = _Run(problem, method, limits, progress)
+    run = _Run(problem, method, limits, progress, (operator, inside))
     if checkpoint is not None:
         run.checkpoint = Checkpoint.of(checkpoint)
         run.key = fingerprint(data, exposure, method)
@@ -152,16 +157,17 @@ def deconvolve_series(
     """
     limits = iterations if isinstance(iterations, Stop) else Stop(iterations)
     _check(operator, method)
+    wide, inside = beyond(operator)
     scale: Scale | None = None
     for raw in frames:
         if scale is None:
             exposure = _known(raw, exposure)
             data = values(raw, operator, exposure)
-            _require(operator, data)
-            scale = Scale.of(operator, exposure, data)
+            _require(wide, data)
+            scale = Scale.of(wide, exposure, data, least_seen(operator))
         assert exposure is not None
         problem = Problem.of(raw, exposure, scale)
-        yield _finished(_Run(problem, method, limits, progress), raw)
+        yield _finished(_Run(problem, method, limits, progress, (operator, inside)), raw)
 
 
 @dataclass(slots=True)
@@ -170,6 +176,7 @@ class _Run:
     method: Method
     limits: Stop
     progress: Progress | None
+    wanted: tuple[Linear, Inside]
     checkpoint: Checkpoint | None = None
     key: str = ""
     began: float = 0.0
@@ -190,15 +197,21 @@ class _Run:
         if self.checkpoint is not None and state.done > first:
             self.checkpoint.keep(self.problem, state, self.key, now=True)
 
+    def result(self, state: State, raw: RawImage | Array) -> Any:
+        """What is asked for of the object, with its place in space."""
+        operator, inside = self.wanted
+        return _placed(cut(state.estimate, inside), raw, operator)
+
     def _first(self) -> State:
         kept = None if self.checkpoint is None else self.checkpoint.found(self.problem, self.key)
         if kept is not None:
             return kept
         if self.method.start is None:
             return State.at(self.problem, self.problem.flat())
-        start, needed = self.method.start, tuple(self.problem.scale.sensitivity.shape)
+        start, needed = self.method.start, tuple(self.wanted[0].shape[1])
         if tuple(start.shape) != needed:
             raise GeometryError(f"start has shape {tuple(start.shape)} but the object has {needed}.")
+        start = continued(start, tuple(self.problem.scale.sensitivity.shape), self.wanted[1])
         return State.at(self.problem, arrays.like(np.asarray(arrays.to_numpy(start)), self.problem.data))
 
     def _tell(self, state: State, change: float, first: int) -> None:
@@ -223,9 +236,8 @@ def _finished(run: _Run, raw: RawImage | Array) -> Any:
             raise
         if run.checkpoint is not None:
             run.checkpoint.keep(run.problem, reached[0], run.key, now=True)
-        partial = _placed(reached[0].estimate, raw, run.problem.scale.operator)
-        raise Interrupted(partial, reached[0].done) from None
-    return _placed(reached[0].estimate, raw, run.problem.scale.operator)
+        raise Interrupted(run.result(reached[0], raw), reached[0].done) from None
+    return run.result(reached[0], raw)
 
 
 def _placed(estimate: Array, raw: RawImage | Array, operator: Linear) -> Any:

@@ -8,6 +8,7 @@ import numpy as np
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.brief import brief
+from lumigraph.core.prepared import PreparedImage, Reason
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 
@@ -75,7 +76,7 @@ class Exposure:
 
     @classmethod
     def of(cls, raw: RawImage, **known: Any) -> "Exposure":
-        """Gain, noise and dark signal that a raw image of `Sensor.expose` records, and what is `known`."""
+        """What `Sensor.expose` has recorded or `lumigraph.prepare` has found, and what else is `known`."""
         found: dict[str, Any] = {}
         if "full_well" in raw.metadata and raw.bit_depth is not None:
             told = {name: float(raw.metadata.get(name, 0.0)) for name in ("read_noise", "black_level")}
@@ -83,6 +84,11 @@ class Exposure:
             gain = float(raw.metadata["full_well"]) / highest
             dark = float(raw.metadata.get("dark_signal", 0.0)) / gain
             found = {**told, "gain": gain, "background": told["black_level"] + dark}
+        if isinstance(raw, PreparedImage):
+            planes = {"background": raw.background, "response": raw.response}
+            found |= {name: plane for name, plane in planes.items() if plane is not None}
+            counted = raw.reasons < Reason.OUTSIDE  # dark ones do: no light is a measurement
+            found |= {} if counted.all() else {"weights": counted.astype(np.float32)}
         return cls(**{**found, **known})
 
     @property

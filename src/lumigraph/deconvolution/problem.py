@@ -47,8 +47,8 @@ class Scale:
     gain: float
 
     @classmethod
-    def of(cls, operator: Linear, exposure: Exposure, like: Array) -> "Scale":
-        """Of an operator, in the library and precision of an array."""
+    def of(cls, operator: Linear, exposure: Exposure, like: Array, least: float = UNSEEN) -> "Scale":
+        """Of an operator, in the library and precision of an array; see `UNSEEN` for `least`."""
         shape, xp = tuple(operator.shape[0]), arrays.namespace(like)
         response = _plane("response", exposure.response, shape, like)
         weights = _plane("weights", exposure.weights, shape, like)
@@ -62,7 +62,7 @@ class Scale:
         highest = float(xp.max(sensitivity))
         if not highest > 0:
             raise GeometryError("no light of the object reaches a pixel that counts. Check grid and weights.")
-        seen = sensitivity > UNSEEN * highest
+        seen = sensitivity > least * highest
         total = background + exposure.offset
         if getattr(total, "shape", ()):  # a dark image's noise may reach below the black level
             total = xp.where(total > 0, total, xp.zeros_like(total))

@@ -5,6 +5,7 @@
 - `from_focus`: refocus factors from the sharpness of a focal stack; `point_alpha` for a picture of one
   point, and `BiasCurve`, which corrects what diffraction does to either
 - `correlation`: patch sizes of a plenoptic 2.0 camera's lenslets, from neighbouring micro-images
+- `bias`: `unbiased`, a map corrected by planes of known depth
 - `fuse`: several maps as one, smooth but for kinks and jumps
 - `metric`: distances through the camera's geometry: metres, virtual depths, points in space
 - `pictures`, `sweep`, `lines`: the steps of `epi`: even views, a plane sweep, least squares on all views
@@ -13,11 +14,12 @@
 """
 
 from lumigraph.core.depth_map import DepthMap
+from lumigraph.depth.bias import unbiased
 from lumigraph.depth.correlation import correlation
 from lumigraph.depth.epi import epi
 from lumigraph.depth.from_focus import BiasCurve, from_focus, point_alpha, sharpness
 from lumigraph.depth.fuse import fuse
-from lumigraph.depth.metric import cloud, metric, virtual_depth
+from lumigraph.depth.metric import cloud, defocus, metric, virtual_depth
 from lumigraph.depth.quantities import alpha_of, disparity_of
 
 __all__ = [
@@ -26,6 +28,7 @@ __all__ = [
     "alpha_of",
     "cloud",
     "correlation",
+    "defocus",
     "disparity_of",
     "epi",
     "from_focus",
@@ -33,5 +36,6 @@ __all__ = [
     "metric",
     "point_alpha",
     "sharpness",
+    "unbiased",
     "virtual_depth",
 ]

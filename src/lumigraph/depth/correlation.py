@@ -14,6 +14,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.depth.smooth import Stiffness, update
 from lumigraph.depth.volume import Progress, cheapest, semi_global, silent
 from lumigraph.errors import CalibrationError, GeometryError
+from lumigraph.preparation import of_raw
 from lumigraph.rendering import lenslet_indices
 from lumigraph.rendering.decode import check_raw
 from lumigraph.rendering.interpolate import as_float, sample
@@ -27,6 +28,7 @@ _BEND = 0.01  # of the correlation's peak: what a texture of waves 60 px long ha
 _NOISE = 0.01  # of the picture's white
 
 
+@of_raw
 def correlation(
     raw: RawImage | Array,
     calibration: Calibration,

@@ -87,6 +87,22 @@ def metric(
     return found.replaced(distance - checks.positive("object_distance", focused), "depth")
 
 
+def defocus(found: DepthMap, views: LightField, depth_per_alpha: Callable[[float], float]) -> DepthMap:
+    """Depth of each place before a microscope from the focused plane [m], positive farther.
+
+    Parameters
+    ----------
+    found
+        Disparities or refocus factors.
+    views
+        What they were measured on.
+    depth_per_alpha
+        Metres per unit of α' of views with a separation [m]: `LightFieldMicroscope.depth_per_alpha`.
+    """
+    alpha = to_numpy(alpha_of(found, views).values).astype(float)
+    return found.replaced((alpha - 1) * depth_per_alpha(views.separation), "depth")
+
+
 def _views(source: LightField | Calibration) -> LightField:
     checks.instance("source", source, LightField)
     assert isinstance(source, LightField)

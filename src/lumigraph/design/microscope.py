@@ -25,6 +25,42 @@ SPARROW = 0.47
 """Distance of two points that just merge into one peak, in units of λ/NA (Sparrow's criterion)."""
 
 
+def depth_per_alpha(
+    magnification: float, aperture: tuple[float, float], distances: tuple[float, float]
+) -> float:
+    r"""Depth of an object over α' - 1 of the picture that it is sharp in [m], positive farther.
+
+    .. math:: \frac{\Delta z}{\alpha' - 1} = \frac{n (F + b)}{k M^2}, \qquad
+              k = \frac{4}{s^4} \left(\frac{2}{3} - c + \frac{c^3}{3}\right)
+
+    A view sees the object under sin θ = s' and moves it by Δz tan θ; k is the slope of tan θ over sin θ by
+    least squares in the pupil, with s = NA/n and c² = 1 - s²: 1 for a small aperture.
+
+    Parameters
+    ----------
+    magnification
+        From the object to the lenslets, M.
+    aperture
+        Numerical aperture and index of the medium (NA, n).
+    distances
+        Views to lenslets as the light field counts it, F (`LightField.separation`), and lenslets to sensor,
+        b [m].
+
+    Examples
+    --------
+    >>> round(depth_per_alpha(20, (0.01, 1.0), (0.04, 0.002)) * 1e6, 2)
+    105.0
+    """
+    (na, index), (separation, b) = aperture, distances
+    s = checks.positive("the numerical aperture", na, "1") / checks.positive("index", index, "1")
+    if s >= 1:
+        raise GeometryError(f"the numerical aperture {na:g} is not below the index {index:g}. Change one.")
+    c = math.sqrt(1 - s**2)
+    # 2/3 - c + c³/3 = (1 - c)² (2 + c)/3 and s² = (1 - c)(1 + c): nothing cancels in a small aperture.
+    slope = 4 * (2 + c) / (3 * (1 + c) ** 2)
+    return index * (separation + b) / (slope * magnification**2)
+
+
 def tube_lens(maker: str) -> float:
     """Focal length of the maker's tube lens [m].
 

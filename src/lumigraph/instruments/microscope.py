@@ -276,6 +276,24 @@ class LightFieldMicroscope(Instrument):
         """
         return self._each(closed_forms.low_pass_distance, depths)
 
+    def depth_per_alpha(self, separation: float) -> float:
+        """Depth from the focused plane over α' - 1, of views with a separation [m]; positive farther.
+
+        See `design.microscope.depth_per_alpha`.
+
+        Raises
+        ------
+        GeometryError
+            Configuration "2.0" or "fourier", whose raw images are not decoded into views.
+        """
+        if self.configuration != "1.0":
+            raise GeometryError(
+                f"refocus factors are of configuration '1.0', not {self.configuration!r}. "
+                "Use deconvolve for depths."
+            )
+        aperture = (self.objective.numerical_aperture, self.objective.immersion_index)
+        return closed_forms.depth_per_alpha(self.magnification, aperture, (separation, self.lenslet_distance))
+
     def _each(self, closed_form: Callable[..., float], depths: Sequence[float]) -> tuple[float, ...]:
         aperture = (self.objective.numerical_aperture, self.objective.immersion_index)
         return tuple(closed_form(self.wavelength, aperture, self.lenslet_size, dz) for dz in depths)

@@ -139,7 +139,7 @@ def calibration(found: dict[str, Any]) -> Calibration:
         indices = source.nominal_indices(Path("its metadata"), lattice, stored.shape)
         return Calibration(
             lattice, stored.shape, indices, lattice.position(indices), 0.0, stored.pixel_pitch, separation,
-            distance, notes=(_NOTE,),
+            distance, notes=(_NOTE,), by_maker=True,
         )  # fmt: skip
     except LumigraphError as error:
         raise FormatError(f"its lenslets make no lattice: {error}") from error

@@ -56,7 +56,16 @@ def load(
     )
     indices = source.nominal_indices(path, lattice, shape)
     return Calibration(
-        lattice, shape, indices, lattice.position(indices), 0.0, pixel, separation, distance, notes=(_NOTE,)
+        lattice,
+        shape,
+        indices,
+        lattice.position(indices),
+        0.0,
+        pixel,
+        separation,
+        distance,
+        notes=(_NOTE,),
+        by_maker=True,
     )
 
 

@@ -57,7 +57,7 @@ def load(
     with source.decoding(path, "a Raytrix calibration"):
         lattice = Lattice(_basis(path, root, diameter, rotation), origin, "hex", _kinds(root))
     indices = source.nominal_indices(path, lattice, shape)
-    return Calibration(lattice, shape, indices, lattice.position(indices), 0.0, notes=(_NOTE,))
+    return Calibration(lattice, shape, indices, lattice.position(indices), 0.0, notes=(_NOTE,), by_maker=True)
 
 
 def contents(path: Path) -> list[tuple[str, str, str]]:

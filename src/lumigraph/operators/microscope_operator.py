@@ -9,7 +9,7 @@ through the lenslets' frequencies instead (`microscope_spectrum`), with the same
 import hashlib
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -97,6 +97,40 @@ class MicroscopeOperator(Linear):
         """Of the kernels, of the lenslets' frequencies where they are used, and of an image [bytes]."""
         spectra = microscope_spectrum.matrix_numbers(self.kernels, self.cells) if self.by_frequency else 0
         return self.nbytes + 4.0 * (spectra + 3 * sum(math.prod(shape) for shape in self.shape))
+
+    @property
+    def reach(self) -> int:
+        """Lenslets that light goes to either side of the one that it is before, at most."""
+        return max(map(_reach, self.kernels))
+
+    def widened(self) -> "tuple[MicroscopeOperator, tuple[slice, slice]]":
+        """The same raw image of an object that reaches as far beyond the lenslets as light comes from.
+
+        A picture is a crop of what the lenslets see: light comes in from objects beside it, and a model
+        without them explains it by objects at the border.
+
+        Returns
+        -------
+        tuple
+            The operator, and where its object (y, x) is that of this one.
+        """
+        margin, s = self.reach, self.kernels[0].sampling.points
+        if "wide" not in self._spectra:
+            self._spectra["wide"] = self._with_margin(margin)
+        rows, columns = (slice(margin * s, (margin + n) * s) for n in self.cells)
+        return self._spectra["wide"], (rows, columns)
+
+    def _with_margin(self, margin: int) -> "MicroscopeOperator":
+        sampling, grid = self.kernels[0].sampling, self.object_grid
+        cells = (self.cells[0] + 2 * margin, self.cells[1] + 2 * margin)
+        if grid is not None:
+            grid = Grid((cells[0] * sampling.points, cells[1] * sampling.points), grid.pitch, grid.center)
+        ny, nx = self.shape[0]
+        placement = self.placement or PixelPlacement.every((ny, nx))
+        return replace(
+            self, cells=cells, object_grid=grid, placement=placement.widened(margin * sampling.pixels),
+            by_frequency=_suits_frequencies(self.kernels, cells), _spectra={},
+        )  # fmt: skip
 
     def _forward(self, intensity: Array) -> Array:
         volume = intensity if self.depths is not None else intensity[None, ...]

@@ -59,6 +59,22 @@ class PixelPlacement:
         middle = calibration.position((first + last) / 2)
         return cls((ny, nx), samples, _interpolation(at, samples)), cells, middle
 
+    @classmethod
+    def every(cls, shape: tuple[int, int]) -> "PixelPlacement":
+        """Of pixels (ny, nx) that are the samples themselves."""
+        count = math.prod(shape)
+        ones, start = np.ones(count, np.float32), np.arange(count + 1)
+        return cls(shape, shape, csr_array((ones, start[:-1], start), shape=(count, count)))
+
+    def widened(self, margin: int) -> "PixelPlacement":
+        """The same pixels among samples that reach `margin` farther to each side."""
+        rows, columns = (n + 2 * margin for n in self.samples)
+        y, x = np.divmod(np.asarray(self.matrix.indices, np.int64), self.samples[1])
+        indices = (y + margin) * columns + x + margin
+        shape = (math.prod(self.shape), rows * columns)
+        matrix = csr_array((self.matrix.data, indices, self.matrix.indptr), shape=shape)
+        return PixelPlacement(self.shape, (rows, columns), matrix)
+
     def forward(self, plane: Array) -> Array:
         """Pixels (ny, nx) from samples (rows, columns)."""
         return arrays.namespace(plane).reshape(self._applied(plane, transposed=False), self.shape)

@@ -1,17 +1,17 @@
 """A plenoptic 1.0 raw image to the light field it holds, resampled on the true micro-image lattice."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, is_complex, is_single, namespace
 from lumigraph.core.calibration import Calibration
-from lumigraph.core.drift import check_drift
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.lightfield import LightField
+from lumigraph.core.prepared import PreparedImage, Reason
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.rendering.geometry import Frame, lenslet_rectangle, transposed
@@ -61,7 +61,8 @@ def decode(
         "linear" (bilinear), "cubic" or "band_limited", between pixels and between lenslets.
     bad
         Pixels (y, x) to leave out, true or false, such as `hot_pixels` finds. They are filled from their
-        neighbours, and samples that rest on them for more than half are marked in ``valid``.
+        neighbours, and samples that rest on them for more than half are marked in ``valid``. Left out, those
+        that `lumigraph.prepare` found dead.
 
     Returns
     -------
@@ -72,14 +73,12 @@ def decode(
     Warns
     -----
     SamplingWarning
-        The raw image looks like that of a camera 2.0, which is not decoded but rendered; or its own lattice
-        of dark gaps slips a little against the calibration's.
+        The raw image looks like that of a camera 2.0, which is not decoded but rendered.
 
     Raises
     ------
     CalibrationError
-        The raw image has another size than the white image, its own lattice slips by more than half a pitch
-        (`calibration.drift`), it has NaN, or a Bayer pattern; bad has another size.
+        The raw image has another size than the white image, NaN, or a Bayer pattern; bad has another size.
     LumigraphError
         It would not fit in memory.
 
@@ -101,6 +100,9 @@ def decode(
     samples = checks.whole("samples", samples)
     warn_if_focused(raw.data, calibration)
     data, mask = as_float(raw.data), None
+    if isinstance(raw, PreparedImage):
+        calibration = _without_dark(raw, calibration)
+        bad = raw.dead if bad is None and raw.dead.any() else bad
     if bad is not None:
         mask = checked_mask(bad, raw)
         data = repaired(data, mask)
@@ -116,6 +118,16 @@ def decode(
     data = xp.permute_dims(views.data, (1, 0, 3, 2, *(4 for _ in extra)))
     valid = None if views.valid is None else xp.permute_dims(views.valid, (1, 0, 3, 2))
     return LightField(data, _exchanged(views.aperture), _exchanged(views.lenslets), views.separation, valid)
+
+
+def _without_dark(ready: PreparedImage, calibration: Calibration) -> Calibration:
+    """The calibration that also misses lenslets whose pixels are dark in the white image, or dead."""
+    if ready.lenslets is None:
+        return calibration
+    lost = np.isin(ready.lenslets.reasons, (Reason.DARK, Reason.MASKED, Reason.DEAD))
+    if not lost.any():
+        return calibration
+    return replace(calibration, missing=np.concatenate([calibration.missing, ready.lenslets.indices[lost]]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +172,6 @@ def check_raw(raw: RawImage, calibration: Calibration) -> None:
             f"the raw image has a Bayer pattern ({raw.bayer}): its neighbours have different colours. "
             "Demosaic it to (y, x, 3) first: lg.demosaic(raw)."
         )
-    check_drift(raw.data, calibration)
 
 
 @dataclass(frozen=True, slots=True)

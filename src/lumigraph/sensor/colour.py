@@ -119,7 +119,8 @@ def demosaic(
     kind = np.float64 if data.dtype == np.float64 else np.float32
     what = f"a colour picture of {data.shape[0]} x {data.shape[1]} pixels"
     memory.require(3 * data.size * np.dtype(kind).itemsize, what, "Crop it.", FormatError)
-    black, scale = _levels(raw, pattern)
+    black, white = levels(raw)
+    scale = 1 / (white - black)
     gains = _gains(raw.metadata.get("white_balance"), pattern) if white_balance else np.ones((2, 2))
     matrix = _matrix(raw.metadata.get("colour_matrix")) if colour_matrix else np.eye(3)
     decode, picture = _library(method), np.empty((*data.shape, 3), kind)
@@ -149,14 +150,26 @@ def _mirrored(start: int, stop: int, n: int) -> np.ndarray:
     return np.minimum(index, 2 * n - 2 - index)
 
 
-def _levels(raw: RawImage, pattern: str) -> tuple[np.ndarray, np.ndarray]:
-    """Black level (2, 2), and one over white minus black (2, 2), of the first 2 x 2 pixels."""
-    full = float(2**raw.bit_depth - 1) if raw.bit_depth is not None else 1.0
+def levels(raw: RawImage) -> tuple[np.ndarray, np.ndarray]:
+    """What the first 2 x 2 pixels of a raw image read without light, and at most (2, 2), as it records them.
+
+    Parameters
+    ----------
+    raw
+        Its metadata may hold ``black_level`` and ``white_level``; else 0, and the largest number of the
+        bits, 1 for floats.
+
+    Raises
+    ------
+    FormatError
+        A white level that is not above the black one, or levels that are no numbers.
+    """
+    full, pattern = float(2**raw.bit_depth - 1) if raw.bit_depth is not None else 1.0, raw.bayer or "RGGB"
     black = _sites("black_level", raw.metadata.get("black_level", 0.0), pattern)
     white = _sites("white_level", raw.metadata.get("white_level", full), pattern)
     if (white <= black).any():
         raise FormatError(f"white_level {white.tolist()} must be above black_level {black.tolist()}.")
-    return black, 1 / (white - black)
+    return black, white
 
 
 def _gains(recorded: Any, pattern: str) -> np.ndarray:

@@ -4,11 +4,13 @@
 - `microscope_scene`: scenes before a light-field microscope
 - `spectrum`: `Spectrum`, light of several wavelengths, colour sensors
 - `coherence`: `Incoherent`, `Coherent`, `Snapshots`, `TiltedWaves`: how the scene's light interferes
+- `known_planes`: `plane_views`, textured planes at known depths
 - `directions`: quasi-random directions of tilted waves, more of them where more light comes from
 """
 
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Snapshots, TiltedWaves
 from lumigraph.simulation.imaging import Interrupted, simulate
+from lumigraph.simulation.known_planes import plane_views
 from lumigraph.simulation.spectrum import Spectrum
 
 __all__ = [
@@ -19,5 +21,6 @@ __all__ = [
     "Snapshots",
     "Spectrum",
     "TiltedWaves",
+    "plane_views",
     "simulate",
 ]

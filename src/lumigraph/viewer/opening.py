@@ -14,10 +14,12 @@ from lumigraph.core import checks
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
+from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError, SamplingWarning
+from lumigraph.preparation import Given, prepare
 from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_map
 
 Progress = Callable[[str, float], None]
@@ -33,21 +35,27 @@ _LABELS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Origin:
+@dataclass(frozen=True)
+class Origin(Given):
     """What a raw image needs to become views or pictures.
 
     Parameters
     ----------
-    calibration, white
-        File of a calibration, and of a white image, which a raw image is divided by.
+    calibration, white, dark
+        Files.
+    camera
+        Its description.
     patch
         Of a camera 2.0 [px]: pictures with patches about this size.
     """
 
-    calibration: Path | None = None
-    white: Path | None = None
+    camera: Any = None
     patch: float | None = None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether anything tells where micro-images stand."""
+        return any(one is not None for one in (self.camera, self.calibration, self.white))
 
 
 def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | None = None) -> Exhibit:
@@ -78,7 +86,8 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
         return _raw(path.name, found, origin or Origin(), tell)
     if origin not in (None, Origin()):
         raise FormatError(
-            f"{path} holds no raw image, so that --calibration, --white and --patch have no use."
+            f"{path} holds no raw image, so that --calibration, --white, --dark, --camera and --patch have "
+            "no use."
         )
     match found:
         case LightField():
@@ -126,15 +135,17 @@ def of_raw(
 ) -> Exhibit:
     """A raw image; with a calibration also its views, or (camera 2.0) pictures with patches about `patch`."""
     checks.finite_array(name, raw.data, FormatError)
+    if calibration is not None and not isinstance(raw, PreparedImage):
+        raw = prepare(raw, calibration)
     facts = (
         ("Raw image", f"{_size(raw.shape)}" + (f", Bayer {raw.bayer}" if raw.bayer else "")),
         ("Numbers", _numbers(raw.data)),
         *((("Pixels", f"{raw.pixel_pitch * 1e6:.4g} µm"),) if raw.pixel_pitch else ()),
         *(tuple(_split(line) for line in calibration.report().splitlines()) if calibration else ()),
+        *((("Prepared", note) for note in raw.notes) if isinstance(raw, PreparedImage) else ()),
     )  # fmt: skip
-    if calibration is None or raw.bayer is not None:
-        return Exhibit(name, raw=raw, calibration=calibration, facts=facts)
-    calibration.check_fits(raw.shape)
+    if calibration is None:
+        return Exhibit(name, raw=raw, facts=facts)
     patch = patch if patch is not None else _own_patch(raw, calibration)
     if patch is not None:
         planes = rendered(raw, calibration, patch)
@@ -192,34 +203,12 @@ def _simulated(path: Path, tell: Progress) -> Exhibit:
 
 
 def _raw(name: str, raw: RawImage, origin: Origin, tell: Progress) -> Exhibit:
-    from lumigraph import calibration as verbs
-
-    white = None if origin.white is None else _white(origin.white)
-    found = None
-    if origin.calibration is not None:
-        found = _calibration(origin.calibration, raw)
-    elif white is not None:
-        tell("calibrating", 0.3)
-        found = verbs.calibrate(white)
-    if white is not None and raw.bayer is None:
-        raw = verbs.devignette(raw, white)
+    if not origin.is_known:
+        return of_raw(name, raw)
+    tell("calibrating", 0.3)
+    ready = origin.prepared(raw, camera=origin.camera)
     tell("decoding", 0.6)
-    return of_raw(name, raw, found, origin.patch)
-
-
-def _white(path: Path) -> RawImage:
-    white = io.open(path)
-    if not isinstance(white, RawImage):
-        raise FormatError(f"{path} holds a {type(white).__name__} where a white image is needed.")
-    return white
-
-
-def _calibration(path: Path, raw: RawImage) -> Calibration:
-    """A calibration; makers' files do not say how large their raw images are."""
-    found: Any = io.open(path, shape=raw.shape if path.suffix.lower() in (".xml", ".ini") else None)
-    if not isinstance(found, Calibration):
-        raise FormatError(f"{path} holds a {type(found).__name__} where a calibration is needed.")
-    return found
+    return of_raw(name, ready, ready.calibration, origin.patch)
 
 
 def _own_patch(raw: RawImage, calibration: Calibration) -> float | None:

@@ -1,0 +1,98 @@
+"""A raw image that is ready to use: which pixels and lenslets count, and why the others do not."""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+
+from lumigraph.core.arrays import Array
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.raw import RawImage
+
+
+class Reason(IntEnum):
+    """Why a pixel or a lenslet does not count; the highest that applies.
+
+    - good: it counts
+    - dark: the white image has no light there: gaps between micro-images, vignetted corners
+    - outside: it belongs to a lenslet whose centre is not on the picture
+    - masked: left out on request, such as what is not in a region of interest
+    - saturated: at the highest value that the bits can hold
+    - dead: it shines without light, stays dark in light, or stands in a border that was never read
+    """
+
+    GOOD = 0
+    DARK = 1
+    OUTSIDE = 2
+    MASKED = 3
+    SATURATED = 4
+    DEAD = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdicts:
+    """A `Reason` for each lenslet whose centre is on the picture.
+
+    Parameters
+    ----------
+    indices
+        Lenslets (k, 2) as (i, j).
+    reasons
+        Of each (k,), uint8.
+    """
+
+    indices: np.ndarray
+    reasons: np.ndarray
+
+    @property
+    def valid(self) -> np.ndarray:
+        """Which lenslets count (k,), true or false."""
+        return self.reasons == Reason.GOOD
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedImage(RawImage):
+    """A raw image that `lumigraph.prepare` has looked at.
+
+    Parameters
+    ----------
+    calibration
+        Where its micro-images stand; None where nothing says so.
+    reasons
+        A `Reason` for each pixel (y, x), uint8.
+    lenslets
+        A `Reason` for each lenslet; None without a calibration.
+    background
+        What its pixels read without light, in its values: a number or (y, x); None where unknown, 0 where
+        it has been subtracted.
+    response
+        Light that reaches each micro-image (y, x), up to 1; None where unknown, or divided out.
+    notes
+        What was done and found, one sentence each.
+    """
+
+    calibration: Calibration | None = None
+    reasons: np.ndarray = field(default_factory=lambda: np.zeros((1, 1), np.uint8))
+    lenslets: Verdicts | None = None
+    background: float | Array | None = None
+    response: Array | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def valid(self) -> np.ndarray:
+        """Which pixels count (y, x), true or false."""
+        return self.reasons == Reason.GOOD
+
+    @property
+    def dead(self) -> np.ndarray:
+        """Pixels (y, x) that pictures leave out, true or false: a saturated one is bright all the same."""
+        return (self.reasons == Reason.DEAD) | (self.reasons == Reason.MASKED)
+
+    def counts(self) -> dict[str, tuple[int, int]]:
+        """Pixels and lenslets of each reason but good, by its name."""
+        lenslets = np.zeros(0, np.uint8) if self.lenslets is None else self.lenslets.reasons
+        return {
+            reason.name.lower(): (int((self.reasons == reason).sum()), int((lenslets == reason).sum()))
+            for reason in Reason
+            if reason is not Reason.GOOD
+        }

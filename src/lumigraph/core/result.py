@@ -1,0 +1,140 @@
+"""What a verb found: `Result`, which text, JSON, reports and notebooks read."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A named value.
+
+    Parameters
+    ----------
+    name
+        As programs read it, such as "pitch_px".
+    value
+        Number, text, or several of them; lengths in metres.
+    unit
+        "m", "px", "1", ...; empty for what has none.
+    interval
+        The range that holds it, low and high, in the same unit; None where it is not known.
+
+    Examples
+    --------
+    >>> str(Quantity("spacing", 6.5e-6, "m")), Quantity("spacing", 6.5e-6, "m").label
+    ('6.5 µm', 'spacing')
+    >>> str(Quantity("slope", 2.0, "px", (1.9, 2.2)))
+    '2 px (1.9 to 2.2)'
+    """
+
+    name: str
+    value: Any
+    unit: str = ""
+    interval: tuple[float, float] | None = None
+
+    @property
+    def label(self) -> str:
+        """The name as people read it."""
+        return self.name.removesuffix("_px").replace("_", " ")
+
+    def __str__(self) -> str:
+        several = isinstance(self.value, tuple | list)
+        text = " to ".join(map(self._one, _ends(self.value))) if several else self._one(self.value)
+        return text if self.interval is None else f"{text} ({' to '.join(map(self._bare, self.interval))})"
+
+    def _one(self, value: Any) -> str:
+        if self.unit == "m" and (value is None or isinstance(value, float)):
+            from lumigraph.core import picture  # brings SciPy, which a command line's --help does without
+
+            return picture.length(value)
+        return f"{self._bare(value)} {self.unit}".rstrip()
+
+    @staticmethod
+    def _bare(value: Any) -> str:
+        return f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def _ends(values: Any) -> list[Any]:
+    return list(values) if len(values) < 3 else [values[0], values[-1]]
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A picture of a report, under a heading of its own or beside the one before.
+
+    Parameters
+    ----------
+    image
+        An array (y, x[, 3]), a `RawImage`, a matplotlib figure, text that keeps its lines, or
+        the rows of a table, its header first.
+    caption
+        What it shows.
+    section
+        Heading that it stands under.
+    options
+        As `report.pictures.picture` takes them.
+    """
+
+    image: Any
+    caption: str = ""
+    section: str = "Pictures"
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Result:
+    """What a verb found.
+
+    Parameters
+    ----------
+    title, about
+        Of a report: a word, and a sentence.
+    thing
+        What was made: views, a picture, a volume, a map, ...
+    headline
+        Lines that people read first.
+    quantities
+        Named values.
+    figures
+        Gives the pictures of a report; called only for one.
+    notes
+        What was done and what to know, one sentence each.
+    written
+        Files.
+    extra
+        What only programs read.
+    """
+
+    title: str
+    about: str
+    thing: Any = None
+    headline: tuple[str, ...] = ()
+    quantities: tuple[Quantity, ...] = ()
+    figures: Callable[[], Iterable[Figure]] = tuple
+    notes: tuple[str, ...] = ()
+    written: tuple[Path, ...] = ()
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+    def text(self) -> str:
+        """What people read on a terminal."""
+        notes = (f"note: {note}" for note in self.notes)
+        return "\n".join((*self.headline, *notes, *(f"written {path}" for path in self.written)))
+
+    def values(self) -> dict[str, Any]:
+        """What programs read: values by name, lengths in metres, intervals as name_interval."""
+        found: dict[str, Any] = {one.name: one.value for one in self.quantities}
+        found |= {f"{one.name}_interval": one.interval for one in self.quantities if one.interval}
+        found |= self.extra
+        if self.notes:
+            found["notes"] = self.notes
+        if self.written:
+            paths = [str(path) for path in self.written]
+            found["output"] = paths[0] if len(paths) == 1 else paths
+        return found
+
+    def _repr_html_(self) -> str:
+        from lumigraph.core import picture
+
+        return picture.card(self.title, [(one.label, str(one)) for one in self.quantities])

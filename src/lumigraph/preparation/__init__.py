@@ -1,0 +1,34 @@
+"""One way in for a raw image: ready for every verb, the viewer and Python.
+
+- `prepare`: `prepare`, a raw image and what is known of it as one `PreparedImage`; `of_raw`, functions of
+  raw images that prepare what comes unprepared
+- `validity`: which pixels and lenslets count, and why the others do not
+- `drift`: the lattice that a raw image carries itself, beside that of a calibration
+- `agreement`: what a picture says about the camera that its file describes
+- `vignetting`: how much light reaches each micro-image
+- `beside`: the pictures that come with a raw image
+- `given`: the files that come with a raw image
+"""
+
+from lumigraph.core.prepared import PreparedImage, Reason
+from lumigraph.preparation.agreement import implied
+from lumigraph.preparation.given import Given, read_calibration, read_pages, read_raw
+from lumigraph.preparation.prepare import decode, of_raw, prepare, render, render_stack, super_resolve
+from lumigraph.preparation.vignetting import vignetting
+
+__all__ = [
+    "Given",
+    "PreparedImage",
+    "Reason",
+    "decode",
+    "implied",
+    "of_raw",
+    "prepare",
+    "read_calibration",
+    "read_pages",
+    "read_raw",
+    "render",
+    "render_stack",
+    "super_resolve",
+    "vignetting",
+]

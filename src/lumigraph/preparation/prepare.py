@@ -1,0 +1,212 @@
+"""`prepare`: a raw image, and what is known of it, ready to use."""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+import numpy as np
+
+from lumigraph import rendering
+from lumigraph.calibration import aligned, calibrate, devignette
+from lumigraph.calibration.devignette import as_raw
+from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.drift import check_drift
+from lumigraph.core.prepared import PreparedImage, Reason, Verdicts
+from lumigraph.core.raw import RawImage
+from lumigraph.errors import CalibrationError, SamplingWarning
+from lumigraph.preparation.agreement import implied
+from lumigraph.preparation.beside import Beside, above, black_plane, coloured
+from lumigraph.preparation.validity import pixel_reasons, verdicts
+from lumigraph.preparation.vignetting import vignetting
+
+Options = ParamSpec("Options")
+Made = TypeVar("Made")
+
+
+def prepare(
+    raw: RawImage | Array,
+    calibration: Calibration | None = None,
+    *,
+    white: RawImage | Array | None = None,
+    dark: RawImage | Array | None = None,
+    camera: Any | None = None,
+    mask: Array | None = None,
+    divide: bool = True,
+) -> PreparedImage:
+    """A raw image that is ready to use, with its calibration, valid pixels and lenslets, and notes.
+
+    The lattice is that of `calibration`, else it is found on the white image, else it is the camera's. A
+    maker's is moved to the micro-images. It is compared with the raw image's own lattice where that shows,
+    and with the camera's. The dark image is subtracted, the white image divided out, a mosaic demosaiced.
+
+    Parameters
+    ----------
+    raw
+        As it was read (y, x[, c]).
+    calibration
+        Where the micro-images stand.
+    white
+        Picture of an evenly lit surface with the same settings.
+    dark
+        Picture with the lens covered: tells which pixels shine by themselves, too.
+    camera
+        Its description: gives lengths, and the lattice where nothing else does.
+    mask
+        Pixels to use (y, x), true or false; None for all.
+    divide
+        False leaves the values as they were read, for `lumigraph.deconvolve`, whose model takes the
+        `background` and the `response` instead: dividing would spoil the statistics of the noise.
+
+    Returns
+    -------
+    PreparedImage
+        A `RawImage` that also has `calibration`, `valid`, `reasons`, `lenslets` and `notes`.
+
+    Raises
+    ------
+    CalibrationError
+        Another size, a lattice that slips by half a pitch or more against the raw image's own, a white
+        image without light, values that are not finite.
+
+    Warns
+    -----
+    SamplingWarning
+        The lattice slips a little, a maker's lattice was moved, or picture and camera disagree.
+
+    Examples
+    --------
+    >>> import lumigraph as lg
+    >>> camera = lg.PlenopticCamera.from_catalogue("thesis-plenoptic-1").replace(
+    ...     lenslets={"pitch": "150 um", "focal_length": "5 mm", "count": (5, 5)})
+    >>> ready = prepare(np.ones(camera.sensor.shape, np.float32), camera=camera)
+    >>> ready.valid.shape == camera.sensor.shape, ready.notes[0]
+    (True, 'the lattice is that of the camera file')
+    """
+    beside = Beside(*(None if one is None else as_raw(one) for one in (white, dark)))
+    raw = as_raw(raw)
+    beside.check(raw)
+    found, notes = _placed(raw, calibration, beside.white, camera)
+    reasons = pixel_reasons(raw, beside, found, _mask(mask, raw))
+    lenslets = None if found is None else verdicts(reasons, found)
+    notes = (*notes, *beside.notes(raw, divide=divide), *_counted(reasons, lenslets))
+    known: dict[str, Any] = {"calibration": found, "reasons": reasons, "lenslets": lenslets, "notes": notes}
+    if divide:
+        ready = _pictured(raw, beside)
+    else:
+        ready, known = raw, known | _modelled(raw, beside, found)
+    return PreparedImage(ready.data, ready.pixel_pitch, ready.bit_depth, ready.bayer, ready.metadata, **known)
+
+
+def _placed(
+    raw: RawImage, calibration: Calibration | None, white: RawImage | None, camera: Any | None
+) -> tuple[Calibration | None, list[str]]:
+    """Where the micro-images stand, by whom, and whether raw image and camera agree."""
+    if calibration is not None:
+        found, notes = calibration, ["the lattice is that of the calibration"]
+    elif white is not None:
+        found = calibrate(white)
+        notes = ["the lattice was found on the white image", *found.notes]
+    elif camera is not None:
+        found, notes = camera.calibration, ["the lattice is that of the camera file"]
+    else:
+        return None, ["where the micro-images stand is not known"]
+    found.check_fits(raw.shape)
+    if found.by_maker:
+        found = aligned(found, raw)
+        if not found.by_maker:
+            _warn(notes, f"the maker's lattice was {found.notes[-1]}")
+    judged = check_drift(raw.data, found)
+    notes += [] if judged is None else [judged.told()]
+    if camera is not None and found is not camera.calibration:
+        line, agree = implied(found, camera)
+        notes.append(line) if agree else _warn(notes, line)
+        found = _with_lengths(found, camera.calibration)
+    return found, notes
+
+
+def _warn(notes: list[str], line: str) -> None:
+    notes.append(line)
+    warnings.warn(line, SamplingWarning, stacklevel=4)
+
+
+def _with_lengths(found: Calibration, told: Calibration) -> Calibration:
+    """The calibration with the lengths of a camera where it has none."""
+    names = ("pixel_pitch", "separation", "lenslet_distance")
+    missing = {name: getattr(told, name) for name in names if getattr(found, name) is None}
+    return replace(found, **missing) if missing else found
+
+
+def _mask(mask: Array | None, raw: RawImage) -> np.ndarray | None:
+    if mask is None:
+        return None
+    used = np.asarray(to_numpy(mask)) != 0
+    if used.shape != raw.shape or not used.any():
+        raise CalibrationError(
+            f"mask has shape {used.shape} and {int(used.sum())} true values but the raw image has "
+            f"{raw.shape[0]} x {raw.shape[1]} pixels. Give true for each pixel to use."
+        )
+    return used
+
+
+def _pictured(raw: RawImage, beside: Beside) -> RawImage:
+    """Values that pictures are made of: above the dark, evenly lit, in colour."""
+    dark = beside.dark or black_plane(raw)
+    if beside.white is not None:
+        even = devignette(raw, beside.white, dark=dark)
+    else:
+        even = raw if dark is None else above(raw, dark)
+    return even if raw.bayer is None else coloured(even, raw)
+
+
+def _modelled(raw: RawImage, beside: Beside, found: Calibration | None) -> dict[str, Any]:
+    """What the model of a deconvolution takes of the dark and the white image."""
+    dark = None if beside.dark is None else np.asarray(to_numpy(beside.dark.data), np.float64)
+    if beside.white is None or found is None:
+        return {"background": dark}
+    white = np.asarray(to_numpy(beside.white.data), np.float64)
+    lit = white - (0.0 if dark is None else dark)
+    return {"background": dark, "response": vignetting(lit, found.lattice.pitch)}
+
+
+def _counted(reasons: np.ndarray, lenslets: Verdicts | None) -> tuple[str, ...]:
+    """How many pixels and lenslets do not count, by reason; nothing where all do."""
+    told = []
+    for reason in Reason:
+        pixels = int((reasons == reason).sum())
+        many = 0 if lenslets is None else int((lenslets.reasons == reason).sum())
+        if reason is not Reason.GOOD and pixels:
+            told.append(f"{reason.name.lower()}: {pixels} of {reasons.size} pixels, {many} lenslets")
+    return tuple(told)
+
+
+def of_raw(function: Callable[Concatenate[RawImage, Calibration, Options], Made]) -> Callable[..., Made]:
+    """The same function of any raw image: one that was not prepared is prepared before.
+
+    The calibration may be left out where `prepare` has found one.
+    """
+
+    @wraps(function)
+    def call(
+        raw: RawImage | Array, calibration: Calibration | None = None,
+        *args: Options.args, **options: Options.kwargs,
+    ) -> Made:  # fmt: skip
+        if not isinstance(raw, PreparedImage):
+            raw = prepare(raw, calibration)
+            calibration = raw.calibration
+        place = calibration or raw.calibration
+        if place is None:
+            raise CalibrationError(
+                "where the micro-images stand is not known. Give a calibration, or prepare(raw, white=...)."
+            )
+        return function(raw, place, *args, **options)
+
+    return call
+
+
+decode = of_raw(rendering.decode)
+render = of_raw(rendering.render)
+render_stack = of_raw(rendering.render_stack)
+super_resolve = of_raw(rendering.super_resolve)
