@@ -33,6 +33,10 @@ def run(context: Context) -> Outcome:
     step = f[1]
     for distance in DISTANCES:
         limit = min(sampling.band_limits(GRID, distance, WAVELENGTH)[1], f[-1])
+        figures.append((_figure(f, distance, limit), f"Wrapped phase at z = {distance / mm:g} mm"))
+        if limit == f[-1]:
+            rows.append(_unaliased(f, distance))
+            continue
         rows.append(
             Row(
                 f"highest frequency without aliasing, z = {distance / mm:g} mm",
@@ -43,7 +47,6 @@ def run(context: Context) -> Outcome:
                 note="within one frequency sample",
             )
         )
-        figures.append((_figure(f, distance, limit), f"Wrapped phase at z = {distance / mm:g} mm"))
     sine = WAVELENGTH / (2 * GRID.pitch[1])
     longest = sampling.longest_distance(GRID, WAVELENGTH) * np.sqrt(1 - sine**2)
     rows.append(
@@ -60,21 +63,31 @@ def run(context: Context) -> Outcome:
     return Outcome(tuple(rows), tuple(figures), WHY)
 
 
-def _phase(f: np.ndarray, distance: float) -> np.ndarray:
-    """Phase of H without its constant [rad], from differences of directions: 2πz (sqrt(1 - λ²f²) - 1)/λ."""
-    s = np.square(WAVELENGTH * f)
-    return -2 * np.pi * distance / WAVELENGTH * s / (1 + np.sqrt(1 - s))
+def _unaliased(f: np.ndarray, distance: float) -> Row:
+    """Where no frequency aliases: the largest step of the phase, below π."""
+    sine = WAVELENGTH * (f[-1] + f[-2]) / 2
+    step = 2 * distance * WAVELENGTH * (f[1] - f[0]) * (f[-1] + f[-2]) / 2 / np.sqrt(1 - sine**2)
+    return Row(
+        f"largest step of the phase over π, z = {distance / mm:g} mm", _steps(f, distance).max() / np.pi, "",
+        expected=step, tolerance=1e-4, note="2 λ z f Δf / sqrt(1 - (λf)²); below 1, unaliased",
+    )  # fmt: skip
+
+
+def _steps(f: np.ndarray, distance: float) -> np.ndarray:
+    """How far the phase of H turns from each frequency to the next [rad], unwrapped on 64 times as many."""
+    fine = np.linspace(f[0], f[-1], 64 * (len(f) - 1) + 1)
+    phase = np.unwrap(np.angle(transfer_function(np.zeros(1), fine, distance, WAVELENGTH)[0]))
+    return np.abs(np.diff(phase[::64]))
 
 
 def _highest(f: np.ndarray, distance: float) -> float:
     """Last frequency before the phase turns by more than π to the next sample."""
-    too_far = np.flatnonzero(np.abs(np.diff(_phase(f, distance))) > np.pi)
-    return float(f[too_far[0]]) if len(too_far) else float(f[-1])
+    return float(f[np.flatnonzero(_steps(f, distance) > np.pi)[0]])
 
 
 def _longest(f: np.ndarray) -> float:
     """Distance at which the last step of the phase is π: the phase grows in proportion to z."""
-    return float(np.pi / np.abs(np.diff(_phase(f, 1.0))).max())
+    return float(np.pi / _steps(f, 1 * mm).max()) * mm
 
 
 def _figure(f: np.ndarray, distance: float, limit: float):

@@ -5,6 +5,7 @@ from decimal import Decimal
 
 from lumigraph.design import plenoptic2, resolution
 from lumigraph.experiments.registry import Context, Outcome, Row, experiment
+from lumigraph.experiments.thesis._lenslet import measured
 from lumigraph.plots.curves import curves
 
 _FOCAL, _PITCH, _WAVELENGTH = 5.2e-3, 150e-6, 633e-9
@@ -70,18 +71,10 @@ def run(context: Context) -> Outcome:
         for column, unit, cell in zip(COLUMNS, _UNITS, cells, strict=True):
             rows.append(_checked(text, column, unit, found[column], cell))
         for column in ("ν main lens", "ν plenoptic"):
-            rows.append(
-                Row(
-                    f"m = {text}: incoherent {column}",
-                    2 * found[column],
-                    "1/m",
-                    None,
-                    2 * MISPRINTS.get((text, column), float(cells[COLUMNS.index(column)])),
-                    2e-3,
-                )
-            )
             lines[column.removeprefix("ν ")].append(2 * found[column] / 1e4)
         magnifications.append(float(text))
+    for m in (0.1, 0.25, 0.5, 1.0):
+        rows += _by_waves(m)
     figure = curves(
         magnifications, lines, xlabel="magnification of the lenslets", ylabel="incoherent cut-off [10⁴ /m]"
     )
@@ -91,6 +84,19 @@ def run(context: Context) -> Outcome:
         why="The table's cut-offs are coherent, 1/(2λF#); all other chapters use the incoherent 1/(λF#), "
         f"shown beside them. {len(MISPRINTS)} cells are misprints, marked as such; at m = 0 a is infinite.",
     )
+
+
+def _by_waves(m: float) -> list[Row]:
+    """The incoherent cut-offs behind a simulated lenslet: twice those of the table."""
+    printed = next(line.split() for line in PRINTED.strip().splitlines() if float(line.split()[0]) == m)
+    main, plenoptic = (float(printed[1 + COLUMNS.index(f"ν {name}")]) for name in ("main lens", "plenoptic"))
+    cells = row(m)
+    found = measured(cells["a"], cells["b"], _WAVELENGTH)[1]
+    return [
+        Row(f"m = {m:g}: incoherent ν {name}, of a wave", value, "1/m", printed, 2 * printed, 0.02 * printed,
+            "twice the printed, coherent one; from the MTF of a simulated lenslet's image")
+        for name, value, printed in (("main lens", found / m, main), ("plenoptic", found, plenoptic))
+    ]  # fmt: skip
 
 
 def row(magnification: float) -> dict[str, float]:
