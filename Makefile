@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test lint format bench reproduce fuzz torch lock clean
+.PHONY: demo test lint format bench reproduce fuzz docs torch lock clean
 .DEFAULT_GOAL := demo
 
 $(READY): requirements.lock pyproject.toml
@@ -47,12 +47,19 @@ reproduce: $(READY)  ## the thesis' experiments at full size, and the long tests
 fuzz: $(READY)  ## 20,000 damaged files for every reader, each in a process of its own with bounds on memory and time
 	$(BIN)/python tests/fuzz/run.py --count 20000
 
+docs: $(READY)  ## the site, with its gallery: site/index.html; strict, without a network once its tools are there
+	@$(BIN)/python -c "import furo, myst_parser, sphinx_gallery" 2>/dev/null || \
+		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r docs/requirements.lock
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html docs site
+
 torch: $(READY)  ## optional: PyTorch, so that the array tests run on it too
 	@$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/python -m pip install --quiet --disable-pip-version-check "torch==2.13.0"
 
 lock: $(READY)  ## compile requirements.lock again (needs uv)
 	uv pip compile --universal --python-version 3.11 --generate-hashes --extra dev --extra video --no-emit-index-url --no-emit-find-links \
 		--custom-compile-command "make lock" -o requirements.lock pyproject.toml
+	uv pip compile --universal --python-version 3.11 --generate-hashes --extra docs --constraint requirements.lock --no-emit-index-url --no-emit-find-links \
+		--custom-compile-command "make lock" -o docs/requirements.lock pyproject.toml
 
 clean:
-	rm -rf .venv demo reproduce build dist
+	rm -rf .venv demo reproduce build dist site docs/gallery docs/api

@@ -116,7 +116,7 @@ def _calibration(source: LightField | Calibration) -> Calibration:
 
 
 def virtual_depth(found: DepthMap, calibration: Calibration) -> DepthMap:
-    """Virtual depth |a'|/b of each lenslet's patch, as the maker of multi-focus cameras counts.
+    """Virtual depth, the size of a'/b, of each lenslet's patch, as the maker of multi-focus cameras counts.
 
     Pitch over patch where the calibration does not know the distances b and L, as for a main lens far away.
     """

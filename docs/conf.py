@@ -1,0 +1,71 @@
+"""The site: `make docs` builds it into site/, strictly and without a network."""
+
+from importlib.metadata import version as _version
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+project = "lumigraph"
+author = "The lumigraph developers"
+release = version = _version("lumigraph")
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "sphinx_gallery.gen_gallery",
+    "sphinx-mathjax-offline",
+]
+html_theme = "furo"
+html_title = "lumigraph"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sourcelink = False
+exclude_patterns = ["_build", "gallery/*.ipynb"]
+templates_path = ["_templates"]
+
+default_role = "code"
+myst_enable_extensions = ["colon_fence", "dollarmath"]
+myst_heading_anchors = 3
+autosummary_generate = True
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_default_options = {"members": True, "show-inheritance": False}
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+suppress_warnings = ["config.cache"]
+
+
+def _figures(block: Any, variables: dict[str, Any], gallery: dict[str, Any]) -> str:
+    """Save the figures that a block of an example has made; lumigraph's own open no window."""
+    from sphinx_gallery.scrapers import figure_rst
+
+    found, known = [], gallery.setdefault("_figures", set())
+    for thing in variables["example_globals"].values():
+        if isinstance(thing, Figure) and id(thing) not in known:
+            known.add(id(thing))
+            path = Path(next(variables["image_path_iterator"]))
+            thing.savefig(path, dpi=110)
+            found.append(str(path))
+    return figure_rst(found, gallery["src_dir"])
+
+
+sphinx_gallery_conf = {
+    "examples_dirs": ["../examples/gallery"],
+    "gallery_dirs": ["gallery"],
+    "filename_pattern": r"\.py$",
+    "image_scrapers": (_figures,),
+    "capture_repr": ("_repr_html_",),
+    "within_subsection_order": "FileNameSortKey",
+    "reset_modules": (),
+    "abort_on_example_error": True,
+    "only_warn_on_example_error": False,
+    "download_all_examples": False,
+    "remove_config_comments": True,
+    "show_memory": False,
+    "min_reported_time": 0,
+}

@@ -1,0 +1,19 @@
+"""
+From the shadow of a hole to its far field
+==========================================
+
+A round hole of 1 mm in light of 633 nm. At distances of a²/(Nλ), N Fresnel zones fit into it: the middle is
+bright for odd N and dark for even N. Much farther, only the Airy pattern is left.
+"""
+
+import lumigraph as lg
+from lumigraph.units import mm, nm, um
+
+grid, wavelength = lg.Grid.square(640, 6.25 * um), 633 * nm
+hole = lg.Field(lg.CircularAperture(1 * mm).transmission(grid, wavelength), grid, wavelength)
+pictures = []
+for zones in (6, 5, 2, 1, 0.5, 0.25):
+    z = (0.5 * mm) ** 2 / (zones * wavelength)
+    image = lg.propagate(hole, z).intensity[200:440, 200:440]
+    pictures.append((image, f"{zones:g} zones, {z:.3g} m"))
+figure = lg.plots.images(pictures, columns=3)

@@ -1,0 +1,20 @@
+"""
+Test charts
+===========
+
+What stands before a camera: each target knows its place in object space.
+"""
+
+import lumigraph as lg
+from lumigraph.units import mm, um
+
+grid = lg.Grid.square(512, 8 * mm / 512)
+charts = {
+    "USAF 1951": lg.targets.usaf1951(grid, 1),
+    "Siemens star": lg.targets.siemens_star(grid),
+    "gratings": lg.targets.gratings(grid, (1e3, 2e3, 4e3)),
+    "slanted edge": lg.targets.slanted_edge(grid),
+    "pinhole": lg.targets.pinhole(grid, 400 * um),
+    "photograph": lg.targets.photo(grid),
+}
+figure = lg.plots.images([(scene.parts[0].intensity, name) for name, scene in charts.items()], columns=3)
