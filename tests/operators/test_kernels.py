@@ -74,7 +74,7 @@ def test_borders_and_corners_add_up_to_what_the_lenslets_there_bring(shape, monk
     reach = optics.reach
     monkeypatch.setattr(Optics, "near", reach)
     parts = kernels._unpacked(kernels._build(optics)).parts
-    builder = blocks._Builder(optics, print, 1)
+    builder = blocks.Builder(optics, print, 1)
     builder.periodic()
     last = optics.cells.image[0] - 1
     for row, column in ((0, 0), (0, 2), (1, 1), (1, 2), (2, 3), (last, 1)):
@@ -84,7 +84,7 @@ def test_borders_and_corners_add_up_to_what_the_lenslets_there_bring(shape, monk
             half = optics.array.extent[k] / 2
             limits.append((-half - middle, half - middle))
         state = (limits[0], limits[1])
-        known = builder._images([state], reach)[state]
+        known = builder.images([state], reach)[state]
         for dy in (-1, 0, 2):
             direct = [known.line(dy)(dx) for dx in range(-1, 2)]
             for dx, expected in zip(range(-1, 2), direct, strict=True):

@@ -10,9 +10,11 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError
 from lumigraph.instruments import PlenopticCamera
-from lumigraph.operators import band, cells, periodic_operator
-from lumigraph.scene import Scene, Slice, targets
-from lumigraph.simulation import Incoherent, Snapshots, imaging, simulate
+from lumigraph.operators import band, cells, kernels, periodic_operator
+from lumigraph.operators.optics import Optics
+from lumigraph.operators.streamed import stream_bytes
+from lumigraph.scene import targets
+from lumigraph.simulation import Snapshots, simulate
 from lumigraph.units import mm, nm, um
 
 focused = partial(cameras.focused, count=(9, 9))
@@ -143,15 +145,35 @@ def test_the_kernel_interpolates_what_the_main_lens_passes():
             assert value == pytest.approx(np.cos(2 * np.pi * frequency * place), abs=2e-5)
 
 
-def test_a_large_operator_gives_way_to_snapshots(monkeypatch):
-    monkeypatch.setattr(imaging, "LARGEST_OPERATOR", 1e6)
-    raw = simulate(CAMERAS["2.0"], Scene([Slice(PATCH, Grid((4, 4), 30 * um))]), Incoherent(3, rng=1))
-    assert raw.metadata["shots"] == 3
+@pytest.mark.parametrize("name", ["2.0, even count, moved", "1.0"])
+def test_what_is_too_large_to_hold_is_streamed_and_gives_the_same(name, monkeypatch, rng):
+    """All blocks, borders and corners among them; the factors leave out a sixth of 1e-2."""
+    camera = CAMERAS[name].replace(lenslets={"count": (6, 7)})
+    held = periodic_operator(camera, camera.object_grid, 1.1 * mm, accuracy=1e-2)
+    seen: list[float] = []
+    monkeypatch.setattr(kernels, "HELD", 0.0)
+    monkeypatch.setattr(kernels, "_MATRICES", type(kernels._MATRICES)())
+    streamed = periodic_operator(camera, camera.object_grid, 1.1 * mm, accuracy=1e-2, progress=seen.append)
+    x, y = (rng.random(shape).astype(np.float32) for shape in reversed(held.shape))
+    seen.clear()
+    image = streamed.forward(x)
+    assert seen == sorted(seen)
+    assert seen[-1] == pytest.approx(1)
+    assert relative(held.forward(x), image) < 3e-3
+    assert relative(held.adjoint(y), streamed.adjoint(y)) < 3e-3
+    left = (image.astype(float) * y).sum()
+    assert left == pytest.approx((x * streamed.adjoint(y).astype(float)).sum(), rel=1e-6)
 
 
 def test_an_operator_that_cannot_fit_is_refused(monkeypatch):
     from lumigraph.core import memory
 
+    camera, grid = CAMERAS["2.0"], Grid((4, 4), 30 * um)
     monkeypatch.setattr(memory, "available", lambda: 1000)
-    with pytest.raises(SamplingError, match="the periodic operator needs"):
-        periodic_operator(CAMERAS["2.0"], Grid((4, 4), 30 * um), 1.234 * mm)
+    with pytest.raises(SamplingError, match=r"the periodic operator needs .* Use slower lenslets"):
+        periodic_operator(camera, grid, 1.234 * mm)
+    optics = [Optics.of(camera, camera.object_distance + 1.234 * mm, accuracy) for accuracy in (1e-4, 1e-5)]
+    between = np.mean([stream_bytes(o) for o in optics])
+    monkeypatch.setattr(memory, "available", lambda: between)
+    with pytest.raises(SamplingError, match=r"An accuracy of 0\.0001 fits: ask for that"):
+        periodic_operator(camera, grid, 1.234 * mm, accuracy=1e-5)

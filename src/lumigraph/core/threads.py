@@ -1,7 +1,8 @@
 """Independent pieces of work side by side, each on one thread."""
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from threading import Lock
 from typing import TypeVar
@@ -20,8 +21,8 @@ def each(
     """``function(item)`` of every item, in order, on some threads: by default one for each processor.
 
     Matrix products inside `function` take one thread each: many small ones run faster so, the more on a busy
-    machine, and their result does not depend on the number of processors. An interruption drops what has
-    not begun.
+    machine, and their result does not depend on the number of processors. No more than two for each thread
+    are begun, or wait to be taken, at a time; an interruption drops what has not begun.
 
     Examples
     --------
@@ -31,7 +32,13 @@ def each(
     with single_products():
         pool = ThreadPoolExecutor(workers, thread_name_prefix="lumigraph")
         try:
-            yield from pool.map(function, items)
+            begun: deque[Future[Result]] = deque()
+            for item in items:
+                begun.append(pool.submit(function, item))
+                if len(begun) >= 2 * workers:
+                    yield begun.popleft().result()
+            while begun:
+                yield begun.popleft().result()
         finally:
             pool.shutdown(cancel_futures=True)
 

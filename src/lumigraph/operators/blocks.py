@@ -32,6 +32,10 @@ from lumigraph.operators.optics import Optics
 from lumigraph.operators.point_images import Apart, Few, Line, Lit, factors, few, lit, mirrored, wave
 
 State = tuple[Limits, Limits]
+"""Limits of the lenslets that exist, along y and along x."""
+
+INSIDE: State = (INFINITE, INFINITE)
+"""Far from all borders."""
 
 Offset = tuple[int, int]
 
@@ -56,7 +60,7 @@ class Part:
     offsets
         (dy, dx, rank): cells from the image's to the object's, row by row, and the factors' columns for it.
     left
-        (points, R) with the ranks side by side.
+        (points, R) with the ranks side by side; None for one offset whose block `right` is.
     right
         (R, samples).
     """
@@ -64,8 +68,14 @@ class Part:
     rows: tuple[int, int]
     columns: tuple[int, int]
     offsets: tuple[tuple[int, int, int], ...]
-    left: np.ndarray
+    left: np.ndarray | None
     right: np.ndarray
+
+    @property
+    def factor(self) -> np.ndarray:
+        """The left one, of a part in factors."""
+        assert self.left is not None  # a single block
+        return self.left
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,22 +166,17 @@ def build_bytes(optics: Optics, workers: int = 1) -> float:
     cells, near = optics.cells, optics.near
     even = _symmetric(optics.array) and _cells.mirrored(optics.camera)
     square = even and cells.size[0] == cells.size[1]
-    wanted = [place for place, source, _ in _alike(places(optics), even, square) if place is source]
+    wanted = [place for place, source, _ in alike(places(optics), even, square) if place is source]
     states = {(INFINITE, INFINITE)} | {state for place in wanted for state in terms(place)}
     kept = 1 + sum(INFINITE in state for state in states)
     points, samples = math.prod(cells.points), math.prod(cells.samples)
     block = 4.0 * points * samples
-    rows = workers * max(kept * (2 * near[1] + 1), 2 * optics.reach[1] + 1) * block
+    rows = workers * (2 * kept + 4) * block
     factors = (1.3 * len(wanted) + 0.7 * len(places(optics))) * math.sqrt(points)  # of a block
     factors /= optics.array.fill_factor  # small lenslets diffract more widely
     rows += factors * math.prod(2 * n + 1 for n in near) * 4.0 * (points + samples)
-    if optics.straight:
-        return rows
-    dense = 8.0 * math.prod(axis.samples * len(axis.window) for axis in optics.axes)
-    few = 8.0 * samples
-    for axis, reach in zip(optics.axes, near, strict=True):
-        few *= (2 * reach + 1) * axis.size * 2 * axis.band + 12
-    return rows + workers * dense + len(states) * few
+    images = {state[1] for state in states} if optics.straight else states
+    return rows + len(images) * optics.images_bytes(near)
 
 
 @dataclass(slots=True)
@@ -216,7 +221,7 @@ def build(optics: Optics, progress: Progress | None = None) -> Built:
     free, workers = memory.available() or math.inf, WORKERS
     while workers > 1 and build_bytes(optics, workers) > free / 2:
         workers -= 1
-    builder = _Builder(optics, progress or (lambda _: None), workers)
+    builder = Builder(optics, progress or (lambda _: None), workers)
     inside, means = builder.periodic()
     rows, columns = (band[0].cells for band in (bands(optics, 0), bands(optics, 1)))
     ranks, border = builder.border()
@@ -235,7 +240,7 @@ def _part(rows: tuple[int, int], columns: tuple[int, int], blocks: Blocks) -> Pa
     return Part(rows, columns, offsets, left, right)
 
 
-class _Builder:
+class Builder:
     """Blocks of one depth."""
 
     def __init__(self, optics: Optics, progress: Progress, workers: int) -> None:
@@ -251,46 +256,62 @@ class _Builder:
     def periodic(self) -> tuple[Blocks, dict[Offset, np.ndarray]]:
         """Blocks inside the array, and the mean images (samples,) of a cell's points."""
         inside, reach = (INFINITE, INFINITE), self.optics.reach
-        images = self._images([inside], reach)[inside]
+        images = self.images([inside], reach)[inside]
         own = images.line(0)(0)
         self.least = 0.02 * self.optics.fineness.rank * float(np.linalg.norm(own))
 
         def piece(job: Job) -> tuple[float, dict[Offset, _Found]]:
             (dy, across), found, norm = job, {}, 0.0
             line = images.line(dy)
-            for dx in across if self.even else _signed(across):
+            for dx in across if self.even else signed(across):
                 block, copies = line(dx), 2 ** ((dy != 0) + (dx != 0)) if self.even else 1
                 norm += copies * float(np.linalg.norm(block)) ** 2
                 found[dy, dx] = self._factored(block, copies)
             return norm, found
 
-        pieces = list(each(piece, self._jobs(self.even, reach), self.workers))
+        pieces = list(each(piece, self.jobs(self.even, reach), self.workers))
         self.norm = sum(norm for norm, _ in pieces)
         found = {key: f for _, part in pieces for key, f in part.items()}
         self.progress(0.1)
         return self._completed(found)
 
-    def _jobs(self, folded: bool, reach: tuple[int, int]) -> list[Job]:
+    def jobs(self, folded: bool, reach: tuple[int, int]) -> list[Job]:
         """Offsets that share work, those of dx and -dx together."""
         rows, across = self._columns(folded, reach[0]), tuple(range(reach[1] + 1))
         if self.optics.straight:
             return [(dy, (dx,)) for dy in rows for dx in across]
         return [(dy, across) for dy in rows]
 
+    def means_at_the_end(self) -> dict[Offset, np.ndarray]:
+        """Mean images (samples,) of the points of the cells that are farthest, without any other block."""
+        reach, found = self.optics.reach, {}
+        images = self.images([INSIDE], reach)[INSIDE]
+        for dy, across in self.jobs(self.even, reach):
+            line = images.line(dy)
+            for dx in across if self.even else signed(across):
+                if abs(dy) == reach[0] or abs(dx) == reach[1]:
+                    found[dy, dx] = line(dx).mean(0, dtype=np.float64)
+        return self._unfolded_means(found)
+
+    def _unfolded_means(self, means: dict[Offset, np.ndarray]) -> dict[Offset, np.ndarray]:
+        none = np.zeros((math.prod(self.optics.cells.points), 1))
+        blocks = {key: (none, mean[None]) for key, mean in means.items()}
+        return {key: mean[0] for key, (_, mean) in self._unfolded(blocks, (self.even, self.even)).items()}
+
     def _completed(self, found: dict[Offset, _Found]) -> tuple[Blocks, dict[Offset, np.ndarray]]:
         least = _least(found.values(), self.optics.fineness.rank**2 * self.norm)
         folds = (self.even, self.even)
         result = self._unfolded({key: f.cut(least) for key, f in found.items()}, folds)
-        means = self._unfolded({key: (f.left[:, :1] * 0, f.mean[None]) for key, f in found.items()}, folds)
+        means = self._unfolded_means({key: f.mean for key, f in found.items()})
         even = np.ones((math.prod(self.optics.cells.points), 1), np.float32)
         for key, (left, right) in result.items():
-            left_out = means[key][1] - left.mean(0, keepdims=True) @ right
+            left_out = means[key] - left.mean(0, keepdims=True) @ right
             result[key] = np.hstack([left, even]), np.vstack([right, left_out])
-        return result, {key: mean[0] for key, (_, mean) in means.items()}
+        return result, means
 
     def border(self) -> tuple[int, Iterator[Part]]:
         """Ranks and parts of what differs where lenslets are missing, and of all in the ring."""
-        sources = _alike(places(self.optics), self.even, self.square)
+        sources = alike(places(self.optics), self.even, self.square)
         blocks = self._border_blocks([place for place, source, _ in sources if place is source])
         lit = [found for found in sources if _ranks(blocks[found[1]])]
 
@@ -303,7 +324,7 @@ class _Builder:
     def _border_blocks(self, wanted: Sequence[Place]) -> dict[Place, Blocks]:
         """Of some places: row after row of cells, so that what they share is computed once."""
         reach = self.optics.near
-        known = self._images({state for place in wanted for state in terms(place)}, reach)
+        known = self.images({state for place in wanted for state in terms(place)}, reach)
 
         def piece(job: Job) -> dict[tuple[Place, Offset], _Found]:
             (dy, across), found = job, {}
@@ -311,15 +332,15 @@ class _Builder:
             for dx in across:
                 for place in wanted:
                     up, left = self._folds(place)
-                    for signed in [] if up and dy < 0 else [dx] if left else _signed((dx,)):
-                        block = shared.total(terms(place), signed)
-                        found[place, (dy, signed)] = self._factored(block, 1, BORDER)
+                    for mine in [] if up and dy < 0 else [dx] if left else signed((dx,)):
+                        block = shared.total(terms(place), mine)
+                        found[place, (dy, mine)] = self._factored(block, 1, BORDER)
                     shared.forget(lambda s: INFINITE not in s)  # those of corners serve once
                 shared.forget_blocks()
             return found
 
         found: dict[Place, dict[Offset, _Found]] = {place: {} for place in wanted}
-        jobs = self._jobs(False, reach)
+        jobs = self.jobs(False, reach)
         for done, part in enumerate(each(piece, jobs, self.workers)):
             for (place, offset), block in part.items():
                 found[place][offset] = block
@@ -334,7 +355,7 @@ class _Builder:
             result[place] = self._unfolded(cut, self._folds(place))
         return result
 
-    def _images(self, states: Iterable[State], reach: tuple[int, int]) -> dict[State, Apart | Few]:
+    def images(self, states: Iterable[State], reach: tuple[int, int]) -> dict[State, Apart | Few]:
         """Of points of `reach` cells to all sides, with the lenslets of each state."""
         cells, light = self.optics.cells, self.light
         middle = [  # of any cell: only the border, as it is told, makes a difference
@@ -398,7 +419,7 @@ class _Builder:
 class _Shared:
     """Blocks of one row of cells with the lenslets of some states, each computed once."""
 
-    def __init__(self, builder: _Builder, known: dict[State, Apart | Few], dy: int) -> None:
+    def __init__(self, builder: Builder, known: dict[State, Apart | Few], dy: int) -> None:
         self.builder, self.known, self.dy = builder, known, dy
         self.lines: dict[State, Line] = {}
         self.blocks: dict[tuple[State, int], np.ndarray] = {}
@@ -434,12 +455,12 @@ class _Shared:
         return self.lines[state](dx)
 
 
-def _signed(across: Sequence[int]) -> list[int]:
+def signed(across: Sequence[int]) -> list[int]:
     """Both signs of each number that is not 0."""
     return [*across, *(-dx for dx in across if dx)]
 
 
-def _alike(wanted: Sequence[Place], even: bool, square: bool) -> list[tuple[Place, Place, Turn]]:
+def alike(wanted: Sequence[Place], even: bool, square: bool) -> list[tuple[Place, Place, Turn]]:
     """Each place, the first that it mirrors, and how: across the diagonal, up and down, left and right."""
     both, first, result = (False, True) if even else (False,), {}, []
     for place in wanted:

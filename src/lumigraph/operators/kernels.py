@@ -18,6 +18,7 @@ from lumigraph.errors import SamplingError
 from lumigraph.operators.blocks import Part, build, build_bytes
 from lumigraph.operators.glare import Glare, glare
 from lumigraph.operators.optics import Optics
+from lumigraph.operators.streamed import Streamed, stream_bytes, streamed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,15 +42,18 @@ class Matrix:
     @property
     def nbytes(self) -> int:
         """Memory that it takes [bytes]."""
-        parts = sum(part.left.nbytes + part.right.nbytes for part in self.parts)
+        parts = sum(part.factor.nbytes + part.right.nbytes for part in self.parts)
         return parts + self.glare.spectra.nbytes + self.glare.pictures.nbytes
 
 
 _MATRICES = ByteCache()
 
+HELD = 2.0**32
+"""Matrices that take more than this to build [bytes] are computed whenever they are applied."""
 
-def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None = None) -> Matrix:
-    """Of one depth: from memory, from disk, or built.
+
+def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None = None) -> Matrix | Streamed:
+    """Of one depth: from memory, from disk, or built; streamed where building takes more than `HELD`.
 
     Parameters
     ----------
@@ -65,18 +69,37 @@ def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None
     SamplingError
         It does not fit in memory.
     """
+    if not _held(optics):
+        _require(optics)
+        return streamed(optics, progress)
 
     def built() -> dict[str, np.ndarray]:
-        memory.require(
-            build_bytes(optics),
-            "the periodic operator",
-            "Use slower lenslets, a lower accuracy, or Snapshots.",
-            SamplingError,
-        )
         return _build(optics, progress)
 
     # Packed and unpacked, built or found: products with other strides would round otherwise.
     return _MATRICES.get(optics.key, lambda: _unpacked(store.kept(optics.key, built, folder)))
+
+
+def _held(optics: Optics) -> bool:
+    limit = HELD if optics.straight else math.inf  # what cannot be streamed is held where it fits at all
+    return build_bytes(optics) <= min(limit, memory.available() or math.inf)
+
+
+def _streams(optics: Optics) -> bool:
+    """Whether blocks are computed fast enough to be let go: those of lenslets whose axes are apart."""
+    return optics.straight and stream_bytes(optics) <= (memory.available() or math.inf)
+
+
+def _require(optics: Optics) -> None:
+    """Refuse what can neither be held nor streamed, and name the finest accuracy that can."""
+    if _streams(optics):
+        return
+    coarser = (a for a in (1e-4, 1e-3, 1e-2) if a > optics.fineness.accuracy)
+    others = (Optics.of(optics.camera, optics.distance, a) for a in coarser)
+    fits = next((o.fineness.accuracy for o in others if _held(o) or _streams(o)), None)
+    remedy = "Use slower lenslets" if fits is None else f"An accuracy of {fits:g} fits: ask for that"
+    needed = stream_bytes(optics) if optics.straight else build_bytes(optics)
+    memory.require(needed, "the periodic operator", f"{remedy}, or use Snapshots.", SamplingError)
 
 
 def _build(optics: Optics, progress: Progress | None = None) -> dict[str, np.ndarray]:
@@ -89,8 +112,8 @@ def _build(optics: Optics, progress: Progress | None = None) -> dict[str, np.nda
     for part in found.parts:
         places.append((*part.rows, *part.columns, len(part.offsets)))
         offsets += part.offsets
-        mine = slice(start, start + part.left.shape[1])
-        left[mine], right[mine], start = part.left.T, part.right, mine.stop
+        mine = slice(start, start + len(part.right))
+        left[mine], right[mine], start = part.factor.T, part.right, mine.stop
     return {
         "places": np.array(places),
         "offsets": np.array(offsets),

@@ -96,6 +96,17 @@ class Optics:
         y, x = (max(1, round(far / size)) for size in self.cells.size)
         return min(y, self.reach[0]), min(x, self.reach[1])
 
+    def images_bytes(self, reach: tuple[int, int]) -> float:
+        """Memory that images of points `reach` cells around are computed from [bytes]."""
+        samples = math.prod(self.cells.samples)
+        if self.straight:
+            (y, x), n = self.axes, 2 * reach[0] + 1
+            return 8.0 * (n * y.points + 2 * y.margin) * (2 * reach[1] + 1) * x.points * x.samples
+        few = 8.0 * samples
+        for axis, r in zip(self.axes, reach, strict=True):
+            few *= (2 * r + 1) * axis.size * 2 * axis.band + 12
+        return few + 8.0 * math.prod(axis.samples * len(axis.window) for axis in self.axes)
+
     @property
     def image_scale(self) -> float:
         """Magnification of the telecentric image onto the sensor, 1 + b/L."""

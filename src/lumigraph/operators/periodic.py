@@ -17,7 +17,7 @@ M. Broxton et al., Opt. Express 21, 25418 (2013) use the same periodicity in a l
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from os import PathLike
@@ -39,6 +39,7 @@ from lumigraph.operators.cells import HALF_WIDTH, Cells
 from lumigraph.operators.kernels import Matrix, matrix
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.resampling import averaged, represented
+from lumigraph.operators.streamed import Streamed
 from lumigraph.operators.turning import Crop, Turn, turn_margin
 
 PIECE = 600
@@ -57,7 +58,7 @@ class Plane:
         From the object's samples to those points.
     """
 
-    matrix: Matrix
+    matrix: Matrix | Streamed
     spread: Linear
 
 
@@ -139,7 +140,7 @@ class PeriodicOperator(Linear):
         return self.accuracy
 
 
-def _pieces(parts: Sequence[Part]) -> Iterator[Part]:
+def _pieces(parts: Iterable[Part]) -> Iterator[Part]:
     """The parts, those of many cells in rows that stay in the processor's cache."""
     for part in parts:
         (top, bottom), (first, last) = part.rows, part.columns
@@ -157,7 +158,8 @@ def _groups(part: Part, margin: tuple[int, int]) -> "Iterator[_Group]":
         start = ranks.stop
         rows = slice(part.rows[0] + margin[0] + dy, part.rows[1] + margin[0] + dy)
         columns = part.columns[0] + margin[1], part.columns[1] + margin[1]
-        yield _Group(rows, columns, across, part.left[:, ranks], part.right[ranks])
+        left = None if part.left is None else part.left[:, ranks]
+        yield _Group(rows, columns, across, left, part.right[ranks])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,7 +169,7 @@ class _Group:
     rows: slice
     columns: tuple[int, int]
     across: tuple[tuple[int, int], ...]
-    left: np.ndarray
+    left: np.ndarray | None
     right: np.ndarray
 
     def _span(self) -> slice:
@@ -184,13 +186,19 @@ class _Group:
     def seen(self, points: Array) -> Array:
         """Points (rows, columns, points) through the left factors: (rows, columns, ranks)."""
         xp = arrays.namespace(points)
-        wide = points[self.rows, self._span(), :] @ arrays.like(self.left, points)
+        wide = points[self.rows, self._span(), :]
+        if self.left is None:
+            return wide
+        wide = wide @ arrays.like(self.left, points)
         return xp.concat([wide[:, cells, ranks] for cells, ranks in self._places()], axis=2)
 
     def return_to(self, points: Array, seen: Array) -> None:
         """The transpose of `seen`, added to points."""
         xp = arrays.namespace(seen)
         span = self._span()
+        if self.left is None:
+            points[self.rows, span, :] += seen
+            return
         shape = (seen.shape[0], span.stop - span.start, seen.shape[2])
         wide = xp.zeros(shape, dtype=seen.dtype, device=seen.device)
         for cells, ranks in self._places():
@@ -258,7 +266,7 @@ def periodic_operator(
     return operator
 
 
-def _plane(optics: Optics, matrix: Matrix, grid: Grid) -> Plane:
+def _plane(optics: Optics, matrix: Matrix | Streamed, grid: Grid) -> Plane:
     """The spread of an object's samples onto the points of the cells, turned with the array."""
     cells, camera = optics.cells, optics.camera
     ring = (cells.ring[0] + matrix.margin[0], cells.ring[1] + matrix.margin[1])

@@ -17,10 +17,8 @@ from lumigraph.core.volume import Volume
 from lumigraph.elements import CircularAperture, Train
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
 from lumigraph.operators import single_lens
-from lumigraph.operators.blocks import build_bytes
 from lumigraph.operators.camera import Camera
 from lumigraph.operators.cells import fits
-from lumigraph.operators.optics import Optics
 from lumigraph.operators.periodic import periodic_operator
 from lumigraph.propagation import Propagate, propagate
 from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
@@ -31,9 +29,6 @@ from lumigraph.simulation.spectrum import Spectrum, by_wavelength
 
 PUPIL_OVERSAMPLING = 1.1
 """How much denser than half of λL/p the points of the pupil stand that make a white image."""
-
-LARGEST_OPERATOR = 2.0**32
-"""A lenslet-periodic operator that takes more than this [bytes] to build gives way to snapshots."""
 
 Progress = Callable[[float, int], None]
 
@@ -231,9 +226,7 @@ def _exact(camera: Camera, scene: Scene, accuracy: float | None) -> list[Slice |
         return [part for part in scene.parts if isinstance(part, Slice | Points)]
     if not fits(camera):
         return []
-    slices = [part for part in scene.parts if isinstance(part, Slice)]
-    optics = [Optics.of(camera, camera.object_distance + s.dz, accuracy) for s in slices]
-    return [part for part, o in zip(slices, optics, strict=True) if build_bytes(o) <= LARGEST_OPERATOR]
+    return [part for part in scene.parts if isinstance(part, Slice)]
 
 
 def _read_out(camera: Camera, light: _Light, coherence: Coherence | Incoherent) -> RawImage:
