@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test lint format bench reproduce fuzz docs torch lock clean
+.PHONY: demo test lint format bench reproduce fuzz audit docs torch lock clean
 .DEFAULT_GOAL := demo
 
 $(READY): requirements.lock pyproject.toml
@@ -44,8 +44,12 @@ reproduce: $(READY)  ## the thesis' experiments at full size, and the long tests
 	$(BIN)/lumigraph reproduce
 	$(BIN)/python -m pytest -m long tests
 
-fuzz: $(READY)  ## 20,000 damaged files for every reader, each in a process of its own with bounds on memory and time
-	$(BIN)/python tests/fuzz/run.py --count 20000
+fuzz: $(READY)  ## 100,000 damaged files for every reader, each in a process of its own with bounds on memory and time
+	$(BIN)/python tests/fuzz/run.py --count 100000
+
+audit: $(READY)  ## known holes in the locked dependencies; fails where no advisory service answers
+	@test -x .venv/audit/bin/pip-audit || { $(PYTHON) -m venv .venv/audit && .venv/audit/bin/pip install --quiet --disable-pip-version-check pip-audit; }
+	.venv/audit/bin/pip-audit --strict --disable-pip --require-hashes -r requirements.lock
 
 docs: $(READY)  ## the site, with its gallery: site/index.html; strict, without a network once its tools are there
 	@$(BIN)/python -c "import furo, myst_parser, sphinx_gallery" 2>/dev/null || \

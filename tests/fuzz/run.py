@@ -28,10 +28,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
+import lumigraph as lg
 import lumigraph.io as io
+from lumigraph import store
 from lumigraph.errors import LumigraphError
 
-SECONDS, MEMORY, BATCH = 10, 1 << 30, 250
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from fuzz.structure import Link, Pipe, structural
+
+SECONDS, MEMORY, BATCH, STRUCTURAL = 10, 1 << 30, 250, 0.3
 # Whole numbers that lengths, counts and offsets are replaced by, and texts that numbers are.
 NUMBERS = (
     0,
@@ -85,8 +90,11 @@ class Score:
 
 
 def mutant(trees: list[Tree], mend: Callable[[Tree], Tree] | None, rng: np.random.Generator) -> Tree:
-    """One of the trees with one of its files damaged in one to four places."""
+    """One of the trees with one of its files damaged in one to four places, or of the wrong structure."""
     tree = dict(trees[rng.integers(len(trees))])
+    if rng.random() < STRUCTURAL:
+        tree = structural(tree, rng)
+        return mend(tree) if mend is not None else tree
     name = sorted(tree)[rng.integers(len(tree))]
     content = bytearray(tree[name])
     for _ in range(1 + int(rng.integers(4))):
@@ -162,12 +170,23 @@ def read(tree: Tree, folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     for name, content in tree.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
+        if isinstance(content, Link):
+            (folder / name).symlink_to(content.decode())
+        elif isinstance(content, Pipe):
+            os.mkfifo(folder / name)
+        else:
+            (folder / name).write_bytes(content)
     path, first = folder, sorted(tree)[0]
     if not first.startswith(("folder", "input_Cam")):
         path = folder / first.split("/")[0]
     elif first.startswith("folder"):
         path = folder / "folder"
+    if path.name == "camera.toml":
+        lg.load_camera(path).describe()
+        return
+    if path.name == "run.npz":
+        store.read(path)
+        return
     options = {"shape": (60, 70)} if path.suffix in (".xml", ".ini") else {}
     error = None
     for act in (lambda: io.open(path, **options), lambda: io.contents(path)):
@@ -300,13 +319,15 @@ def preload() -> None:
     """Import every reader now, so that children do not."""
     for row in io.FORMATS:
         row.imported()
+    for name in lg.catalogue():
+        lg.load_camera(name).describe()
 
 
 def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--count", type=int, default=1000, help="mutants for each reader")
     parser.add_argument("--readers", nargs="*", help="only these")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0, help="the same seed makes the same mutants")
     parser.add_argument("--keep", type=Path, help="folder for the mutants that failed")
     given = parser.parse_args(words)
     sys.path.insert(0, str(Path(__file__).parent))
@@ -336,7 +357,7 @@ def main(words: list[str] | None = None) -> int:
                 for file, content in tree.items():
                     path = given.keep / f"{name}-{index}" / file
                     path.parent.mkdir(parents=True, exist_ok=True)
-                    path.write_bytes(content)
+                    path.write_bytes(content)  # a link as the text of where it leads
     return 1 if failed else 0
 
 

@@ -22,7 +22,9 @@ from PIL import Image
 from zarr.abc.codec import BytesBytesCodec
 from zarr.codecs import GzipCodec
 
+import lumigraph as lg
 import lumigraph.io as io
+from lumigraph import store
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.cloud import PointCloud
 from lumigraph.core.grid import Grid
@@ -223,12 +225,24 @@ def seeds() -> dict[str, tuple[list[Tree], Callable[[Tree], Tree] | None]]:
             [{"a.json": json.dumps(frame_metadata((60, 60), 12, "big", "b", illum=False)).encode()}],
             None,
         ),
+        "camera": (
+            [{"camera.toml": lg.load_camera(name).to_toml().encode()} for name in lg.catalogue()],
+            None,
+        ),
+        "checkpoint": ([_sealed()], None),
         "toml": ([saved(calibration, "a.toml")], None),
         "xml": ([{"a.xml": RAYTRIX}], None),
         "ini": ([{"a.ini": PLENOPTOMOS}], None),
         "views": ([folder, hci], None),
         "eslf": ([{"a_eslf.png": saved(np.tile(grey[:6, :6], (5, 7)), "a.png")["a.png"]}], mend_png),
     }
+
+
+def _sealed() -> Tree:
+    """A file of a deconvolution, or of the cache."""
+    with tempfile.TemporaryDirectory() as place:
+        store.write(Path(place) / "run.npz", {"estimate": np.arange(12.0).reshape(3, 4), "done": np.array(3)})
+        return read_tree(Path(place))
 
 
 def saved(thing: object, name: str) -> Tree:

@@ -1,13 +1,18 @@
 """A short run of the fuzzer (tests/fuzz/run.py, `make fuzz`): damaged files are opened or refused."""
 
+import os
+from datetime import UTC, datetime
+
 import pytest
 
 from fuzz import run, seeds
 
 READERS = (
     "tiff", "png", "jpeg", "zarr", "zarr.zip", "hdf5", "pfm", "ply", "lytro", "lytro raw", "lytro json",
-    "toml", "xml", "ini", "views", "eslf",
+    "toml", "xml", "ini", "views", "eslf", "camera", "checkpoint",
 )  # fmt: skip
+SEED = int(os.environ.get("LUMIGRAPH_FUZZ_SEED", f"{datetime.now(UTC):%Y%m%d}"))
+"""Other mutants every day, the same ones for all workers; printed, so that a failure can be made again."""
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +29,8 @@ def test_every_reader_has_seeds(found):
 def test_damaged_files_are_opened_or_refused(found, reader):
     trees, mend = found[reader]
     held = run.memory()[1]  # by tests before this one, and by the children that are forked here
-    score = run.run(trees, mend, 60 if reader == "zarr" else 200, seed=7)
+    print(f"the seed of the day is {SEED}: python tests/fuzz/run.py --readers {reader!r} --seed {SEED}")
+    score = run.run(trees, mend, 60 if reader == "zarr" else 200, seed=SEED)
     assert score.failures == []
     assert score.opened + score.refused == (60 if reader == "zarr" else 200)
     assert score.most_memory < max(run.MEMORY, held + run.MEMORY // 2)
@@ -42,7 +48,6 @@ def test_the_seeds_themselves_are_opened(found, reader, tmp_path):
 
 
 def test_the_fuzzer_sees_a_crash_a_hang_and_a_wrong_error(monkeypatch):
-    import os
     import time
 
     def read(tree, folder):

@@ -1,7 +1,7 @@
 """One file of arrays with a checksum over every byte: an uncompressed .npz, which NumPy reads as well.
 
 Arrays begin at multiples of 64 bytes, so that they are read as memory maps. The comment at the end of the
-archive is the seal: a word and the CRC-32 of all bytes before its eight digits.
+archive is the seal: a word and a checksum of all bytes before its eight digits.
 """
 
 import os
@@ -9,11 +9,13 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 
+from lumigraph.core.arrays import WORKERS
 from lumigraph.errors import FormatError
 from lumigraph.store.atomic import replacing
 
@@ -26,7 +28,7 @@ _PADDING = 0xD935
 _HEADER, _ZIP64 = 30, 20
 """Bytes of a ZIP entry's header without name and extra fields, and of the field for large entries."""
 
-_PIECE = 1 << 24
+_PIECE = 1 << 22  # bytes
 
 
 class DamagedError(FormatError):
@@ -129,7 +131,11 @@ def _array(whole: np.ndarray, entry: zipfile.ZipInfo) -> np.ndarray:
 
 
 def _checksum(data: np.ndarray) -> int:
-    total = 0
-    for start in range(0, len(data), _PIECE):
-        total = zlib.crc32(data[start : start + _PIECE].data, total)
-    return total
+    """CRC-32 of the CRC-32 of each piece: pieces are summed side by side, at 3 GB/s each."""
+    pieces = [data[start : start + _PIECE].data for start in range(0, len(data), _PIECE)]
+    if len(pieces) > 1:
+        with ThreadPoolExecutor(WORKERS) as pool:
+            sums = list(pool.map(zlib.crc32, pieces))
+    else:
+        sums = [zlib.crc32(piece) for piece in pieces]
+    return zlib.crc32(struct.pack(f"<{len(sums)}I", *sums))
