@@ -16,6 +16,7 @@ _M = 0.3
 _PLACES = (-55 * um, 75 * um)  # of a red and a green point, on the main-lens image
 _COLOURS = ((0.85, 0.2, 0.15), (0.15, 0.55, 0.2))
 _REACH = 3
+_SEEN = 1 / 3  # of the light of the brightest lenslet, or of its width
 
 
 @experiment(
@@ -41,7 +42,7 @@ def run(context: Context) -> Outcome:
         context.progress(number / 2, f"point at {place / um:.0f} um")
         raw = simulate(camera, targets.points([(0.0, place / camera.magnification)]))
         samples.append(_samples(camera, raw))
-        rows += _rows(samples[-1], place)
+        rows += _rows(samples[-1], place, _covered(camera, place))
     pair = [(_bands(camera), "rays: lenslets as bands"), (_scattered(camera, samples), "simulated pixels")]
     return Outcome(
         tuple(rows),
@@ -76,17 +77,27 @@ def _samples(
     return found
 
 
-def _rows(samples: list[tuple[np.ndarray, np.ndarray, np.ndarray]], place: float) -> list[Row]:
+def _covered(camera: FocusedPlenopticCamera, place: float) -> int:
+    """Lenslets of the middle row that the cone of a point's rays covers by more than `_SEEN`."""
+    pitch, spread = camera.lenslets.pitch, camera.relay_distance / camera.image_distance
+    centre, radius = place * (1 + spread), camera.pupil_diameter * spread / 2
+    left = (np.arange(-_REACH, _REACH + 1) - 0.5) * pitch
+    parts = np.minimum(left + pitch, centre + radius) - np.maximum(left, centre - radius)
+    return int((parts > _SEEN * pitch).sum())
+
+
+def _rows(samples: list[tuple[np.ndarray, np.ndarray, np.ndarray]], place: float, covered: int) -> list[Row]:
     """Where each lenslet that sees the point says it is."""
     total = max(light.sum() for _, _, light in samples)
-    seen = sum(light.sum() > 0.3 * total for _, _, light in samples)
+    seen = sum(light.sum() > _SEEN * total for _, _, light in samples)
     places = []
     for x, _, light in samples:
         if light.sum() > 0.6 * total:
             top = np.maximum(light - light.max() / 2, 0)
             places.append(float(x @ top / top.sum()))
     return [
-        Row(f"lenslets that see the point at {place / um:.0f} um", float(seen), "", 3, 3.33, 0.7),
+        Row(f"lenslets that see the point at {place / um:.0f} um", float(seen), "", 3, covered, 0.0,
+            note="those that its cone of rays covers by more than a third; 1/m = 3.33 in the mean"),
         Row(f"its place by these lenslets, mean, {place / um:.0f} um", float(np.mean(places)) / um, "um",
             None, place / um, 5.0),
         Row(f"largest difference between them, {place / um:.0f} um", float(np.ptp(places)) / um, "um",

@@ -112,7 +112,7 @@ def _rows(gratings: list[_Grating], m: float) -> list[Row]:
         Row(f"f2, rendered, m = {m:g}", second.rendered_contrast, "", "gone" if m == 0.25 else None, tile,
             tolerance),
         Row(f"f2, rendered and filtered, m = {m:g}", second.filtered_contrast, "", None,
-            kept * second.rendered_contrast, 0.01, "exp(-f²/2σ²) = 0.79 of it"),
+            kept * second.rendered_contrast, 0.02 * second.rendered_contrast, "exp(-f²/2σ²) = 0.79 of it"),
         Row(f"f3, rendered, m = {m:g}", third.rendered_contrast, "", "gone", 0.0, 0.04,
             "at or above the cut-off; seams let some through"),
         Row(f"f1, rendered, m = {m:g}", gratings[0].rendered_contrast),
