@@ -33,6 +33,7 @@ VERBS = (
         "refocus",
         "depth",
         "deconvolve",
+        "measure",
         "view",
         "samples",
     ),

@@ -17,6 +17,7 @@ from lumigraph.cli.deconvolve import deconvolve
 from lumigraph.cli.demo import demo
 from lumigraph.cli.depth import depth
 from lumigraph.cli.design import design
+from lumigraph.cli.measure import measure
 from lumigraph.cli.options import COMMAND
 from lumigraph.cli.refocus import refocus
 from lumigraph.cli.render import render
@@ -33,7 +34,8 @@ FAILED, USAGE, INTERRUPTED = 1, 2, 130
 _LONGEST = 400  # characters of a line on standard error
 
 VERBS = (
-    demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, view, samples, reproduce
+    demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure, view, samples,
+    reproduce,
 )  # fmt: skip
 """In the order of their use."""
 
