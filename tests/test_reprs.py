@@ -10,6 +10,7 @@ import cameras
 import lumigraph as lg
 from lumigraph.core.linear import Linear
 from lumigraph.core.matrix import Matrix
+from lumigraph.core.prepared import PreparedImage
 from lumigraph.deconvolution import Exposure
 from lumigraph.operators import periodic_operator, single_lens_operator
 
@@ -31,6 +32,7 @@ LARGE = [
     lg.Scene([lg.Slice(PICTURE, GRID, dz) for dz in np.linspace(0, 1e-3, 50)]),
     lg.targets.points([(y, 0.0) for y in np.linspace(0, 1e-3, 999)]).parts[0],
     CAMERA.calibration,
+    PreparedImage(PICTURE, 5e-6, calibration=CAMERA.calibration, reasons=np.zeros((N, N), np.uint8)),
     Exposure(background=PICTURE, response=PICTURE),
     Matrix(PICTURE, (N,), (N,)),
     periodic_operator(cameras.focused(count=(4, 4)), lg.Grid.square(40, 1e-5), accuracy=1e-2),

@@ -5,7 +5,10 @@ import pytest
 
 import cameras
 from lumigraph.core.linear import Linear, stack
-from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.errors import GeometryError, LumigraphError, SamplingError
+from lumigraph.instruments import load_camera
+from lumigraph.operators import periodic_operator
+from lumigraph.sensor import Sensor
 from lumigraph.units import mm, um
 
 
@@ -101,3 +104,73 @@ def test_other_shapes_are_refused(volume):
         volume.forward(np.ones((20, 15)))
     with pytest.raises(GeometryError, match=r"a raw image has shape \(3, 3\) but the operator takes"):
         volume.adjoint(np.ones((3, 3)))
+
+
+INSTRUMENTS = {
+    "single": lambda: load_camera("thesis-2f").replace(sensor={"shape": (40, 50)}),
+    "focused": lambda: cameras.focused(count=(4, 3), pixel_pitch=9 * um),
+    "microscope": lambda: load_camera("lfm-worm").replace(
+        lenslets={"count": (5, 5)}, objective={"model": "scalar"}
+    ),
+    "fourier": lambda: load_camera("lfm-fourier"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", INSTRUMENTS)
+def test_every_instrument_has_one_signature(name, tmp_path):
+    """None is a plane (y, x), a sequence a volume (z, y, x) whose slice at 0 is that plane."""
+    instrument, seen = INSTRUMENTS[name](), []
+    options = {"accuracy": 1e-2, "pixels": None, "folder": tmp_path, "progress": seen.append}
+    plane = instrument.operator(None, None, **options)
+    volume = instrument.operator((0.0,), None, **options)
+    assert isinstance(plane, Linear)
+    assert plane.shape[1] == plane.object_grid.shape
+    assert volume.shape == (plane.shape[0], (1, *plane.shape[1]))
+    assert plane.depths is None
+    assert volume.depths == (0.0,)
+    picture = np.random.default_rng(1).random(plane.shape[1]).astype(np.float32)
+    image = plane.forward(picture)
+    np.testing.assert_allclose(volume.forward(picture[None]), image, rtol=1e-6)
+    np.testing.assert_allclose(volume.adjoint(image)[0], plane.adjoint(image), rtol=1e-6)
+    assert all(0 < fraction <= 1 for fraction in seen)
+    if seen:
+        assert seen[-1] == 1
+    if name in ("focused", "microscope"):
+        assert any(tmp_path.iterdir())
+
+
+def test_another_sensor_takes_the_place_of_the_cameras(camera):
+    """Pixels three times as large, the middle one on the axis: each is the mean of nine."""
+    fine = Sensor((63, 63), 3 * um)
+    coarse = Sensor((21, 21), 9 * um)
+    images = [camera.operator(None, 5, accuracy=1e-2, pixels=s) for s in (fine, coarse)]
+    star = np.random.default_rng(2).random(images[0].shape[1]).astype(np.float32)
+    one, other = (operator.forward(star) for operator in images)
+    np.testing.assert_allclose(one.reshape(21, 3, 21, 3).mean((1, 3)), other, atol=2e-3 * other.max())
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "message"),
+    [
+        ("single", {"samples_per_lenslet": 3}, "no lenslets to count by"),
+        ("single", {"accuracy": 1e-5}, "accuracy is 1e-05 but a single lens is imaged to 0.0001"),
+        ("focused", {"pixels": 7}, "pixels is of type int but must be a Sensor"),
+        ("microscope", {"accuracy": 0.0}, "accuracy is 0"),
+        ("microscope", {"accuracy": np.nan}, "accuracy is nan"),
+    ],
+)
+def test_what_an_instrument_cannot_do_is_refused(name, arguments, message):
+    with pytest.raises(LumigraphError, match=message):
+        INSTRUMENTS[name]().operator(None, **arguments)
+
+
+def test_optics_are_plain_values(camera):
+    """An operator of the values is that of the camera, which is not asked again."""
+    optics = camera.optics()
+    assert optics.optics() is optics
+    assert hash(optics) == hash(camera.optics())
+    grid = camera.object_grid
+    np.testing.assert_array_equal(
+        periodic_operator(optics, grid, accuracy=1e-2).forward(np.ones(grid.shape, np.float32)),
+        periodic_operator(camera, grid, accuracy=1e-2).forward(np.ones(grid.shape, np.float32)),
+    )

@@ -321,12 +321,10 @@ def operator_of(
     """The camera's model of how it sees planes [m]."""
     from lumigraph.instruments import LightFieldMicroscope, SingleLensCamera
 
-    if isinstance(camera, SingleLensCamera):
-        if samples is not None:
-            raise FormatError(f"a {camera.KIND} camera has no lenslets to count --samples by. Leave it out.")
-        return camera.operator(planes)
     if isinstance(camera, LightFieldMicroscope):
-        return camera.operator(planes, samples, pixels=calibration)
+        return camera.operator(planes or (0.0,), samples, pixels=calibration)
+    if isinstance(camera, SingleLensCamera) and samples is not None:
+        raise FormatError(f"a {camera.KIND} camera has no lenslets to count --samples by. Leave it out.")
     return camera.operator(planes, samples)
 
 

@@ -212,9 +212,10 @@ def simulate(
 def _drawn_on(camera: Any) -> "Grid":
     """Samples of the scene's pictures: a microscope's as fine as its objective resolves, within reason."""
     from lumigraph.core.grid import Grid
+    from lumigraph.instruments import LightFieldMicroscope
 
-    grid, optics = camera.object_grid, getattr(camera, "optics", None)
-    if optics is None or camera.configuration == "fourier":
+    grid = camera.object_grid
+    if not isinstance(camera, LightFieldMicroscope) or camera.configuration == "fourier":
         return grid
     finest = camera.wavelength / (4 * camera.objective.numerical_aperture)
     finer = min(3, math.ceil(grid.pitch[0] / finest))

@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 
 from lumigraph.core.arrays import Array
+from lumigraph.core.brief import brief
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.raw import RawImage
 
@@ -44,6 +45,8 @@ class Verdicts:
     indices: np.ndarray
     reasons: np.ndarray
 
+    __repr__ = brief
+
     @property
     def valid(self) -> np.ndarray:
         """Which lenslets count (k,), true or false."""
@@ -77,6 +80,8 @@ class PreparedImage(RawImage):
     background: float | Array | None = None
     response: Array | None = None
     notes: tuple[str, ...] = ()
+
+    __repr__ = brief
 
     @property
     def valid(self) -> np.ndarray:

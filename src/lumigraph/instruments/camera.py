@@ -2,23 +2,38 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from os import PathLike
 
 from pydantic import Field
 
 from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
+from lumigraph.core.linear import Linear, Sum
+from lumigraph.core.progress import Progress, part
 from lumigraph.design import plenoptic1, resolution, thin_lens
-from lumigraph.elements import ThinLens, Train, ZernikePlate
+from lumigraph.elements import LensletArray, ThinLens, Train, ZernikePlate
 from lumigraph.errors import GeometryError
 from lumigraph.instruments.grids import Sampling
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.parts import MainLens, Pixels
 from lumigraph.instruments.quantities import Length, Wavelength
 from lumigraph.instruments.trade_offs import Range
+from lumigraph.operators import CameraOptics
 from lumigraph.propagation import Propagate
 from lumigraph.sensor import Sensor
+from lumigraph.simulation import Spectrum
+
+
+@dataclass(frozen=True, slots=True)
+class Making:
+    """How an operator is made: how exactly, where it is kept, and who is told of its progress."""
+
+    accuracy: float
+    folder: str | PathLike[str] | None
+    progress: Progress | None
 
 
 class Camera(Instrument):
@@ -134,6 +149,79 @@ class Camera(Instrument):
             lambda m: self.replace(object_distance=focal_length * (1 + 1 / m)),
         )  # fmt: skip
 
+    def optics(self) -> CameraOptics:
+        """What operators read of the camera, as plain values."""
+        return CameraOptics(
+            self.wavelength, self.object_distance, self.separation, self.pupil_diameter, self.lens_train(),
+            self.sensor, self.sampling.object_pitch, self.lenslet_array(), self.lenslet_distance,
+        )  # fmt: skip
+
+    def lenslet_array(self) -> LensletArray | None:
+        """The lenslets; None without them."""
+        return None
+
+    def operator(
+        self,
+        depths: Sequence[float] | None = None,
+        samples_per_lenslet: int | None = None,
+        *,
+        accuracy: float = 1e-3,
+        pixels: Sensor | None = None,
+        folder: str | PathLike[str] | None = None,
+        progress: Progress | None = None,
+        spectrum: Spectrum | None = None,
+    ) -> Linear:
+        """The exact model of how this camera sees incoherent planes, for `lumigraph.deconvolve`.
+
+        Parameters
+        ----------
+        depths
+            From the focused plane [m], positive farther, for an object (z, y, x); None for the focused
+            plane alone, an object (y, x).
+        samples_per_lenslet
+            Object samples along a lenslet's pitch, as the main lens shows it; None for as many as hold what
+            the main lens resolves, λ z1/(2D). Without lenslets, None: the samples are `object_grid`'s.
+        accuracy
+            Relative rms error of the raw image, 1e-2 to 1e-5; without lenslets 1e-2 to 1e-4.
+        pixels
+            Another sensor in the place of the camera's.
+        folder
+            Keeps what is computed of lenslets; None for the user's cache folder.
+        progress
+            Called as ``progress(fraction)``.
+        spectrum
+            Of one channel, in the place of the camera's wavelength.
+
+        Raises
+        ------
+        GeometryError
+            No depths, one inside the focal length, samples below 1 or without lenslets to count them by, or
+            pixels that are no `Sensor`.
+        SamplingError
+            An accuracy out of range, or an operator that does not fit in memory.
+        """
+        planes = None if depths is None else self._depths(depths)
+        optics, making = self.optics(), Making(accuracy, folder, progress)
+        if pixels is not None:
+            checks.instance("pixels", pixels, Sensor)
+            optics = replace(optics, sensor=pixels)
+        if spectrum is None:
+            return self._planes(optics, planes, samples_per_lenslet, making)
+        if len(spectrum.weights[0]) != 1:
+            raise GeometryError("an operator is of one channel but the spectrum has three. Take one of them.")
+        maps, count = [], len(spectrum.wavelengths)
+        for number, wavelength in enumerate(spectrum.wavelengths):
+            told = replace(making, progress=part(progress, number, count))
+            plain = replace(optics, wavelength=wavelength)
+            maps.append(self._planes(plain, planes, samples_per_lenslet, told))
+        weights = tuple(weight for (weight,) in spectrum.weights)
+        return Sum(tuple(maps), weights, object_grid=maps[0].object_grid, depths=maps[0].depths)
+
+    def _planes(
+        self, optics: CameraOptics, depths: Sequence[float] | None, samples: int | None, making: "Making"
+    ) -> Linear:
+        raise NotImplementedError
+
     def defocused(self, dz: float) -> float:
         """Object distance of a depth `dz` from the focused plane [m]; positive is farther.
 
@@ -152,9 +240,9 @@ class Camera(Instrument):
             )
         return distance
 
-    def _depths(self, depths: Sequence[float] | None) -> list[float]:
-        """Depths [m], none of them inside the focal length; None is the focused plane."""
-        planes = [0.0] if depths is None else [checks.finite("a depth", dz) for dz in depths]
+    def _depths(self, depths: Sequence[float]) -> tuple[float, ...]:
+        """Depths [m], none of them inside the focal length."""
+        planes = tuple(checks.finite("a depth", dz) for dz in depths)
         if not planes:
             raise GeometryError("depths is empty. Give at least one depth, or None for the focused plane.")
         for dz in planes:

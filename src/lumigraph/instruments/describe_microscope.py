@@ -42,7 +42,7 @@ def _objective(scope: "LightFieldMicroscope") -> Iterator[Row]:
         "lateral resolution", design.lateral_resolution(wave, number), "m", "0.61 λ/NA, of the objective"
     )
     yield Row("depth of field", design.depth_of_field(wave, number, n), "m", "λ n/NA², of the objective")
-    yield Row("point images", scope.optics[0].model, "", "Debye integral")
+    yield Row("point images", scope.objectives[0].model, "", "Debye integral")
     for index, waves in part.aberrations.items():
         yield Row(f"Noll {index}", float(waves), "waves rms", "given")
 

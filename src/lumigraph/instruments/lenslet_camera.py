@@ -9,17 +9,15 @@ from lumigraph.core import checks
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
-from lumigraph.core.linear import Linear, Sum
+from lumigraph.core.linear import Linear
 from lumigraph.design import plenoptic1, plenoptic2, resolution
 from lumigraph.elements import LensletArray, Train
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import grids
-from lumigraph.instruments.camera import Camera
+from lumigraph.instruments.camera import Camera, Making
 from lumigraph.instruments.parts import Lenslets
-from lumigraph.operators import periodic_operator
-from lumigraph.operators.blocks import Progress
+from lumigraph.operators import CameraOptics, periodic_operator
 from lumigraph.propagation import Propagate
-from lumigraph.simulation import Spectrum
 
 
 class LensletCamera(Camera):
@@ -78,52 +76,13 @@ class LensletCamera(Camera):
             pixel_pitch=pitch, separation=self.separation, lenslet_distance=self.lenslet_distance,
         )  # fmt: skip
 
-    def operator(
-        self,
-        depths: Sequence[float] | None = None,
-        samples_per_lenslet: int | None = None,
-        *,
-        accuracy: float = 1e-3,
-        spectrum: Spectrum | None = None,
-        progress: Progress | None = None,
+    def _planes(
+        self, optics: CameraOptics, depths: Sequence[float] | None, samples: int | None, making: Making
     ) -> Linear:
-        """The exact model of how this camera sees incoherent planes, for `lumigraph.deconvolve`.
-
-        Parameters
-        ----------
-        depths
-            From the focused plane [m], positive farther, for an object (z, y, x); None for the focused
-            plane alone, an object (y, x).
-        samples_per_lenslet
-            Object samples along a lenslet's pitch, as the main lens shows it; None for as many as hold what
-            the main lens resolves, λ z1/(2D).
-        accuracy
-            Relative rms error of the raw image, 1e-2 to 1e-5.
-        spectrum
-            Of one channel, in the place of the camera's wavelength.
-        progress
-            Called as ``progress(fraction)``.
-
-        Raises
-        ------
-        GeometryError
-            No depths, one inside the focal length, or samples below 1.
-        SamplingError
-            An accuracy out of range, or an operator that does not fit in memory.
-        """
-        planes = self._depths(depths)
-        grid = self._lenslet_samples(samples_per_lenslet)
-        dz = 0.0 if depths is None else planes
-        if spectrum is None:
-            return periodic_operator(self, grid, dz, accuracy=accuracy, progress=progress)
-        if len(spectrum.weights[0]) != 1:
-            raise GeometryError("an operator is of one channel but the spectrum has three. Take one of them.")
-        maps = tuple(
-            periodic_operator(self.replace(wavelength=w), grid, dz, accuracy=accuracy, progress=progress)
-            for w in spectrum.wavelengths
-        )
-        weights = tuple(weight for (weight,) in spectrum.weights)
-        return Sum(maps, weights, object_grid=grid, depths=maps[0].depths)
+        return periodic_operator(
+            optics, self._lenslet_samples(samples), 0.0 if depths is None else depths,
+            accuracy=making.accuracy, folder=making.folder, progress=making.progress,
+        )  # fmt: skip
 
     def _lenslet_samples(self, samples: int | None) -> Grid:
         """Object samples over the array's field, so many along a lenslet's pitch."""
@@ -178,6 +137,17 @@ class LensletCamera(Camera):
             lenslet,
         )
 
+    def lenslet_array(self) -> LensletArray:
+        """The lenslets: their phases and borders."""
+        parts = self.lenslets
+        return LensletArray(
+            self.lattice,
+            parts.focal_length,
+            shape=parts.shape,
+            fill_factor=parts.fill_factor,
+            extent=parts.extent,
+        )
+
     def image_train(self) -> Train:
         """Elements from the field just before the main lens to the sensor."""
         to_lenslets = Propagate(self.separation, "band_limited", grid=self.lenslet_grid)
@@ -185,16 +155,8 @@ class LensletCamera(Camera):
 
     def relay_train(self) -> Train:
         """Elements from the field just before the lenslets to the sensor."""
-        parts = self.lenslets
-        array = LensletArray(
-            self.lattice,
-            parts.focal_length,
-            shape=parts.shape,
-            fill_factor=parts.fill_factor,
-            extent=parts.extent,
-        )
         # "auto" pads by no more than light spreads over the short way b: a fraction of the window.
-        return Train((array, Propagate(self.lenslet_distance, "auto", grid=self.image_grid)))
+        return Train((self.lenslet_array(), Propagate(self.lenslet_distance, "auto", grid=self.image_grid)))
 
     def _check_lenslets_behind_lens(self) -> None:
         if self.separation <= 0:

@@ -13,6 +13,8 @@ from lumigraph.core import checks
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
+from lumigraph.core.linear import Linear
+from lumigraph.core.progress import Progress
 from lumigraph.design import microscope as closed_forms
 from lumigraph.elements.objective import Mismatch, Model, Objective
 from lumigraph.errors import GeometryError
@@ -22,18 +24,16 @@ from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.parts import Lenslets, Part, Pixels
 from lumigraph.instruments.quantities import Aberrations, Displacement, Fraction, Length, Positive, Wavelength
 from lumigraph.instruments.row import Row
-from lumigraph.operators.fourier_microscope import FourierMicroscopeOperator, Mosaic, fourier_operator
+from lumigraph.operators.fourier_microscope import Mosaic, fourier_operator
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_kernels import DROPPED
-from lumigraph.operators.microscope_operator import Layout, MicroscopeOperator, Progress, microscope_operator
+from lumigraph.operators.microscope_kernels import DROPPED, TAILS
+from lumigraph.operators.microscope_operator import Layout, microscope_operator
 from lumigraph.operators.microscope_pixels import PixelPlacement, narrowed
 from lumigraph.sensor import Sensor
 from lumigraph.simulation.microscope_scene import SAMPLES, point_image
 
 FINENESS = 1.7
 """Samples of a lenslet's image over what its cut-off asks for, where pixels are interpolated from them."""
-
-Operator = MicroscopeOperator | FourierMicroscopeOperator
 
 
 class MicroscopeObjective(Part):
@@ -194,7 +194,7 @@ class LightFieldMicroscope(Instrument):
         return 2 * self.objective.numerical_aperture / self.magnification * (self.fourier_lens or 1.0)
 
     @property
-    def optics(self) -> tuple[Objective, ...]:
+    def objectives(self) -> tuple[Objective, ...]:
         """The objective at each wavelength that is summed: three over a band."""
         part, band = self.objective, self.bandwidth or 0.0
         steps = (-band / 3, 0.0, band / 3) if band else (0.0,)
@@ -303,29 +303,31 @@ class LightFieldMicroscope(Instrument):
         depths: Sequence[float] | None = None,
         samples_per_lenslet: int | None = None,
         *,
+        accuracy: float = TAILS * DROPPED,
         pixels: int | Calibration | None = None,
-        dropped: float = DROPPED,
         folder: str | PathLike[str] | None = None,
         progress: Progress | None = None,
-    ) -> Operator:
+    ) -> Linear:
         """The model of how this microscope sees slices at `depths`, for `lumigraph.deconvolve`.
 
         Parameters
         ----------
         depths
-            From the focused plane [m], positive farther from the objective; None for the focused plane.
+            From the focused plane [m], positive farther from the objective, for an object (z, y, x); None
+            for the focused plane alone, an object (y, x).
         samples_per_lenslet
             s: object samples along a lenslet; an odd number has one on its axis. None for 5. A Fourier
             microscope samples the object as its pixels do.
+        accuracy
+            Relative rms error by the light that is not followed: faint cells, far from a point's own. What
+            is kept is as bright as the whole. Half of it takes four times the memory.
         pixels
             What the raw image's pixels are: None, those of this description; a `Calibration`, those of a real
             camera, wherever its lenslets stand; a whole number N, N × N for each lenslet, as `rectify` gives.
-        dropped
-            Part of the light that may be left out for speed.
         folder
             Keeps what is computed in files, mapped into memory when it is used.
         progress
-            Called with the slices done and their number.
+            Called as ``progress(fraction)`` after each slice.
 
         Raises
         ------
@@ -334,19 +336,17 @@ class LightFieldMicroscope(Instrument):
         GeometryError
             No depths, or samples below 1.
         """
-        depths = (0.0,) if depths is None else _numbers(depths)
+        planes = None if depths is None else _numbers(depths)
         if self.configuration == "fourier":
-            return fourier_operator(self.optics, self._mosaic(), depths)
-        samples = 5 if samples_per_lenslet is None else samples_per_lenslet
-        if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 1:
-            raise GeometryError(f"samples_per_lenslet is {samples!r} but must be a whole number from 1.")
-        layout = self._layout(int(samples), pixels)
-        options = {
-            "dropped": dropped,
-            "folder": None if folder is None else str(folder),
-            "progress": progress,
-        }
-        return microscope_operator(self.optics, self.lenslet, layout, depths, **options)  # type: ignore[arg-type]
+            return fourier_operator(self.objectives, self._mosaic(), planes)
+        samples = (
+            5 if samples_per_lenslet is None else checks.whole("samples_per_lenslet", samples_per_lenslet)
+        )
+        dropped = checks.positive("accuracy", accuracy, "1") / TAILS
+        return microscope_operator(
+            self.objectives, self.lenslet, self._layout(samples, pixels), planes,
+            dropped=dropped, folder=folder, progress=progress,
+        )  # fmt: skip
 
     def point_image(self, y: float, x: float, dz: float = 0.0) -> np.ndarray:
         """Raw image (ny, nx) of a point anywhere [m] that is as bright as a sample of `object_grid` of 1.
@@ -361,8 +361,8 @@ class LightFieldMicroscope(Instrument):
         """
         y, x, dz = (checks.finite(name, at) for name, at in zip(("y", "x", "dz"), (y, x, dz), strict=True))
         if self.configuration == "fourier":
-            return fourier_operator(self.optics, self._mosaic(), (dz,)).point_image(y, x)
-        return point_image(self.optics, self.lenslet, self._layout(SAMPLES, None), (y, x, dz))
+            return fourier_operator(self.objectives, self._mosaic(), (dz,)).point_image(y, x)
+        return point_image(self.objectives, self.lenslet, self._layout(SAMPLES, None), (y, x, dz))
 
     def _layout(self, samples: int, pixels: int | Calibration | None) -> Layout:
         if isinstance(pixels, int) and not isinstance(pixels, bool):
@@ -373,7 +373,9 @@ class LightFieldMicroscope(Instrument):
         if not isinstance(calibration, Calibration):
             raise GeometryError(f"pixels is {pixels!r} but must be a whole number, a Calibration or None.")
         pitch = calibration.lattice.pitch
-        cutoff = 2 * self.lenslets.pitch**2 / (min(o.wavelength for o in self.optics) * self.lenslet_distance)
+        cutoff = (
+            2 * self.lenslets.pitch**2 / (min(o.wavelength for o in self.objectives) * self.lenslet_distance)
+        )
         N = max(2, math.ceil(FINENESS * cutoff), math.ceil(1.5 * pitch))
         placement, cells, middle = PixelPlacement.of(calibration, N)
         step = self.lenslet_size / pitch

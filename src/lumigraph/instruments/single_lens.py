@@ -6,16 +6,18 @@ from typing import ClassVar
 
 from pydantic import model_validator
 
-from lumigraph.core.grid import Grid
+from lumigraph.core import checks
 from lumigraph.core.linear import Linear, stack
+from lumigraph.core.progress import part
 from lumigraph.design import resolution
 from lumigraph.elements import Train
-from lumigraph.errors import FormatError
+from lumigraph.errors import FormatError, GeometryError, SamplingError
 from lumigraph.instruments import describe, grids, trade_offs
-from lumigraph.instruments.camera import Camera
+from lumigraph.instruments.camera import Camera, Making
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.row import Row
-from lumigraph.operators import single_lens_operator
+from lumigraph.operators import CameraOptics, single_lens_operator
+from lumigraph.operators.single_lens import ERROR
 from lumigraph.propagation import Propagate
 
 
@@ -102,28 +104,21 @@ class SingleLensCamera(Camera):
             (self.lens_train(), Propagate(self.image_distance, "band_limited", grid=self.image_grid))
         )
 
-    def operator(self, depths: Sequence[float] | None = None, *, grid: Grid | None = None) -> Linear:
-        """The exact model of how this camera sees incoherent planes, for `lumigraph.deconvolve`.
-
-        Parameters
-        ----------
-        depths
-            From the focused plane [m], positive farther, for an object (z, y, x); None for the focused
-            plane alone, an object (y, x).
-        grid
-            Samples of the object; None for what the sensor sees, `object_grid`.
-
-        Raises
-        ------
-        GeometryError
-            No depths, or one inside the focal length.
-        SamplingError
-            The image's samples do not fit in memory.
-        """
-        grid = self.object_grid if grid is None else grid
-        planes = self._depths(depths)
-        operators = [single_lens_operator(self, grid, dz) for dz in planes]
-        return operators[0] if depths is None else stack(operators, depths=planes)
+    def _planes(
+        self, optics: CameraOptics, depths: Sequence[float] | None, samples: int | None, making: Making
+    ) -> Linear:
+        if samples is not None:
+            raise GeometryError("the camera has no lenslets to count by. Leave samples_per_lenslet out.")
+        if not 1e-2 >= checks.finite("accuracy", making.accuracy, "1", SamplingError) >= ERROR:
+            raise SamplingError(
+                f"accuracy is {making.accuracy:g} but a single lens is imaged to {ERROR:g}, relative rms. "
+                f"Ask for {ERROR:g} to 0.01."
+            )
+        maps, planes = [], (0.0,) if depths is None else depths
+        for number, dz in enumerate(planes):
+            maps.append(single_lens_operator(optics, self.object_grid, dz))
+            part(making.progress, number, len(planes))(1.0)
+        return maps[0] if depths is None else stack(maps, depths=depths)
 
     def trade_offs(self) -> tuple[Row, ...]:
         """Resolution, depth of field and views, to first order."""

@@ -10,15 +10,16 @@
   `microscope_kernels`, images of its points; `microscope_rays`, the same by rays; `microscope_spectrum`, the
   lenslets' frequencies; `microscope_pixels`, real pixels; `fourier_microscope`
 - `band`: band-limited samples along an axis, to and from points and pixels
-- `camera`: `Camera`, what an operator asks of an instrument
+- `camera`: `CameraOptics`, what an operator reads of an instrument, as plain values
 """
 
-from lumigraph.operators.camera import Camera
+from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.periodic import PeriodicOperator, periodic_operator
 from lumigraph.operators.single_lens import SingleLensOperator, single_lens_operator
 
 __all__ = [
-    "Camera",
+    "CameraOptics",
+    "HasOptics",
     "PeriodicOperator",
     "SingleLensOperator",
     "periodic_operator",

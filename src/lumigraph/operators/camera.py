@@ -1,79 +1,60 @@
-"""What a simulation asks of an instrument."""
+"""`CameraOptics`: what an operator reads of a camera, as plain values."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
-from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
-from lumigraph.elements import Train
+from lumigraph.elements import LensletArray, Train
 from lumigraph.sensor import Sensor
 
 
-class Camera(Protocol):
-    """An instrument, as `simulate` sees it; what belongs to lenslets is None without them."""
+@dataclass(frozen=True, slots=True)
+class CameraOptics:
+    """A main lens, lenslets or none, and pixels.
 
-    @property
-    def wavelength(self) -> float:
-        """In vacuum [m]."""
-        ...
+    Parameters
+    ----------
+    wavelength
+        In vacuum [m].
+    object_distance, separation
+        Focused plane to main lens, z1; main lens to lenslets, L, or to the sensor where there are none [m].
+    pupil_diameter
+        Of the main lens, D [m].
+    lens
+        The main lens: phase, stop and aberrations.
+    sensor
+        Pixels.
+    object_pitch
+        Of the camera's own samples of the focused plane [m].
+    array
+        The lenslets; None without them.
+    lenslet_distance
+        Lenslets to sensor, b [m]; None without lenslets.
+    """
 
-    @property
-    def object_distance(self) -> float:
-        """Focused plane to main lens, z1 [m]."""
-        ...
+    wavelength: float
+    object_distance: float
+    separation: float
+    pupil_diameter: float
+    lens: Train
+    sensor: Sensor
+    object_pitch: float
+    array: LensletArray | None = None
+    lenslet_distance: float | None = None
 
-    @property
-    def separation(self) -> float:
-        """Main lens to lenslets, or to the sensor where there are none [m]."""
-        ...
-
-    @property
-    def lenslet_distance(self) -> float | None:
-        """Lenslets to sensor, b [m]."""
-        ...
-
-    @property
-    def pupil_diameter(self) -> float:
-        """Of the main lens [m]."""
-        ...
+    def optics(self) -> "CameraOptics":
+        """Itself: an operator takes an instrument, or the values that it reads of one."""
+        return self
 
     @property
     def lattice(self) -> Lattice | None:
         """Where the lenslets stand [m]."""
-        ...
+        return None if self.array is None else self.array.lattice
 
-    @property
-    def object_grid(self) -> Grid:
-        """Samples of the focused plane."""
-        ...
 
-    @property
-    def pupil_grid(self) -> Grid:
-        """Samples of the main lens."""
-        ...
+class HasOptics(Protocol):
+    """An instrument with a main lens, or its values themselves."""
 
-    @property
-    def lenslet_grid(self) -> Grid | None:
-        """Samples of the lenslet plane."""
-        ...
-
-    @property
-    def image_grid(self) -> Grid:
-        """Samples of the sensor plane."""
-        ...
-
-    @property
-    def sensor(self) -> Sensor:
-        """Pixels."""
-        ...
-
-    def lens_train(self) -> Train:
-        """The main lens: phase, stop and aberrations."""
-        ...
-
-    def image_train(self) -> Train:
-        """From the field just before the main lens to the sensor."""
-        ...
-
-    def relay_train(self) -> Train | None:
-        """From the field just before the lenslets to the sensor."""
+    def optics(self) -> CameraOptics:
+        """What an operator reads of it."""
         ...

@@ -13,7 +13,7 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.elements import CircularAperture, LensletArray, ThinLens, Train, ZernikePlate, noll_to_nm
 from lumigraph.elements.train import Element
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators.camera import Camera
+from lumigraph.operators.camera import CameraOptics
 
 OVERSAMPLING = 1.2
 """How much closer than λL/(2D) the points of a cell stand: a kernel of `HALF_WIDTH` interpolates them."""
@@ -154,30 +154,23 @@ def _tail(fresnel_number: float) -> float:
     return min(1.0, math.sqrt(3 / fresnel_number))
 
 
-def fits(camera: Camera) -> bool:
-    """Whether the camera has lenslets."""
-    return camera.lattice is not None and camera.lenslet_distance is not None
-
-
-def lenslet_distance(camera: Camera) -> float:
+def lenslet_distance(camera: CameraOptics) -> float:
     """Lenslets to sensor, b [m], of a camera that has lenslets."""
-    assert camera.lenslet_distance is not None  # `fits` has been asked
+    assert camera.lenslet_distance is not None  # asked by `lenslet_array`
     return camera.lenslet_distance
 
 
-def telecentric_distance(camera: Camera) -> float:
+def telecentric_distance(camera: CameraOptics) -> float:
     """Lenslets to sensor of the telecentric camera with the same image, b L/(L + b) [m]."""
     b, L = lenslet_distance(camera), camera.separation
     return b * L / (b + L)
 
 
-def lenslet_array(camera: Camera) -> LensletArray:
+def lenslet_array(camera: CameraOptics) -> LensletArray:
     """The array of a camera that has lenslets, turned about the axis so that its rows lie along x."""
-    train = camera.relay_train()
-    array = train.elements[0] if train is not None and train.elements else None
-    if not isinstance(array, LensletArray):
+    if camera.array is None:
         raise GeometryError("the camera has no lenslets: the periodic operator is for lenslet arrays.")
-    return replace(array, lattice=straight(array.lattice))
+    return replace(camera.array, lattice=straight(camera.array.lattice))
 
 
 def straight(lattice: Lattice) -> Lattice:
@@ -195,14 +188,14 @@ def straight(lattice: Lattice) -> Lattice:
     return replace(lattice, basis=(row, column), origin=turned(origin))
 
 
-def cells_of(camera: Camera, array: LensletArray, fineness: Fineness) -> Cells:
+def cells_of(camera: CameraOptics, array: LensletArray, fineness: Fineness) -> Cells:
     """The smallest upright rectangle that repeats the lattice, its points and its samples."""
     lattice = array.lattice
     if lattice.layout == "hex":
         size = (math.sqrt(3) * lattice.pitch, lattice.pitch * lattice.kinds)
     else:
         size = lattice.pitches
-    extent = array.extent or camera.image_grid.size
+    extent = array.extent or camera.sensor.grid.size
     count = tuple(max(1, math.ceil(e / s - 1e-6)) for e, s in zip(extent, size, strict=True))
     # Cells are centred on a lattice point or, for an even number of them, on the axis' side of it.
     edge = tuple(
@@ -222,7 +215,7 @@ def cells_of(camera: Camera, array: LensletArray, fineness: Fineness) -> Cells:
     return Cells(_pair(size), _pair(edge), _pair(count), _pair(points), _pair(samples), _pair(ring))
 
 
-def _seen(camera: Camera) -> tuple[float, float]:
+def _seen(camera: CameraOptics) -> tuple[float, float]:
     """How far the sensor sees along y and x of the straight array, on the telecentric image [m]."""
     scale, rotation = (
         1 + lenslet_distance(camera) / camera.separation,
@@ -233,35 +226,35 @@ def _seen(camera: Camera) -> tuple[float, float]:
     return height * cos + width * sin, width * cos + height * sin
 
 
-def diffraction(camera: Camera) -> float:
+def diffraction(camera: CameraOptics) -> float:
     """Width of the diffraction on the image [m]: the main lens', or the lenslets' where it is wide.
 
     They are the same where the f-numbers match, and taken for the same up to a quarter more.
     """
-    assert camera.lattice is not None  # `fits` has been asked
+    assert camera.lattice is not None  # asked by `lenslet_array`
     behind = camera.wavelength * telecentric_distance(camera) / camera.lattice.pitch
     return max(airy(camera), 0.8 * behind)
 
 
-def spill(camera: Camera) -> float:
+def spill(camera: CameraOptics) -> float:
     """How far a micro-image reaches over its lenslet's edge [m]: 0 but where the main lens is wide."""
-    assert camera.lattice is not None  # `fits` has been asked
+    assert camera.lattice is not None  # asked by `lenslet_array`
     width = camera.pupil_diameter * lenslet_distance(camera) / camera.separation
     return max(0.0, width - 1.25 * camera.lattice.pitch) / 2
 
 
-def fresnel_number(camera: Camera) -> float:
+def fresnel_number(camera: CameraOptics) -> float:
     """p²/(λb) of the telecentric camera: light goes aside the less, the larger it is."""
-    assert camera.lattice is not None  # `fits` has been asked
+    assert camera.lattice is not None  # asked by `lenslet_array`
     return camera.lattice.pitch**2 / (camera.wavelength * telecentric_distance(camera))
 
 
-def airy(camera: Camera) -> float:
+def airy(camera: CameraOptics) -> float:
     """λL/D in the lenslet plane [m]: the finest period that the main lens' light has there."""
     return camera.wavelength * camera.separation / camera.pupil_diameter
 
 
-def lens(camera: Camera) -> Train:
+def lens(camera: CameraOptics) -> Train:
     """The camera's main lens, turned about the axis as `lenslet_array` turns the array.
 
     Raises
@@ -269,7 +262,7 @@ def lens(camera: Camera) -> Train:
     GeometryError
         An element that is not known to be round, before a turned array.
     """
-    train, rotation = camera.lens_train(), 0.0 if camera.lattice is None else camera.lattice.rotation
+    train, rotation = camera.lens, 0.0 if camera.lattice is None else camera.lattice.rotation
     if not rotation:
         return train
     return Train(_turned(element, -rotation) for element in train.elements)
@@ -288,7 +281,7 @@ def _turned(element: Element, angle: float) -> Element:
     )
 
 
-def mirrored(camera: Camera) -> bool:
+def mirrored(camera: CameraOptics) -> bool:
     """Whether the main lens is known to be the same in a mirror along each axis of the straight array."""
     return all(
         isinstance(element, ThinLens | CircularAperture)
@@ -302,13 +295,13 @@ def _even(j: int, coefficient: float) -> bool:
     return abs(coefficient) < 1e-9 or (m >= 0 and m % 2 == 0)
 
 
-def blur(camera: Camera, distance: float) -> float:
+def blur(camera: CameraOptics, distance: float) -> float:
     """Radius of a point's geometric image in the lenslet plane [m].
 
     A ray through (y, x) of the pupil arrives at (y, x) (1 - L/f + L/z) + λL/(2π) ∇φ for plates of phase φ.
     Where they aberrate, it is √2 times the rms distance from the axis, as of an even disc: few go farther.
     """
-    elements = camera.lens_train().elements
+    elements = camera.lens.elements
     (focal_length,) = (p.focal_length for p in elements if isinstance(p, ThinLens))
     spread = 1 - camera.separation * (1 / focal_length - 1 / distance)
     plates = [p for p in elements if isinstance(p, ZernikePlate)]

@@ -77,7 +77,8 @@ def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None
         return _build(optics, progress)
 
     # Packed and unpacked, built or found: products with other strides would round otherwise.
-    return _MATRICES.get(optics.key, lambda: _unpacked(store.kept(optics.key, built, folder)))
+    key = optics.key
+    return _MATRICES.get((key, folder), lambda: _unpacked(store.kept(key, built, folder)))
 
 
 def _held(optics: Optics) -> bool:

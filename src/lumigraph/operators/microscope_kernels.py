@@ -25,6 +25,12 @@ MARGIN = 1.15
 DROPPED = 0.01
 """Part of the light in the faintest offsets between cells, which are left out."""
 
+TAILS = 1.5
+"""Relative rms error of an image over the part of the light that is left out.
+
+Measured at NA 0.5, 20x, f/20 lenslets, sparse points: 1.3 for a hundredth in focus, 1.0 at 20 um out of it.
+"""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SliceKernel:

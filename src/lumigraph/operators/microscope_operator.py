@@ -28,6 +28,7 @@ from lumigraph.operators import microscope_spectrum
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_kernels import (
     DROPPED,
+    TAILS,
     SliceKernel,
     kernel_bytes,
     octant,
@@ -55,6 +56,8 @@ class MicroscopeOperator(Linear):
         Of each depth.
     cells
         Lenslets (rows, columns).
+    dropped
+        Part of each point's light that is left out.
     placement
         Where the pixels stand; None where they are the N × N samples of each cell.
     by_frequency
@@ -64,6 +67,7 @@ class MicroscopeOperator(Linear):
 
     kernels: tuple[SliceKernel, ...]
     cells: tuple[int, int]
+    dropped: float
     placement: PixelPlacement | None = None
     by_frequency: bool = False
     _spectra: dict = field(default_factory=dict)
@@ -77,6 +81,11 @@ class MicroscopeOperator(Linear):
         raw = (self.cells[0] * N, self.cells[1] * N) if self.placement is None else self.placement.shape
         volume = () if self.depths is None else (len(self.kernels),)
         return raw, (*volume, self.cells[0] * s, self.cells[1] * s)
+
+    @property
+    def error(self) -> float:
+        """By the light that is left out: `TAILS` times as much."""
+        return TAILS * self.dropped
 
     @property
     def multiply_adds(self) -> int:
@@ -278,7 +287,7 @@ def microscope_operator(
         if progress is not None:
             progress((done + 1) / len(planes))
     return MicroscopeOperator(
-        tuple(kernels), layout.cells, layout.placement, _suits_frequencies(kernels, layout.cells),
+        tuple(kernels), layout.cells, dropped, layout.placement, _suits_frequencies(kernels, layout.cells),
         object_grid=_object_grid(lenslet, layout), depths=None if depths is None else planes,
     )  # fmt: skip
 

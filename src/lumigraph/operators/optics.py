@@ -8,7 +8,7 @@ import numpy as np
 
 from lumigraph.elements import LensletArray
 from lumigraph.operators import cells as _cells
-from lumigraph.operators.camera import Camera
+from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.cell_response import SLACK, Axis
 from lumigraph.operators.cells import Cells, Fineness
 
@@ -28,17 +28,18 @@ class Optics:
         Object to main lens [m].
     """
 
-    camera: Camera
+    camera: CameraOptics
     array: LensletArray
     cells: Cells
     fineness: Fineness
     distance: float
 
     @classmethod
-    def of(cls, camera: Camera, distance: float, accuracy: float) -> "Optics":
+    def of(cls, camera: HasOptics, distance: float, accuracy: float) -> "Optics":
         """Of a plane at a distance from the main lens [m]."""
-        fineness, array = Fineness(accuracy), _cells.lenslet_array(camera)
-        return cls(camera, array, _cells.cells_of(camera, array, fineness), fineness, distance)
+        plain, fineness = camera.optics(), Fineness(accuracy)
+        array = _cells.lenslet_array(plain)
+        return cls(plain, array, _cells.cells_of(plain, array, fineness), fineness, distance)
 
     @property
     def rotation(self) -> float:

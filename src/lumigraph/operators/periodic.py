@@ -34,7 +34,7 @@ from lumigraph.core.progress import Progress
 from lumigraph.core.progress import part as part_of
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators.blocks import Offset, Part
-from lumigraph.operators.camera import Camera
+from lumigraph.operators.camera import HasOptics
 from lumigraph.operators.cells import HALF_WIDTH, Cells
 from lumigraph.operators.kernels import Matrix, matrix
 from lumigraph.operators.optics import Optics
@@ -207,7 +207,7 @@ class _Group:
 
 
 def periodic_operator(
-    camera: Camera,
+    camera: HasOptics,
     grid: Grid,
     dz: float | Sequence[float] = 0.0,
     *,
@@ -248,9 +248,9 @@ def periodic_operator(
     ``periodic_operator(camera, camera.object_grid).forward(picture)``
     """
     depths = tuple(float(d) for d in np.ravel(np.asarray(dz, np.float64)))
-    planes, optics = [], None
+    plain, planes, optics = camera.optics(), [], None
     for k, depth in enumerate(depths):
-        optics = Optics.of(camera, camera.object_distance + depth, accuracy)
+        optics = Optics.of(plain, plain.object_distance + depth, accuracy)
         report = part_of(progress, k, len(depths))
         planes.append(_plane(optics, matrix(optics, report, None if folder is None else Path(folder)), grid))
         report(1.0)

@@ -15,7 +15,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.elements import ThinLens, Train
 from lumigraph.errors import SamplingWarning
 from lumigraph.operators import cells as _cells
-from lumigraph.operators.camera import Camera
+from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.cell_response import STEP, Axis, Response, legendre
 from lumigraph.scene import sources
 
@@ -59,7 +59,7 @@ class Wave:
         return all(np.abs(core - np.flip(core, axis)).max() < tolerance for axis in (0, 1))
 
 
-def wave(camera: Camera, distance: float, axes: tuple[Axis, Axis], reach: Sequence[int]) -> Wave:
+def wave(camera: CameraOptics, distance: float, axes: tuple[Axis, Axis], reach: Sequence[int]) -> Wave:
     """Of a point on the axis, without the phase exp(iπw²/(λL)), wide enough for cells `reach` away."""
     multiples = []
     for axis, cells in zip(axes, reach, strict=True):
@@ -77,7 +77,7 @@ def wave(camera: Camera, distance: float, axes: tuple[Axis, Axis], reach: Sequen
     return Wave(data.astype(np.complex64), (int(multiples[0][0]), int(multiples[1][0])))
 
 
-def _round(camera: Camera, focal_length: float, distance: float, radius: np.ndarray) -> np.ndarray:
+def _round(camera: CameraOptics, focal_length: float, distance: float, radius: np.ndarray) -> np.ndarray:
     """Amplitude behind a round lens at a radius [m], for light of 1 in all: a Hankel transform."""
     half, squared = camera.pupil_diameter / 2, camera.wavelength * camera.separation
     focus = np.pi / camera.wavelength * (1 / distance + 1 / camera.separation - 1 / focal_length)
@@ -91,7 +91,7 @@ def _round(camera: Camera, focal_length: float, distance: float, radius: np.ndar
     return CubicSpline(at, values)(radius) / (squared * half * np.sqrt(np.pi))
 
 
-def _sampled(camera: Camera, lens: Train, distance: float, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+def _sampled(camera: CameraOptics, lens: Train, distance: float, y: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Amplitude (y, x) behind any lens, for light of 1 in all: a matrix Fourier transform of its pupil."""
     # Light comes again after as many λL/D as there are samples.
     widest = 2 * max(float(np.abs(at).max()) for at in (y, x))

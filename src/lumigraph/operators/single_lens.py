@@ -37,7 +37,7 @@ from lumigraph.elements import ThinLens
 from lumigraph.errors import SamplingError, SamplingWarning
 from lumigraph.operators import band
 from lumigraph.operators.band import Span
-from lumigraph.operators.camera import Camera
+from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.resampling import Resampling, averaged, represented
 from lumigraph.propagation import propagate
 from lumigraph.propagation.window import smooth_size
@@ -116,12 +116,7 @@ class SingleLensOperator(Chain):
         return ERROR
 
 
-def fits(camera: Camera) -> bool:
-    """Whether the camera has no lenslets."""
-    return camera.lattice is None
-
-
-def single_lens_operator(camera: Camera, grid: Grid, dz: float = 0.0) -> SingleLensOperator:
+def single_lens_operator(camera: HasOptics, grid: Grid, dz: float = 0.0) -> SingleLensOperator:
     """Operator from a plane at depth `dz`, sampled on `grid`, to the raw image; transfers are kept for reuse.
 
     Parameters
@@ -138,9 +133,10 @@ def single_lens_operator(camera: Camera, grid: Grid, dz: float = 0.0) -> SingleL
     SamplingError
         The camera has lenslets, or the image's samples do not fit in memory.
     """
-    if not fits(camera):
+    plain = camera.optics()
+    if plain.array is not None:
         raise SamplingError("the camera has lenslets: use periodic_operator.")
-    scale, pitch = -camera.separation / (camera.object_distance + dz), image_pitch(camera)
+    scale, pitch = -plain.separation / (plain.object_distance + dz), image_pitch(plain)
     here = _covering((scale * grid.y, scale * grid.x), pitch)
     points = [span.pitch / scale for span in here]  # descending in the object
     samples = Grid(
@@ -148,18 +144,19 @@ def single_lens_operator(camera: Camera, grid: Grid, dz: float = 0.0) -> SingleL
         (-points[0], -points[1]),
         ((here[0].first + here[0].count // 2) * points[0], (here[1].first + here[1].count // 2) * points[1]),
     )
-    maps = represented(grid, samples), *_imaging(camera, here, dz)
+    maps = represented(grid, samples), *_imaging(plain, here, dz)
     return SingleLensOperator(maps, object_grid=grid)
 
 
-def slice_image(camera: Camera, part: Slice) -> np.ndarray:
+def slice_image(camera: HasOptics, part: Slice) -> np.ndarray:
     """Raw image (ny, nx) of a slice."""
     operator = single_lens_operator(camera, part.grid, part.dz)
     return operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
 
 
-def points_image(camera: Camera, points: Points) -> np.ndarray:
+def points_image(instrument: HasOptics, points: Points) -> np.ndarray:
     """Raw image (ny, nx) of points, wherever they are: one convolution for each depth."""
+    camera = instrument.optics()
     total = np.zeros(camera.sensor.shape, np.float32)
     for dz in np.unique(points.positions[:, 2]):
         chosen = points.positions[:, 2] == dz
@@ -168,7 +165,7 @@ def points_image(camera: Camera, points: Points) -> np.ndarray:
         here = _covering((y, x), pitch)
         along_y, along_x = band.placed(y, here[0]), band.placed(x, here[1])
         # A point of intensity 1 counts as one sample of the camera's own object grid.
-        light = points.intensities[chosen] * math.prod(camera.object_grid.pitch) * (scale / pitch) ** 2
+        light = points.intensities[chosen] * camera.object_pitch**2 * (scale / pitch) ** 2
         samples = ((along_y * light) @ along_x.T).toarray().astype(np.float32)
         total += Chain(_imaging(camera, here, float(dz))).forward(samples)
     return total
@@ -180,7 +177,7 @@ def _covering(places: tuple[np.ndarray, np.ndarray], pitch: float) -> tuple[Span
     return y, x
 
 
-def _imaging(camera: Camera, here: tuple[Span, Span], dz: float) -> tuple[Convolution, Resampling]:
+def _imaging(camera: CameraOptics, here: tuple[Span, Span], dz: float) -> tuple[Convolution, Resampling]:
     """From samples that stand for their own area of the object to the pixels."""
     distance, pitch, pixels = camera.object_distance + dz, image_pitch(camera), camera.sensor.grid
     half_y, half_x = (np.array([-p / 2, p / 2]) for p in pixels.pitch)
@@ -193,7 +190,7 @@ def _imaging(camera: Camera, here: tuple[Span, Span], dz: float) -> tuple[Convol
     window = smooth_size(offsets[0].count), smooth_size(offsets[1].count)
     _check_memory(window, camera)
     light = (pitch * distance) ** 2 / (math.pi * camera.pupil_diameter**2 / 4)
-    key = repr((offsets, distance, camera.wavelength, camera.separation, camera.lens_train()))
+    key = repr((offsets, distance, camera.wavelength, camera.separation, camera.lens))
     transfer = _TRANSFERS.get(
         key, lambda: arrays.rfft2(_point_image(camera, distance, offsets, light), window)
     )
@@ -201,13 +198,13 @@ def _imaging(camera: Camera, here: tuple[Span, Span], dz: float) -> tuple[Convol
     return Convolution(transfer, window, samples, seen), averaged(_grid(list(there)), pixels)
 
 
-def image_pitch(camera: Camera) -> float:
+def image_pitch(camera: CameraOptics) -> float:
     """Distance of the samples that hold the image [m]: λL/(2D) and some closer."""
     finest = camera.wavelength * camera.separation / (2 * camera.pupil_diameter)
     return finest / band.OVERSAMPLING
 
 
-def _point_image(camera: Camera, distance: float, offsets: list[Span], light: float) -> np.ndarray:
+def _point_image(camera: CameraOptics, distance: float, offsets: list[Span], light: float) -> np.ndarray:
     """Image (ny, nx) of a point on the axis at the given offsets, times `light`, float32."""
     spot = camera.wavelength * camera.separation / camera.pupil_diameter
     blur = _blur(camera, distance)
@@ -219,7 +216,7 @@ def _point_image(camera: Camera, distance: float, offsets: list[Span], light: fl
     with warnings.catch_warnings():  # a smooth converging wave: its samples do not stand for points
         warnings.simplefilter("ignore", SamplingWarning)
         point = sources.point_source(pupil, camera.wavelength, distance, paraxial=True)
-        behind = camera.lens_train()(point)
+        behind = camera.lens(point)
         behind = replace(behind, data=behind.data.astype(np.complex64))
         image = propagate(behind, camera.separation, "fresnel", grid=_grid(near)).intensity
     for axis, span in enumerate(near):  # grey edges are means over samples: h is too faint by a sinc, far off
@@ -235,9 +232,9 @@ def _point_image(camera: Camera, distance: float, offsets: list[Span], light: fl
     return result
 
 
-def _blur(camera: Camera, distance: float) -> float:
+def _blur(camera: CameraOptics, distance: float) -> float:
     """Radius of a point's geometric image [m]."""
-    lenses = [part for part in camera.lens_train().elements if isinstance(part, ThinLens)]
+    lenses = [part for part in camera.lens.elements if isinstance(part, ThinLens)]
     vergence = sum(1 / lens.focal_length for lens in lenses) - 1 / distance
     return camera.pupil_diameter / 2 * abs(1 - camera.separation * vergence)
 
@@ -256,7 +253,7 @@ def _grid(spans: list[Span]) -> Grid:
     return Grid((shape[0], shape[1]), (spans[0].pitch, spans[1].pitch), (center[0], center[1]))
 
 
-def _check_memory(window: tuple[int, int], camera: Camera) -> None:
+def _check_memory(window: tuple[int, int], camera: CameraOptics) -> None:
     memory.require(
         20.0 * math.prod(window) + 8 * math.prod(camera.sensor.shape),
         f"the image's {window[0]} x {window[1]} samples",

@@ -17,12 +17,11 @@ from lumigraph.core.volume import Volume
 from lumigraph.elements import CircularAperture, Train
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
 from lumigraph.operators import single_lens
-from lumigraph.operators.camera import Camera
-from lumigraph.operators.cells import fits
 from lumigraph.operators.periodic import periodic_operator
 from lumigraph.propagation import Propagate, propagate
 from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
 from lumigraph.sensor import integrate
+from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Plane, Snapshots, TiltedWaves
 from lumigraph.simulation.microscope_scene import Microscope, microscope_image
 from lumigraph.simulation.spectrum import Spectrum, by_wavelength
@@ -207,7 +206,7 @@ def _exactly(
 ) -> np.ndarray:
     if isinstance(part, Points):
         return single_lens.points_image(camera, part)
-    if single_lens.fits(camera):
+    if camera.lattice is None:
         return single_lens.slice_image(camera, part.trimmed())
     part = part.trimmed()
     accuracy = accuracy or 1e-3
@@ -222,10 +221,8 @@ def _exact(camera: Camera, scene: Scene, accuracy: float | None) -> list[Slice |
     """
     if accuracy is None:
         return []
-    if single_lens.fits(camera):
+    if camera.lattice is None:
         return [part for part in scene.parts if isinstance(part, Slice | Points)]
-    if not fits(camera):
-        return []
     return [part for part in scene.parts if isinstance(part, Slice)]
 
 

@@ -32,7 +32,7 @@ class Microscope(Protocol):
     """What is asked of a light-field microscope."""
 
     @property
-    def optics(self) -> tuple[Objective, ...]:
+    def objectives(self) -> tuple[Objective, ...]:
         """The objective at each wavelength."""
         ...
 
@@ -78,7 +78,7 @@ def microscope_image(
         if progress is not None:
             progress(done + 1, len(scene.parts))
     known = {
-        "simulated": repr(coherence), "shots": len(scene.parts), "wavelength": scope.optics[0].wavelength
+        "simulated": repr(coherence), "shots": len(scene.parts), "wavelength": scope.objectives[0].wavelength
     }  # fmt: skip
     return RawImage(np.maximum(pixels, 0).astype(np.float32), scope.sensor.pixel_pitch, metadata=known)
 
@@ -100,7 +100,7 @@ def _slice_image(scope: Microscope, part: Slice) -> np.ndarray:
             f"a slice has shape {part.intensity.shape} but one wavelength needs grey (y, x). "
             "Give spectrum=Spectrum.rgb() for a coloured scene."
         )
-    finest = min(one.wavelength / (4 * one.numerical_aperture) for one in scope.optics)
+    finest = min(one.wavelength / (4 * one.numerical_aperture) for one in scope.objectives)
     samples = math.ceil(scope.lenslet_size / max(finest, *part.grid.pitch) - 1e-6)
     operator = scope.operator((part.dz,), max(SAMPLES, samples))
     plane = averaged(arrays.to_numpy(part.intensity), part.grid, operator.object_grid)
