@@ -234,6 +234,8 @@ def thing(scale):
         return data[0, 0]
     if name.endswith(".gif"):
         return list(data[0])
+    if name == "volume.zarr":
+        return lg.Volume(np.float32(data[0]), lg.Grid(data.shape[2:], 1e-6), (0.0, 1e-6, 2e-6))
     if name.endswith(".ply"):
         return lg.PointCloud(rng.random((500 * scale, 3)))
     return lg.LightField(data, lg.Grid((3, 3), 1e-3), lg.Grid(data.shape[2:], 1e-4), 0.01)
@@ -248,7 +250,20 @@ except FormatError as error:
 
 @pytest.mark.parametrize("size", [1, 3000, 20000])
 @pytest.mark.parametrize(
-    "name", ["a.png", "a.tiff", "a.zarr", "a.zarr.zip", "a.h5", "a.pfm", "a.ply", "a.gif", "v", "a_eslf.png"]
+    "name",
+    [
+        "a.png",
+        "a.tiff",
+        "a.zarr",
+        "volume.zarr",
+        "a.zarr.zip",
+        "a.h5",
+        "a.pfm",
+        "a.ply",
+        "a.gif",
+        "v",
+        "a_eslf.png",
+    ],
 )
 def test_where_no_more_fits_the_old_file_stays_and_one_line_says_so(tmp_path, name, size):
     """libhdf5 died of it; TIFF said "120000 requested and 73436 written"."""

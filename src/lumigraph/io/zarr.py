@@ -3,6 +3,7 @@
 Volumes are OME-Zarr (NGFF 0.5), which microscopy programs open; those by other programs are read too.
 """
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import prod
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import zarr
+from zarr.abc.buffer import Buffer
 from zarr.codecs import ZstdCodec
 from zarr.storage import LocalStore, ZipStore
 
@@ -22,6 +24,7 @@ from lumigraph.errors import FormatError
 from lumigraph.io import header, ngff, source, target, zarr_chunks
 
 _SIDE = 1024  # pixels of a chunk along each axis of a raw image
+_PATIENCE = 10.0  # s
 _SIDES = (16, 256, 256)  # voxels of a chunk of a volume
 Names = tuple[str, ...]
 
@@ -168,10 +171,34 @@ def _reading(path: Path) -> Iterator[zarr.Group]:
         store.close()
 
 
+class _Folder(LocalStore):
+    """A folder whose other chunks are not written after one has failed: they would make it again."""
+
+    stopped, busy = False, 0
+
+    async def set(self, key: str, value: Buffer) -> None:
+        """Write one file."""
+        if self.stopped:
+            raise OSError("another chunk was not written")
+        self.busy += 1
+        try:
+            await super().set(key, value)
+        finally:
+            self.busy -= 1
+
+    def stop(self) -> None:
+        """Refuse what comes, and wait for what is being written."""
+        self.stopped, end = True, time.monotonic() + _PATIENCE
+        while self.busy and time.monotonic() < end:
+            time.sleep(0.005)
+
+
 @contextmanager
 def _writing(path: Path, zipped: bool) -> Iterator[LocalStore | ZipStore]:
-    store = ZipStore(path, mode="w") if zipped else LocalStore(path)
+    store = ZipStore(path, mode="w") if zipped else _Folder(path)
     try:
         yield store
     finally:
+        if isinstance(store, _Folder):
+            store.stop()
         store.close()
