@@ -5,14 +5,14 @@
 - `centres`: sub-pixel centre of every micro-image
 - `diagnosis`: `diagnose`, what a white image says about how a camera is put together
 - `aligned`: a maker's lattice moved to the borders of micro-images on a raw image
-- `drift`: the lattice that a raw image carries itself, beside that of a calibration
+- `following`: `followed`, the lattice near a known one that a picture repeats on
 - `devignette`: divide a raw image by its white image; grey versions of colour images
 """
 
 from lumigraph.calibration.borders import aligned
 from lumigraph.calibration.devignette import devignette
 from lumigraph.calibration.diagnosis import Diagnosis, diagnose
+from lumigraph.calibration.following import followed
 from lumigraph.calibration.lattice_fit import calibrate
-from lumigraph.core.drift import Drift, drift
 
-__all__ = ["Diagnosis", "Drift", "aligned", "calibrate", "devignette", "diagnose", "drift"]
+__all__ = ["Diagnosis", "aligned", "calibrate", "devignette", "diagnose", "followed"]

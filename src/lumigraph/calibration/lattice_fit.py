@@ -12,6 +12,7 @@ from lumigraph.calibration.borders import border, edges
 from lumigraph.calibration.centres import Spots, followed, measure
 from lumigraph.calibration.devignette import as_raw, grey
 from lumigraph.calibration.fitting import Fitted, fit, recentred
+from lumigraph.calibration.following import followed as light_followed
 from lumigraph.calibration.overlap import Discs, overlapping, separated
 from lumigraph.calibration.period import Request, Vectors, lattice_vectors
 from lumigraph.calibration.quality import fill_of, sharpness_of
@@ -20,7 +21,6 @@ from lumigraph.calibration.template import mean_cell, sharpened
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
-from lumigraph.core.drift import followed as light_followed
 from lumigraph.core.gaps import logarithm, valleys
 from lumigraph.core.lattice import Lattice, Layout, Vector
 from lumigraph.core.raw import RawImage

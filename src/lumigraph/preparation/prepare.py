@@ -13,12 +13,12 @@ from lumigraph.calibration import aligned, calibrate, devignette
 from lumigraph.calibration.devignette import as_raw
 from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
-from lumigraph.core.drift import check_drift
 from lumigraph.core.prepared import PreparedImage, Reason, Verdicts
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError, SamplingWarning
 from lumigraph.preparation.agreement import implied
 from lumigraph.preparation.beside import Beside, above, black_plane, coloured
+from lumigraph.preparation.drift import check_drift
 from lumigraph.preparation.validity import pixel_reasons, verdicts
 from lumigraph.preparation.vignetting import vignetting
 

@@ -3,24 +3,17 @@
 import math
 import warnings
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.fft
-from scipy import ndimage
 
-from lumigraph.core.arrays import WORKERS, Array, to_numpy
+from lumigraph.calibration import followed
+from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.gaps import logarithm, valleys
 from lumigraph.errors import CalibrationError, SamplingWarning
 
 _SIZE = 1024  # px of the middle of the picture that is looked at
 _FEWEST = 8.0  # lenslets across it
-_RANGE, _TURN = 0.25, math.radians(6)  # of the pitch, and angles, that are searched
-_STEP = 0.35  # lenslets over the picture: steps of the search, below half a line's width
-_EVIDENCE = 12.0  # of a lattice's lines over the median of all tried: 18 and more with gaps, 5 to 10 without
-_LINE = 8.0  # of a single line over that median
-_SHARPEST, _HIGHEST = 0.14, 4.0  # 1/px, and orders, of the lines that gaps have after smoothing
 _CERTAIN, _LIKELY = 0.5, 0.2  # pitches between the lattices at the border of the picture
 _CLEAR, _SLIGHT = (
     18.5,
@@ -105,31 +98,6 @@ def drift(data: Array, calibration: Calibration) -> Drift | None:
     )  # fmt: skip
 
 
-def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> tuple[np.ndarray, float] | None:
-    """The lattice near another one that a feature (y, x) repeats on, by the lines of its spectrum.
-
-    Parameters
-    ----------
-    feature
-        Gaps, or light, of all micro-images.
-    basis
-        Lattice vectors (y, x) of i and j in columns [px].
-    is_hex
-        Whether there are three first harmonics.
-
-    Returns
-    -------
-    tuple or None
-        Basis, and its lines over their surroundings; None where they do not stand out.
-    """
-    pitch = math.sqrt(abs(float(np.linalg.det(basis))))
-    lines = _Lines.of(feature)
-    found = _nearest(lines, np.linalg.inv(basis), is_hex, min(feature.shape) / pitch)
-    if found is None or found.evidence < _EVIDENCE:
-        return None
-    return np.linalg.inv(_refined(lines, found, pitch)), found.evidence
-
-
 def check_drift(data: Array, calibration: Calibration) -> Drift | None:
     """Refuse a raw image (y, x[, c]) that carries another lattice than the calibration's.
 
@@ -198,98 +166,6 @@ def _expected(
         design = np.concatenate([np.ones((len(indices), 1)), indices], -1)
         basis = np.linalg.lstsq(design * weights, points * weights, rcond=None)[0][1:].T
     return basis, np.linalg.inv(basis)
-
-
-@dataclass(frozen=True, slots=True)
-class _Lines:
-    """Amplitudes of a windowed picture's spectrum, between its own bins too; x is not below 0."""
-
-    amplitude: np.ndarray
-    size: np.ndarray
-
-    @classmethod
-    def of(cls, picture: np.ndarray) -> "_Lines":
-        window = [np.hanning(n + 2)[1:-1].astype(np.float32) for n in picture.shape]
-        wave = (picture - picture.mean()) * window[0][:, None] * window[1]
-        size = [scipy.fft.next_fast_len(3 * n // 2, real=True) for n in picture.shape]
-        spectrum: Any = scipy.fft.rfft2(wave, size, workers=WORKERS)
-        return cls(np.abs(spectrum).astype(np.float32), np.array(size))
-
-    def heights(self, waves: np.ndarray) -> np.ndarray:
-        """Amplitudes (...) at waves (..., 2) as (y, x) [1/px]."""
-        waves = np.where(waves[..., 1:] < 0, -waves, waves) * self.size
-        return ndimage.map_coordinates(self.amplitude, np.moveaxis(waves, -1, 0), order=1, mode="grid-wrap")
-
-    def peaks(self, waves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Maxima (k, 2) within two samples of waves (k, 2) [1/px], by parabolas, and their heights (k,)."""
-        near = np.arange(-2, 3)
-        middle = np.rint(waves * self.size).astype(int)
-        rows, columns = np.broadcast_arrays(
-            middle[:, 0, None, None] + near[:, None], middle[:, 1, None, None] + near
-        )
-        turned = np.where(columns < 0, -1, 1)
-        heights = self.amplitude[turned * rows % self.size[0], turned * columns % self.size[1]]
-        place = heights[:, 1:4, 1:4].reshape(len(waves), -1).argmax(1)
-        y, x, k = place // 3 + 1, place % 3 + 1, np.arange(len(waves))
-        logarithms = np.log(np.maximum(heights, 1e-30))
-        dy = _top(*(logarithms[k, y + step, x] for step in (-1, 0, 1)))
-        dx = _top(*(logarithms[k, y, x + step] for step in (-1, 0, 1)))
-        return (middle - 2 + np.stack([y + dy, x + dx], -1)) / self.size, heights[k, y, x]
-
-
-def _top(before: np.ndarray, here: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Where a parabola through three samples is highest, from the middle one."""
-    return np.clip((after - before) / (2 * np.maximum(2 * here - before - after, 1e-6)), -0.6, 0.6)
-
-
-class _Found(NamedTuple):
-    """Waves of i and j (2, 2), their height over the surroundings, and those surroundings."""
-
-    waves: np.ndarray
-    evidence: float
-    surroundings: float
-
-
-def _nearest(lines: _Lines, waves: np.ndarray, is_hex: bool, lenslets: float) -> _Found | None:
-    """The lattice around the expected one, stretched and turned, whose first harmonics are strongest."""
-    stretch, turn = (
-        np.arange(-int(reach * lenslets / _STEP), int(reach * lenslets / _STEP) + 1) * _STEP / lenslets
-        for reach in (_RANGE, _TURN)
-    )
-    first = waves
-    if is_hex:
-        third = min(waves[0] + waves[1], waves[0] - waves[1], key=lambda wave: float(np.hypot(*wave)))
-        first = np.stack([*waves, third])
-    size, angle = 1 / (1 + stretch[:, None]), turn[None, :]
-    y, x = (first[:, k, None, None] * np.cos(angle) for k in (0, 1))
-    ty, tx = (first[:, k, None, None] * np.sin(angle) for k in (0, 1))
-    tried = np.stack([(y + tx) * size, (x - ty) * size], -1)
-    score = np.exp(np.log(np.maximum(lines.heights(tried), 1e-30)).mean(0))
-    best = np.unravel_index(int(np.argmax(score)), score.shape)
-    around = float(np.median(score))
-    if around <= 0:
-        return None
-    return _Found(tried[:2, best[0], best[1]], float(score[best]) / around, around)
-
-
-def _refined(lines: _Lines, found: _Found, pitch: float) -> np.ndarray:
-    """Waves of i and j (2, 2) by least squares over ever more harmonics, each at its own maximum."""
-    highest, waves = float(np.clip(_SHARPEST * pitch, 1.0, _HIGHEST)), found.waves
-    reach = np.arange(-5, 6)
-    orders = np.stack(np.meshgrid(reach, reach, indexing="ij"), -1).reshape(-1, 2)
-    orders = orders[61:]  # half a plane: the rest mirrors it
-    for limit in np.arange(1.1, highest + 0.2, 0.9):
-        expected = orders @ waves
-        used = np.hypot(*expected.T) <= limit * 1.1 * math.sqrt(abs(np.linalg.det(waves)))
-        places, heights = lines.peaks(expected[used])
-        weights = np.where(heights > _LINE * found.surroundings, heights, 0)[:, None]
-        if (weights > 0).sum() < 2:
-            break
-        better = np.linalg.lstsq(orders[used] * weights, places * weights, rcond=None)[0]
-        if np.linalg.matrix_rank(orders[used] * (weights > 0)) < 2:
-            break
-        waves = better
-    return waves
 
 
 def _share(gaps: np.ndarray, waves: np.ndarray) -> float:

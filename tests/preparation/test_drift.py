@@ -14,11 +14,11 @@ from data_folder import real
 from lumigraph import io
 from lumigraph.calibration import calibrate
 from lumigraph.core.calibration import Calibration
-from lumigraph.core.drift import check_drift, drift
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.warp import Warp
 from lumigraph.errors import CalibrationError, SamplingWarning
 from lumigraph.preparation import decode, prepare
+from lumigraph.preparation.drift import check_drift, drift
 
 NONE = np.zeros((0, 2))
 
