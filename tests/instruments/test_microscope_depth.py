@@ -32,7 +32,7 @@ def test_the_depth_of_a_textured_plane_comes_out_in_metres_positive_farther(scop
     views = views_of(scope, dz)
     found = defocus(epi(views), views, scope.depth_per_alpha)
     inner = np.asarray(found.values)[6:-6, 6:-6]
-    # Diffraction at lenslets of 100, 200 and 300 um draws it towards the focus by 15, 5 and 3 %; with sin θ in
+    # Diffraction at lenslets of 100, 200 and 300 um draws it towards the focus by 15, 5, 3 %; with sin θ in
     # the place of tan θ it would be 4 % beyond the plane.
     assert 0.94 < float(np.median(inner)) / dz < 1.0
     assert found.unit == "m"
