@@ -68,11 +68,12 @@ class Matrix(Linear):
 
     def _applied(self, values: Array, *, back: bool) -> Array:
         xp = arrays.namespace(values)
-        flat, matrix = xp.reshape(values, (-1,)), self.matrix.T if back else self.matrix
+        flat = xp.reshape(values, (-1,))
         if arrays.is_numpy(values):
+            matrix = self.matrix.T if back else self.matrix
             return (matrix @ flat).astype(values.dtype, copy=False)
-        if isinstance(matrix, np.ndarray):
-            return arrays.like(matrix, values) @ flat
+        if isinstance(self.matrix, np.ndarray):
+            return arrays.like(self.matrix.T if back else self.matrix, values) @ flat
         index, weight = self._table(values, back)
         gathered = xp.reshape(xp.take(flat, xp.reshape(index, (-1,)), axis=0), weight.shape)
         return xp.sum(gathered * weight, axis=1)

@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from collections.abc import Callable
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags, vstack
@@ -10,6 +11,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, like, namespace, to_numpy
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.matrix import Matrix
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import GeometryError, SamplingWarning
 from lumigraph.rendering.decode import check_raw
@@ -82,7 +84,7 @@ def super_resolve(
     sizes = Patches.of(patch, calibration)
     _warn_if_alike(calibration, sizes, factor)
     layout = Layout.of(calibration, sizes, max(1, round(abs(sizes.middle) * factor)))
-    matrix, used = _projection(calibration, sizes, layout)
+    projection, used = _projection(calibration, sizes, layout)
     data = to_numpy(as_float(raw.data))
     flat = data.reshape(data.shape[0] * data.shape[1], -1)[used].astype(float)
     steps, total = [0], iterations * flat.shape[1]
@@ -92,9 +94,8 @@ def super_resolve(
         if progress is not None:
             progress(steps[0], total)
 
-    shape = (len(layout.y), len(layout.x))
-    channels = [_solved(matrix, channel, shape, (iterations, smoothness), stepped) for channel in flat.T]
-    picture = np.stack(channels, -1).reshape(*shape, *data.shape[2:])
+    channels = [_solved(projection, channel, (iterations, smoothness), stepped) for channel in flat.T]
+    picture = np.stack(channels, -1).reshape(*projection.object_shape, *data.shape[2:])
     return like(picture, as_float(namespace(raw.data).asarray(raw.data)))
 
 
@@ -130,8 +131,8 @@ def _warn_if_alike(calibration: Calibration, sizes: Patches, factor: int) -> Non
         )
 
 
-def _projection(calibration: Calibration, sizes: Patches, layout: Layout) -> tuple[csr_matrix, np.ndarray]:
-    """Matrix (pixels, samples) of means over the pixels' widths, and the flat indices of those pixels."""
+def _projection(calibration: Calibration, sizes: Patches, layout: Layout) -> tuple[Matrix, np.ndarray]:
+    """From a picture to means over the pixels' widths (pixels,), and the flat indices of those pixels."""
     lattice, (ny, nx) = calibration.lattice, calibration.shape
     y, x = np.meshgrid(np.arange(ny, dtype=float), np.arange(nx, dtype=float), indexing="ij")
     i, j = calibration.index(y, x)
@@ -154,8 +155,9 @@ def _projection(calibration: Calibration, sizes: Patches, layout: Layout) -> tup
     index = (down[0][:, :, None] * len(layout.x) + right[0][:, None, :]).reshape(len(used), -1)
     weight = (down[1][:, :, None] * right[1][:, None, :]).reshape(len(used), -1)
     start = np.arange(len(used) + 1) * taps**2
-    shape = (len(used), len(layout.y) * len(layout.x))
-    return csr_matrix((weight.ravel(), index.ravel(), start), shape), used
+    picture = len(layout.y), len(layout.x)
+    matrix = csr_matrix((weight.ravel(), index.ravel(), start), (len(used), math.prod(picture)))
+    return Matrix(matrix, (len(used),), picture), used
 
 
 def _overlaps(place: np.ndarray, width: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -170,30 +172,31 @@ def _overlaps(place: np.ndarray, width: np.ndarray, count: int) -> tuple[np.ndar
 
 
 def _solved(
-    matrix: csr_matrix, values: np.ndarray, shape: tuple[int, int], how: tuple[int, float], stepped
+    projection: Matrix, values: np.ndarray, how: tuple[int, float], stepped: Callable[[np.ndarray], None]
 ) -> np.ndarray:
     """Picture whose projection is nearest to the values, smooth where they say nothing."""
-    (iterations, smoothness), adjoint = how, matrix.T.tocsr()
-    columns = matrix.get_shape()[1]
-    power = float((matrix.data**2).sum()) / columns
-    slopes = _slopes(shape)
-    weight = max(smoothness, 1e-9) * power
+    (iterations, smoothness), shape = how, projection.object_shape
+    slopes, columns = _slopes(shape), math.prod(shape)
+    weight = max(smoothness, 1e-9) * float((projection.matrix.data**2).sum()) / columns
 
-    def normal(picture: np.ndarray) -> np.ndarray:
-        return adjoint @ (matrix @ picture) + weight * (slopes.T @ (slopes @ picture))
+    def normal(flat: np.ndarray) -> np.ndarray:
+        picture = flat.reshape(shape)
+        found = projection.adjoint(projection.forward(picture))
+        return (found + weight * slopes.adjoint(slopes.forward(picture))).ravel()
 
-    seen = adjoint @ np.ones(len(values))
+    seen, back = projection.adjoint(np.ones(len(values))).ravel(), projection.adjoint(values).ravel()
     mean = float(values.mean()) if len(values) else 0.0
-    start = np.where(seen > 1e-3, (adjoint @ values) / np.maximum(seen, 1e-3), mean)
+    start = np.where(seen > 1e-3, back / np.maximum(seen, 1e-3), mean)
     operator = LinearOperator((columns, columns), matvec=normal, dtype=float)  # pyright: ignore
-    return cg(operator, adjoint @ values, x0=start, rtol=1e-5, maxiter=iterations, callback=stepped)[0]
+    return cg(operator, back, x0=start, rtol=1e-5, maxiter=iterations, callback=stepped)[0]
 
 
-def _slopes(shape: tuple[int, int]) -> csr_matrix:
+def _slopes(shape: tuple[int, ...]) -> Matrix:
     """Differences to the next sample down and to the right."""
     ny, nx = shape
     size = ny * nx
     down = diags([-1.0, 1.0], [0, nx], (size - nx, size))  # pyright: ignore
     keep = np.arange(size) % nx != nx - 1
     right = diags([-1.0 * keep, 1.0 * keep[:-1]], [0, 1], (size, size))  # pyright: ignore
-    return csr_matrix(vstack([down, right]))
+    matrix = csr_matrix(vstack([down, right]))
+    return Matrix(matrix, (2 * size - nx,), shape)
