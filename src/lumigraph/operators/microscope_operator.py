@@ -10,6 +10,7 @@ import hashlib
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from os import PathLike
 from pathlib import Path
 from typing import ClassVar
 
@@ -232,7 +233,7 @@ def microscope_operator(
     depths: Sequence[float] | None = None,
     *,
     dropped: float = DROPPED,
-    folder: str | Path | None = None,
+    folder: str | PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> MicroscopeOperator:
     """Operator from slices at `depths` to a raw image.
@@ -324,7 +325,7 @@ def _kept(
     sampling: CellSampling,
     dz: float,
     dropped: float,
-    folder: str | Path | None,
+    folder: str | PathLike[str] | None,
 ) -> SliceKernel:
     """The kernel of a depth, mapped from its file if a folder is given."""
     if folder is None:
