@@ -15,6 +15,7 @@ IDS = (
     "figure-5.3",
     "figure-5.5",
     "figure-5.7",
+    "figure-5.10",
     "figure-5.11",
     "figure-5.17",
     "figure-5.21",

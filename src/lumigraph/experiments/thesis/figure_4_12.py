@@ -30,7 +30,7 @@ def run(context: Context) -> Outcome:
         if dz:
             # Diffraction spreads a lenslet's directions by a third of its micro-image.
             rows.append(Row(f"slope dx/du at {dz / mm:+.0f} mm", slope(views), "", "> 0" if dz < 0 else "< 0",
-                            1 - camera.alpha(dz), 0.03))  # fmt: skip
+                            1 - camera.alpha(dz), 0.02))  # fmt: skip
         if dz in (0.0, -50 * mm, 50 * mm):
             figures.append((_panel(raw.data, views), f"4.12: a point at {dz / mm:+.0f} mm"))
     ratio = -camera.separation / camera.lenslet_distance

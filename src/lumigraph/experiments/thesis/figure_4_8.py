@@ -69,7 +69,7 @@ def _aperture_rows(camera: PlenopticCamera, views: LightField) -> list[Row]:
             note="expected: the disc of ray optics"),
         Row("area with half the aperture, over the whole", areas[1] / areas[0], "", "smaller", 0.6, 0.05,
             note="ray optics: 1/4; a third of the directions are mixed by diffraction"),
-        Row("area with the central view, over the whole", areas[2] / areas[0], "", "pinhole", 0.185, 0.05),
+        Row("area with the central view, over the whole", areas[2] / areas[0], "", "pinhole", 0.185, 0.015),
         Row("light with half the aperture, over the whole", light[1], "", "less", 0.35, 0.03),
         Row("light with the central view, over the whole", light[2], "", "noisier"),
     ]  # fmt: skip
