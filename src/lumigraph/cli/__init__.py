@@ -12,6 +12,8 @@
 Modules of verbs import what is slow inside their functions, so that `--help` answers at once.
 """
 
+import signal
+import threading
 from collections.abc import Sequence
 
 __all__ = ["main"]
@@ -19,9 +21,15 @@ __all__ = ["main"]
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code, see `app.main`; Ctrl-C while it starts is quiet, too."""
+    handler = signal.getsignal(signal.SIGINT)
+    ours = handler is signal.default_int_handler and threading.current_thread() is threading.main_thread()
     try:
+        if ours:  # the system's own way ends without a traceback, which imports would print
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
         from lumigraph.cli import app
 
+        if ours:
+            signal.signal(signal.SIGINT, handler)
         return app.main(arguments)
     except KeyboardInterrupt:
         return 130
