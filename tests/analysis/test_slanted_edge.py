@@ -7,6 +7,10 @@ import pytest
 
 from lumigraph.analysis import slanted_edge
 from lumigraph.errors import SamplingError
+from lumigraph.instruments import SingleLensCamera
+from lumigraph.scene import targets
+from lumigraph.simulation import simulate
+from lumigraph.units import mm, nm, um
 
 
 def lens(frequency, cutoff):
@@ -84,3 +88,24 @@ def test_pictures_without_one_slanted_edge_are_refused():
     ]:
         with pytest.raises(SamplingError, match=message):
             slanted_edge(image)
+
+
+def test_a_simulated_camera_has_the_mtf_of_its_lens_and_pixels():
+    """Wave optics from the object to the pixels, against 2/π (acos s - s √(1 - s²)) and the pixel's sincs."""
+    camera = SingleLensCamera(
+        wavelength=550 * nm,
+        object_distance=100 * mm,
+        main_lens={"focal_length": 50 * mm, "diameter": 10 * mm},
+        sensor={"pixel_pitch": 3 * um, "shape": (200, 200)},
+    )
+    raw = simulate(camera, targets.slanted_edge(camera.object_grid))
+    edge = slanted_edge(raw.data[20:-20, 20:-20], camera.sensor.pixel_pitch)
+    held = edge.frequencies < 0.5 / (3 * um)
+    f = edge.frequencies[held]
+    areas = (
+        3 * um,
+        camera.object_grid.pitch[1] * camera.magnification,
+    )  # pixels, and the target's grey samples
+    squares = [np.sinc(f * w * math.cos(edge.angle)) * np.sinc(f * w * math.sin(edge.angle)) for w in areas]
+    expected = lens(f, 1 / (550 * nm * camera.f_number)) * squares[0] * squares[1]
+    np.testing.assert_allclose(edge.mtf[held], expected, atol=0.01)
