@@ -12,7 +12,7 @@ from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.cell_response import SLACK, Axis
 from lumigraph.operators.cells import Cells, Fineness
 
-VERSION = 5
+VERSION = 6
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 
@@ -84,18 +84,26 @@ class Optics:
     @property
     def reach(self) -> tuple[int, int]:
         """Cells along y and x to which a point's light is followed in full."""
-        blur = _cells.blur(self.camera, self.distance) + self.spill
-        far = self.fineness.reach(blur, _cells.diffraction(self.camera))
+        far = self.fineness.reach(*self._spread)
         y, x = (max(1, math.ceil(far / size)) for size in self.cells.size)
         return y, x
 
     @property
     def near(self) -> tuple[int, int]:
         """Cells to which a point's light is followed at the border of the array."""
-        blur = _cells.blur(self.camera, self.distance) + self.spill
-        far = self.fineness.near(blur, _cells.diffraction(self.camera))
+        far = self.fineness.near(*self._spread)
         y, x = (max(1, round(far / size)) for size in self.cells.size)
         return min(y, self.reach[0]), min(x, self.reach[1])
+
+    @property
+    def _spread(self) -> tuple[float, float]:
+        """Radius of a point's geometric image and width of the diffraction around it [m].
+
+        An edge between lenslets that cuts a sharp image spreads it over micro-images, however small it is.
+        """
+        blur, pitch = _cells.blur(self.camera, self.distance), self.array.lattice.pitch
+        cut = pitch / 4 * max(0.0, 1 - 2 * blur / pitch)
+        return blur + self.spill, max(_cells.diffraction(self.camera), cut)
 
     def images_bytes(self, reach: tuple[int, int]) -> float:
         """Memory that images of points `reach` cells around are computed from [bytes]."""
