@@ -227,7 +227,8 @@ def _child(numbers: range, make: Callable[[int], Tree], board: mmap.mmap, folder
     for k in numbers:
         board[:40] = struct.pack("=qqqqd", k, opened, refused, starved, slowest)
         tree = make(k)
-        signal.alarm(SECONDS)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)  # of the processor: others may be at work
+        signal.alarm(4 * SECONDS)
         start = time.process_time()
         try:
             read(tree, folder)
@@ -239,6 +240,7 @@ def _child(numbers: range, make: Callable[[int], Tree], board: mmap.mmap, folder
             with log.open("a") as file:
                 file.write(f"{k}\t{type(error).__name__}: {' '.join(str(error).split())[:300]}\n")
         signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
         slowest = max(slowest, time.process_time() - start)
     board[:40] = struct.pack("=qqqqd", numbers.stop, opened, refused, starved, slowest)
 
@@ -273,7 +275,7 @@ def run(trees: list[Tree], mend: Callable[[Tree], Tree] | None, count: int, *, s
                 start = numbers.stop
             else:
                 code = os.waitstatus_to_exitcode(status)
-                hung = code == -signal.SIGALRM
+                hung = code in (-signal.SIGALRM, -signal.SIGPROF)
                 score.failures.append((at, f"hung for {SECONDS} s" if hung else f"died with {code}"))
                 start = at + 1
         score.failures += _logged(log)
