@@ -9,6 +9,7 @@ import numpy as np
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
@@ -46,26 +47,6 @@ class Planes:
                 f"planes have shape {tuple(self.data.shape)} and {len(self.positions)} positions "
                 "but must be (n, y, x[, c]) with a position each."
             )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class DepthMap:
-    """A depth for each place (t, s), with a confidence from 0 to 1.
-
-    Parameters
-    ----------
-    values
-        α' where the light field has a focus; NaN where nothing is known.
-    confidence
-        0 to 1.
-    label, unit
-        What the values are.
-    """
-
-    values: Array
-    confidence: Array
-    label: str = "Focus α′"
-    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,12 +155,11 @@ def focal_stack(views: LightField, count: int = 33) -> Planes:
     return Planes(data, tuple(float(alpha) for alpha in alphas))
 
 
-def depth_map(views: LightField, count: int = 49) -> DepthMap:
-    """Depth by `lumigraph.depth.from_focus` over the whole range."""
-    from lumigraph.depth import from_focus
+def depth_map(views: LightField) -> DepthMap:
+    """Refocus factors of the middle view by `lumigraph.depth.epi`, as `lumigraph depth` measures them."""
+    from lumigraph.depth import alpha_of, epi
 
-    found = from_focus(grey_or_colour(views), np.linspace(*focus_range(views), count))
-    return DepthMap(found.alpha, found.confidence)
+    return alpha_of(epi(grey_or_colour(views)), views)
 
 
 def grey_or_colour(views: LightField) -> LightField:

@@ -131,8 +131,9 @@ class Parts:
                 found.append(depth() if callable(depth) else depth)
             return found[0]
 
-        self.about["depth"] = {} if callable(depth) else {"label": depth.label, "unit": depth.unit}
-        self.about["depth"] = {"label": "Focus α′", "unit": "", **self.about["depth"]}
+        known = not callable(depth) and depth.quantity != "alpha"
+        label, unit = (depth.quantity.capitalize(), depth.unit) if known else ("Focus α′", "")
+        self.about["depth"] = {"label": label, "unit": unit}
         self.arrays["depth"] = lambda: Coded.of(_finite(to_numpy(once().values)))
         self.arrays["confidence"] = lambda: Coded.of(
             np.rint(255 * np.clip(_trusted(once()), 0, 1)).astype(np.uint8)

@@ -1,0 +1,71 @@
+"""Python, the command line and the viewer make the same pictures and maps of one raw image."""
+
+import numpy as np
+import pytest
+
+import lumigraph as lg
+from lumigraph import viewer
+from lumigraph.cli import main
+from lumigraph.viewer.exhibit import detail, focal_stack
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    """raw, white and dark image of a plenoptic camera 1.0, and its file."""
+    folder = tmp_path_factory.mktemp("bench")
+    camera = lg.PlenopticCamera.from_catalogue("thesis-plenoptic-1")
+    lenslets = {**camera.lenslets.model_dump(exclude_unset=True), "count": (13, 13)}
+    camera = camera.replace(lenslets=lenslets, sensor={"pixel_pitch": camera.sensor.pixel_pitch})
+    (folder / "camera.toml").write_text(camera.to_toml())
+    grid, rng = camera.object_grid, np.random.default_rng(3)
+    ky, kx = rng.uniform(-4e3, 4e3, (2, 40, 1, 1))
+    waves = np.cos(ky * grid.y[:, None] + kx * grid.x + rng.uniform(0, 6, (40, 1, 1))).sum(0)
+    scene = lg.Scene((lg.Slice(np.maximum(1 + 0.15 * waves, 0), grid, 0.02),))
+    white = lg.simulate(camera, lg.targets.white())
+    for name, raw in (("raw", lg.simulate(camera, scene)), ("white", white)):
+        lg.save(lg.RawImage((1000 * np.asarray(raw.data) + 64).astype(np.float32)), folder / f"{name}.tiff")
+    lg.save(lg.RawImage(np.full(white.shape, 64, np.float32)), folder / "dark.tiff")
+    return folder
+
+
+def test_refocused_pictures_and_depths_agree_to_a_grey_level(bench, monkeypatch):
+    monkeypatch.chdir(bench)
+    words = ["--calibration", "calibration.toml", "--white", "white.tiff", "--dark", "dark.tiff"]
+    camera = lg.load_camera("camera.toml")
+    lg.save(camera.calibration, "calibration.toml")
+    known = {name: lg.open(f"{name}.tiff") for name in ("white", "dark")}
+    ready = lg.prepare(lg.open("raw.tiff"), lg.open("calibration.toml"), **known)
+    views = lg.decode(ready)
+    files = {name: bench / f"{name}.tiff" for name in ("white", "dark")}
+    shown = viewer.open_exhibit(
+        bench / "raw.tiff", viewer.Origin(bench / "calibration.toml", files["white"], files["dark"])
+    )
+    level = float(views.data.max()) / 255
+    stack = focal_stack(shown.views, 3)
+    alphas = [str(alpha) for alpha in stack.positions]
+    assert (
+        main(
+            [
+                "refocus",
+                "raw.tiff",
+                *words,
+                "--alpha",
+                *alphas,
+                "-o",
+                "stack.tiff",
+                "--oversample",
+                str(detail(views)),
+            ]
+        )
+        == 0
+    )
+    written = np.asarray(lg.open("stack.tiff").data)
+    python = np.asarray(lg.refocus_stack(views, stack.positions, oversample=detail(views)))
+    assert np.abs(written - python).max() < level
+    assert np.abs(np.asarray(stack.data) - python).max() < level
+    assert main(["depth", "raw.tiff", *words, "-o", "map.tiff"]) == 0
+    found = lg.depth.epi(views)
+    np.testing.assert_allclose(lg.open("map.tiff").data, found.values, atol=1e-6)
+    np.testing.assert_allclose(
+        np.asarray(shown.depth().values), np.asarray(lg.depth.alpha_of(found, views).values), atol=1e-6
+    )
