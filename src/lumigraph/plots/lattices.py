@@ -17,6 +17,12 @@ from lumigraph.plots.axes import canvas, check_image, draw
 _MOST_ARROWS = 600
 
 
+def _stretched(image: np.ndarray) -> np.ndarray:
+    """The picture between its 0.5th and 99.5th percentile: a raw image may hold a few bright points."""
+    low, high = np.percentile(image, (0.5, 99.5))
+    return np.clip((image - low) / ((high - low) or 1.0), 0.0, 1.0)
+
+
 def lattice(white: RawImage | Array, calibration: Calibration, *, cells: int = 6) -> Figure:
     """Figure of the micro-images that a calibration found: residuals everywhere, cells near the middle.
 
@@ -43,6 +49,7 @@ def lattice(white: RawImage | Array, calibration: Calibration, *, cells: int = 6
     if cells < 1:
         raise CalibrationError(f"cells is {cells} but must be at least 1.")
     figure, (whole, part) = canvas(1, 2, width=6.4, height=5.4)
+    image = _stretched(image)
     draw(whole, image)
     _arrows(whole, calibration)
     draw(part, image)
