@@ -8,6 +8,7 @@ import numpy as np
 
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.grid import Grid
 from lumigraph.rendering.geometry import lit
 from lumigraph.viewer.encoding import Coded, white_level
@@ -131,8 +132,9 @@ class Parts:
                 found.append(depth() if callable(depth) else depth)
             return found[0]
 
-        known = not callable(depth) and depth.quantity != "alpha"
-        label, unit = (depth.quantity.capitalize(), depth.unit) if known else ("Focus α′", "")
+        label, unit = "Focus α′", ""
+        if isinstance(depth, DepthMap) and depth.quantity != "alpha":
+            label, unit = depth.quantity.capitalize(), depth.unit
         self.about["depth"] = {"label": label, "unit": unit}
         self.arrays["depth"] = lambda: Coded.of(_finite(to_numpy(once().values)))
         self.arrays["confidence"] = lambda: Coded.of(
