@@ -116,6 +116,16 @@ def test_stripes_and_spots_of_the_scene_are_no_lattice(rng):
     assert drift(point, off(lattice)) is None
 
 
+def test_a_point_far_out_of_focus_is_no_lattice():
+    """Its spots stand on every lenslet of a disc, as far apart as its depth says, and as sharp as gaps."""
+    lattice = LATTICES["square"]
+    y, x = np.mgrid[:400, :440]
+    spots = np.exp(-((np.hypot(*Lattice.square(13.4, 0.0, (200, 210)).offset(y, x)) / 4) ** 2))
+    picture = spots * np.exp(-((np.hypot(y - 200, x - 210) / 115) ** 6))
+    assert drift(picture, off(lattice)) is None
+    decode(picture, off(lattice))  # neither refused nor warned of
+
+
 def test_a_prepared_picture_is_not_looked_at_again(rng):
     lattice = LATTICES["square"]
     raw, calibration = raw_image(lattice, (400, 440), rng), off(lattice, 1.01)

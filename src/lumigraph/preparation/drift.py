@@ -5,6 +5,7 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from lumigraph.calibration import followed
 from lumigraph.core.arrays import Array, to_numpy
@@ -23,6 +24,7 @@ _BLOCKS, _EVERYWHERE = (
     8,
     0.45,
 )  # parts along each axis; real lattices have shares over 0.55, single points 0.36
+_DIM, _LIT = 0.05, 0.4  # of a bright lenslet's light; part of the lenslets that must have it
 _CONTRAST = 0.15  # of the mean micro-image from which its place is told
 _SHIFTED = 0.25  # of a pitch
 
@@ -71,6 +73,7 @@ class Drift:
 def drift(data: Array, calibration: Calibration) -> Drift | None:
     """The lattice that a raw image (y, x[, c]) carries itself; None where it shows none for certain.
 
+    Only a picture with light behind lenslets all over is judged: points before a dark ground repeat, too.
     Dark gaps between micro-images leave lines in the spectrum at the lattice's harmonics. The lattice is
     searched for by its first ones, within 25 % of the calibration's pitch and 6° of its rotation, and
     refined on those that follow. A raw image without gaps, or of fewer than some 14 lenslets across, tells
@@ -79,7 +82,7 @@ def drift(data: Array, calibration: Calibration) -> Drift | None:
     picture, corner = _middle(to_numpy(data))
     basis, waves = _expected(calibration, picture.shape, corner)
     pitch = math.sqrt(abs(float(np.linalg.det(basis))))
-    if min(picture.shape) < _FEWEST * pitch or float(np.ptp(picture)) <= 0:
+    if min(picture.shape) < _FEWEST * pitch or float(np.ptp(picture)) <= 0 or _lit(picture, pitch) < _LIT:
         return None
     gaps = valleys(picture, 1.0)
     found = followed(gaps, basis, calibration.lattice.layout == "hex")
@@ -166,6 +169,14 @@ def _expected(
         design = np.concatenate([np.ones((len(indices), 1)), indices], -1)
         basis = np.linalg.lstsq(design * weights, points * weights, rcond=None)[0][1:].T
     return basis, np.linalg.inv(basis)
+
+
+def _lit(picture: np.ndarray, pitch: float) -> float:
+    """Part of the places on the picture, a pitch apart, that are lit."""
+    size = round(pitch)
+    light = ndimage.uniform_filter(picture - np.percentile(picture, 0.5), size)
+    light = light[size // 2 :: size, size // 2 :: size]
+    return float(np.mean(light > _DIM * np.percentile(light, 99)))
 
 
 def _share(gaps: np.ndarray, waves: np.ndarray) -> float:
