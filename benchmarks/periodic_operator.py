@@ -33,7 +33,7 @@ from lumigraph.operators.optics import Optics
 from lumigraph.units import mm, nm, um
 
 Row = dict[str, Any]
-SUITES = ("accuracy", "adjoint", "speed", "cost")
+SUITES = ("accuracy", "adjoint", "speed", "cost", "large")
 COUNTS = (39, 101, 201)
 DEPTHS = (1, 3)
 AREA = (1 * um) ** 2
@@ -174,6 +174,43 @@ def first_image(count: int, depths: int, repeats: int, pixel: float = 1.0) -> li
     }]  # fmt: skip
 
 
+def fast(pitch: float, focal_length: float, count: int) -> lg.PlenopticCamera:
+    """A camera 1.0 of fast lenslets; lengths in micrometres."""
+    parts: dict[str, Any] = {
+        "main_lens": {"focal_length": 30 * mm},
+        "lenslets": {"pitch": pitch * um, "focal_length": focal_length * um, "count": (count, count)},
+        "sensor": {"pixel_pitch": pitch / 10 * um},
+    }
+    return lg.PlenopticCamera(wavelength=550 * nm, object_distance=240 * mm, **parts)
+
+
+LARGE: dict[str, tuple[Callable[[], Any], float]] = {
+    "f/4, 14 um, 1.0": (lambda: fast(14, 56, 39), 1e-3),
+    "f/2, 14 um, 1.0": (lambda: fast(14, 28, 101), 1e-2),
+    "Galilean": (lambda: lg.FocusedPlenopticCamera.from_catalogue("galilean"), 1e-3),
+    "m = 0.25": (lambda: lg.FocusedPlenopticCamera.from_catalogue("thesis-plenoptic-2-m025"), 1e-4),
+    "f/4, 40 um, 1.0": (lambda: fast(40, 160, 39), 1e-3),
+    "multi-focus": (lambda: lg.FocusedPlenopticCamera.from_catalogue("multi-focus-hex"), 1e-3),
+}
+
+
+def large_of(name: str) -> list[Row]:
+    """Processor seconds and memory of the first image and of the next, a star over the whole field."""
+    make, accuracy = LARGE[name]
+    found = make()
+    part: Any = lg.targets.siemens_star(found.object_grid).parts[0]
+    target, before, start = np.asarray(part.intensity, np.float32), _peak(), time.process_time()
+    operator = periodic_operator(found, part.grid, accuracy=accuracy)
+    operator.forward(target)
+    first = time.process_time()
+    operator.forward(target)
+    return [{
+        "camera": name, "accuracy": accuracy, "first image, CPU s": round(first - start, 1),
+        "next, CPU s": round(time.process_time() - first, 2), "peak GiB": round(_peak(), 2),
+        "of it before": round(before, 2), "held": type(operator.planes[0].matrix).__name__ == "Matrix",
+    }]  # fmt: skip
+
+
 def snapshots(which: str) -> list[Row]:
     """Median seconds of one snapshot, None without Octave."""
     measured = getattr(plenoptic_snapshots, f"{which}_seconds")(count=2)
@@ -261,6 +298,10 @@ def run(
         ),
         "speed": ("Table 5.1 camera, USAF target, nothing kept", lambda: speed_rows(quick)),
         "cost": ("Lenslets and depths", lambda: cost_rows(counts, quick)),
+        "large": (
+            "Cameras of many points and samples a cell",
+            lambda: [row for name in list(LARGE)[: 1 if quick else None] for row in apart("large_of", name)],
+        ),
     }
     return [(tables[name][0], tables[name][1]()) for name in SUITES if name in only]
 
