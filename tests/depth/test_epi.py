@@ -13,6 +13,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.depth import alpha_of, disparity_of, epi
 from lumigraph.depth.lines import visible
 from lumigraph.depth.pictures import Pictures
+from lumigraph.depth.smooth import Stiffness, tears, update
 from lumigraph.depth.sweep import costs, moved, span
 from lumigraph.errors import GeometryError
 
@@ -237,3 +238,22 @@ def test_views_that_cannot_see_a_place_are_told(bar):
     assert not seen[6][20, 45:49].any()
     assert seen[0][20, 45:49].all()
     assert all(places[20, 30:42].all() for places in seen.values())
+
+
+def test_a_surface_is_not_bent_across_a_tear():
+    values = np.where(np.arange(64) < 31, 0.0, 6.0) + np.zeros((64, 1))
+    information = np.where(np.abs(np.arange(64) - 30.5) < 12, 0.0, 1.0) + np.zeros((64, 1))
+    how = Stiffness(100.0, 4e-3, 2.0)
+    pull = 0.1 * information
+    kept = update(values, information, pull, how, tears=tears(values, 0.8))
+    # Beside the tear nothing is known: each side goes on as it is, 0.1 higher.
+    np.testing.assert_allclose(kept, values + 0.1, atol=0.04)
+    assert np.abs(update(values, information, pull, how) - values - 0.1).max() > 0.1
+
+
+def test_beside_an_edge_of_depth_a_place_is_less_sure(bar):
+    views, _ = bar
+    trust = np.asarray(epi(views, (-1, 3)).confidence)[4:-4]
+    beside, away = trust[:, [27, 28, 43, 44]], trust[:, 32:40]  # the bar's edges are at 28.5 and 43.5
+    # Both have the same texture: noise and contrast alone gave both the same confidence.
+    assert np.median(beside) < 0.2 * np.median(away)

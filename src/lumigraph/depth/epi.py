@@ -1,7 +1,7 @@
 """Depth from the lines of epipolar-plane images."""
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import maximum_filter, median_filter, minimum_filter
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import like
@@ -15,6 +15,12 @@ from lumigraph.errors import GeometryError
 
 _SURE = 0.05
 """Standard deviation [px per view, or in the outermost view if that is less] with a confidence of 1/2."""
+
+_MIXED, _NEIGHBOURS = 0.15, 9
+"""Part of the difference between neighbours, and within how many samples, by which depth is usually off.
+
+From the rendered scenes *antinous* and *cotton*; without it the surer half of *cotton* is as bad as the rest.
+"""
 
 
 def epi(
@@ -41,7 +47,9 @@ def epi(
     -------
     DepthMap
         Disparities (t, s): positive is nearer than the plane in focus. Confidence is 1/(1 + (σ/0.05 px)²),
-        σ being the standard deviation that noise and contrast give to a 7 x 7 window.
+        σ being the standard deviation that noise and contrast give to a 7 x 7 window, and 0.15 of the
+        differences between the disparities of a 9 x 9 window: beside an edge of depth the map may be on the
+        wrong side.
 
     Raises
     ------
@@ -77,8 +85,14 @@ def epi(
         pictures, first, lambda done, of: progress(len(moves) + 20 * done // of, total)
     )
     found, deviation = found / pictures.reach, deviation / pictures.reach
+    deviation = np.hypot(deviation, _MIXED * _spread(found))
     trust = 1 / (1 + (deviation / min(_SURE, _SURE * 4 / pictures.reach)) ** 2)
     return DepthMap(like(found, views.data), like(trust, views.data), "disparity")
+
+
+def _spread(values: np.ndarray) -> np.ndarray:
+    """Most minus least value (y, x) within a few samples: what is at stake beside an edge of depth."""
+    return maximum_filter(values, _NEIGHBOURS) - minimum_filter(values, _NEIGHBOURS)
 
 
 def _range(disparities: tuple[float, float], reach: float) -> tuple[float, float]:

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates, maximum_filter, spline_filter
 
 from lumigraph.depth.pictures import Pictures
-from lumigraph.depth.smooth import Stiffness, update
+from lumigraph.depth.smooth import Stiffness, tears, update
 from lumigraph.depth.volume import Progress, box
 
 _spline: Any = spline_filter
@@ -18,6 +18,7 @@ _ROUNDS = (2.0, 1.2)
 _KINK = 4e-3  # px in the outermost view
 _STIFFNESS = 3e5
 _BEFORE = 1.2  # how much nearer an occluder is [px in the outermost view]
+_TEAR = 2.0  # px in the outermost view between neighbours that are not of one surface
 _BESIDE = 2  # px beside an occluder whose differences show its edge
 
 
@@ -35,7 +36,7 @@ def refined(pictures: Pictures, moves: np.ndarray, progress: Progress) -> tuple[
     for k, jump in enumerate(_ROUNDS):
         pull, information = _asked(pictures, grey[pictures.middle], lines, moves)
         how = Stiffness(_STIFFNESS * pictures.noise**2 * _share(pictures), _KINK, jump)
-        change = update(moves, information, pull, how) - moves
+        change = update(moves, information, pull, how, tears=tears(moves, _TEAR)) - moves
         moves = moves + np.clip(change, -_BEFORE, _BEFORE)
         progress(k + 1, len(_ROUNDS))
     return moves, pictures.noise / np.sqrt(box(information, 3) + 1e-12)

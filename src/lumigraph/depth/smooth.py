@@ -18,6 +18,10 @@ _ROUNDS = 30  # of conjugate gradients: what is left is seen to by the next leve
 _ENOUGH = 1e-10
 
 
+Tears = tuple[np.ndarray, np.ndarray]
+"""Whether there is a tear between each sample (y, x) and the next, along y and along x."""
+
+
 @dataclass(frozen=True, slots=True)
 class Stiffness:
     """How smooth a map is held.
@@ -43,6 +47,7 @@ def update(
     pull: np.ndarray,
     how: Stiffness,
     edges: np.ndarray | None = None,
+    tears: Tears | None = None,
 ) -> np.ndarray:
     """The map (y, x) moved by what the data pull at, as far as smoothness lets them.
 
@@ -58,10 +63,13 @@ def update(
         Of the smoothness.
     edges
         Part (y, x) of the stiffness that is kept at each place, such as less at a picture's edges.
+    tears
+        Where the surface has no stiffness at all; see `tears`.
     """
     edges = np.ones_like(values) if edges is None else edges
     shape, pad = values.shape, [(0, -n % _LEVELS[0]) for n in values.shape]
     values, edges = (np.pad(a, pad, "edge") for a in (values, edges))
+    down, right = (np.pad(a, pad) for a in tears or (np.zeros(shape, bool),) * 2)
     information, pull = (np.pad(a, pad) for a in (information, pull))
     least = 1e-8 * float(information.max()) + 1e-30
     for size in _LEVELS:
@@ -69,18 +77,53 @@ def update(
             continue
         mean = _pooled(values, size) / size**2
         level = Stiffness(_pooled(edges, size) * how.weight / size**4, how.kink * size**2, how.jump)
-        change = _solve(mean, _pooled(information, size) + least * size**2, _pooled(pull, size), level)
+        whole, cut = _torn(down, right, size)
+        known = _pooled(information, size) * whole + least * size**2
+        change = _solve(mean, known, _pooled(pull, size) * whole, level, cut)
         change = _spread(change, size)
         values = values + change
         pull = pull - information * change
     return values[: shape[0], : shape[1]]
 
 
-def _solve(values: np.ndarray, information: np.ndarray, pull: np.ndarray, how: Stiffness) -> np.ndarray:
+def tears(values: np.ndarray, least: float) -> Tears:
+    """Where neighbours of a map (y, x) differ by more than `least`."""
+    down, right = np.zeros(values.shape, bool), np.zeros(values.shape, bool)
+    down[:-1] = np.abs(np.diff(values, axis=0)) > least
+    right[:, :-1] = np.abs(np.diff(values, axis=1)) > least
+    return down, right
+
+
+def _torn(down: np.ndarray, right: np.ndarray, size: int) -> tuple[np.ndarray | int, Tears]:
+    """Which blocks of size² samples are of one piece, and the tears between them.
+
+    The mean of a torn block is nobody's: it says nothing, and no block bends towards it.
+    """
+    if size == 1:
+        return 1, (down, right)
+    torn = _pooled(down | right, size) > 0
+    return ~torn, (torn | np.roll(torn, -1, 0), torn | np.roll(torn, -1, 1))
+
+
+def _across(cut: Tears) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the second differences of `_bends` cross no tear."""
+    down, right, both = (np.ones(cut[0].shape, bool) for _ in range(3))
+    down[1:-1] = ~(cut[0][:-2] | cut[0][1:-1])
+    right[:, 1:-1] = ~(cut[1][:, :-2] | cut[1][:, 1:-1])
+    both[:-1, :-1] = ~(cut[0][:-1, :-1] | cut[0][:-1, 1:] | cut[1][:-1, :-1] | cut[1][1:, :-1])
+    return down, right, both
+
+
+def _solve(
+    values: np.ndarray, information: np.ndarray, pull: np.ndarray, how: Stiffness, cut: Tears
+) -> np.ndarray:
     """The change by conjugate gradients, with weights made afresh twice."""
     change = np.zeros_like(values)
+    across = _across(cut)
     for _ in range(3):
-        weights = [_weight(part, how) for part in _bends(values + change)]
+        weights = [
+            _weight(part, how) * free for part, free in zip(_bends(values + change), across, strict=True)
+        ]
         diagonal = information + 6 * weights[0] + 6 * weights[1] + 8 * weights[2]
         start = pull - _stiff(values, weights)
         change = _conjugate_gradients(change, start, information, weights, diagonal)
