@@ -121,7 +121,7 @@ def test_a_point_far_out_of_focus_is_no_lattice():
     lattice = LATTICES["square"]
     y, x = np.mgrid[:400, :440]
     spots = np.exp(-((np.hypot(*Lattice.square(13.4, 0.0, (200, 210)).offset(y, x)) / 4) ** 2))
-    picture = spots * np.exp(-((np.hypot(y - 200, x - 210) / 115) ** 6))
+    picture = spots * np.exp(-((np.hypot(y - 200, x - 210) / 130) ** 6))
     assert drift(picture, off(lattice)) is None
     decode(picture, off(lattice))  # neither refused nor warned of
 

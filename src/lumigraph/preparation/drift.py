@@ -24,7 +24,7 @@ _BLOCKS, _EVERYWHERE = (
     8,
     0.45,
 )  # parts along each axis; real lattices have shares over 0.55, single points 0.36
-_DIM, _LIT = 0.05, 0.4  # of a bright lenslet's light; part of the lenslets that must have it
+_DIM, _LIT = 0.05, 0.5  # of a bright lenslet's light; part of the lenslets that must have it
 _CONTRAST = 0.15  # of the mean micro-image from which its place is told
 _SHIFTED = 0.25  # of a pitch
 
@@ -174,7 +174,7 @@ def _expected(
 def _lit(picture: np.ndarray, pitch: float) -> float:
     """Part of the places on the picture, a pitch apart, that are lit."""
     size = round(pitch)
-    light = ndimage.uniform_filter(picture - np.percentile(picture, 0.5), size)
+    light = ndimage.uniform_filter(picture - np.float32(np.percentile(picture, 0.5)), size)
     light = light[size // 2 :: size, size // 2 :: size]
     return float(np.mean(light > _DIM * np.percentile(light, 99)))
 
