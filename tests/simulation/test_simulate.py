@@ -10,10 +10,10 @@ from scipy.interpolate import CubicSpline
 import cameras
 from lumigraph.calibration import calibrate
 from lumigraph.core.grid import Grid
-from lumigraph.errors import GeometryError, LumigraphError, SamplingError
+from lumigraph.errors import GeometryError, LumigraphError, SamplingError, SamplingWarning
 from lumigraph.instruments import PlenopticCamera, SingleLensCamera
 from lumigraph.scene import Scene, Slice, sources, targets
-from lumigraph.simulation import Coherent, Interrupted, Snapshots, TiltedWaves, simulate
+from lumigraph.simulation import Coherent, Incoherent, Interrupted, Snapshots, TiltedWaves, simulate
 from lumigraph.units import mm, nm, um
 
 
@@ -176,14 +176,20 @@ def test_the_white_image_is_what_an_even_wide_scene_gives(plenoptic):
     assert blocks[0][inner].sum() == pytest.approx(blocks[1][inner].sum(), rel=0.03)
 
 
-def test_the_points_of_the_pupil_are_dense_enough(plenoptic, monkeypatch):
-    """Twice as many points per axis change the white image by less than 2 % rms."""
-    from lumigraph.simulation import imaging
+def test_white_images_of_round_lenslets_are_propagated_and_say_how_far_off_they_are():
+    camera = cameras.focused(count=(3, 3), shape="round")
+    with pytest.warns(SamplingWarning, match=r"accuracy of 0.001 was asked for but .* off by some 0.03 rms"):
+        raw = simulate(camera, targets.white())
+    assert raw.metadata["error"]["rms"] == pytest.approx(0.03)
 
-    white = simulate(plenoptic, targets.white()).data
-    monkeypatch.setattr(imaging, "PUPIL_OVERSAMPLING", 2 * imaging.PUPIL_OVERSAMPLING)
-    denser = simulate(plenoptic, targets.white()).data
-    assert np.linalg.norm(white - denser) < 0.02 * np.linalg.norm(denser)
+
+def test_an_accuracy_asked_for_is_in_the_raw_images_error(focused):
+    """Points and white image together: each part counts as much as its light."""
+    scene = targets.points([(0, 0)]) + targets.white()
+    known = simulate(focused, scene, Incoherent(accuracy=1e-2)).metadata["error"]
+    assert 0 < known["rms"] < 1e-2
+    assert "points at accuracy 0.01" in known["source"]
+    assert "white image at accuracy 0.01" in known["source"]
 
 
 def test_a_white_image_without_lenslets_is_even(two_f):

@@ -132,21 +132,26 @@ class Lenslets:
         self._bases = axes[0].basis(), axes[1].basis()
         self._members: dict[tuple[float, float], np.ndarray] = {}
 
+    @property
+    def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
+        """Matrices (m, window), along y and along x, to the numbers that hold band-limited light."""
+        return self._bases[0][0], self._bases[1][0]
+
     def response(self, center: Pair, limits: tuple[Limits, Limits] = (INFINITE, INFINITE)) -> Response:
         """Of the cell centred at (y, x) [m].
 
         Only lenslets whose centres lie within the limits, along y and x from the cell's centre [m], exist.
         """
         if self.array.shape == "square":
-            pieces = [self._straight(k, center[k], limits[k]) for k in (0, 1)]
+            pieces = [self.along(k, center[k], limits[k]) for k in (0, 1)]
             return Response(pieces[0], pieces[1], None)
         return self._dense(center, limits)
 
-    def _straight(self, which: int, center: float, limits: Limits) -> np.ndarray:
+    def along(self, which: int, center: float, limits: Limits) -> np.ndarray:
         """Square lenslets: the field (samples, window) along one axis."""
         axis, (coefficients, light) = self.axes[which], self._bases[which]
         step = abs(self.array.lattice.basis[1 - which][which])
-        (focal_length,), squared = _focal(self.array), self.optics[0] * self.optics[1]
+        (focal_length,), squared = focal_lengths(self.array), self.optics[0] * self.optics[1]
         half, total = self.array.fill_factor * step / 2, np.zeros((axis.samples, len(coefficients)))
         count = nodes(half, focal_length, axis, self.optics)
         reach = axis.size / 2 + axis.neighbourhood
@@ -154,7 +159,7 @@ class Lenslets:
             at, weight = legendre(middle - half, middle + half, count)
             phase = np.exp(-1j * np.pi * (at - middle) ** 2 / (self.optics[0] * focal_length))
             weight = weight * axis.fade(at, step)
-            total = total + (_spread(axis.image, at, squared) * (weight * phase)) @ light(at)
+            total = total + (fresnel(axis.image, at, squared) * (weight * phase)) @ light(at)
         return total @ coefficients
 
     def _dense(self, center: Pair, limits: tuple[Limits, Limits]) -> Response:
@@ -162,19 +167,19 @@ class Lenslets:
         (down, light), (across, _) = self._bases
         n, m = [axis.samples for axis in self.axes], (len(down), len(across))
         core = np.zeros((n[0] * m[0], n[1] * m[1]), np.complex64)
-        at, weight, _ = self._lines
-        for row, members in self._rows(center, limits):
+        at, weight, _ = self.lines
+        for row, members in self.rows(center, limits):
             shade = weight * self.axes[0].fade(row + at, self.array.lattice.pitch)
             seen = shade > FAINTEST * weight
             places = (row + at)[seen]
-            spread = _spread(self.axes[0].image, places, self.optics[0] * self.optics[1]) * shade[seen]
+            spread = fresnel(self.axes[0].image, places, self.optics[0] * self.optics[1]) * shade[seen]
             along_y = spread[:, None, :] * light(places).T  # (n_y, m_y, lines)
-            along_x = np.sum([self._member(*member) for member in members], axis=0)  # (lines, n_x m_x)
+            along_x = np.sum([self.member(*member) for member in members], axis=0)  # (lines, n_x m_x)
             core += along_y.reshape(-1, len(places)).astype(np.complex64) @ along_x[seen]
         core = core.reshape(n[0], m[0], n[1], m[1]).transpose(0, 2, 1, 3)
         return Response(down, across, core.reshape(n[0] * n[1], m[0] * m[1]))
 
-    def _rows(self, center: Pair, limits: tuple[Limits, Limits]) -> Iterator[tuple[float, list[Pair]]]:
+    def rows(self, center: Pair, limits: tuple[Limits, Limits]) -> Iterator[tuple[float, list[Pair]]]:
         """Rows of lenslets: their y, and (x, focal length) of their members."""
         lattice, low, high = self.array.lattice.moved(-center[0], -center[1]), [], []
         for axis, (first, last) in zip(self.axes, limits, strict=True):
@@ -184,7 +189,7 @@ class Lenslets:
         if low[0] > high[0] or low[1] > high[1]:
             return
         pairs = lattice.indices((low[0], high[0]), (low[1], high[1]))
-        focal = np.asarray(_focal(self.array))
+        focal = np.asarray(focal_lengths(self.array))
         focal = focal[lattice.kind(pairs[:, 0], pairs[:, 1]) % len(focal)]
         places = lattice.position(pairs)
         for row in np.unique(pairs[:, 0]):
@@ -192,28 +197,28 @@ class Lenslets:
             across = places[mine, 1].round(12).tolist()
             yield float(places[mine, 0][0]), list(zip(across, focal[mine].tolist(), strict=True))
 
-    def _member(self, middle: float, focal_length: float) -> np.ndarray:
+    def member(self, middle: float, focal_length: float) -> np.ndarray:
         """Field (lines, n_x m_x) along x of one lenslet, on all lines across it; kept."""
         known = self._members.get((middle, focal_length))
         if known is not None:
             return known
         axis, (_, light) = self.axes[1], self._bases[1]
         wavelength, result = self.optics[0], []
-        for y, _, chord in zip(*self._lines, strict=True):
+        for y, _, chord in zip(*self.lines, strict=True):
             at, weight = legendre(
                 middle - chord, middle + chord, nodes(chord, focal_length, axis, self.optics)
             )
             phase = np.exp(-1j * np.pi * ((at - middle) ** 2 + y**2) / (wavelength * focal_length))
             weight = weight * axis.fade(at, self.array.lattice.pitch)
-            spread = _spread(axis.image, at, wavelength * self.optics[1])
+            spread = fresnel(axis.image, at, wavelength * self.optics[1])
             result.append(((spread * (weight * phase)) @ light(at)).astype(np.complex64).ravel())
         return self._members.setdefault((middle, focal_length), np.array(result))
 
     @cached_property
-    def _lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Lines across a lenslet: y from its centre, quadrature weight, half the chord [m]."""
         half = self.array.fill_factor * self.array.lattice.pitch / 2
-        count = nodes(half, min(map(abs, _focal(self.array))), self.axes[0], self.optics)
+        count = nodes(half, min(map(abs, focal_lengths(self.array))), self.axes[0], self.optics)
         if self.array.shape == "round":
             angle, weight = legendre(-math.pi / 2, math.pi / 2, count)
             chord = half * np.cos(angle)
@@ -234,7 +239,7 @@ def _row(origin: float, step: float, reach: float, limits: Limits) -> Iterator[f
         yield origin + k * step
 
 
-def _spread(image: np.ndarray, light: np.ndarray, squared: float) -> np.ndarray:
+def fresnel(image: np.ndarray, light: np.ndarray, squared: float) -> np.ndarray:
     """Fresnel propagation from positions of light to those of the image, along one axis; λb is `squared`."""
     return np.exp(1j * np.pi * (image[:, None] - light) ** 2 / squared) / math.sqrt(squared)
 
@@ -257,5 +262,6 @@ def _legendre(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.polynomial.legendre.leggauss(count)
 
 
-def _focal(array: LensletArray) -> tuple[float, ...]:
+def focal_lengths(array: LensletArray) -> tuple[float, ...]:
+    """Of each kind of lenslet [m]."""
     return array.focal_length if isinstance(array.focal_length, tuple) else (array.focal_length,)

@@ -258,7 +258,7 @@ def periodic_operator(
         raise GeometryError("dz is empty. Give at least one depth.")
     several = depths if np.ndim(dz) else None
     operator = PeriodicOperator(
-        optics.cells, tuple(planes), _readout(optics), accuracy, object_grid=grid, depths=several
+        optics.cells, tuple(planes), readout(optics), accuracy, object_grid=grid, depths=several
     )
     memory.require(
         operator.memory_bytes, "the raw image", "Use fewer lenslets, or larger pixels.", SamplingError
@@ -279,7 +279,7 @@ def _plane(optics: Optics, matrix: Matrix | Streamed, grid: Grid) -> Plane:
     return Plane(matrix, _cropped(turn.grid, wide, ring, cells.points) @ turn @ spread)
 
 
-def _readout(optics: Optics) -> Linear:
+def readout(optics: Optics) -> Linear:
     """Means over the pixels of the image's samples, turned back."""
     cells, pixels = optics.cells, optics.camera.sensor.grid
     if not optics.rotation:

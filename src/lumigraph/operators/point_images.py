@@ -1,26 +1,16 @@
 """Images of the points of a cell of a lenslet array: what the lenslet-periodic operator repeats."""
 
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.interpolate import CubicSpline
-from scipy.special import j0
 
-from lumigraph.core.grid import Grid
-from lumigraph.elements import ThinLens, Train
-from lumigraph.errors import SamplingWarning
-from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import CameraOptics
-from lumigraph.operators.cell_response import STEP, Axis, Response, legendre
-from lumigraph.scene import sources
-
-PUPIL = 1024
-"""Samples across the main lens, or more where its light is followed far."""
+from lumigraph.operators.cell_response import STEP, Axis, Response
+from lumigraph.operators.point_light import point_light
 
 _BLOCK = 2**21
 """Numbers worked on at a time."""
@@ -67,46 +57,9 @@ def wave(camera: CameraOptics, distance: float, axes: tuple[Axis, Axis], reach: 
         multiples.append(np.arange(-n, n + 1))
     pitch = [axis.size / axis.points for axis in axes]
     y, x = (m * step for m, step in zip(multiples, pitch, strict=True))
-    lens = _cells.lens(camera)
-    first = lens.elements[0]
-    if len(lens.elements) == 1 and isinstance(first, ThinLens) and first.diameter is not None:
-        data = _round(camera, first.focal_length, distance, np.hypot(y[:, None], x))
-    else:
-        data = _sampled(camera, lens, distance, y, x)
+    data = point_light(camera, distance, math.hypot(y[-1], x[-1])).at(y, x)
     data *= np.sqrt(np.prod(pitch))
     return Wave(data.astype(np.complex64), (int(multiples[0][0]), int(multiples[1][0])))
-
-
-def _round(camera: CameraOptics, focal_length: float, distance: float, radius: np.ndarray) -> np.ndarray:
-    """Amplitude behind a round lens at a radius [m], for light of 1 in all: a Hankel transform."""
-    half, squared = camera.pupil_diameter / 2, camera.wavelength * camera.separation
-    focus = np.pi / camera.wavelength * (1 / distance + 1 / camera.separation - 1 / focal_length)
-    widest = float(radius.max())
-    turns = (abs(focus) * half**2 + 2 * np.pi * widest * half / squared) / np.pi
-    rho, weight = legendre(0, half, 64 + 3 * int(turns))
-    at = np.arange(0, widest + squared / half, squared / half / 64)
-    pupil = np.exp(1j * focus * rho**2) * 2 * np.pi * rho * weight
-    parts = np.array_split(2 * np.pi / squared * at, math.ceil(len(at) * len(rho) / _BLOCK))
-    values = np.concatenate([j0(np.outer(part, rho)) @ pupil for part in parts])
-    return CubicSpline(at, values)(radius) / (squared * half * np.sqrt(np.pi))
-
-
-def _sampled(camera: CameraOptics, lens: Train, distance: float, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Amplitude (y, x) behind any lens, for light of 1 in all: a matrix Fourier transform of its pupil."""
-    # Light comes again after as many λL/D as there are samples.
-    widest = 2 * max(float(np.abs(at).max()) for at in (y, x))
-    count = max(PUPIL, math.ceil(1.5 * widest / _cells.airy(camera)))
-    grid = Grid.square(count + 8, camera.pupil_diameter / count)
-    with warnings.catch_warnings():  # what is sampled is the product of all phases
-        warnings.simplefilter("ignore", SamplingWarning)
-        point = sources.point_source(grid, camera.wavelength, distance, paraxial=True)
-        pupil = lens(point).data
-    squared = camera.wavelength * camera.separation
-    pupil = pupil * np.outer(*(np.exp(1j * np.pi * c**2 / squared) for c in (grid.y, grid.x)))
-    light = (np.abs(pupil) ** 2).sum() * squared**2 / np.prod(grid.pitch)
-    down = np.exp(-2j * np.pi / squared * np.outer(y, grid.y))
-    across = np.exp(-2j * np.pi / squared * np.outer(grid.x, x))
-    return down @ pupil @ across / np.sqrt(light)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -182,19 +182,20 @@ class Incoherent:
     """Spatially incoherent light, like every lit scene.
 
     A camera without lenslets has its exact image, to 1e-4 rms: the object convolved with the image of a point
-    (`simulation.single_lens`). Before a lenslet array points are propagated one by one and their intensities
-    added, and extended scenes go through the lenslet-periodic operator (`simulation.periodic`), without
-    speckle, to `accuracy`. Lenslets so fast that the operator takes more than 1 GiB to build take white-phase
-    `Snapshots`, which carry speckle of about 1/sqrt(snapshots) rms in a pixel that resolves it.
+    (`operators.single_lens`). Before a lenslet array slices go through the lenslet-periodic operator
+    (`operators.periodic`), points and white images through quadratures of their own (`operators.points`,
+    `operators.white`), all to `accuracy` and without speckle. What takes more memory or time than there is
+    is refused, with the accuracy that could be had; nothing is replaced by `Snapshots`. The raw image's
+    ``metadata["error"]`` holds the estimated relative rms error and its source.
+
+    White images of hexagonal and round lenslets are propagated on grids, to some 3 % rms, and say so.
 
     Parameters
     ----------
-    snapshots
-        Number of snapshots, where they are needed.
-    rng
-        Seed or generator of the snapshots.
+    snapshots, rng
+        Not used any more: ask for `Snapshots` by name.
     accuracy
-        Relative rms error of the operator, 1e-2 to 1e-5.
+        Relative rms error, 1e-2 to 1e-5; within a lenslet of the array's border it may be twice as large.
     """
 
     snapshots: int = 100

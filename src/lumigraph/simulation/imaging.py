@@ -16,11 +16,13 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.elements import CircularAperture, Train
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
-from lumigraph.operators import single_lens
+from lumigraph.operators import points as _points
+from lumigraph.operators import single_lens, white
 from lumigraph.operators.periodic import periodic_operator
 from lumigraph.propagation import Propagate, propagate
 from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
 from lumigraph.sensor import integrate
+from lumigraph.simulation import error
 from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Plane, Snapshots, TiltedWaves
 from lumigraph.simulation.microscope_scene import Microscope, microscope_image
@@ -30,6 +32,11 @@ PUPIL_OVERSAMPLING = 1.1
 """How much denser than half of λL/p the points of the pupil stand that make a white image."""
 
 Progress = Callable[[float, int], None]
+
+Part = Slice | Points | Diffuser
+
+_PROPAGATED = error.Reached(0.03, "propagation on grids twice as fine as the rules ask")
+_SINGLE_LENS = error.Reached(1e-4, "convolution with a point's image")
 
 
 class Interrupted(KeyboardInterrupt):
@@ -122,7 +129,9 @@ def simulate(
     total = len(exact) + count
     try:
         for part in exact:
-            light.pixels += _exactly(camera, part, accuracy, light.within(progress, total))
+            image, reached = _exactly(camera, part, accuracy or 1e-3, light.within(progress, total))
+            light.pixels += image
+            light.reached.append((error.norm(image), reached))
             light.count(progress, total)
         for half, image in map(_Shot.arrive, shots):
             light.add(half, image)
@@ -167,6 +176,8 @@ class _Light:
     """What random or quasi-random shots brought, in two halves."""
     drawn: dict[int, int] = field(default_factory=lambda: {0: 0, 1: 0})
     """Shots in each half."""
+    reached: list[tuple[float, error.Reached]] = field(default_factory=list)
+    """Norm of each part that is imaged at once, and how far off it is."""
 
     def add(self, half: int | None, image: np.ndarray) -> None:
         if half is None:
@@ -202,20 +213,27 @@ def _drawn(coherence: Coherence | Incoherent) -> Coherence:
 
 
 def _exactly(
-    camera: Camera, part: Slice | Points, accuracy: float | None, progress: Callable[[float], None]
-) -> np.ndarray:
-    if isinstance(part, Points):
-        return single_lens.points_image(camera, part)
+    camera: Camera, part: Part, accuracy: float, progress: Callable[[float], None]
+) -> tuple[np.ndarray, error.Reached]:
+    """Raw image of a part, and how far off it is."""
     if camera.lattice is None:
-        return single_lens.slice_image(camera, part.trimmed())
+        if isinstance(part, Points):
+            return single_lens.points_image(camera, part), _SINGLE_LENS
+        assert isinstance(part, Slice)
+        return single_lens.slice_image(camera, part.trimmed()), _SINGLE_LENS
+    if isinstance(part, Points):
+        return _points.points_image(camera, part, accuracy), error.of_quadrature("points", accuracy)
+    if isinstance(part, Diffuser):
+        image = part.intensity * white.white_image(camera, accuracy)
+        return image, error.of_quadrature("white image", accuracy)
     part = part.trimmed()
-    accuracy = accuracy or 1e-3
     operator = periodic_operator(camera, part.grid, part.dz, accuracy=accuracy, progress=progress)
-    return operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
+    image = operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
+    return image, error.of_quadrature("operator", accuracy)
 
 
-def _exact(camera: Camera, scene: Scene, accuracy: float | None) -> list[Slice | Points]:
-    """Parts that a camera without lenslets, or the lenslet-periodic operator, images without snapshots.
+def _exact(camera: Camera, scene: Scene, accuracy: float | None) -> list[Part]:
+    """Parts whose images are computed without a train of elements.
 
     None of them where no accuracy is asked for: the light is not incoherent.
     """
@@ -223,13 +241,17 @@ def _exact(camera: Camera, scene: Scene, accuracy: float | None) -> list[Slice |
         return []
     if camera.lattice is None:
         return [part for part in scene.parts if isinstance(part, Slice | Points)]
-    return [part for part in scene.parts if isinstance(part, Slice)]
+    whole = white.separable(camera, accuracy)
+    return [part for part in scene.parts if whole or not isinstance(part, Diffuser)]
 
 
 def _read_out(camera: Camera, light: _Light, coherence: Coherence | Incoherent) -> RawImage:
     pixels = light.pixels
+    reached = list(light.reached)
     if light.intensity.any():
-        pixels = pixels + integrate(light.intensity, camera.image_grid, camera.sensor)
+        seen = integrate(light.intensity, camera.image_grid, camera.sensor)
+        reached.append((error.norm(seen), _SINGLE_LENS if camera.lattice is None else _PROPAGATED))
+        pixels = pixels + seen
     halves = {k: integrate(image, camera.image_grid, camera.sensor) for k, image in light.halves.items()}
     for half in halves.values():
         pixels = pixels + half
@@ -238,6 +260,12 @@ def _read_out(camera: Camera, light: _Light, coherence: Coherence | Incoherent) 
     known = {"simulated": repr(coherence), "shots": light.done, "wavelength": camera.wavelength}
     if len(halves) == 2:
         known["estimated_error"] = _error(halves, light.drawn, pixels, _drawn(coherence).convergence)
+        drawn = error.Reached(known["estimated_error"], f"two halves of {light.done} shots")
+        reached.append((error.norm(pixels), drawn))
+    if (whole := error.together(reached)) is not None:
+        known["error"] = {"rms": whole.rms, "source": whole.source}
+    if isinstance(coherence, Incoherent):
+        error.warn_if_missed(coherence.accuracy, whole)
     return RawImage(data, pixel_pitch=camera.sensor.pixel_pitch, metadata=known)
 
 

@@ -1,0 +1,116 @@
+"""Raw images of points before a camera with lenslets, wherever they are: each its own, straight away.
+
+A point lights few lenslets; cells of the image that get less than the accuracy asks for are left dark.
+"""
+
+import math
+
+import numpy as np
+
+from lumigraph.operators.camera import HasOptics
+from lumigraph.operators.cells import FINEST
+from lumigraph.operators.optics import Optics
+from lumigraph.operators.periodic import readout
+from lumigraph.operators.point_light import PointLight, point_light
+from lumigraph.operators.relay import Relay, relay
+from lumigraph.scene import Points
+
+LEFT_OUT = 0.3
+"""Part of the accuracy that cells may have that are left dark."""
+
+OUTSIDE = 0.1
+"""Factor of the accuracy for points beyond the array: the little of their light that arrives is all."""
+
+_PER_CELL = 4
+"""Samples along a cell that tell how bright it is."""
+
+
+def points_image(camera: HasOptics, points: Points, accuracy: float) -> np.ndarray:
+    """Raw image (ny, nx), to a relative rms error of `accuracy`."""
+    camera = camera.optics()
+    total = np.zeros(camera.sensor.shape, np.float32)
+    for dz in np.unique(points.positions[:, 2]):
+        mine = points.positions[:, 2] == dz
+        positions, intensities = points.positions[mine, :2], points.intensities[mine]
+        optics = Optics.of(camera, camera.object_distance + float(dz), accuracy)
+        within = _within(optics, _on_lenslets(optics, positions))
+        if within.any():
+            total += _plane_image(optics, positions[within], intensities[within])
+        if not within.all():
+            finer = Optics.of(camera, optics.distance, max(accuracy * OUTSIDE, FINEST))
+            total += _plane_image(finer, positions[~within], intensities[~within])
+    return total
+
+
+def _within(optics: Optics, places: np.ndarray) -> np.ndarray:
+    """Which places (n, 2) lie in cells of the array."""
+    cells = optics.cells
+    low = np.array(cells.edge)
+    return np.all((places >= low) & (places <= low + np.array(cells.size) * cells.count), axis=1)
+
+
+def _plane_image(optics: Optics, positions: np.ndarray, intensities: np.ndarray) -> np.ndarray:
+    """Raw image (ny, nx) of points (n, 2) of one depth."""
+    image = np.zeros([n * k for n, k in zip(optics.cells.image, optics.cells.samples, strict=True)])
+    places, lenslets = _on_lenslets(optics, positions), relay(optics)
+    light = point_light(optics.camera, optics.distance, _farthest(optics, places))
+    for place, intensity in zip(places, intensities, strict=True):
+        _add(image, lenslets, light, place, float(intensity))
+    return readout(optics).forward(image.astype(np.float32))
+
+
+def _on_lenslets(optics: Optics, positions: np.ndarray) -> np.ndarray:
+    """Images (n, 2) in the lenslet plane of points (n, 2) [m], in the frame that turns with the lenslets."""
+    sin, cos = math.sin(optics.rotation), math.cos(optics.rotation)
+    y, x = (-optics.camera.separation / optics.distance * positions).T
+    return np.stack([y * cos - x * sin, y * sin + x * cos], axis=1)
+
+
+def _farthest(optics: Optics, places: np.ndarray) -> float:
+    """From any of the places to any light that the image's cells see [m]."""
+    cells, reach = optics.cells, 0.0
+    for edge, n, ring, size, axis, at in zip(
+        cells.edge, cells.count, cells.ring, cells.size, optics.axes, places.T, strict=True
+    ):
+        low = edge - ring * size - axis.neighbourhood - size
+        high = edge + (n + ring) * size + axis.neighbourhood + size
+        reach = math.hypot(reach, max(high - at.min(), at.max() - low))
+    return reach
+
+
+def _add(image: np.ndarray, lenslets: Relay, light: PointLight, place: np.ndarray, intensity: float) -> None:
+    """A point's image, added to the samples of all cells."""
+    optics = lenslets.optics
+    rows, columns = _lit(optics, light, place)
+    y, x = lenslets.places(rows, columns)
+    field = lenslets.field(light.at(y - place[0], x - place[1]).astype(np.complex64), rows, columns)
+    share = optics.camera.object_pitch**2 * (optics.camera.separation / optics.distance) ** 2
+    share *= intensity / optics.image_scale**2
+    (ky, kx) = optics.cells.samples
+    image[rows.start * ky : rows.stop * ky, columns.start * kx : columns.stop * kx] += share * (
+        np.abs(field) ** 2
+    )
+
+
+def _lit(optics: Optics, light: PointLight, place: np.ndarray) -> tuple[range, range]:
+    """Rows and columns of the image's cells that all but `LEFT_OUT` of the accuracy lies in."""
+    cells, far = optics.cells, []
+    axes = [
+        edge - ring * size + (np.arange((n + 2 * ring) * _PER_CELL) + 0.5) / _PER_CELL * size - at
+        for edge, ring, size, n, at in zip(
+            cells.edge, cells.ring, cells.size, cells.count, place, strict=True
+        )
+    ]
+    bright = np.abs(light.at(axes[0], axes[1])) ** 2
+    (ny, nx) = cells.image
+    bright = bright.reshape(ny, _PER_CELL, nx, _PER_CELL).mean((1, 3)) ** 2
+    (ry, rx) = cells.ring  # where there are no lenslets
+    bright[:ry], bright[ny - ry :], bright[:, :rx], bright[:, nx - rx :] = 0, 0, 0, 0
+    budget = (LEFT_OUT * optics.fineness.accuracy) ** 2 * bright.sum() / 4
+    for k, n in enumerate(cells.image):
+        spill = math.ceil((optics.spill + optics.fineness.ring * optics.array.lattice.pitch) / cells.size[k])
+        line = bright.sum(1 - k)
+        first = int(np.searchsorted(np.cumsum(line), budget))
+        last = n - 1 - int(np.searchsorted(np.cumsum(line[::-1]), budget))
+        far.append(range(max(0, first - spill), min(n, last + spill + 1)))
+    return far[0], far[1]

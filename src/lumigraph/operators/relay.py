@@ -1,0 +1,198 @@
+"""Light that is known in the lenslet plane, through the lenslets to the image: cell by cell, nothing is kept.
+
+For what has no use for the matrices of all points of a cell: single points wherever they are, planes of
+coherent light, the pupil's own light. As in `cell_response`, each lenslet is a quadrature with exact borders,
+and exactly those lenslets count that exist.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from lumigraph.operators import cells as _cells
+from lumigraph.operators.cell_response import INFINITE, STEP, Axis, Lenslets, Limits, fresnel
+from lumigraph.operators.optics import Optics
+
+Pair = tuple[float, float]
+
+Members = tuple[Pair, ...]
+
+
+class Relay(Protocol):
+    """From amplitudes in the lenslet plane to amplitudes on the image, for any block of its cells."""
+
+    optics: Optics
+
+    def places(self, rows: range, columns: range) -> tuple[np.ndarray, np.ndarray]:
+        """Where amplitudes are needed along y and along x [m], without the phase exp(iπw²/(λL))."""
+        ...
+
+    def field(self, light: np.ndarray, rows: range, columns: range) -> np.ndarray:
+        """Amplitude (y, x) on the samples of the cells, of light (y, x) at those places."""
+        ...
+
+
+def relay(optics: Optics) -> Relay:
+    """Of a camera's lenslets, in the frame that turns with them."""
+    return Straight(optics) if optics.straight else Lines(optics)
+
+
+@dataclass(slots=True)
+class _Cells:
+    """Cells of the image along one axis, and the light around them."""
+
+    optics: Optics
+    which: int
+
+    @property
+    def axis(self) -> Axis:
+        return self.optics.axes[self.which]
+
+    def center(self, cell: int) -> float:
+        """Of a cell of the image [m]; 0 is the outermost of the ring."""
+        cells = self.optics.cells
+        return cells.edge[self.which] + (cell - cells.ring[self.which] + 0.5) * cells.size[self.which]
+
+    def limits(self, cell: int) -> Limits:
+        """Of the lenslets' centres from the cell's; infinite where light is not followed that far."""
+        extent, axis = self.optics.array.extent, self.axis
+        if extent is None:
+            return INFINITE
+        reach, middle = axis.size / 2 + axis.neighbourhood, self.center(cell)
+        low, high = (round(side * extent[self.which] / 2 - middle, 12) for side in (-1, 1))
+        return low if low > -reach else INFINITE[0], high if high < reach else INFINITE[1]
+
+    def places(self, cells: range) -> np.ndarray:
+        """Samples of light that hold the windows of all cells."""
+        first, axis = self.axis.window, self.axis
+        count = len(first) + (len(cells) - 1) * axis.points // STEP
+        return self.center(cells[0]) + first[0] + np.arange(count) * (first[1] - first[0])
+
+    def window(self, number: int) -> slice:
+        """Of the cell of this number, among those samples."""
+        start = number * self.axis.points // STEP
+        return slice(start, start + len(self.axis.window))
+
+
+def _lenslets(optics: Optics) -> Lenslets:
+    distance = _cells.telecentric_distance(optics.camera)
+    return Lenslets(optics.axes, optics.array, optics.camera.wavelength, distance)
+
+
+@dataclass(slots=True)
+class Straight:
+    """Square lenslets, whose two axes are apart."""
+
+    optics: Optics
+    _known: dict[tuple[int, Limits], np.ndarray] = field(default_factory=dict)
+    _lenslets: Lenslets = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._lenslets = _lenslets(self.optics)
+
+    def places(self, rows: range, columns: range) -> tuple[np.ndarray, np.ndarray]:
+        """As `Relay.places`."""
+        return _Cells(self.optics, 0).places(rows), _Cells(self.optics, 1).places(columns)
+
+    def field(self, light: np.ndarray, rows: range, columns: range) -> np.ndarray:
+        """As `Relay.field`."""
+        return self.along(1, self.along(0, light, rows).T, columns).T
+
+    def along(self, which: int, light: np.ndarray, cells: range) -> np.ndarray:
+        """Amplitude (samples, n) along one axis of light (places, n)."""
+        mine = _Cells(self.optics, which)
+        parts = [self.matrix(which, cell) @ light[mine.window(k)] for k, cell in enumerate(cells)]
+        return np.concatenate(parts)
+
+    def matrix(self, which: int, cell: int) -> np.ndarray:
+        """Amplitude (samples, window) of one cell along one axis."""
+        mine = _Cells(self.optics, which)
+        key = which, mine.limits(cell)
+        if key not in self._known:
+            found = self._lenslets.along(which, mine.center(cell), key[1])
+            self._known[key] = found.astype(np.complex64)
+        return self._known[key]
+
+
+@dataclass(slots=True)
+class Lines:
+    """Lenslets of any shape: line after line across each row of them."""
+
+    optics: Optics
+    _known: dict[Members, np.ndarray] = field(default_factory=dict)
+    _spreads: dict[float, np.ndarray] = field(default_factory=dict)
+    _lenslets: Lenslets = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._lenslets = _lenslets(self.optics)
+
+    def places(self, rows: range, columns: range) -> tuple[np.ndarray, np.ndarray]:
+        """As `Relay.places`: along y, the lines of all rows of lenslets."""
+        lines = self._lenslets.lines[0]
+        return (self._rows(rows)[:, None] + lines).ravel(), _Cells(self.optics, 1).places(columns)
+
+    def field(self, light: np.ndarray, rows: range, columns: range) -> np.ndarray:
+        """As `Relay.field`."""
+        (y, x), all_rows = self.optics.axes, self._rows(rows)
+        light = light.reshape(len(all_rows), -1, light.shape[1])
+        result = np.zeros((len(rows), y.samples, len(columns), x.samples), np.complex64)
+        for k, column in enumerate(columns):
+            around = [self._around(row, column, all_rows) for row in rows]
+            behind = self._behind(light[:, :, _Cells(self.optics, 1).window(k)], around)
+            for j, seen in enumerate(around):
+                for number, (place, _) in seen.items():
+                    result[j, :, k] += self._spread(place) @ behind[number]
+        return result.reshape(len(rows) * y.samples, -1)
+
+    def _rows(self, cells: range) -> np.ndarray:
+        """Places of the rows of lenslets that the cells see [m]."""
+        mine, lattice, axis = _Cells(self.optics, 0), self.optics.array.lattice, self.optics.axes[0]
+        reach, step = axis.size / 2 + axis.neighbourhood, lattice.basis[1][0]
+        low, high = mine.center(cells[0]) - reach, mine.center(cells[-1]) + reach
+        first = math.ceil((low - lattice.origin[0]) / step - 1e-6)
+        last = math.floor((high - lattice.origin[0]) / step + 1e-6)
+        return lattice.origin[0] + np.arange(first, last + 1) * step
+
+    def _around(self, row: int, column: int, all_rows: np.ndarray) -> dict[int, tuple[float, Members]]:
+        """Rows of lenslets around a cell: number, place along y from the cell's centre, and members."""
+        y, x = _Cells(self.optics, 0), _Cells(self.optics, 1)
+        center, limits = (y.center(row), x.center(column)), (y.limits(row), x.limits(column))
+        return {
+            int(np.abs(all_rows - place - center[0]).argmin()): (round(place, 12), tuple(members))
+            for place, members in self._lenslets.rows(center, limits)
+        }
+
+    def _behind(
+        self, light: np.ndarray, around: list[dict[int, tuple[float, Members]]]
+    ) -> dict[int, np.ndarray]:
+        """Amplitude (lines, samples) along x behind each row of lenslets, of light (rows, lines, window)."""
+        alike: dict[Members, set[int]] = {}
+        for seen in around:
+            for number, (_, members) in seen.items():
+                alike.setdefault(members, set()).add(number)
+        result = {}
+        for members, numbers in alike.items():
+            order = sorted(numbers)
+            behind = self._matrix(members) @ light[order].transpose(1, 2, 0)
+            result |= {number: behind[:, :, k] for k, number in enumerate(order)}
+        return result
+
+    def _matrix(self, members: Members) -> np.ndarray:
+        """Amplitude (lines, samples, window) along x behind these lenslets of a row."""
+        if members not in self._known:
+            coefficients = self._lenslets.coefficients[1]
+            behind = np.sum([self._lenslets.member(*member) for member in members], axis=0)
+            behind = behind.reshape(len(behind), self.optics.axes[1].samples, -1)
+            self._known[members] = behind @ coefficients.astype(np.complex64)
+        return self._known[members]
+
+    def _spread(self, place: float) -> np.ndarray:
+        """Amplitude (samples, lines) along y of a row of lenslets there from the cell's centre [m]."""
+        if place not in self._spreads:
+            axis, (lines, weight, _) = self.optics.axes[0], self._lenslets.lines
+            spread = fresnel(axis.image, place + lines, math.prod(self._lenslets.optics))
+            spread *= weight * axis.fade(place + lines, self.optics.array.lattice.pitch)
+            self._spreads[place] = spread.astype(np.complex64)
+        return self._spreads[place]

@@ -1,0 +1,64 @@
+"""What a raw image promises: its estimated relative rms error, and where that comes from."""
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lumigraph.errors import SamplingWarning
+
+_MEASURED = {  # of the accuracy asked for, in the middle and at the border (`benchmarks.accuracy`)
+    "points": (0.35, 0.03),
+    "white image": (0.25, 0.13),
+    "operator": (0.5, 0.4),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """How far off an image, or a part of it, is.
+
+    Parameters
+    ----------
+    rms
+        Relative rms error, estimated.
+    source
+        How it is known.
+    """
+
+    rms: float
+    source: str
+
+
+def of_quadrature(path: str, accuracy: float) -> Reached:
+    """Of a path that takes an accuracy: what was measured of it, at 1e-3 and above and towards 1e-4."""
+    coarse, fine = _MEASURED[path]
+    towards = min(max(-math.log10(accuracy) - 3, 0.0), 1.0)
+    return Reached(accuracy * coarse ** (1 - towards) * fine**towards, f"{path} at accuracy {accuracy:g}")
+
+
+def together(parts: Sequence[tuple[float, Reached]]) -> Reached | None:
+    """Of a sum of images of the given norms, whose errors are independent."""
+    if not parts:
+        return None
+    whole = math.hypot(*(norm for norm, _ in parts)) or 1.0
+    rms = math.hypot(*(norm * part.rms for norm, part in parts)) / whole
+    return Reached(rms, "; ".join(dict.fromkeys(part.source for _, part in parts)))
+
+
+def warn_if_missed(asked: float, reached: Reached | None) -> None:
+    """Warn where the error is larger than what was asked for."""
+    if reached is not None and reached.rms > asked:
+        warnings.warn(
+            f"an accuracy of {asked:g} was asked for but the raw image is off by some {reached.rms:.2g} rms "
+            f"({reached.source}).",
+            SamplingWarning,
+            stacklevel=4,
+        )
+
+
+def norm(image: np.ndarray) -> float:
+    """Root of the sum of an image's squares."""
+    return float(np.linalg.norm(image))
