@@ -6,6 +6,7 @@ from scenes import focused_raw, texture
 
 import lumigraph.io as io
 from data_folder import real
+from lumigraph.calibration import devignette
 from lumigraph.core.arrays import namespace, to_numpy
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.raw import RawImage
@@ -13,7 +14,7 @@ from lumigraph.depth import correlation, metric, virtual_depth
 from lumigraph.errors import CalibrationError, GeometryError
 from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.rendering import lenslet_indices, render
-from lumigraph.scene import Scene, Slice
+from lumigraph.scene import Scene, Slice, targets
 from lumigraph.simulation import simulate
 
 LATTICES = {
@@ -131,14 +132,17 @@ def camera():
 
 
 @pytest.mark.long  # half a minute of wave optics
-@pytest.mark.parametrize("dz", [0.0, 8e-3])
-def test_a_simulated_camera_tells_patch_and_distance(camera, dz):
+@pytest.mark.parametrize(("dz", "divided"), [(0.0, True), (8e-3, False)])
+def test_a_simulated_camera_tells_patch_and_distance(camera, dz, divided):
+    """The shading of micro-images stands still and pulls patches to 0: in focus by 4 to 15 % undivided."""
     grid = camera.object_grid
     rng = np.random.default_rng(3)
     paint = texture(rng, longest=1.0)
     unit = 40e-6
     image = np.maximum(paint(grid.y[:, None] / unit, grid.x / unit), 0)
     raw = simulate(camera, Scene((Slice(image, grid, dz),)))
+    if divided:
+        raw = devignette(raw, simulate(camera, targets.white()))
     found = correlation(raw, camera.calibration)
     inner = (slice(2, -2), slice(2, -2))
     truth = camera.patch_at(dz)
