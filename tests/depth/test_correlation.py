@@ -11,8 +11,9 @@ from lumigraph.core.arrays import namespace, to_numpy
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.raw import RawImage
 from lumigraph.depth import correlation, metric, virtual_depth
-from lumigraph.errors import CalibrationError, GeometryError
+from lumigraph.errors import CalibrationError, GeometryError, SamplingWarning
 from lumigraph.instruments import FocusedPlenopticCamera
+from lumigraph.preparation import prepare
 from lumigraph.rendering import lenslet_indices, render
 from lumigraph.scene import Scene, Slice, targets
 from lumigraph.simulation import simulate
@@ -171,7 +172,10 @@ def test_the_real_multi_focus_camera_has_smooth_depth_without_its_lattice():
     raw = io.open(folder / "sc2_klein.png")
     assert isinstance(raw, RawImage)
     calibration = io.open(folder / "sc2_klein.xml", shape=raw.shape)
-    found = correlation(raw, calibration, (-12, -3))
+    with pytest.warns(SamplingWarning, match="maker's lattice was moved"):
+        ready = prepare(raw, calibration)
+    calibration = ready.calibration
+    found = correlation(ready, calibration, (-12, -3))
     values, trust = np.asarray(found.values), np.asarray(found.confidence)
     assert np.median(trust) > 0.6
     depth = np.asarray(virtual_depth(found, calibration).values)

@@ -91,7 +91,7 @@ MISTAKES = {
     ),
     "decode without calibration": (
         lambda: lg.decode(RAW, None),
-        "calibration is of type NoneType but must be a Cal",
+        "where the micro-images stand is not known",
     ),
     "decode complex": (
         lambda: lg.decode(RAW + 0j, CALIBRATION),

@@ -31,7 +31,7 @@ def test_things_move_from_view_to_view_as_their_disparity_says(sample):
 def test_a_depth_map_of_the_views_finds_the_truth(sample):
     found = lg.depth.epi(sample.views)
     error = np.abs(np.asarray(found.values) - np.asarray(sample.disparity.values))
-    assert np.nanmedian(error) < 0.06  # of -1.5 to 1.5 px; a map of the other sign has 0.5
+    assert np.nanmedian(error) < 0.12  # of -1.5 to 1.5 px; a map of the other sign has 0.5
 
 
 def test_what_stands_in_front_hides_what_is_behind(sample):

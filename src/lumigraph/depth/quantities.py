@@ -26,6 +26,7 @@ def alpha_of(found: DepthMap, views: LightField) -> DepthMap:
 
     Examples
     --------
+    >>> import numpy as np
     >>> from lumigraph.core.grid import Grid
     >>> views = LightField(np.zeros((3, 3, 1, 1)), Grid((3, 3), 2.0), Grid((1, 1), 1.0), 10.0)
     >>> float(alpha_of(DepthMap(np.array([[0.1]]), np.ones((1, 1)), "disparity"), views).values[0, 0])

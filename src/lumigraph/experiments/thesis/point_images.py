@@ -89,10 +89,17 @@ class PointImage:
     def micro_image(self) -> tuple[np.ndarray, Grid]:
         """What the lenslet on the axis makes of a point there, and its place in the main-lens image [m].
 
-        It holds the rendered picture's point image before it is cut into patches.
+        It holds the rendered picture's point image before it is cut into patches. The other lenslets are dark:
+        what they send across their borders would be taken for frequencies beyond the lenslet's cut-off.
         """
         pixel, m = self.camera.pixels.pixel_pitch, self.camera.lenslet_magnification
         half = int(self.camera.lenslets.pitch * (1 + abs(m)) / 2 / pixel)
-        (ny, nx), data = self.raw.shape, np.asarray(self.raw.data, float)
+        lone = self.camera.replace(
+            lenslets={"count": (1, 1)},
+            sensor={"shape": self.camera.sensor.shape},
+            main_lens={"diameter": self.camera.pupil_diameter},
+        )
+        data = np.asarray(simulate(lone, targets.points([(0.0, 0.0)])).data, float)
+        ny, nx = data.shape
         part = data[ny // 2 - half : ny // 2 + half + 1, nx // 2 - half : nx // 2 + half + 1]
         return part, Grid.square(2 * half + 1, pixel / abs(m))
