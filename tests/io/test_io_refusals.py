@@ -211,7 +211,7 @@ def test_a_damaged_calibration_names_the_field(tmp_path, change, message):
 
 def test_binary_and_oversized_toml_are_refused(tmp_path, monkeypatch):
     (tmp_path / "c.toml").write_bytes(b"\xff\xfe\x00garbage")
-    with pytest.raises(FormatError, match="damaged TOML|is not TOML"):
+    with pytest.raises(FormatError, match="is not TOML"):
         io.open(tmp_path / "c.toml")
     monkeypatch.setattr("lumigraph.io.calibration._LARGEST", 4)
     with pytest.raises(FormatError, match="too many for a calibration"):

@@ -89,8 +89,8 @@ class PointImage:
     def micro_image(self) -> tuple[np.ndarray, Grid]:
         """What the lenslet on the axis makes of a point there, and its place in the main-lens image [m].
 
-        It holds the rendered picture's point image before it is cut into patches. The other lenslets are dark:
-        what they send across their borders would be taken for frequencies beyond the lenslet's cut-off.
+        It holds the rendered picture's point image before it is cut into patches. The other lenslets are
+        dark: what they send across their borders would be taken for frequencies beyond the lenslet's cut-off.
         """
         pixel, m = self.camera.pixels.pixel_pitch, self.camera.lenslet_magnification
         half = int(self.camera.lenslets.pitch * (1 + abs(m)) / 2 / pixel)
