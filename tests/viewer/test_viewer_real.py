@@ -6,6 +6,7 @@ import pytest
 import lumigraph as lg
 from data_folder import real
 from lumigraph import viewer
+from lumigraph.errors import SamplingWarning
 from lumigraph.viewer.opening import open_exhibit
 from viewer_pages import served
 
@@ -55,7 +56,8 @@ def test_a_plenoptic_camera_1_shows_pictures_lattice_and_depth(open_page):
 
 def test_a_multi_focus_camera_2_shows_pictures_and_three_kinds_of_lenslets(open_page):
     folder = real("raytrix_r42_multifocus")
-    exhibit = open_exhibit(folder / "sc2_klein.png", viewer.Origin(calibration=folder / "sc2_klein.xml"))
+    with pytest.warns(SamplingWarning, match="maker's lattice was moved"):
+        exhibit = open_exhibit(folder / "sc2_klein.png", viewer.Origin(calibration=folder / "sc2_klein.xml"))
     with served(exhibit) as address:
         page = open_page(address)
         assert page.page.evaluate("lumigraph.app.main.model.about.raw.lattice.kinds") == 3
