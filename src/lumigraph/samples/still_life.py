@@ -4,7 +4,7 @@ Painted, not photographed. Places are (y, x) in heights of the picture, (0, 0) i
 Every layer is a function of them, so that each view samples the scene itself: no picture is interpolated.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -204,7 +204,7 @@ def _leaves(canvas: Canvas) -> None:
         part.fill(blade, tone[blade][:, None] * np.array(GREEN, np.float32))
 
 
-LAYERS: Iterable[Layer] = (
+LAYERS = (
     Layer(_evening, -0.085),
     Layer(_table, -0.112, 0.365),
     Layer(_robot, 0.012),
