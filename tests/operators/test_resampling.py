@@ -100,3 +100,14 @@ def test_pixels_side_by_side_collect_all_of_the_light(rng):
     plane, pixels = Grid((31, 31), (0.5, 0.5)), Grid((41, 41), (1.0, 1.0))
     light = rng.random(plane.shape)
     assert averaged(plane, pixels).forward(light).sum() == pytest.approx(light.sum() * 0.25, rel=1e-5)
+
+
+@pytest.mark.parametrize("map_of", [represented, averaged])
+def test_axes_that_are_sampled_alike_share_one_matrix(map_of):
+    square, wide = Grid.square(40, 2.0), Grid((40, 40), (2.0, 2.5))
+    assert (both := map_of(square, square)).y is both.x
+    for other in (wide, Grid((40, 40), 2.0, (0.0, 1.0)), Grid((40, 42), 2.0)):
+        unlike = map_of(other, square)
+        assert unlike.y is not unlike.x
+        np.testing.assert_array_equal(dense(unlike.y), dense(both.y))
+        assert dense(unlike.x).shape != dense(both.x).shape or (dense(unlike.x) != dense(both.x)).any()

@@ -113,28 +113,37 @@ def represented(source: Grid, points: Grid, half_width: float = HALF_WIDTH) -> R
 
     The closer the points stand to what the band asks for, the longer the kernel must be.
     """
-    matrices = []
-    for axis in (0, 1):
+
+    def matrix(axis: int) -> Banded:
         pitch = points.pitch[axis]
         at = _descending(points, axis) / pitch
         samples = (source.y, source.x)[axis] / pitch
         scale = source.pitch[axis] / pitch
-        matrices.append(banded(at, samples, lambda d, s=scale: kernel(d, half_width) * s, half_width))
-    return Resampling(matrices[0], matrices[1])
+        return banded(at, samples, lambda d: kernel(d, half_width) * scale, half_width)
+
+    return _on_both_axes(matrix, source, points)
 
 
 def averaged(plane: Grid, pixels: Grid) -> Resampling:
     """Means over the areas of pixels of a band-limited plane, the pixels turned by 180°."""
-    matrices = []
-    for axis in (0, 1):
+
+    def matrix(axis: int) -> Banded:
         pitch, width = plane.pitch[axis], pixels.pitch[axis] / plane.pitch[axis]
 
-        def mean(d: np.ndarray, width: float = width) -> np.ndarray:
+        def mean(d: np.ndarray) -> np.ndarray:
             return (integral(d + width / 2) - integral(d - width / 2)) / width
 
         at = -(pixels.y, pixels.x)[axis] / pitch
-        matrices.append(banded(at, (plane.y, plane.x)[axis] / pitch, mean, HALF_WIDTH + width / 2))
-    return Resampling(matrices[0], matrices[1])
+        return banded(at, (plane.y, plane.x)[axis] / pitch, mean, HALF_WIDTH + width / 2)
+
+    return _on_both_axes(matrix, plane, pixels)
+
+
+def _on_both_axes(matrix: Callable[[int], Banded], *grids: Grid) -> Resampling:
+    """The matrices of both axes; one for both where they are sampled alike."""
+    y = matrix(0)
+    alike = all(len({*pair}) == 1 for grid in grids for pair in (grid.shape, grid.pitch, grid.center))
+    return Resampling(y, y if alike else matrix(1))
 
 
 def banded(
@@ -147,7 +156,9 @@ def banded(
         first = int(np.searchsorted(columns, mine.min() - reach, "left"))
         last = int(np.searchsorted(columns, mine.max() + reach, "right"))
         offsets = mine[:, None] - columns[first:last]
-        blocks.append((first, np.asarray(entries(offsets)).reshape(len(mine), last - first)))
+        near, block = np.abs(offsets) <= reach, np.zeros(offsets.shape)
+        block[near] = entries(offsets[near])
+        blocks.append((first, block))
     return Banded(len(columns), tuple(blocks))
 
 
