@@ -105,7 +105,8 @@ def test_pixels_side_by_side_collect_all_of_the_light(rng):
 @pytest.mark.parametrize("map_of", [represented, averaged])
 def test_axes_that_are_sampled_alike_share_one_matrix(map_of):
     square, wide = Grid.square(40, 2.0), Grid((40, 40), (2.0, 2.5))
-    assert (both := map_of(square, square)).y is both.x
+    both = map_of(square, square)
+    assert both.y is both.x
     for other in (wide, Grid((40, 40), 2.0, (0.0, 1.0)), Grid((40, 42), 2.0)):
         unlike = map_of(other, square)
         assert unlike.y is not unlike.x
