@@ -133,6 +133,13 @@ def test_lenslets_that_the_calibration_misses_are_not_valid():
         assert np.abs(places - (0.2, 0.9)).max() < 9.6
 
 
+@pytest.mark.parametrize(("pitch", "views"), [(14.99976, 15), (14.96, 15), (14.9, 14), (15.04, 15)])
+def test_a_pitch_that_is_whole_but_for_its_error_gives_as_many_views(pitch, views):
+    """A rectified picture of 15 px was measured as 14.99976 px and gave 14 x 14 views."""
+    found = decode(np.ones((95, 95)), calibrated(Lattice.square(pitch, 0.0, (47, 47)), (95, 95)))
+    assert found.data.shape[:2] == (views, views)
+
+
 @pytest.mark.filterwarnings("ignore:the raw image repeats every")  # on the lattice that is not distorted
 @pytest.mark.parametrize("name", LATTICES)
 def test_a_distorted_lattice_is_decoded_on_its_own_centres(name):

@@ -18,6 +18,7 @@ from lumigraph.calibration.period import Request, Vectors, lattice_vectors
 from lumigraph.calibration.quality import fill_of, sharpness_of
 from lumigraph.calibration.surface import Surface, flattened
 from lumigraph.calibration.template import mean_cell, sharpened
+from lumigraph.calibration.unlit import saturated, unlit
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
@@ -55,8 +56,8 @@ def calibrate(
     Candidates for the lattice come from autocorrelation and spectrum of the light and of its dark gaps, and
     are judged by all their harmonics. Centres come from the phase of each micro-image's first harmonic and
     are sharpened by the mean micro-image; the lattice from least squares with two free basis vectors, and
-    tilt and radial distortion where the residuals ask for them (`fitting.fit` says when). Micro-images
-    farther from it than four standard deviations (dust, broken lenslets) are listed as missing.
+    tilt and radial distortion where the residuals ask for them (`fitting.fit` says when). Lenslets without
+    light are listed as missing; one that stands off the lattice is not fitted, but it counts.
 
     On a raw image of a scene the gaps between micro-images are followed instead of their light, since a
     scene moves from one micro-image to the next; the result says so in its notes.
@@ -100,6 +101,7 @@ def calibrate(
     rotation    +0.000 mrad (+0.000 deg)
     origin      (44.000, 59.000) px (y, x)
     residual    0.000 px rms, 0.000 px at worst
+    missing     0 lenslets without light
     """
     first, original = _light(white)
     _check_request(layout, pitch, rotation)
@@ -124,7 +126,9 @@ def calibrate(
         pixel_pitch if pixel_pitch is not None else first.pixel_pitch, separation, lenslet_distance,
         warp=fitted.warp, light=fitted.spots.light / bright,
         fill=fill_of(cell) if discs is None else discs.size,
-        missing=_missing(fitted, model), sharpness=sharpness_of(original, model), notes=found.notes,
+        missing=unlit(original, model, fitted.spots.centers, white=found.white),
+        sharpness=sharpness_of(original, model),
+        notes=(*found.notes, *_overexposed(first, model, fitted.spots.indices)),
     )  # fmt: skip
 
 
@@ -144,7 +148,17 @@ def _overlapped(flat: np.ndarray, fitted: Fitted, discs: Discs) -> "_Followed":
         f"micro-images overlap, they are {discs.size:.2f} pitches wide: their centres were found by the sum "
         "of such discs; close the main lens for less cross-talk"
     )
-    return _Followed(separated(flat, fitted, discs), flat, (note,))
+    return _Followed(separated(flat, fitted, discs), flat, (note,), white=True)
+
+
+def _overexposed(image: RawImage, model: Calibration, indices: np.ndarray) -> tuple[str, ...]:
+    """What is to be known of micro-images at the top of the range."""
+    if not (many := saturated(image, model, indices)):
+        return ()
+    return (
+        f"{many} of {len(indices)} micro-images are saturated in their middle: they count, but their light is "
+        "not known; expose less",
+    )
 
 
 class _Followed(NamedTuple):
@@ -153,6 +167,7 @@ class _Followed(NamedTuple):
     fitted: Fitted
     picture: np.ndarray
     notes: tuple[str, ...] = ()
+    white: bool = False
 
 
 def _light(white: RawImage | Array | Sequence[RawImage | Array]) -> tuple[RawImage, np.ndarray]:
@@ -180,7 +195,7 @@ def _followed(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, vectors:
     try:
         light = _by_light(flat, above, vectors)
         if _spread(light) <= _CLEAR and _share(light, flat.shape) > _WHITE:
-            return _Followed(light, above)
+            return _Followed(light, above, white=True)
         found.append(_Followed(light, above))
     except CalibrationError as error:
         refused.append(error)
@@ -304,17 +319,6 @@ def _outwards(
         model = fitted.model(shape)
     assert fitted is not None
     return recentred(fitted, shape)
-
-
-def _missing(fitted: Fitted, model: Calibration) -> np.ndarray:
-    """Indices (m, 2) of lenslets whose micro-images are whole on the picture but were not found."""
-    spots = fitted.spots
-    low, high = spots.centers.min(0), spots.centers.max(0)
-    expected = model.indices_within((low[0], high[0]), (low[1], high[1]))
-    first = np.minimum(expected.min(0), spots.indices.min(0))
-    there = np.zeros(np.maximum(expected.max(0), spots.indices.max(0)) - first + 1, bool)
-    there[tuple((spots.indices - first).T)] = True
-    return expected[~there[tuple((expected - first).T)]]
 
 
 def _check_request(layout: str | None, pitch: float | None, rotation: float | None) -> None:

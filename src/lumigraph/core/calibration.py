@@ -50,8 +50,7 @@ class Calibration:
         Width of the lit part of a micro-image over the pitch: 1 where the f-numbers of main lens and
         lenslets match, less where the main lens is stopped down; None where it could not be measured.
     missing
-        Indices (m, 2) of lenslets that ought to stand on the picture and were not found, or not where they
-        ought to be: dead ones, dust.
+        Indices (m, 2) of lenslets that ought to stand on the picture and send no light: dead ones, dust.
     sharpness
         Contrast of each of the three kinds of lenslets, `lattice.kind`, over their mean; empty for one kind.
     notes
@@ -161,6 +160,11 @@ class Calibration:
         inside = (y >= y_range[0]) & (y <= y_range[1]) & (x >= x_range[0]) & (x <= x_range[1])
         return indices[inside]
 
+    def misses(self, indices: np.ndarray) -> np.ndarray:
+        """Which lenslets (...) of (..., 2) as (i, j) are missing."""
+        keys = [each[..., 0] * (1 << 32) + each[..., 1] for each in (indices, self.missing)]
+        return np.isin(keys[0], keys[1])
+
     def centers_within(self, y_range: Vector, x_range: Vector) -> np.ndarray:
         """Micro-image centres (k, 2) as (y, x) [px] in the closed ranges, row by row."""
         return self.position(self.indices_within(y_range, x_range))
@@ -213,5 +217,6 @@ class Calibration:
             f"rotation    {mrad:+.3f} mrad ({math.degrees(mrad / 1e3):+.3f} deg)",
             f"origin      ({self.lattice.origin[0]:.3f}, {self.lattice.origin[1]:.3f}) px (y, x)",
             f"residual    {fit}",
+            f"missing     {len(self.missing)} lenslets without light",
         ]
         return "\n".join(lines)

@@ -15,7 +15,7 @@ class Reason(IntEnum):
     """Why a pixel or a lenslet does not count; the highest that applies.
 
     - good: it counts
-    - dark: the white image has no light there: gaps between micro-images, vignetted corners
+    - dark: the white image has no light there: gaps between micro-images, vignetted corners, missing lenslets
     - outside: it belongs to a lenslet whose centre is not on the picture
     - masked: left out on request, such as what is not in a region of interest
     - saturated: at the highest value that the bits can hold
@@ -51,6 +51,11 @@ class Verdicts:
     def valid(self) -> np.ndarray:
         """Which lenslets count (k,), true or false."""
         return self.reasons == Reason.GOOD
+
+    @property
+    def lost(self) -> np.ndarray:
+        """Which lenslets decoding leaves out (k,): a saturated one is bright all the same."""
+        return np.isin(self.reasons, (Reason.DARK, Reason.MASKED, Reason.DEAD))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -172,13 +172,15 @@ def _modelled(raw: RawImage, beside: Beside, found: Calibration | None) -> dict[
 
 
 def _counted(reasons: np.ndarray, lenslets: Verdicts | None) -> tuple[str, ...]:
-    """How many pixels and lenslets do not count, by reason; nothing where all do."""
+    """How many pixels and lenslets do not count, by reason, and how many lenslets are left out in all."""
     told = []
     for reason in Reason:
         pixels = int((reasons == reason).sum())
         many = 0 if lenslets is None else int((lenslets.reasons == reason).sum())
         if reason is not Reason.GOOD and pixels:
             told.append(f"{reason.name.lower()}: {pixels} of {reasons.size} pixels, {many} lenslets")
+    if lenslets is not None:
+        told.append(f"left out: {int(lenslets.lost.sum())} of {len(lenslets.reasons)} lenslets")
     return tuple(told)
 
 

@@ -54,7 +54,10 @@ def pixel_reasons(
 
 
 def verdicts(reasons: np.ndarray, calibration: Calibration) -> Verdicts:
-    """A `Reason` for each lenslet: the one that most of the pixels around its centre have."""
+    """A `Reason` for each lenslet: the one that most of the pixels around its centre have.
+
+    Those that the calibration misses are dark.
+    """
     ny, nx = reasons.shape
     indices = calibration.indices_within((-0.5, ny - 0.5), (-0.5, nx - 0.5))
     reach = max(1, int(_CORE * calibration.lattice.pitch))
@@ -66,6 +69,7 @@ def verdicts(reasons: np.ndarray, calibration: Calibration) -> Verdicts:
     found = np.full(len(indices), Reason.GOOD, np.uint8)
     for reason in (one for one in Reason if one is not Reason.GOOD and (reasons == one).any()):
         found[(seen == reason).mean(-1) > _MOST] = reason
+    found[(found == Reason.GOOD) & calibration.misses(indices)] = Reason.DARK
     return Verdicts(indices, found)
 
 

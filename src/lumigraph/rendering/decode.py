@@ -11,7 +11,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.lightfield import LightField
-from lumigraph.core.prepared import PreparedImage, Reason
+from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.rendering.geometry import Frame, lenslet_rectangle, transposed
@@ -22,6 +22,8 @@ from lumigraph.rendering.squared import Squared
 
 MOST_DIRECTIONS = 4096
 """Views along one axis; more would be far beyond the pixels of any micro-image."""
+
+_WHOLE = 0.05  # px of a view that may belong to the next micro-image: fits of whole pitches are no better
 
 
 def decode(
@@ -124,10 +126,8 @@ def _without_dark(ready: PreparedImage, calibration: Calibration) -> Calibration
     """The calibration that also misses lenslets whose pixels are dark in the white image, or dead."""
     if ready.lenslets is None:
         return calibration
-    lost = np.isin(ready.lenslets.reasons, (Reason.DARK, Reason.MASKED, Reason.DEAD))
-    if not lost.any():
-        return calibration
-    return replace(calibration, missing=np.concatenate([calibration.missing, ready.lenslets.indices[lost]]))
+    lost = ready.lenslets.indices[ready.lenslets.lost]
+    return replace(calibration, missing=np.concatenate([calibration.missing, lost]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ def _decoded(data: Array, bad: np.ndarray | None, calibration: Calibration, how:
     if good is not None or len(calibration.missing):
         good = good if good is not None else np.ones(calibration.shape, np.float32)
         seen = _gather(good, centers, (frame, plan, calibration.lattice), "linear")
-        seen = seen * ~_among(indices, calibration.missing)
+        seen = seen * ~calibration.misses(indices)
         valid = namespace(data).asarray(squared.apply(seen, "linear") > 0.5, device=data.device)
     pitch = plan.step[0] * frame.aperture_per_px, plan.step[1] * frame.aperture_per_px
     grid = _lenslet_grid(calibration, frame, indices, squared)
@@ -184,7 +184,7 @@ class _Directions:
     @classmethod
     def of(cls, calibration: Calibration, directions: int | tuple[int, int] | None) -> "_Directions":
         if directions is None:
-            count = tuple(max(1, math.floor(p + 1e-6)) for p in calibration.lattice.pitches)
+            count = tuple(max(1, math.floor(p + _WHOLE)) for p in calibration.lattice.pitches)
             return cls((count[0], count[1]), (1.0, 1.0))
         nv, nu = checks.shape("directions", directions)
         if max(nv, nu) > MOST_DIRECTIONS:
@@ -237,12 +237,6 @@ def _own(vectors: np.ndarray, lattice: Lattice) -> np.ndarray:
     """1 where a pixel at `vectors` (k, 2) from a micro-image's centre belongs to it, else 0."""
     i, j = lattice.index(*(vectors + lattice.origin).T)
     return ((i == 0) & (j == 0)).astype(float)
-
-
-def _among(indices: np.ndarray, some: np.ndarray) -> np.ndarray:
-    """Which lenslets (rows, cols, 2) are among others (k, 2)."""
-    listed = {(int(i), int(j)) for i, j in some}
-    return np.array([[(int(i), int(j)) in listed for i, j in row] for row in indices])
 
 
 def _row_spacing(calibration: Calibration, frame: Frame) -> float:
