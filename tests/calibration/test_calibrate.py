@@ -380,7 +380,7 @@ def test_a_lenslet_is_missing_for_its_darkness_not_for_its_place():
     y, x = np.mgrid[:180, :200]
     i, j = lattice.index(y, x)
     white[(i == 4) & (j == 5)] = 0
-    dy, dx = lattice.offset(y, x)
+    _, dx = lattice.offset(y, x)
     white[(i == 7) & (j == 6) & (dx > -2)] *= 0.4
     found = calibrate(white)
     dead, dusty = (found.lattice.index(*lattice.position(np.array(at)))[:2] for at in ((4, 5), (7, 6)))

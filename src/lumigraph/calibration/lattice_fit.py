@@ -156,8 +156,8 @@ def _overexposed(image: RawImage, model: Calibration, indices: np.ndarray) -> tu
     if not (many := saturated(image, model, indices)):
         return ()
     return (
-        f"{many} of {len(indices)} micro-images are saturated in their middle: they count, but their light is "
-        "not known; expose less",
+        f"{many} of {len(indices)} micro-images are saturated in their middle: they count, but their light "
+        "is not known; expose less",
     )
 
 
