@@ -172,7 +172,7 @@ def simulated(snapshots: int) -> tuple[list[float], list[float]]:
     camera = lg.SingleLensCamera.from_catalogue("thesis-2f")
     ticks = []
 
-    def tick(done: int, total: int) -> None:
+    def tick(fraction: float) -> None:
         ticks.append((time.perf_counter(), user_seconds()))
 
     lg.simulate(

@@ -17,6 +17,7 @@ import lumigraph.io as io
 from lumigraph.cli import app as cli_app
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
+from lumigraph.core.progress import Stage
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import SamplingWarning
 from lumigraph.instruments import load_camera
@@ -261,7 +262,7 @@ def test_render_takes_the_patch_from_a_camera_or_by_itself(lumigraph, bench):
 
 def test_demo_is_run_in_the_folder(lumigraph, monkeypatch):
     def run(output, progress, living):
-        progress("white image", 0.5)
+        progress(Stage(0.5, "white image"))
         assert callable(living)
         return Path(output) / "report.html"
 
@@ -367,9 +368,10 @@ def test_the_progress_bar_is_for_terminals(monkeypatch):
 
     primary, secondary = pty.openpty()
     code = (
-        "from lumigraph.cli.console import progress, stages\n"
-        "with progress('simulate') as p: p(1, 2)\n"
-        "with stages('demo') as s: s('white image', 0.5)\n"
+        "from lumigraph.cli.console import progress\n"
+        "with progress('simulate') as p: p(0.5)\n"
+        "from lumigraph.core.progress import Stage\n"
+        "with progress('demo') as p: p(Stage(0.5, 'white image'))\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], stderr=secondary, stdout=subprocess.PIPE, check=True,

@@ -7,12 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from lumigraph.cli.options import Common
-
-Count = Callable[[float, int], None]
-"""Called with what is done and the total."""
-
-Stages = Callable[[str, float], None]
-"""Called with what goes on and the fraction of the whole that is done."""
+from lumigraph.core.progress import Progress, what_of
 
 
 def report(common: Common, text: str, values: Mapping[str, Any] | Sequence[Any]) -> None:
@@ -24,20 +19,15 @@ def report(common: Common, text: str, values: Mapping[str, Any] | Sequence[Any])
 
 
 @contextmanager
-def progress(task: str) -> Iterator[Count]:
-    """Context that gives a function of (done, total) which moves a bar, shown on a terminal only.
+def progress(task: str) -> Iterator[Progress]:
+    """Context that gives a function which moves a bar, shown on a terminal only.
 
     Until it is called, and where it never is, the bar only shows that something goes on.
     """
     with _bar(task) as update:
-        yield lambda done, total: update(completed=done, total=total)
-
-
-@contextmanager
-def stages(task: str) -> Iterator[Stages]:
-    """Context that gives a function of (what, fraction) which moves a bar, shown on a terminal only."""
-    with _bar(task) as update:
-        yield lambda what, fraction: update(description=f"{task}: {what}", completed=fraction, total=1.0)
+        yield lambda fraction: update(
+            description=": ".join(filter(None, (task, what_of(fraction)))), completed=fraction, total=1.0
+        )
 
 
 @contextmanager
@@ -46,10 +36,11 @@ def _bar(task: str) -> Iterator[Callable[..., None]]:
         yield lambda **_: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
 
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         number = bar.add_task(task, total=None)
         yield lambda **changes: bar.update(number, **changes)
 

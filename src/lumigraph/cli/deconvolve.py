@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import Stages, stages
+from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, above_zero, length
 from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.core.progress import Progress, Stage
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
@@ -220,9 +221,9 @@ def deconvolve(
     if len(frames) > 1 and way.checkpoint is not None:
         raise FormatError("--checkpoint keeps one run, not several pages. Give one --page.")
     written, steps, found = [], [], None
-    with stages("deconvolve") as shown:
+    with progress("deconvolve") as shown:
         ready = seen.prepared(frames[0][1], described)
-        shown("point images", 0.0)
+        shown(Stage(0.0, "point images"))
         operator = operator_of(described, wanted_depths, wanted.samples, ready.calibration)
         task = _Task(operator, way, way.method(described, operator), output)
         for name, frame in frames:
@@ -243,7 +244,7 @@ class _Task:
     method: Any
     output: Path
 
-    def run(self, ready: "PreparedImage", name: str, followed: "tuple[list[Step], Stages]") -> Any:
+    def run(self, ready: "PreparedImage", name: str, followed: "tuple[list[Step], Progress]") -> Any:
         """The object of one page; steps are kept, and shown."""
         from lumigraph import deconvolution, io
 
@@ -257,7 +258,8 @@ class _Task:
 
         def follow(step: "Step") -> None:
             steps.append(step)
-            shown(f"{name[1:]} {_reached(step, exposure.gain)}".strip(), step.iteration / step.iterations)
+            what = f"{name[1:]} {_reached(step, exposure.gain)}".strip()
+            shown(Stage(step.iteration / step.iterations, what))
 
         try:
             return deconvolution.deconvolve(

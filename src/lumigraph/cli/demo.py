@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from lumigraph.cli.console import stages
+from lumigraph.cli.console import progress
 from lumigraph.cli.options import COMMON, Common, Output
 from lumigraph.core.result import Result
 from lumigraph.errors import FormatError
@@ -31,7 +31,7 @@ def demo(*, output: Output = Path("demo"), common: Common = COMMON) -> Result:
     from lumigraph.io.target import write_bytes
     from lumigraph.viewer import view_inline
 
-    with stages("demo") as shown:
+    with progress("demo") as shown:
         page = demo.run(
             output, shown, living=lambda views, file: write_bytes(file, view_inline(views).page.encode())
         )

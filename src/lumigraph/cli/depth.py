@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import Count, progress
+from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, above_zero, length
 from lumigraph.cli.origin import FOCUSED, NO_ORIGIN, PLENOPTIC, Origin
 from lumigraph.cli.refocus import range_of
 from lumigraph.cli.reporting import REPORTED, Reported, enlarged
+from lumigraph.core.progress import Progress, silent
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
@@ -70,7 +71,7 @@ class Search:
             ) from None
         return low, high
 
-    def of_views(self, views: "LightField", shown: Count) -> "DepthMap":
+    def of_views(self, views: "LightField", shown: Progress) -> "DepthMap":
         """Disparities or refocus factors of the middle view."""
         from lumigraph import depth
 
@@ -103,7 +104,7 @@ class Search:
         planes = math.ceil((high - low + 2 * spare) * count) + 1
         return [float(alpha) for alpha in np.linspace(first, last, min(max(21, planes), _MOST_PLANES))]
 
-    def of_raw(self, raw: "RawImage", calibration: "Calibration", shown: Count) -> "DepthMap":
+    def of_raw(self, raw: "RawImage", calibration: "Calibration", shown: Progress) -> "DepthMap":
         """Patches of the lenslets."""
         from lumigraph import depth
 
@@ -199,7 +200,7 @@ def depth(
 
 
 def _measured(
-    source: Path, how: tuple[Origin, Search], shown: Count
+    source: Path, how: tuple[Origin, Search], shown: Progress
 ) -> "tuple[DepthMap, Any, Any, tuple[str, ...]]":
     """The map, what it was measured on, the picture of the same places or None, and notes."""
     from lumigraph import preparation
@@ -223,7 +224,7 @@ def _is_focused(camera: Any, calibration: "Calibration") -> bool:
     return calibration.lattice.kinds > 1 if camera is None else camera.KIND == FOCUSED
 
 
-def _corrected(found: "DepthMap", views: Any, how: tuple[Any, Search], shown: Count) -> "DepthMap":
+def _corrected(found: "DepthMap", views: Any, how: tuple[Any, Search], shown: Progress) -> "DepthMap":
     """Refocus factors without the bias of diffraction, which planes of known depth tell."""
     from lumigraph import depth as verbs
     from lumigraph.simulation import plane_views
@@ -232,7 +233,7 @@ def _corrected(found: "DepthMap", views: Any, how: tuple[Any, Search], shown: Co
     return verbs.unbiased(
         verbs.alpha_of(found, views),
         lambda alpha: plane_views(camera, alpha),
-        lambda known: verbs.alpha_of(search.of_views(known, lambda done, total: None), known),
+        lambda known: verbs.alpha_of(search.of_views(known, silent), known),
         farthest=camera.alpha(9 * camera.object_distance), progress=shown,
     )  # fmt: skip
 

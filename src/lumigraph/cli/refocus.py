@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import Count, progress
+from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, length
 from lumigraph.cli.origin import NO_ORIGIN, PLENOPTIC, Origin
 from lumigraph.cli.reporting import REPORTED, Reported, enlarged
+from lumigraph.core.progress import Progress
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
@@ -119,7 +120,7 @@ class Quality:
         if self.method == "fourier" and self.oversample != 1:
             raise FormatError("--oversample has no meaning with --method fourier. Use --method shear.")
 
-    def pictures(self, views: "LightField", alphas: list[float], shown: Count) -> "list[Array]":
+    def pictures(self, views: "LightField", alphas: list[float], shown: Progress) -> "list[Array]":
         """The pictures focused by each factor."""
         from lumigraph import rendering
 
@@ -136,7 +137,7 @@ class Quality:
         images = []
         for alpha in alphas:
             images.append(rendering.refocus_fourier(views, alpha))
-            shown(len(images), len(alphas))
+            shown(len(images) / len(alphas))
         return images
 
 

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import Count, progress
+from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, length
 from lumigraph.cli.origin import FOCUSED, NO_ORIGIN, Origin
 from lumigraph.cli.refocus import MOST_SHOWN, range_of
 from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.core.progress import Progress
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
@@ -259,7 +260,7 @@ def _figures(made: _Made, output: Path) -> "Iterator[Figure]":
         yield Figure(drawn, f"{made.depth.quantity} [{made.depth.unit}] of each place.", "Picture")
 
 
-def _from_raw(found: "RawImage", how: tuple[Origin, Tiles], output: Path, shown: Count) -> _Made:
+def _from_raw(found: "RawImage", how: tuple[Origin, Tiles], output: Path, shown: Progress) -> _Made:
     from lumigraph import depth, io, preparation, rendering
 
     origin, tiles = how
@@ -306,7 +307,7 @@ def _planes(stack: Any, sizes: list[float], output: Path, notes: tuple[str, ...]
     return _Made(list(stack), text, (Quantity("patch_px", sizes, "px"),), None, notes)
 
 
-def _from_views(views: "LightField", look: Look, output: Path, shown: Count) -> _Made:
+def _from_views(views: "LightField", look: Look, output: Path, shown: Progress) -> _Made:
     from lumigraph import depth, io, rendering
     from lumigraph.core.stack import Stack
 

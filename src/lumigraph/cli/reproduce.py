@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from lumigraph.cli.console import report, stages
+from lumigraph.cli.console import progress, report
 from lumigraph.cli.options import COMMON, Common, Output
+from lumigraph.core.progress import Stage
 from lumigraph.errors import FormatError, LumigraphError
 
 if TYPE_CHECKING:
@@ -55,11 +56,11 @@ def reproduce(
     from lumigraph.experiments import pages, run
 
     output.mkdir(exist_ok=True)
-    with stages("reproduce") as shown:
+    with progress("reproduce") as shown:
         results = run.run(
             chosen, output, quick=quick, fresh=fresh, progress=shown, finished=_tell
         )  # fmt: skip
-        shown("report", 1.0)
+        shown(Stage(1.0, "report"))
         pages.write_report(chosen, results, output / "report.html", quick=quick)
         run.write_records(results, output / "results.json")
     text = "\n\n".join([*map(_table, results), f"Open {output / 'report.html'}"])

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Literal
 
-from lumigraph.cli.console import report, stages
+from lumigraph.cli.console import progress, report
 from lumigraph.cli.options import COMMON, Common, Output
 from lumigraph.errors import FormatError
 
@@ -39,7 +39,7 @@ def samples(
         raise FormatError(f"--output {output} is a file. Give a folder.")
     from lumigraph.samples import NAMES, write
 
-    with stages("samples") as shown:
+    with progress("samples") as shown:
         files = write(output, names or NAMES, size=size, progress=shown)
     text = "\n".join(f"Wrote {file}" for file in files)
     report(common, text, {"output": str(output), "files": [str(file) for file in files]})

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.console import stages
+from lumigraph.cli.console import progress
 from lumigraph.cli.options import COMMON, Common
 from lumigraph.cli.origin import Origin
 from lumigraph.cli.serving import Port, announce, check_port
@@ -99,7 +99,7 @@ def view(
     page.check()
     exhibits = [_opened(path, origin) for path in (file, beside) if path is not None]
     if page.export is not None:
-        with stages("export") as shown:
+        with progress("export") as shown:
             written = viewer.export(exhibits, page.export, quality=page.quality, progress=shown)
         sizes = {name.split("/")[1]: size for name, size in written.arrays.items()}
         parts = ", ".join(f"{name} {_megabytes(size)}" for name, size in sizes.items())
@@ -118,7 +118,7 @@ def _opened(path: Path, origin: Shown) -> Any:
     from lumigraph import viewer
 
     wanted = viewer.Origin(origin.calibration, origin.white, origin.dark, origin.described(), origin.patch)
-    with stages(f"open {path.name}") as shown:
+    with progress(f"open {path.name}") as shown:
         return viewer.open_exhibit(path, wanted, shown)
 
 

@@ -3,18 +3,64 @@
 from collections.abc import Callable
 
 Progress = Callable[[float], None]
-"""Called with the fraction that is done, from 0 to 1."""
+"""Called with the fraction that is done, from 0 to 1: any function of a number. See `Stage`."""
 
 
-def part(progress: Progress | None, number: int, count: int) -> Progress:
-    """What one of `count` equal parts of a computation is to tell, so that the whole goes from 0 to 1.
+class Stage(float):
+    """A fraction that also says what goes on, for a bar's description.
 
-    >>> part(print, 1, 4)(0.5)
-    0.375
+    >>> fraction = Stage(0.25, "raw image")
+    >>> print(fraction, fraction.what)
+    0.25 raw image
+    """
+
+    what: str
+
+    def __new__(cls, fraction: float, what: str = "") -> "Stage":
+        """The fraction with its text."""
+        made = super().__new__(cls, fraction)
+        made.what = what
+        return made
+
+
+def silent(fraction: float) -> None:
+    """Progress that nobody looks at."""
+
+
+def within(progress: Progress | None, first: float, last: float, what: str = "") -> Progress:
+    """What a part of a computation is to tell, so that it goes from `first` to `last` of the whole.
+
+    Parameters
+    ----------
+    progress
+        Of the whole.
+    first, last
+        Fractions of the whole.
+    what
+        Goes on meanwhile, before what the part itself says.
+
+    >>> within(print, 0.5, 1.0)(0.5)
+    0.75
     """
 
     def tell(fraction: float) -> None:
         if progress is not None:
-            progress((number + fraction) / count)
+            text = ": ".join(filter(None, (what, what_of(fraction))))
+            place = first + (last - first) * fraction
+            progress(Stage(place, text) if text else place)
 
     return tell
+
+
+def part(progress: Progress | None, number: int, count: int) -> Progress:
+    """What one of `count` equal parts of a computation is to tell.
+
+    >>> part(print, 1, 4)(0.5)
+    0.375
+    """
+    return within(progress, number / count, (number + 1) / count)
+
+
+def what_of(fraction: float) -> str:
+    """What a fraction says that goes on; empty where it says nothing."""
+    return fraction.what if isinstance(fraction, Stage) else ""

@@ -56,7 +56,7 @@ class Step:
     stopped: str = ""
 
 
-Progress = Callable[[Step], None]
+Report = Callable[[Step], None]
 
 
 class Interrupted(KeyboardInterrupt):
@@ -75,7 +75,7 @@ def deconvolve(
     *,
     method: Method = RichardsonLucy(),  # noqa: B008 - frozen
     exposure: Exposure | None = None,
-    progress: Progress | None = None,
+    progress: Report | None = None,
     checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
 ) -> Any:
     """What was in front of the camera: intensities (y, x) or (z, y, x), at least 0.
@@ -141,7 +141,7 @@ def deconvolve_series(
     *,
     method: Method = RichardsonLucy(),  # noqa: B008 - frozen
     exposure: Exposure | None = None,
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> Iterator[Any]:
     """The result of each frame of a time series, one after the other, as `deconvolve` gives it.
 
@@ -175,7 +175,7 @@ class _Run:
     problem: Problem
     method: Method
     limits: Stop
-    progress: Progress | None
+    progress: Report | None
     wanted: tuple[Linear, Inside]
     checkpoint: Checkpoint | None = None
     key: str = ""

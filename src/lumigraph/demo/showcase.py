@@ -11,13 +11,12 @@ from lumigraph.calibration import calibrate, devignette
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
+from lumigraph.core.progress import Progress, Stage, silent, within
 from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.plots import layout
 from lumigraph.rendering import decode, reduce_aperture, refocus, render, view
 from lumigraph.samples import BenchSample, bench, camera_file
 from lumigraph.units import mm
-
-Progress = Callable[[str, float], None]
 
 Living = Callable[[LightField, Path], None]
 """Writes the viewer's page of a light field into a file."""
@@ -59,17 +58,17 @@ def run(
     output
         Folder to write into; made when missing.
     progress
-        Called as ``progress(what, fraction)`` with the fraction of the whole that is done.
+        Called as ``progress(fraction)`` of the whole, a `core.progress.Stage`.
     living
         Writes the viewer's page of the views, which the report then shows first.
     """
     folder = Path(output)
     folder.mkdir(parents=True, exist_ok=True)
-    tell = progress or (lambda what, fraction: None)
+    tell = progress or silent
     page = report.Page("lumigraph: a demonstration", INTRODUCTION)
     start = time.perf_counter()
-    first = _plenoptic(page, folder, living, lambda what, part: tell(f"1.0 camera: {what}", 0.65 * part))
-    second = _focused(page, folder, lambda what, part: tell(f"2.0 camera: {what}", 0.65 + 0.35 * part))
+    first = _plenoptic(page, folder, living, within(tell, 0.0, 0.65, "1.0 camera"))
+    second = _focused(page, folder, within(tell, 0.65, 1.0, "2.0 camera"))
     for shown in (first, second):
         _recorded(page, shown)
     for shown in (first, second):
@@ -77,13 +76,12 @@ def run(
     seconds = time.perf_counter() - start
     page.section("Time").text(f"Both cameras took {seconds:.0f} s.")
     page.write(folder / "report.html")
-    tell("done", 1.0)
     return folder / "report.html"
 
 
 def _exposed(title: str, kind: str, tell: Progress) -> _Shown:
     """White image and raw image of a bench, and the lattice found on the white image."""
-    sample = bench(kind, progress=lambda what, part: tell(what, 0.95 * part))
+    sample = bench(kind, progress=within(tell, 0.0, 0.95))
     camera = sample.camera
     found = calibrate(sample.white, separation=camera.separation, lenslet_distance=camera.lenslet_distance)
     return _Shown(title, kind, sample, found)
@@ -92,7 +90,7 @@ def _exposed(title: str, kind: str, tell: Progress) -> _Shown:
 def _plenoptic(page: report.Page, folder: Path, living: Living | None, tell: Progress) -> _Shown:
     shown = _exposed("Plenoptic 1.0", "plenoptic", tell)
     sample, camera, depths = shown.sample, shown.sample.camera, shown.sample.depths
-    tell("decoding", 0.96)
+    tell(Stage(0.96, "decoding"))
     views = decode(devignette(sample.raw, sample.white), shown.calibration)
     alphas = [camera.alpha(dz) for dz in depths]
     pictures = {name: refocus(views, alpha) for name, alpha in zip(NAMES, alphas, strict=True)}
@@ -137,7 +135,7 @@ def parallax(views: LightField, sides: tuple[int, int], alphas: tuple[float, flo
 def _focused(page: report.Page, folder: Path, tell: Progress) -> _Shown:
     shown = _exposed("Plenoptic 2.0", "focused-plenoptic", tell)
     sample, camera, depths = shown.sample, shown.sample.camera, shown.sample.depths
-    tell("rendering", 0.96)
+    tell(Stage(0.96, "rendering"))
     assert isinstance(camera, FocusedPlenopticCamera)  # as its file says
     raw = devignette(sample.raw, sample.white)
     patches = [camera.patch_at(dz) for dz in depths]

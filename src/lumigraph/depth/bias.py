@@ -6,6 +6,7 @@ import numpy as np
 
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
+from lumigraph.core.progress import Progress
 from lumigraph.depth.from_focus import BiasCurve
 
 _KNOTS = 7
@@ -19,7 +20,7 @@ def unbiased(
     measure: Callable[[LightField], DepthMap],
     *,
     farthest: float,
-    progress: Callable[[int, int], None],
+    progress: Progress,
 ) -> DepthMap:
     """A map of refocus factors, corrected by what the same method makes of planes whose depth is known.
 
@@ -34,7 +35,7 @@ def unbiased(
     farthest
         Refocus factor of the farthest plane worth a try.
     progress
-        Called with the planes done and their number.
+        Called as ``progress(fraction)``.
     """
     alpha = np.asarray(found.alpha, float)
     low, high = np.nanquantile(alpha, (0.02, 0.98))
@@ -45,5 +46,5 @@ def unbiased(
         again = measure(views_at(float(one)))
         rows, columns = (slice(n // 4, n - n // 4) for n in again.shape)
         measured.append(float(np.nanmedian(np.asarray(again.values)[rows, columns])))
-        progress(done, _KNOTS)
+        progress(done / _KNOTS)
     return found.replaced(BiasCurve(np.array(measured), true)(alpha), "alpha")

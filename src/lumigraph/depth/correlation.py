@@ -10,9 +10,10 @@ from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, like, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
+from lumigraph.core.progress import Progress, silent, within
 from lumigraph.core.raw import RawImage
 from lumigraph.depth.smooth import Stiffness, update
-from lumigraph.depth.volume import Progress, cheapest, semi_global, silent
+from lumigraph.depth.volume import cheapest, semi_global
 from lumigraph.errors import CalibrationError, GeometryError
 from lumigraph.preparation import of_raw
 from lumigraph.rendering import lenslet_indices
@@ -57,7 +58,7 @@ def correlation(
         Least and most size that may occur [px]: above 0 Keplerian, below 0 Galilean. Both are tried from
         0.08 to 0.6 of the pitch where None; and the sign that fits the picture better is kept.
     progress
-        Called with what is done and the total.
+        Called as ``progress(fraction)``.
 
     Returns
     -------
@@ -91,7 +92,7 @@ def correlation(
     sizes = [np.arange(low, high + _STEP / 2, _STEP) for low, high in ranges]
     scores, done, total = [], 0, sum(map(len, sizes))
     for some in sizes:
-        scores.append(micro.scores(some, lambda k, _, start=done: progress(start + k, total)))
+        scores.append(micro.scores(some, within(progress, done / total, (done + len(some)) / total)))
         done += len(some)
     best = int(np.argmax([_overall(score) for score in scores]))
     values, trust = _joined(scores[best], sizes[best])
@@ -178,7 +179,7 @@ class _MicroImages:
         for k, size in enumerate(sizes):
             found = [self._agreement(other, vector * size) for other, vector in neighbours]
             out[k] = _better_half(np.stack(found))
-            progress(k + 1, len(sizes))
+            progress((k + 1) / len(sizes))
         return out
 
     def _ways(self) -> list[tuple[int, int]]:

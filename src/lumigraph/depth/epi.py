@@ -7,10 +7,10 @@ from lumigraph.core import checks
 from lumigraph.core.arrays import like
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
+from lumigraph.core.progress import Progress, silent, within
 from lumigraph.depth.lines import refined
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.sweep import labels, span, swept
-from lumigraph.depth.volume import Progress, silent
 from lumigraph.errors import GeometryError
 
 _SURE = 0.05
@@ -41,7 +41,7 @@ def epi(
     disparities
         Least and most that may occur [lenslets per view]; found by a coarse sweep where None.
     progress
-        Called with what is done and the total.
+        Called as ``progress(fraction)``.
 
     Returns
     -------
@@ -78,12 +78,10 @@ def epi(
     pictures = Pictures.of(views)
     low, high = span(pictures) if disparities is None else _range(disparities, pictures.reach)
     moves = labels(low, high)
-    total = len(moves) + 20
-    first = swept(pictures, moves, lambda done, _: progress(done, total))
+    share = len(moves) / (len(moves) + 20)
+    first = swept(pictures, moves, within(progress, 0, share))
     first = np.clip(median_filter(first, 5), moves[0], moves[-1])
-    found, deviation = refined(
-        pictures, first, lambda done, of: progress(len(moves) + 20 * done // of, total)
-    )
+    found, deviation = refined(pictures, first, within(progress, share, 1))
     found, deviation = found / pictures.reach, deviation / pictures.reach
     deviation = np.hypot(deviation, _MIXED * _spread(found))
     trust = 1 / (1 + (deviation / min(_SURE, _SURE * 4 / pictures.reach)) ** 2)

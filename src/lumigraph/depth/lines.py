@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import map_coordinates, maximum_filter, spline_filter
 
+from lumigraph.core.progress import Progress
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.smooth import Stiffness, tears, update
-from lumigraph.depth.volume import Progress, box
+from lumigraph.depth.volume import box
 
 _spline: Any = spline_filter
 
@@ -38,7 +39,7 @@ def refined(pictures: Pictures, moves: np.ndarray, progress: Progress) -> tuple[
         how = Stiffness(_STIFFNESS * pictures.noise**2 * _share(pictures), _KINK, jump)
         change = update(moves, information, pull, how, tears=tears(moves, _TEAR)) - moves
         moves = moves + np.clip(change, -_BEFORE, _BEFORE)
-        progress(k + 1, len(_ROUNDS))
+        progress((k + 1) / len(_ROUNDS))
     return moves, pictures.noise / np.sqrt(box(information, 3) + 1e-12)
 
 

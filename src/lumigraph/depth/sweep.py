@@ -10,8 +10,9 @@ import math
 import numpy as np
 
 from lumigraph.core import memory
+from lumigraph.core.progress import Progress, silent
 from lumigraph.depth.pictures import Pictures
-from lumigraph.depth.volume import Progress, box, cheapest, guided, semi_global, silent
+from lumigraph.depth.volume import box, cheapest, guided, semi_global
 from lumigraph.errors import GeometryError
 
 _STEP = 0.4  # between labels: how far a point moves in the outermost view [px]
@@ -64,7 +65,7 @@ def costs(pictures: Pictures, moves: np.ndarray, most: float, progress: Progress
         for sides in halves:
             means = [_disagreement(pictures, side, float(move), most) for side in sides]
             out[k] += np.minimum(*means) if len(means) == 2 else means[0]
-        progress(k + 1, len(moves))
+        progress((k + 1) / len(moves))
     return out
 
 

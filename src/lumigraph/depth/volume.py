@@ -1,16 +1,7 @@
 """Cost volumes (n, y, x): how badly each of n labels explains each place, and the best label of each."""
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy.ndimage import uniform_filter
-
-Progress = Callable[[int, int], None]
-"""Called with what is done and the total."""
-
-
-def silent(done: int, total: int) -> None:
-    """Progress that nobody looks at."""
 
 
 def box(image: np.ndarray, radius: int) -> np.ndarray:

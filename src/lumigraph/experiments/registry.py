@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from lumigraph import store
+from lumigraph.core.progress import Progress, Stage
 from lumigraph.errors import FormatError, LumigraphError
 
-Tell = Callable[[float, str], None]
 """Called with the fraction of an experiment that is done, and what goes on."""
 
 Tolerance = float | tuple[float, float]
@@ -106,17 +106,17 @@ class Context:
     folder
         Where finished parts are kept; None keeps nothing.
     tell
-        Called with the fraction that is done and what goes on.
+        Called as ``tell(fraction)``, a `core.progress.Stage`.
     """
 
     quick: bool = True
     folder: Path | None = None
-    tell: Tell | None = None
+    tell: Progress | None = None
 
     def progress(self, fraction: float, what: str = "") -> None:
         """Say which fraction of the experiment is done."""
         if self.tell is not None:
-            self.tell(min(max(fraction, 0.0), 1.0), what)
+            self.tell(Stage(min(max(fraction, 0.0), 1.0), what))
 
     def cached(self, name: str, function: Callable[[], Any]) -> Any:
         """What `function` returns, an array or a dictionary of arrays, computed once per output folder.

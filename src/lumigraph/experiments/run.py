@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from lumigraph import store
+from lumigraph.core.progress import Progress, Stage, within
 from lumigraph.errors import FormatError
 from lumigraph.experiments.collected import experiments
 from lumigraph.experiments.registry import Context, Experiment, Outcome, Row
 from lumigraph.io.target import write_bytes
 from lumigraph.report.pictures import Picture, picture
 
-Progress = Callable[[str, float], None]
 """Called with what goes on and the fraction of the whole that is done."""
 
 _RESULT = "result"
@@ -93,27 +93,21 @@ def run(
     fresh
         Forget what earlier runs of the chosen experiments kept.
     progress
-        Called with what goes on and the fraction of all experiments that is done.
+        Called as ``progress(fraction)`` of all experiments, a `core.progress.Stage`.
     finished
         Called with each result.
     """
     results = []
     for number, one in enumerate(chosen):
-
-        def tell(fraction: float, what: str, number: int = number, one: Experiment = one) -> None:
-            if progress is not None:
-                progress(f"{one.id} {what}".strip(), (number + fraction) / len(chosen))
-
-        tell(0.0, one.title)
+        tell = within(progress, number / len(chosen), (number + 1) / len(chosen), one.id)
+        tell(Stage(0.0, one.title))
         results.append(_run_or_read(one, folder / "parts", quick, fresh, tell))
         if finished is not None:
             finished(results[-1])
     return results
 
 
-def _run_or_read(
-    one: Experiment, folder: Path, quick: bool, fresh: bool, tell: Callable[[float, str], None]
-) -> Result:
+def _run_or_read(one: Experiment, folder: Path, quick: bool, fresh: bool, tell: Progress) -> Result:
     name = f"{one.id}-{'quick' if quick else 'full'}-{sources(one)[:16]}"
     whole, parts = folder / f"{name}.npz", folder / name
     if fresh:

@@ -12,12 +12,10 @@ from scipy.ndimage import distance_transform_edt
 from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, is_complex, is_numpy, like, namespace, to_numpy
 from lumigraph.core.lightfield import LightField
+from lumigraph.core.progress import Progress
 from lumigraph.errors import GeometryError
 from lumigraph.rendering.geometry import lit
 from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, take, taps, weighted
-
-Progress = Callable[[int, int], None]
-"""Called with what is done and the total."""
 
 _BLOCK = 10_000  # values summed at a time: they stay in the cache, and BLAS keeps to one thread
 _LEAST_VALID = 0.3  # of the light that would be seen without the mask of valid samples
@@ -86,7 +84,7 @@ def refocus_stack(
     alphas
         F / F' of each picture, above 0.
     progress
-        Called with the rows of views that are done, and their number.
+        Called as ``progress(fraction)``.
     """
     checks.instance("views", views, LightField)
     check_interpolation(interpolation)
@@ -230,7 +228,7 @@ def _sheared(data: Array, open_views: np.ndarray, planes: list[_Plane], progress
                         for step, weight in by_row[v]:
                             add(picture[py][px], line, (top - step) * width, weight)
         if progress is not None:
-            progress(v + 1, nv)
+            progress((v + 1) / nv)
     return xp.stack([_interleaved(picture, (nt, ns, gap), tail) for picture in pictures])
 
 

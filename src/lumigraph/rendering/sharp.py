@@ -10,10 +10,11 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter, median_filter
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, like, to_numpy
 from lumigraph.core.lightfield import LightField
+from lumigraph.core.progress import Progress, within
 from lumigraph.errors import GeometryError
 from lumigraph.rendering.geometry import lit
 from lumigraph.rendering.interpolate import Interpolation, as_float, taps, weighted
-from lumigraph.rendering.refocus import Progress, refocus_stack, shifts
+from lumigraph.rendering.refocus import refocus_stack, shifts
 
 _PLANES_AT_ONCE = 8
 _STEP = 0.5  # lenslets by which the outermost view may move from one plane to the next
@@ -75,7 +76,7 @@ def all_in_focus(
     interpolation
         "linear", "cubic" or "band_limited", between lenslets.
     progress
-        Called with the planes that are done, and their number.
+        Called as ``progress(fraction)``.
 
     Raises
     ------
@@ -92,22 +93,15 @@ def all_in_focus(
     if (alphas is None) == (depth is None):
         given = "both" if alphas is not None else "neither"
         raise GeometryError(f"alphas and depth are {given} given but one of them is needed. Give one.")
-    report = progress or (lambda done, total: None)
     if depth is None:
         assert alphas is not None
         tried = _even(alphas)
-        rounds = len(tried)
-        factors, trust = _agreeing(views, tried, window, lambda done: report(done, 2 * rounds))
+        factors, trust = _agreeing(views, tried, window, within(progress, 0.0, 0.5))
     else:
-        factors, rounds = _given(depth, views), 0
+        factors = _given(depth, views)
         trust = np.ones(factors.shape)
-    planes = _planes(views, factors)
-    rounds = rounds or len(planes)
-
-    def shown(done: int) -> None:
-        report(rounds + done * rounds // len(planes), 2 * rounds)
-
-    picture = _blended(views, planes, factors, interpolation, shown)
+    rest = within(progress, 0.0 if depth is not None else 0.5, 1.0)
+    picture = _blended(views, _planes(views, factors), factors, interpolation, rest)
     kind = as_float(views.data)
     return AllInFocus(picture, like(factors, kind), like(trust, kind))
 
@@ -142,7 +136,9 @@ def _given(depth: Array, views: LightField) -> np.ndarray:
     return factors
 
 
-def _agreeing(views: LightField, alphas: np.ndarray, window: float, shown) -> tuple[np.ndarray, np.ndarray]:
+def _agreeing(
+    views: LightField, alphas: np.ndarray, window: float, progress: Progress
+) -> tuple[np.ndarray, np.ndarray]:
     """Refocus factor of each place on which the views agree best, and how clearly."""
     window = checks.positive("window", window, "lenslets")
     pictures, chosen = _some_grey(views)
@@ -156,7 +152,7 @@ def _agreeing(views: LightField, alphas: np.ndarray, window: float, shown) -> tu
             power += moved * moved
         variance = power / len(chosen) - (total / len(chosen)) ** 2
         costs.append(gaussian_filter(np.maximum(variance, 0), window))
-        shown(k + 1)
+        progress((k + 1) / len(alphas))
     cost = np.stack(costs)
     lowest, usual = cost.min(0), np.median(cost, axis=0)
     best = cost.argmin(0)
@@ -224,7 +220,11 @@ def _planes(views: LightField, factors: np.ndarray) -> np.ndarray:
 
 
 def _blended(
-    views: LightField, planes: np.ndarray, factors: np.ndarray, interpolation: Interpolation, shown
+    views: LightField,
+    planes: np.ndarray,
+    factors: np.ndarray,
+    interpolation: Interpolation,
+    progress: Progress,
 ) -> Array:
     """Picture of the two planes next to each place's factor."""
     place = (factors - planes[0]) / (planes[1] - planes[0]) if len(planes) > 1 else np.zeros(factors.shape)
@@ -235,5 +235,5 @@ def _blended(
         for k in range(len(part)):
             term = weighted(stack[k, ...], np.clip(1 - np.abs(place - first - k), 0, 1), tail)
             total = term if total is None else total + term
-        shown(min(first + _PLANES_AT_ONCE, len(planes)))
+        progress(min(first + _PLANES_AT_ONCE, len(planes)) / len(planes))
     return total

@@ -12,12 +12,12 @@ from lumigraph.core import checks, memory
 from lumigraph.core.arrays import Array, like, namespace, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.matrix import Matrix
+from lumigraph.core.progress import Progress
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import GeometryError, SamplingWarning
 from lumigraph.rendering.decode import check_raw
 from lumigraph.rendering.interpolate import as_float
 from lumigraph.rendering.patches import Layout, Patches
-from lumigraph.rendering.refocus import Progress
 
 _MOST = 8  # times finer
 _ENOUGH = 1.6  # the widest gap between samples, over the finer picture's pitch, that still resolves it
@@ -53,7 +53,7 @@ def super_resolve(
     smoothness
         λ² over the mean square of A's columns: more for noisy raw images.
     progress
-        Called with the iterations that are done, and their number.
+        Called as ``progress(fraction)``.
 
     Warns
     -----
@@ -92,7 +92,7 @@ def super_resolve(
     def stepped(_: np.ndarray) -> None:
         steps[0] += 1
         if progress is not None:
-            progress(steps[0], total)
+            progress(steps[0] / total)
 
     channels = [_solved(projection, channel, (iterations, smoothness), stepped) for channel in flat.T]
     picture = np.stack(channels, -1).reshape(*projection.object_shape, *data.shape[2:])

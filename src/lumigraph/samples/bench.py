@@ -1,20 +1,18 @@
 """A bench with a plenoptic camera: white image and raw image of three targets at three depths."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.core.grid import Grid
+from lumigraph.core.progress import Progress, within
 from lumigraph.core.raw import RawImage
 from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera
 from lumigraph.samples.files import camera_path
 from lumigraph.scene import Scene, targets
 from lumigraph.simulation import simulate
 from lumigraph.units import mm
-
-Progress = Callable[[str, float], None]
 
 DEPTHS = {"plenoptic": (-14 * mm, 0.0, 18 * mm), "focused-plenoptic": (-4 * mm, 0.0, 5 * mm)}
 """Of the near, the middle and the far target, from the focused plane [m]."""
@@ -57,7 +55,7 @@ def bench(kind: str = "plenoptic", *, seed: int = 1, progress: Progress | None =
     seed
         Of the sensor's noise.
     progress
-        Called as ``progress(what, fraction)``.
+        Called as ``progress(fraction)``, a `core.progress.Stage`.
 
     Raises
     ------
@@ -65,15 +63,12 @@ def bench(kind: str = "plenoptic", *, seed: int = 1, progress: Progress | None =
         Another kind.
     """
     checks.choice("kind", kind, DEPTHS)
-    tell = progress or (lambda what, fraction: None)
     with camera_path(kind) as path:
         camera = _CLASSES[kind].from_toml(path)
     scene, rng = three_depths(camera.object_grid, DEPTHS[kind]), np.random.default_rng(seed)
-    light = simulate(
-        camera, targets.white(), progress=lambda done, total: tell("white image", 0.4 * done / total)
-    )
+    light = simulate(camera, targets.white(), progress=within(progress, 0.0, 0.4, "white image"))
     white = camera.sensor.expose(light.data, rng=rng)
-    light = simulate(camera, scene, progress=lambda done, total: tell("raw image", 0.4 + 0.6 * done / total))
+    light = simulate(camera, scene, progress=within(progress, 0.4, 1.0, "raw image"))
     return BenchSample(camera, scene, DEPTHS[kind], white, camera.sensor.expose(light.data, rng=rng))
 
 

@@ -1,20 +1,18 @@
 """Samples as files, for the command line and for other programs."""
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from lumigraph import io
 from lumigraph.core.lightfield import LightField
+from lumigraph.core.progress import Progress, Stage, part
 from lumigraph.errors import LumigraphError
 from lumigraph.samples.bench import bench
 from lumigraph.samples.files import camera_file
 from lumigraph.samples.scene import scene
 from lumigraph.samples.volume import volume
-
-Progress = Callable[[str, float], None]
 
 NAMES = ("scene", "bench", "volume")
 """What can be written."""
@@ -38,7 +36,7 @@ def write(
     size
         Samples (t, s) of each view of the scene.
     progress
-        Called as ``progress(what, fraction)``.
+        Called as ``progress(fraction)``, a `core.progress.Stage`.
 
     Raises
     ------
@@ -47,16 +45,13 @@ def write(
     """
     if unknown := [name for name in names if name not in NAMES]:
         raise LumigraphError(f"there is no sample {unknown[0]!r}. Choose from {', '.join(NAMES)}.")
-    tell, place, written = progress or (lambda what, fraction: None), Path(folder), []
+    place, written = Path(folder), []
     place.mkdir(parents=True, exist_ok=True)
     for k, name in enumerate(names):
-
-        def part(what: str, fraction: float, k: int = k) -> None:
-            tell(what, (k + fraction) / len(names))
-
-        part(name, 0.0)
-        written += {"scene": _scene, "bench": _bench, "volume": _volume}[name](place, size, part)
-    tell("done", 1.0)
+        tell = part(progress, k, len(names))
+        tell(Stage(0.0, name))
+        written += {"scene": _scene, "bench": _bench, "volume": _volume}[name](place, size, tell)
+        tell(Stage(1.0, name))
     return written
 
 

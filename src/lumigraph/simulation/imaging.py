@@ -12,6 +12,8 @@ import numpy as np
 from lumigraph.core import arrays, checks, memory
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
+from lumigraph.core.progress import Progress
+from lumigraph.core.progress import part as share
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.elements import CircularAperture, Train
@@ -30,8 +32,6 @@ from lumigraph.simulation.spectrum import Spectrum, by_wavelength
 
 PUPIL_OVERSAMPLING = 1.1
 """How much denser than half of λL/p the points of the pupil stand that make a white image."""
-
-Progress = Callable[[float, int], None]
 
 Part = Slice | Points | Diffuser
 
@@ -97,8 +97,7 @@ def simulate(
         Wavelengths that take the place of the camera's own, and the channels that see them. Then slices
         may be coloured, (y, x, 3), and the raw image is (ny, nx, 3) or a Bayer mosaic.
     progress
-        Called as ``progress(done, total)`` after each propagation and, where a lenslet-periodic operator is
-        built, with the fraction of it that is.
+        Called as ``progress(fraction)`` after each propagation and while an operator is built.
     map
         Runs the propagations, such as a pool's ``imap``; results are added in order, so that every map
         gives the same raw image.
@@ -130,7 +129,7 @@ def simulate(
     total = len(exact) + count
     try:
         for part in exact:
-            image, reached = _exactly(camera, part, accuracy or 1e-3, light.within(progress, total))
+            image, reached = _exactly(camera, part, accuracy or 1e-3, share(progress, light.done, total))
             light.pixels += image
             light.reached.append((error.norm(image), reached))
             light.count(progress, total)
@@ -157,11 +156,7 @@ def _coloured(
     count = len(spectrum.wavelengths)
 
     def at_wavelength(camera: Camera | Microscope, scene: Scene, number: int) -> RawImage:
-        def report(done: float, total: int) -> None:
-            if progress is not None:
-                progress(number * total + done, count * total)
-
-        return simulate(camera, scene, coherence, progress=report, map=map)
+        return simulate(camera, scene, coherence, progress=share(progress, number, count), map=map)
 
     return by_wavelength(camera, scene, spectrum, at_wavelength)
 
@@ -191,19 +186,10 @@ class _Light:
         self.intensity *= factor
         self.halves = {half: image * factor for half, image in self.halves.items()}
 
-    def within(self, progress: Progress | None, total: int) -> Callable[[float], None]:
-        """Function that tells how much of the next shot is done."""
-
-        def tell(fraction: float) -> None:
-            if progress is not None and fraction < 1:
-                progress(self.done + fraction, total)
-
-        return tell
-
     def count(self, progress: Progress | None, total: int) -> None:
         self.done += 1
         if progress is not None:
-            progress(self.done, total)
+            progress(self.done / total)
 
 
 def _drawn(coherence: Coherence | Incoherent) -> Coherence:
@@ -214,7 +200,7 @@ def _drawn(coherence: Coherence | Incoherent) -> Coherence:
 
 
 def _exactly(
-    camera: Camera, part: Part, accuracy: float, progress: Callable[[float], None]
+    camera: Camera, part: Part, accuracy: float, progress: Progress
 ) -> tuple[np.ndarray, error.Reached]:
     """Raw image of a part, and how far off it is."""
     if camera.lattice is None:

@@ -4,13 +4,14 @@ All light is incoherent: fluorescence. What stands beyond the field that the len
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from lumigraph.core import arrays, coverage
 from lumigraph.core.grid import Grid
+from lumigraph.core.progress import Progress
 from lumigraph.core.raw import RawImage
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError
@@ -23,8 +24,6 @@ from lumigraph.simulation.coherence import Incoherent
 
 SAMPLES = 5
 """Samples along a lenslet of a scene's slice, at least: those of the microscope's ``object_grid``."""
-
-Progress = Callable[[int, int], None]
 
 
 @runtime_checkable
@@ -76,7 +75,7 @@ def microscope_image(
     for done, part in enumerate(scene.parts):
         pixels += _image(scope, part)
         if progress is not None:
-            progress(done + 1, len(scene.parts))
+            progress((done + 1) / len(scene.parts))
     known = {
         "simulated": repr(coherence), "shots": len(scene.parts), "wavelength": scope.objectives[0].wavelength
     }  # fmt: skip

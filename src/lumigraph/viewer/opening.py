@@ -2,7 +2,6 @@
 
 import tomllib
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,14 +14,13 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.prepared import PreparedImage
+from lumigraph.core.progress import Progress, Stage, silent, within
 from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError, SamplingWarning
 from lumigraph.preparation import Given, prepare
 from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_map
-
-Progress = Callable[[str, float], None]
 
 _CAMERA_FILE = 1 << 20  # bytes; camera files have some hundred
 _PATCHES = 25
@@ -68,7 +66,7 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
     origin
         Calibration or white image of a raw image.
     progress
-        Called with what goes on and the fraction done.
+        Called as ``progress(fraction)``, a `core.progress.Stage`.
 
     Raises
     ------
@@ -77,10 +75,10 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
     LumigraphError
         Whatever reading, decoding or simulating finds wrong.
     """
-    tell = progress or (lambda what, done: None)
+    tell = progress or silent
     if is_camera(path):
         return _simulated(path, tell)
-    tell("reading", 0.0)
+    tell(Stage(0.0, "reading"))
     found = io.open(path)
     if isinstance(found, RawImage):
         return _raw(path.name, found, origin or Origin(), tell)
@@ -196,7 +194,7 @@ def _simulated(path: Path, tell: Progress) -> Exhibit:
     camera: Any = load_camera(path)
     raw = simulate(
         camera, targets.photo(camera.object_grid),
-        progress=lambda done, total: tell("simulating", done / max(total, 1)),
+        progress=within(tell, 0.0, 1.0, "simulating"),
     )  # fmt: skip
     calibration, patch = getattr(camera, "calibration", None), getattr(camera, "patch", None)
     return of_raw(path.name, raw, calibration, patch)
@@ -205,9 +203,9 @@ def _simulated(path: Path, tell: Progress) -> Exhibit:
 def _raw(name: str, raw: RawImage, origin: Origin, tell: Progress) -> Exhibit:
     if not origin.is_known:
         return of_raw(name, raw)
-    tell("calibrating", 0.3)
+    tell(Stage(0.3, "calibrating"))
     ready = origin.prepared(raw, camera=origin.camera)
-    tell("decoding", 0.6)
+    tell(Stage(0.6, "decoding"))
     return of_raw(name, ready, ready.calibration, origin.patch)
 
 

@@ -4,10 +4,11 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from lumigraph.core.progress import Progress, Stage
 from lumigraph.errors import LumigraphError
 from lumigraph.io.target import check_target, write_bytes
 from lumigraph.viewer.encoding import Coded
@@ -21,8 +22,6 @@ LARGEST = 400 << 20
 LOSSLESS = 100
 
 _EXACT_16 = 64 << 20  # bytes of 16-bit views that still go into a page without loss
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +57,7 @@ def export(
     quality
         Of the views as WebP pictures, 1 to 99; 100 keeps every number.
     progress
-        Called with what goes on and the fraction done.
+        Called as ``progress(fraction)``, a `core.progress.Stage`.
 
     Raises
     ------
@@ -85,7 +84,7 @@ def exported(
     sizes: dict[str, int] = {}
     for k, (number, name) in enumerate(names):
         if progress is not None:
-            progress(name, k / len(names))
+            progress(Stage(k / len(names), name))
         content = _blob(name, parts[number].arrays[name](), parts[number], quality)
         sizes[f"{number}/{name}"] = len(content)
         if sum(sizes.values()) * 4 / 3 > LARGEST:
