@@ -3,7 +3,8 @@
     python tests/fuzz/run.py --count 20000 [--readers tiff png] [--seed 0] [--keep folder]
 
 Mutants are read in forked children that may take 1 GiB of memory in all and 10 s for each; a child that dies,
-hangs or raises anything else is a failure, and its mutant is kept. The same seed makes the same mutants.
+hangs or raises anything else is a failure, and its mutant is kept. In every fourth child the lines that are
+run are watched: a mutant that reaches a new one becomes a seed. The same seed makes the same mutants.
 """
 
 import argparse
@@ -20,8 +21,10 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -32,48 +35,16 @@ import lumigraph as lg
 import lumigraph.io as io
 from lumigraph import store
 from lumigraph.errors import LumigraphError
+from lumigraph.io.formats import format_of
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from fuzz.damage import DAMAGES
 from fuzz.structure import Link, Pipe, structural
 
 SECONDS, MEMORY, BATCH, STRUCTURAL = 10, 1 << 30, 250, 0.3
-# Whole numbers that lengths, counts and offsets are replaced by, and texts that numbers are.
-NUMBERS = (
-    0,
-    1,
-    2,
-    7,
-    0x7F,
-    0x80,
-    0xFF,
-    0x100,
-    0x7FFF,
-    0xFFFF,
-    0x10000,
-    1 << 20,
-    1 << 24,
-    10**9,
-    2**31 - 1,
-    2**31,
-    2**32 - 1,
-)
-TEXTS = (
-    b"0",
-    b"-1",
-    b"1e9",
-    b"999999999",
-    b"1e308",
-    b"nan",
-    b"null",
-    b"[]",
-    b"{}",
-    b'""',
-    b"65536",
-    b"0.5",
-    b"true",
-    b"[[",
-    b"&x;",
-)
+WATCHED, GUIDED = 4, 0.4  # one child of so many is watched; share of mutants made of those that it found
+MOST_SEEDS, LARGEST_SEED = 300, 100_000  # of new seeds: their number, and the bytes of one
+PACKAGE = str(Path(lg.__file__).parent)
 Tree = dict[str, bytes]
 
 
@@ -85,8 +56,41 @@ class Score:
     refused: int = 0
     out_of_memory: int = 0
     slowest: float = 0.0
+    spent: float = 0.0
     most_memory: int = 0
     failures: list[tuple[int, str]] = field(default_factory=list)
+    damaged: list[Tree] = field(default_factory=list)
+    lines: set[str] = field(default_factory=set)
+    corpus: list[Tree] = field(default_factory=list)
+
+
+class Watch:
+    """Context that collects the lines of the package that are run, by file and number."""
+
+    def __init__(self, known: set[str]) -> None:
+        self.known, self._run = known, set()
+
+    def __enter__(self) -> "Watch":
+        self._run.clear()
+        sys.settrace(self._call)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        sys.settrace(None)
+
+    def new(self) -> set[str]:
+        """Those that were not known; from now on they are."""
+        found = {f"{Path(code.co_filename).relative_to(PACKAGE)}:{line}" for code, line in self._run}
+        found -= self.known
+        self.known |= found
+        return found
+
+    def _call(self, frame: Any, event: str, _: object) -> Any:
+        return self._line if frame.f_code.co_filename.startswith(PACKAGE) else None
+
+    def _line(self, frame: Any, event: str, _: object) -> Any:
+        self._run.add((frame.f_code, frame.f_lineno))
+        return self._line
 
 
 def mutant(trees: list[Tree], mend: Callable[[Tree], Tree] | None, rng: np.random.Generator) -> Tree:
@@ -101,68 +105,6 @@ def mutant(trees: list[Tree], mend: Callable[[Tree], Tree] | None, rng: np.rando
         content = DAMAGES[rng.integers(len(DAMAGES))](content, rng)
     tree[name] = bytes(content)
     return mend(tree) if mend is not None and rng.random() < 0.6 else tree
-
-
-def _place(content: bytearray, rng: np.random.Generator) -> int:
-    """Half of the places lie in the first 300 bytes, where headers stand."""
-    near = min(len(content), 300) if rng.random() < 0.5 else len(content)
-    return int(rng.integers(max(near, 1)))
-
-
-def flip(content: bytearray, rng: np.random.Generator) -> bytearray:
-    if content:
-        content[_place(content, rng)] ^= 1 << int(rng.integers(8))
-    return content
-
-
-def number(content: bytearray, rng: np.random.Generator) -> bytearray:
-    size, order = int(rng.choice((1, 2, 4, 8))), ("little", "big")[rng.integers(2)]
-    value = NUMBERS[rng.integers(len(NUMBERS))] % 256**size
-    at = _place(content, rng)
-    content[at : at + size] = value.to_bytes(size, order)
-    return content
-
-
-def text(content: bytearray, rng: np.random.Generator) -> bytearray:
-    """A run of digits, as in JSON, XML and headers of text, becomes something else."""
-    at = _place(content, rng)
-    start = next((k for k in range(at, min(len(content), at + 200)) if 48 <= content[k] < 58), at)
-    stop = start
-    while stop < len(content) and (48 <= content[stop] < 58 or content[stop] in b".-+e"):
-        stop += 1
-    content[start:stop] = TEXTS[rng.integers(len(TEXTS))]
-    return content
-
-
-def noise(content: bytearray, rng: np.random.Generator) -> bytearray:
-    at, size = _place(content, rng), int(rng.integers(1, 16))
-    content[at : at + size] = rng.bytes(size)
-    return content
-
-
-def cut(content: bytearray, rng: np.random.Generator) -> bytearray:
-    return content[: int(rng.integers(len(content) + 1))]
-
-
-def remove(content: bytearray, rng: np.random.Generator) -> bytearray:
-    at = _place(content, rng)
-    del content[at : at + int(rng.integers(1, 64))]
-    return content
-
-
-def repeat(content: bytearray, rng: np.random.Generator) -> bytearray:
-    at, size = _place(content, rng), int(rng.integers(1, 64))
-    content[at:at] = content[at : at + size] * int(rng.choice((1, 2, 50)))
-    return content
-
-
-def move(content: bytearray, rng: np.random.Generator) -> bytearray:
-    here, there, size = _place(content, rng), _place(content, rng), int(rng.integers(1, 32))
-    content[here : here + size] = content[there : there + size]
-    return content
-
-
-DAMAGES = (flip, flip, number, number, number, text, text, noise, cut, remove, repeat, move)
 
 
 def read(tree: Tree, folder: Path) -> None:
@@ -189,7 +131,10 @@ def read(tree: Tree, folder: Path) -> None:
         return
     options = {"shape": (60, 70)} if path.suffix in (".xml", ".ini") else {}
     error = None
-    for act in (lambda: io.open(path, **options), lambda: io.contents(path)):
+    acts = [lambda: io.open(path, **options)]
+    if hasattr(format_of(path).imported(), "contents"):  # else it opens the file once more
+        acts.append(lambda: io.contents(path))
+    for act in acts:
         try:
             act()
         except LumigraphError as refusal:
@@ -217,31 +162,45 @@ def _limit() -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def _child(numbers: range, make: Callable[[int], Tree], board: mmap.mmap, folder: Path, log: Path) -> None:
+def _child(
+    numbers: range,
+    make: Callable[[int], Tree],
+    board: mmap.mmap,
+    folder: Path,
+    log: Path,
+    known: set[str] | None,
+) -> None:
     """Read mutants; the board tells the parent: index, opened, refused, out of memory, slowest."""
     _limit()
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # libtiff tells of damage there
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # what libraries print
     warnings.simplefilter("ignore")
+    watch = nullcontext() if known is None else Watch(known)
     opened = refused = starved = 0
     slowest = 0.0
     for k in numbers:
         board[:40] = struct.pack("=qqqqd", k, opened, refused, starved, slowest)
-        tree = make(k)
+        tree, told = make(k), []
         signal.setitimer(signal.ITIMER_PROF, SECONDS)  # of the processor: others may be at work
         signal.alarm(4 * SECONDS)
         start = time.process_time()
         try:
-            read(tree, folder)
+            with watch:
+                read(tree, folder)
             opened += 1
         except LumigraphError as error:
             refused += 1
             starved += "does not fit into memory" in str(error)
+            if len(str(error)) > 400 or "\n" in str(error):
+                told.append(f"!a line of {len(str(error))} characters: {str(error)[:100]!r}")
         except BaseException as error:
-            with log.open("a") as file:
-                file.write(f"{k}\t{type(error).__name__}: {' '.join(str(error).split())[:300]}\n")
+            told.append(f"!{type(error).__name__}: {' '.join(str(error).split())[:300]}")
         signal.alarm(0)
         signal.setitimer(signal.ITIMER_PROF, 0)
         slowest = max(slowest, time.process_time() - start)
+        told += sorted(watch.new()) if isinstance(watch, Watch) else []
+        if told:
+            with log.open("a") as file:
+                file.writelines(f"{k}\t{each}\n" for each in told)
     board[:40] = struct.pack("=qqqqd", numbers.stop, opened, refused, starved, slowest)
 
 
@@ -249,49 +208,69 @@ def run(trees: list[Tree], mend: Callable[[Tree], Tree] | None, count: int, *, s
     """Read `count` mutants."""
 
     def make(k: int) -> Tree:
-        return mutant(trees, mend, np.random.default_rng((seed, k)))
+        rng = np.random.default_rng((seed, k))
+        return mutant(score.corpus if score.corpus and rng.random() < GUIDED else trees, mend, rng)
 
     score, board = Score(), mmap.mmap(-1, 64)
     with tempfile.TemporaryDirectory() as place:
         folder, log, start = Path(place) / "mutant", Path(place) / "log", 0
         while start < count:
-            numbers = range(start, min(count, start + BATCH))
+            numbers = range(start, min(count, start // BATCH * BATCH + BATCH))
+            watched = start // BATCH % WATCHED == 0 and sys.gettrace() is None
             board[:40] = struct.pack("=qqqqd", start, 0, 0, 0, 0.0)
             child = _fork()
             if child == 0:
                 code = 70
                 try:
-                    _child(numbers, make, board, folder, log)
+                    _child(numbers, make, board, folder, log, score.lines if watched else None)
                     code = 0
                 finally:
                     os._exit(code)
             _, status, usage = os.wait4(child, 0)
-            at, opened, refused, starved, slowest = struct.unpack("=qqqqd", board[:40])
-            score.opened, score.refused = score.opened + opened, score.refused + refused
-            score.out_of_memory += starved
-            score.slowest = max(score.slowest, slowest)
-            score.most_memory = max(score.most_memory, usage.ru_maxrss * 1024)
-            if status == 0:
-                start = numbers.stop
-            else:
+            at = _add(score, board, usage)
+            failures = [(k, line[1:]) for k, line in _lines(log) if line.startswith("!")]
+            if status != 0:
                 code = os.waitstatus_to_exitcode(status)
                 hung = code in (-signal.SIGALRM, -signal.SIGPROF)
-                score.failures.append((at, f"hung for {SECONDS} s" if hung else f"died with {code}"))
-                start = at + 1
-        score.failures += _logged(log)
+                failures.append((at, f"hung for {SECONDS} s" if hung else f"died with {code}"))
+            score.failures += failures
+            score.damaged += [make(k) for k, _ in failures]
+            _grow(score, make, log)
+            start = numbers.stop if status == 0 else at + 1
     return score
+
+
+def _add(score: Score, board: mmap.mmap, usage: resource.struct_rusage) -> int:
+    """Count what a child did; the mutant where it ended."""
+    at, opened, refused, starved, slowest = struct.unpack("=qqqqd", board[:40])
+    score.opened, score.refused = score.opened + opened, score.refused + refused
+    score.out_of_memory += starved
+    score.slowest = max(score.slowest, slowest)
+    score.spent += usage.ru_utime + usage.ru_stime
+    score.most_memory = max(score.most_memory, usage.ru_maxrss * 1024)
+    return at
+
+
+def _lines(log: Path) -> Iterator[tuple[int, str]]:
+    for line in log.read_text().splitlines() if log.exists() else []:
+        index, _, message = line.partition("\t")
+        yield int(index), message
+
+
+def _grow(score: Score, make: Callable[[int], Tree], log: Path) -> None:
+    """Make seeds of the mutants that reached new lines of the package, as they were made."""
+    reached = [(k, line) for k, line in _lines(log) if not line.startswith("!")]
+    log.unlink(missing_ok=True)
+    score.lines |= {line for _, line in reached}
+    trees = [make(k) for k in dict.fromkeys(k for k, _ in reached)]
+    small = [tree for tree in trees if sum(map(len, tree.values())) <= LARGEST_SEED]
+    score.corpus += small[: MOST_SEEDS - len(score.corpus)]
 
 
 def _fork() -> int:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # Python 3.12 on: threads there may be
         return os.fork()
-
-
-def _logged(log: Path) -> Iterator[tuple[int, str]]:
-    for line in log.read_text().splitlines() if log.exists() else []:
-        index, _, message = line.partition("\t")
-        yield int(index), message
 
 
 def in_child(function: Callable[[], object]) -> object:
@@ -348,14 +327,14 @@ def main(words: list[str] | None = None) -> int:
         print(
             f"{name:12} {given.count} mutants: {score.opened} opened, {score.refused} refused "
             f"({score.out_of_memory} for memory), {len(score.failures)} failed; "
-            f"slowest {score.slowest:.2f} s CPU, memory up to {score.most_memory / 2**20:.0f} MiB; "
-            f"{time.monotonic() - start:.0f} s",
+            f"{len(score.lines)} lines reached, {len(score.corpus)} seeds more; "
+            f"{1e3 * score.spent / given.count:.2f} ms CPU each, slowest {score.slowest:.2f} s, "
+            f"memory up to {score.most_memory / 2**20:.0f} MiB; {time.monotonic() - start:.0f} s",
             flush=True,
         )
-        for index, message in score.failures[:20]:
+        for (index, message), tree in list(zip(score.failures, score.damaged, strict=True))[:20]:
             print(f"    mutant {index}: {message}", flush=True)
             if given.keep:
-                tree = mutant(trees, mend, np.random.default_rng((given.seed, index)))
                 for file, content in tree.items():
                     path = given.keep / f"{name}-{index}" / file
                     path.parent.mkdir(parents=True, exist_ok=True)

@@ -6,8 +6,12 @@ Bytes flipped at random hardly ever make these. Each function takes a tree of fi
 import io
 import json
 import re
+import struct
+import warnings
 import zipfile
+import zlib
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -52,6 +56,8 @@ def structural(tree: Tree, rng: Rng) -> Tree:
     if len(tree) > 1 and rng.random() < 0.3:
         return _renamed(tree, name, rng)
     content = tree[name]
+    if rng.random() < 0.02:
+        return {**tree, name: _swollen(content)}
     if name.endswith(".zip"):
         return {**tree, name: _archive(content, rng)}
     if name.endswith((".json", ".txt")):
@@ -151,26 +157,67 @@ def _archive(content: bytes, rng: Rng) -> bytes:
     """The archive with a file inside it changed, twice in it, itself in it, or packed to nothing."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as file:
-            tree: Tree = {name: file.read(name) for name in file.namelist() if not name.endswith("/")}
+            names = [name for name in file.namelist() if not name.endswith("/")]
+            if sum(file.getinfo(name).file_size for name in names) > 1 << 20:
+                return content
+            tree: Tree = {name: file.read(name) for name in names}
     except Exception:
         return content
-    kind, packing = rng.integers(6), zipfile.ZIP_STORED
-    extra: list[tuple[str, bytes]] = []
-    if kind == 0:
+    kind, extra = rng.random(), list[tuple[str, bytes]]()
+    if kind < 0.15:
         extra = [(NAMES[rng.integers(len(NAMES))], content)]
-    elif kind == 1:
+    elif kind < 0.3:
         extra = [(name, b"{}") for name in tree]
-    elif kind == 2:
-        extra, packing = [("data/c/0/0", bytes(20 << 20))], zipfile.ZIP_DEFLATED
-    elif kind == 3:
+    elif kind < 0.33:
         extra = [(f"../x{k}", b"") for k in range(2000)]
-    else:
+    elif kind > 0.4:
         tree = structural(tree, rng) if tree else tree
     buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", packing) as file:
+    with zipfile.ZipFile(buffer, "w") as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # two of one name are meant
         for name, each in [*tree.items(), *extra]:
-            file.writestr(zipfile.ZipInfo(name), each, packing)
+            file.writestr(zipfile.ZipInfo(name), each)
+        if 0.33 < kind < 0.36:
+            _add_bomb(file, sorted(tree)[rng.integers(len(tree))], int(rng.choice((100, SWOLLEN))))
     return buffer.getvalue()
+
+
+SWOLLEN = 2 << 30
+"""Bytes that a bomb becomes: more than a reader may take."""
+
+
+@cache
+def bomb(wbits: int) -> bytes:
+    """Two GiB of zeros, packed by zlib (15), gzip (31) or plain Deflate (-15), with a wrong checksum."""
+    engine, piece = zlib.compressobj(9, wbits=wbits), bytes(1 << 20)
+    first = engine.compress(piece) + engine.flush(zlib.Z_FULL_FLUSH)
+    again = engine.compress(piece) + engine.flush(zlib.Z_FULL_FLUSH)
+    return first + again * ((SWOLLEN >> 20) - 1) + engine.flush(zlib.Z_FINISH)
+
+
+def _swollen(content: bytes) -> bytes:
+    """The first packed part replaced by a bomb; of PNG files with the length of its chunk."""
+    if (at := content.find(b"IDAT")) >= 0:
+        length, packed = int.from_bytes(content[at - 4 : at], "big"), b"IDAT" + bomb(15)
+        whole = struct.pack(">I", len(packed) - 4) + packed + struct.pack(">I", zlib.crc32(packed))
+        return content[: at - 4] + whole + content[at + 8 + length :]
+    for magic, wbits in ((b"\x1f\x8b\x08", 31), (b"\x78\x9c", 15), (b"\x78\xda", 15), (b"\x78\x5e", 15)):
+        if (at := content.find(magic)) >= 0:
+            return content[:at] + bomb(wbits)
+    return content
+
+
+def _add_bomb(file: zipfile.ZipFile, name: str, told: int) -> None:
+    """Add an entry to an archive that becomes 2 GiB, and says that it becomes `told` bytes."""
+    entry, packed = zipfile.ZipInfo(name), bomb(-15)
+    entry.compress_type, entry.CRC = zipfile.ZIP_DEFLATED, 0
+    entry.compress_size, entry.file_size = len(packed), told
+    assert file.fp is not None  # the archive is open
+    entry.header_offset = file.fp.tell()
+    file.fp.write(entry.FileHeader(zip64=False) + packed)
+    file.start_dir = file.fp.tell()
+    file.filelist.append(entry)
+    file.NameToInfo[name] = entry
 
 
 def _deep(levels: int) -> Any:

@@ -1,6 +1,7 @@
 """TIFF of any depth and several pages, OME-TIFF, OME-Zarr, HDF5: what is saved comes back, sizes too."""
 
 import functools
+import gzip
 import json
 import struct
 import zlib
@@ -307,8 +308,8 @@ def test_bombs_in_a_zarr_store_are_refused(tmp_path):
     io.save(np.zeros((64, 64), np.uint8), tmp_path / "a.zarr")
     chunk = tmp_path / "a.zarr" / "data" / "c" / "0" / "0"
     whole = bytearray(chunk.read_bytes())
-    # A frame header that declares 1 GiB: single segment, 4 bytes of content size.
-    chunk.write_bytes(b"\x28\xb5\x2f\xfd" + bytes([0b10100000]) + struct.pack("<I", 1 << 30) + whole[6:])
+    # A frame header that declares 1 GiB: single segment, 4 bytes of content size, a checksum.
+    chunk.write_bytes(b"\x28\xb5\x2f\xfd" + bytes([0b10100100]) + struct.pack("<I", 1 << 30) + whole[7:])
     with pytest.raises(FormatError, match=r"a chunk becomes 1073741824 bytes where 4096 are declared"):
         io.open(tmp_path / "a.zarr")
     chunk.write_bytes(b"\x28\xb5\x2f\xfd" + bytes([0, 0]) + whole[6:])
@@ -318,7 +319,7 @@ def test_bombs_in_a_zarr_store_are_refused(tmp_path):
     fields = json.loads(metadata.read_text())
     fields["codecs"][1] = {"name": "gzip", "configuration": {"level": 5}}
     metadata.write_text(json.dumps(fields))
-    chunk.write_bytes(bomb())
+    chunk.write_bytes(bomb(4 << 20))
     with pytest.raises(FormatError, match="made to fill the memory"):
         io.open(tmp_path / "a.zarr")
     fields["codecs"].append({"name": "zstd", "configuration": {"level": 0, "checksum": False}})
@@ -343,6 +344,10 @@ def test_what_a_file_cannot_hold_is_refused_before_it_is_allocated(tmp_path):
     ):
         io.open(tmp_path / "a.png")
     source.check_inflated(tmp_path, zlib.compress(bytes(5000)), 5000)
+    two = gzip.compress(bytes(100)) + bytes(3) + gzip.compress(bytes(4900))  # as one file of gzip
+    source.check_inflated(tmp_path, two, 5000)
+    with pytest.raises(FormatError, match="become more than the 4999"):
+        source.check_inflated(tmp_path, two, 4999)
     with pytest.raises(FormatError, match="become more than the 4999"):
         source.check_inflated(tmp_path, zlib.compress(bytes(5000)), 4999)
 

@@ -261,8 +261,19 @@ def toml(path: Path, text: str) -> dict[str, Any]:
         raise FormatError(f"{path} is damaged TOML: {error}. Correct that line.") from error
 
 
-def check_inflated(path: Path, packed: bytes, limit: int) -> None:
-    """Refuse Deflate data (zlib or gzip) that becomes more than `limit` bytes; little memory is used.
+def check_inflated(path: Path, packed: bytes, limit: int, *, wbits: int = 47) -> None:
+    """Refuse Deflate data that becomes more than `limit` bytes; little memory is used.
+
+    Parameters
+    ----------
+    path
+        The file.
+    packed
+        With the header of zlib or gzip, or without one where `wbits` is -15.
+    limit
+        Bytes.
+    wbits
+        As `zlib.decompressobj` takes it.
 
     Raises
     ------
@@ -271,10 +282,13 @@ def check_inflated(path: Path, packed: bytes, limit: int) -> None:
     """
     if len(packed) * MOST_INFLATED <= limit:
         return
-    engine, total, rest = zlib.decompressobj(wbits=47), 0, packed
-    while rest and not engine.eof:
+    engine, total, rest = zlib.decompressobj(wbits), 0, packed
+    while rest:
         total += len(engine.decompress(rest, 1 << 20))
         rest = engine.unconsumed_tail
+        if engine.eof:  # gzip files may follow each other, and are read as one
+            rest = engine.unused_data.lstrip(b"\0")
+            rest, engine = rest if rest.startswith(b"\x1f\x8b") else b"", zlib.decompressobj(wbits)
         if total > limit:
             raise FormatError(
                 f"{path} holds {len(packed)} bytes that become more than the {limit} its header declares: "

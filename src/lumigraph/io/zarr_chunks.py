@@ -1,10 +1,11 @@
 """Whether the chunks of a Zarr store become what its metadata declares, before one is decoded."""
 
+import struct
 import zipfile
 from collections.abc import Iterator
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import zarr
 
@@ -14,6 +15,7 @@ from lumigraph.io import source
 _PLAIN = {"bytes", "transpose", "crc32c"}
 _PACKED = {"zstd", "gzip"}  # not blosc: its decoder dies on some damaged chunks
 _MOST_CHUNKS = 1_000_000
+_NAMES = 26  # where a ZIP entry's header gives the lengths of its name and of its extra fields
 
 
 def check_entries(path: Path, limit: int) -> None:
@@ -23,19 +25,38 @@ def check_entries(path: Path, limit: int) -> None:
         for file in [path / "zarr.json", *path.glob("*/zarr.json")][:1000]:
             _check_metadata(path, file.stat().st_size if file.exists() else 0)
         return
-    with zipfile.ZipFile(path) as file:
+    size, held = path.stat().st_size, 0
+    with path.open("rb") as packed, zipfile.ZipFile(packed) as file:
         for entry in file.infolist():
-            if not 0 <= entry.compress_size <= path.stat().st_size:
+            held += max(entry.compress_size, 0)
+            if entry.compress_size < 0 or held > size:  # entries may also share their bytes: a bomb
                 raise FormatError(
                     f"{path} is cut short: {entry.filename[:60]!r} is not all there. Copy it again."
                 )
-            source.check_stored(path, entry.file_size, entry.compress_size)
             if entry.file_size > limit:
                 raise FormatError(
                     f"{path} holds {entry.filename[:60]!r} of {entry.file_size} bytes: too many."
                 )
             if entry.filename.endswith("zarr.json"):
                 _check_metadata(path, entry.file_size)
+            _check_packing(path, packed, entry)
+
+
+def _check_packing(path: Path, file: BinaryIO, entry: zipfile.ZipInfo) -> None:
+    """Refuse an entry that becomes more than it declares: whoever reads it would inflate all of it first."""
+    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise FormatError(
+            f"{path} holds {entry.filename[:60]!r} packed by method {entry.compress_type} of ZIP. "
+            "Pack it by Deflate, or not at all."
+        )
+    if entry.compress_type == zipfile.ZIP_STORED:
+        source.check_stored(path, entry.file_size, entry.compress_size, 1)
+        return
+    source.check_stored(path, entry.file_size, entry.compress_size)
+    file.seek(entry.header_offset + _NAMES)
+    name, extra = struct.unpack("<HH", file.read(4))
+    file.seek(name + extra, 1)
+    source.check_inflated(path, file.read(entry.compress_size), entry.file_size, wbits=-15)
 
 
 def check_chunks(path: Path, array: zarr.Array[Any], name: str) -> int:
@@ -53,13 +74,14 @@ def check_chunks(path: Path, array: zarr.Array[Any], name: str) -> int:
     if array.nchunks > _MOST_CHUNKS:
         raise FormatError(f"{path} declares {array.nchunks} chunks, at most {_MOST_CHUNKS} are read.")
     limit, stored = prod(array.chunks) * array.dtype.itemsize, 0
-    for content in _contents(path, name):
+    for content in _contents(path, name, limit + limit // 100 + 1024):  # what cannot be packed grows a little
         stored += len(content)
         inner = content[:-4] if codecs[-1:] == ["crc32c"] else content
-        size = len(inner) if not packed else _declared(inner, packed[0])
         if packed == ["gzip"]:
             source.check_inflated(path, inner, limit)
-        elif size is None or size > limit:
+            continue
+        size = _declared(inner) if packed else len(inner)
+        if size is None or size > limit:
             raise FormatError(
                 f"{path} is damaged: a chunk becomes {size or 'an unknown number of'} bytes where {limit} "
                 "are declared. Copy it again."
@@ -67,32 +89,49 @@ def check_chunks(path: Path, array: zarr.Array[Any], name: str) -> int:
     return stored
 
 
-def _contents(path: Path, name: str) -> Iterator[bytes]:
-    """Bytes of every chunk of an array."""
+def _contents(path: Path, name: str, most: int) -> Iterator[bytes]:
+    """Bytes of every chunk of an array; one of more than `most` is refused before it is read."""
     if path.is_dir():
         for file in (path / name).rglob("*"):
             if file.name != "zarr.json" and file.is_file():
+                _check_chunk(path, file.name, file.stat().st_size, most)
                 yield file.read_bytes()
         return
     with zipfile.ZipFile(path) as file:
         for entry in file.infolist():
             if entry.filename.startswith(f"{name}/") and not entry.filename.endswith(("zarr.json", "/")):
+                _check_chunk(path, entry.filename, entry.file_size, most)
                 yield file.read(entry)
 
 
-def _declared(content: bytes, codec: str) -> int | None:
-    """Bytes that a zstd frame says it becomes (RFC 8878, 3.1.1.1); None where it does not say."""
-    if codec == "gzip":
-        return 0
+def _check_chunk(path: Path, name: str, size: int, most: int) -> None:
+    if size > most:
+        raise FormatError(
+            f"{path} is damaged: its chunk {name[:60]!r} holds {size} bytes, {most} suffice. Copy it again."
+        )
+
+
+def _declared(content: bytes) -> int | None:
+    """Bytes that a lone zstd frame says it becomes (RFC 8878, 3.1.1); None where it does not say."""
     if len(content) < 6 or content[:4] != b"\x28\xb5\x2f\xfd":
         return None
     flags = content[4]
     single, size = flags >> 5 & 1, (0, 2, 4, 8)[flags >> 6]
     start = 5 + (not single) + (0, 1, 2, 4)[flags & 3]
     size = size or single
-    if size == 0 or len(content) < start + size:
+    if size == 0 or _end_of_blocks(content, start + size) + 4 * (flags >> 2 & 1) != len(content):
         return None
     return int.from_bytes(content[start : start + size], "little") + (256 if size == 2 else 0)
+
+
+def _end_of_blocks(content: bytes, at: int) -> int:
+    """Where the blocks of a zstd frame that begin at a place end; those that are repeated bytes hold one."""
+    last = 0
+    while not last and at + 3 <= len(content):
+        head = int.from_bytes(content[at : at + 3], "little")
+        last, kind = head & 1, head >> 1 & 3
+        at += 3 + (1 if kind == 1 else head >> 3)
+    return at
 
 
 def _check_metadata(path: Path, size: int) -> None:
