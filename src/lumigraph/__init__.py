@@ -12,6 +12,8 @@ stays quick. Nothing inside the package imports this module.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from lumigraph.core import drawing
+
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
@@ -221,6 +223,9 @@ def __getattr__(name: str) -> Any:
     value = import_module(f"{home}.{name}") if home == "lumigraph" else getattr(import_module(home), name)
     globals()[name] = value
     return value
+
+
+drawing.done_by(lambda: __getattr__("plots"))
 
 
 def __dir__() -> list[str]:

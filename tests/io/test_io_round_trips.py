@@ -90,7 +90,7 @@ def test_a_light_field_survives_exactly(tmp_path, rng, name, channels, dtype):
 def test_other_programs_read_the_axes_and_units_of_a_light_field(tmp_path):
     views = LightField(np.zeros((3, 2, 4, 5), np.float32), Grid((3, 2), 0.1), Grid((4, 5), 1e-4), 0.4)
     io.save(views, tmp_path / "views.zarr")
-    with xarray.open_zarr(tmp_path / "views.zarr", consolidated=False) as found:
+    with xarray.open_zarr(tmp_path / "views.zarr") as found:
         assert found["data"].dims == ("v", "u", "t", "s")
         np.testing.assert_array_equal(found["s"], views.lenslets.x)
         assert found["v"].attrs["units"] == "m"

@@ -8,6 +8,8 @@
 - `warp`: `Warp`, tilt and distortion of their lattice
 - `lightfield`: `LightField`, decoded radiance (v, u, t, s)
 - `depth_map`: `DepthMap`, a depth for each place, and how sure it is
+- `noun`: what the nouns share: NumPy, xarray and drawings; `labelled`: arrays with named axes
+- `drawing`: where nouns find what draws them
 - `picture`: thumbnails and tables for notebooks
 - `volume`: `Volume`, reconstructed intensities (z, y, x)
 - `stack`: `Stack`, pictures in an order; `cloud`: `PointCloud`, points in space

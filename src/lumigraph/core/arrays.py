@@ -6,7 +6,7 @@ computed by NumPy in float64 and cast last, by `like`.
 """
 
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 import scipy.fft
@@ -14,6 +14,27 @@ from array_api_compat import array_namespace, device, is_numpy_array, is_torch_a
 
 Array = Any
 """An array of any library that follows the array API standard."""
+
+if TYPE_CHECKING:
+    import typing_extensions
+    from numpy.typing import DTypeLike
+
+    class _Indexed(Protocol):
+        @property
+        def shape(self) -> Any: ...
+
+        @property
+        def dtype(self) -> Any: ...
+
+        @property
+        def ndim(self) -> int: ...
+
+        def __getitem__(self, key: Any, /) -> Any: ...
+
+    A = typing_extensions.TypeVar("A", bound=_Indexed, default=Any)
+else:
+    A = TypeVar("A")
+"""The type of an array, kept from what goes in to what comes out."""
 
 WORKERS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 """Threads that one FFT may use: the processors this process may run on."""
@@ -35,6 +56,19 @@ def to_numpy(array: Array) -> np.ndarray:
     if hasattr(array, "get"):  # CuPy
         return array.get()
     return np.asarray(array)
+
+
+def as_numpy(array: Array, dtype: "DTypeLike | None" = None, copy: bool | None = None) -> np.ndarray:
+    """The array on the CPU as `numpy.asarray` gives it: a copy always, never (false) or where needed (None).
+
+    Raises
+    ------
+    ValueError
+        `copy` is false but the type asks for one, or the array stands on a GPU.
+    """
+    if copy is False and not is_numpy_array(array) and "cpu" not in str(device(array)).lower():
+        raise ValueError(f"an array on {device(array)} needs a copy. Leave copy=False out.")
+    return np.array(to_numpy(array), dtype=dtype, copy=copy)
 
 
 def is_numpy(array: Array) -> bool:

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
+from lumigraph.core import picture
+
 WIDTH, LINES = 100, 8
 """Of the text."""
 
@@ -29,6 +31,12 @@ def brief(self: Any) -> str:
     )
     lines = textwrap.wrap(f"{type(self).__name__}({shown})", WIDTH, subsequent_indent="    ")
     return "\n".join(lines if len(lines) <= LINES else [*lines[: LINES - 1], "    ...)"])
+
+
+def table(self: Any) -> str:
+    """A dataclass with its fields as a card of HTML, for its ``_repr_html_``."""
+    rows = [(f.name.replace("_", " "), _short(getattr(self, f.name))) for f in fields(self) if f.repr]
+    return picture.card(type(self).__name__, rows)
 
 
 def _short(value: Any) -> str:

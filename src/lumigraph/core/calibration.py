@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from lumigraph.core import checks, picture
 from lumigraph.core.brief import brief
+from lumigraph.core.drawing import draw
 from lumigraph.core.lattice import Lattice, Vector
 from lumigraph.core.warp import Warp
 from lumigraph.errors import CalibrationError
@@ -197,6 +199,10 @@ class Calibration:
                 f"the raw image has {shape[0]} x {shape[1]} pixels but the calibration was made on "
                 f"{self.shape[0]} x {self.shape[1]}. Use the white image taken with the same camera settings."
             )
+
+    def plot(self, white: Any, **options: Any) -> Any:
+        """A matplotlib Figure of the micro-images over a raw or white image: `lumigraph.plots.lattice`."""
+        return draw("lattice", white, self, **options)
 
     def _repr_html_(self) -> str:
         rows = [(line[:12].strip(), line[12:]) for line in self.report().splitlines()]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, to_numpy
-from lumigraph.core.brief import brief
+from lumigraph.core.brief import brief, table
 from lumigraph.errors import GeometryError
 
 
@@ -34,6 +34,7 @@ class PointCloud:
     confidence: Array | None = None
 
     __repr__ = brief
+    _repr_html_ = table
 
     def __post_init__(self) -> None:
         checks.array("points", self.points)

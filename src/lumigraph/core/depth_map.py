@@ -3,12 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import ClassVar, Self
 
 import numpy as np
 
 from lumigraph.core import checks, picture
-from lumigraph.core.arrays import Array, like, to_numpy
+from lumigraph.core.arrays import A, like, to_numpy
 from lumigraph.core.brief import brief
+from lumigraph.core.labelled import Labels
+from lumigraph.core.noun import Noun
 from lumigraph.errors import GeometryError
 
 QUANTITIES: Mapping[str, str] = MappingProxyType(
@@ -25,7 +28,7 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DepthMap:
+class DepthMap(Noun[A]):
     """A value for each place of a picture, and how much to trust it.
 
     Parameters
@@ -49,8 +52,11 @@ class DepthMap:
     ('px', [[0.5, nan]])
     """
 
-    values: Array
-    confidence: Array
+    pixels: ClassVar[str] = "values"
+    axes: ClassVar[str] = "yx"
+
+    values: A
+    confidence: A
     quantity: str
 
     __repr__ = brief
@@ -76,7 +82,7 @@ class DepthMap:
         return int(self.values.shape[0]), int(self.values.shape[1])
 
     @property
-    def alpha(self) -> Array:
+    def alpha(self) -> A:
         """Refocus factors (y, x) of a map that holds them."""
         self.check("alpha")
         return self.values
@@ -97,7 +103,7 @@ class DepthMap:
             "Depth map", rows, picture.thumbnail(values - low), f"{self.quantity}, least black"
         )
 
-    def trusted(self, lowest: float) -> Array:
+    def trusted(self, lowest: float) -> A:
         """The values (y, x), NaN where the confidence is below `lowest`."""
         values, trust = to_numpy(self.values), to_numpy(self.confidence)
         return like(np.where(trust >= lowest, values, np.nan), self.values)
@@ -111,6 +117,16 @@ class DepthMap:
             confidence=like(trust, self.confidence),
             quantity=quantity,
         )
+
+    def _labels(self) -> Labels:
+        along = {"confidence": (("y", "x"), to_numpy(self.confidence))}
+        about = {"quantity": self.quantity}
+        return Labels("yx", self.quantity, self.unit, along, {"confidence": "1"}, attributes=about)
+
+    @classmethod
+    def _of_labels(cls, labels: Labels) -> Self:
+        trust = labels.along.get("confidence", np.ones(labels.data.shape))
+        return cls(labels.data, trust, labels.attribute("quantity"))
 
     def check(self, *quantities: str) -> None:
         """Refuse a map of another quantity.

@@ -1,10 +1,12 @@
 """A complex scalar wave on a plane."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
-from lumigraph.core import checks
+from lumigraph.core import checks, picture
 from lumigraph.core.arrays import Array, as_complex, intensity, namespace
 from lumigraph.core.brief import brief
+from lumigraph.core.drawing import draw
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 
@@ -51,6 +53,19 @@ class Field:
                 "the last two axes must be (y, x) of the grid."
             )
         object.__setattr__(self, "data", as_complex(self.data))
+
+    def plot(self, **options: Any) -> Any:
+        """A matplotlib Figure of intensity and phase, as `lumigraph.plots.show` draws it."""
+        return draw("show", self, **options)
+
+    def _repr_html_(self) -> str:
+        size = " × ".join(map(picture.length, self.grid.size))
+        rows = [
+            ("samples", picture.sized(self.data.shape)), ("size", size),
+            ("wavelength", picture.length(self.wavelength)), ("numbers", str(self.data.dtype)),
+        ]  # fmt: skip
+        flat = self.intensity.reshape((-1, *self.grid.shape))[0]
+        return picture.card("Field", rows, picture.thumbnail(flat), "Intensity, black to white")
 
     @property
     def intensity(self) -> Array:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import checks, picture
 from lumigraph.errors import GeometryError
 
 
@@ -47,6 +47,11 @@ class Grid:
         object.__setattr__(self, "shape", checks.shape("shape", self.shape))
         object.__setattr__(self, "pitch", pitch)
         object.__setattr__(self, "center", checks.pair("center", self.center))
+
+    def _repr_html_(self) -> str:
+        pairs = {"pitch (y, x)": self.pitch, "size (y, x)": self.size, "centre (y, x)": self.center}
+        lengths = [(name, ", ".join(map(picture.length, pair))) for name, pair in pairs.items()]
+        return picture.card("Grid", [("samples (y, x)", picture.sized(self.shape)), *lengths])
 
     @classmethod
     def square(cls, n: int, pitch: float) -> "Grid":

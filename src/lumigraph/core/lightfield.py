@@ -1,17 +1,19 @@
 """Decoded radiance: one picture for each place on the main lens."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar, Self
 
 from lumigraph.core import checks, picture
-from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.arrays import A, Array, to_numpy
 from lumigraph.core.brief import brief
 from lumigraph.core.grid import Grid
+from lumigraph.core.labelled import Labels
+from lumigraph.core.noun import Noun
 from lumigraph.errors import GeometryError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LightField:
+class LightField(Noun[A]):
     """Radiance L(v, u, t, s): (v, u) on the main-lens aperture, (t, s) on the lenslets.
 
     Both pairs are coordinates of one frame, so that an object whose image lies at F' = F / α' obeys
@@ -37,7 +39,9 @@ class LightField:
         The data's or the mask's shape differs from the two grids', or the separation is not above zero.
     """
 
-    data: Array
+    axes: ClassVar[str] = "vuts"
+
+    data: A
     aperture: Grid
     lenslets: Grid
     separation: float
@@ -64,15 +68,15 @@ class LightField:
                     "(v, u, t, s). Give one true or false for each."
                 )
 
-    def view(self, v: int, u: int) -> Array:
+    def view(self, v: int, u: int) -> A:
         """Picture (t, s[, c]) seen from one place on the main lens; indices as in NumPy."""
         return self.data[v, u, ...]
 
-    def micro_image(self, t: int, s: int) -> Array:
+    def micro_image(self, t: int, s: int) -> A:
         """Directions (v, u[, c]) that meet in one lenslet."""
         return self.data[:, :, t, s, ...]
 
-    def epi(self, v: int, t: int) -> Array:
+    def epi(self, v: int, t: int) -> A:
         """Epipolar-plane image (u, s[, c]): one row of lenslets seen from one row of the aperture."""
         return self.data[v, :, t, ...]
 
@@ -86,16 +90,13 @@ class LightField:
         middle = picture.thumbnail(self.view(nv // 2, nu // 2))
         return picture.card("Light field", rows, middle, "The middle view")
 
-    def to_xarray(self) -> Any:
-        """The radiance as an `xarray.DataArray` with named axes and coordinates in metres."""
-        import xarray
+    def _labels(self) -> Labels:
+        labels = Labels("vuts", "radiance", attributes={"separation": self.separation})
+        if self.valid is not None:
+            labels.along["valid"], labels.units["valid"] = (tuple("vuts"), to_numpy(self.valid)), ""
+        return labels.stands_on(self.aperture, "vu").stands_on(self.lenslets, "ts")
 
-        names = ("v", "u", "t", "s", "c")[: self.data.ndim]
-        coordinates = {"v": self.aperture.y, "u": self.aperture.x, "t": self.lenslets.y, "s": self.lenslets.x}
-        array = xarray.DataArray(
-            to_numpy(self.data), dims=names, coords=coordinates, name="radiance",
-            attrs={"separation": self.separation},
-        )  # fmt: skip
-        for name in coordinates:
-            array[name].attrs["units"] = "m"
-        return array
+    @classmethod
+    def _of_labels(cls, labels: Labels) -> Self:
+        grids = labels.grid("vu"), labels.grid("ts")
+        return cls(labels.data, *grids, float(labels.attribute("separation")), labels.along.get("valid"))

@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Self
 
 import numpy as np
 
 from lumigraph.core.arrays import Array
 from lumigraph.core.brief import brief
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.labelled import Labels
 from lumigraph.core.raw import RawImage
+from lumigraph.errors import GeometryError
 
 
 class Reason(IntEnum):
@@ -106,3 +109,9 @@ class PreparedImage(RawImage):
             for reason in Reason
             if reason is not Reason.GOOD
         }
+
+    @classmethod
+    def _of_labels(cls, labels: Labels) -> Self:
+        raise GeometryError(
+            "reasons and calibration do not travel with xarray. Read a RawImage, and prepare it again."
+        )

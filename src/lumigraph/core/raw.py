@@ -2,11 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar, Self
+
+import numpy as np
 
 from lumigraph.core import checks, picture
-from lumigraph.core.arrays import Array
+from lumigraph.core.arrays import A
 from lumigraph.core.brief import brief
+from lumigraph.core.labelled import Labels
+from lumigraph.core.noun import Noun
 from lumigraph.errors import FormatError, GeometryError
 
 BAYER_PATTERNS = ("RGGB", "GRBG", "GBRG", "BGGR")
@@ -15,7 +19,7 @@ _MOST_BITS = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RawImage:
+class RawImage(Noun[A]):
     """A sensor's picture, in which position and direction are still interleaved.
 
     A simulated raw image is turned by 180° as every camera's is, so that pictures stand upright.
@@ -41,7 +45,9 @@ class RawImage:
         Data that is no array of numbers; a bit depth, Bayer pattern or metadata that a raw image cannot have.
     """
 
-    data: Array
+    axes: ClassVar[str] = "yx"
+
+    data: A
     pixel_pitch: float | None = None
     bit_depth: int | None = None
     bayer: str | None = None
@@ -75,3 +81,17 @@ class RawImage:
         rows += [("Bayer pattern", self.bayer)] if self.bayer else []
         rows.append(("pixel pitch", picture.length(self.pixel_pitch)))
         return picture.card("Raw image", rows, picture.thumbnail(self.data))
+
+    def _labels(self) -> Labels:
+        about = {"bit_depth": self.bit_depth, "bayer": self.bayer, "metadata": dict(self.metadata)}
+        pitch, unit = (self.pixel_pitch, "m") if self.pixel_pitch else (1.0, "px")
+        along = {name: np.arange(n) * pitch for name, n in zip("yx", self.shape, strict=True)}
+        pitches = dict.fromkeys("yx", pitch) if self.pixel_pitch else {}
+        units = dict.fromkeys("yx", unit)
+        return Labels("yx", "pixel value", along=along, units=units, pitches=pitches, attributes=about)
+
+    @classmethod
+    def _of_labels(cls, labels: Labels) -> Self:
+        about = labels.attributes
+        pitch = labels.grid().pitch[1] if labels.units.get("x") == "m" else None
+        return cls(labels.data, pitch, about.get("bit_depth"), about.get("bayer"), about.get("metadata", {}))

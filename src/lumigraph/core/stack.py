@@ -2,18 +2,23 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from lumigraph.core import checks
-from lumigraph.core.arrays import Array
+from lumigraph.core import checks, picture
+from lumigraph.core.arrays import A, to_numpy
 from lumigraph.core.brief import brief
+from lumigraph.core.labelled import Labels
+from lumigraph.core.noun import Noun
 from lumigraph.errors import GeometryError
+
+_SHOWN, _SIDE = 4, 160
+"""Pictures in a notebook's strip, and pixels across each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stack:
+class Stack(Noun[A]):
     """Pictures one after the other; indexing and iterating give the pictures as arrays.
 
     Parameters
@@ -43,7 +48,9 @@ class Stack:
     (3, (4, 5))
     """
 
-    data: Array
+    axes: ClassVar[str] = "nyx"
+
+    data: A
     positions: tuple[float, ...] = ()
     quantity: str = "page"
     pixel_pitch: float | None = None
@@ -78,8 +85,48 @@ class Stack:
     def __len__(self) -> int:
         return int(self.data.shape[0])
 
-    def __getitem__(self, index: int) -> Array:
+    def __getitem__(self, index: int) -> A:
         return self.data[range(len(self))[index], ...]
 
-    def __iter__(self) -> Iterator[Array]:
+    def __iter__(self) -> Iterator[A]:
         return (self.data[k, ...] for k in range(len(self)))
+
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """What each picture is, such as "alpha 0.95", "dz 20 mm" or "page 3"."""
+        name, _, unit = self.quantity.removesuffix("]").partition(" [")
+        if not self.positions:
+            return tuple(f"{name} {k}" for k in range(len(self)))
+        if unit == "m":
+            return tuple(f"{name} {picture.length(position)}" for position in self.positions)
+        return tuple(f"{name} {position:.5g} {unit}".rstrip() for position in self.positions)
+
+    def _repr_html_(self) -> str:
+        titles = self.titles
+        ends = titles[0] if len(self) == 1 else f"{titles[0]} to {titles[-1]}"
+        rows = [
+            ("pictures", f"{len(self)}, {ends}"), ("size", f"{picture.sized(self.shape)} px"),
+            ("numbers", picture.numbers(self.data)), ("pixel pitch", picture.length(self.pixel_pitch)),
+        ]  # fmt: skip
+        some = np.unique(np.linspace(0, len(self) - 1, min(len(self), _SHOWN)).round().astype(int))
+        strip = np.concatenate([to_numpy(self[int(k)]) for k in some], axis=1)
+        return picture.card("Stack", rows, picture.thumbnail(strip, _SHOWN * _SIDE), "Some of its pictures")
+
+    def _labels(self) -> Labels:
+        unit = self.quantity.removesuffix("]").partition(" [")[2]
+        labels = Labels("nyx", "pixel value", units={"n": unit, "y": "px", "x": "px"})
+        labels.along["n"] = np.asarray(self.positions or range(len(self)), np.float64)
+        for axis, count in zip("yx", self.shape, strict=True):
+            labels.along[axis] = np.arange(count) * (self.pixel_pitch or 1.0)
+        about = {"quantity": self.quantity, "pixel_pitch": self.pixel_pitch, "bit_depth": self.bit_depth}
+        labels.attributes = {**about, "positioned": bool(self.positions), "metadata": dict(self.metadata)}
+        if self.pixel_pitch:
+            labels.units.update(y="m", x="m")
+        return labels
+
+    @classmethod
+    def _of_labels(cls, labels: Labels) -> Self:
+        about = labels.attributes
+        positions = tuple(labels.along["n"].tolist()) if about.get("positioned") else ()
+        known = about.get("pixel_pitch"), about.get("bit_depth"), about.get("metadata", {})
+        return cls(labels.data, positions, about.get("quantity", "page"), *known)

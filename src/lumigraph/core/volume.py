@@ -1,13 +1,17 @@
 """What was reconstructed: intensities in space."""
 
 from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from lumigraph.core import checks, picture
-from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.arrays import A, to_numpy
 from lumigraph.core.brief import brief
+from lumigraph.core.drawing import draw
 from lumigraph.core.grid import Grid
+from lumigraph.core.labelled import Labels
+from lumigraph.core.noun import Noun
 from lumigraph.errors import GeometryError
 
 _EVEN = 1e-6
@@ -15,7 +19,7 @@ _EVEN = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Volume:
+class Volume(Noun[A]):
     """Intensity of a stack of planes across the optical axis, in object space.
 
     Parameters
@@ -40,7 +44,9 @@ class Volume:
     (2e-06, (3, 4, 5))
     """
 
-    data: Array
+    axes: ClassVar[str] = "zyx"
+
+    data: A
     grid: Grid
     depths: tuple[float, ...]
 
@@ -93,7 +99,18 @@ class Volume:
         brightest = picture.thumbnail(to_numpy(self.data).max(0))
         return picture.card("Volume", rows, brightest, "The brightest sample along z")
 
-    def plane(self, dz: float) -> Array:
+    def plane(self, dz: float) -> A:
         """The plane (y, x[, c]) whose depth is nearest to `dz` [m]."""
         nearest = int(np.argmin(np.abs(np.asarray(self.depths) - checks.finite("dz", dz))))
         return self.data[nearest, ...]
+
+    def plot(self, **options: Any) -> Any:
+        """A matplotlib Figure of the brightest sample along each axis: `lumigraph.plots.projections`."""
+        return draw("projections", self, **options)
+
+    def _labels(self) -> Labels:
+        return Labels("zyx", "intensity", along={"z": np.asarray(self.depths)}).stands_on(self.grid)
+
+    @classmethod
+    def _of_labels(cls, labels: Labels) -> Self:
+        return cls(labels.data, labels.grid(), tuple(labels.coordinate("z").tolist()))

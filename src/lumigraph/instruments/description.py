@@ -3,10 +3,14 @@
 from dataclasses import dataclass
 from typing import Any
 
+from lumigraph.core import picture
 from lumigraph.instruments.row import Row
 
 TRADE_OFFS = "Trade-offs"
 """Title of the section whose rows change with the magnification."""
+
+_COMPUTING = "Simulation"
+"""Title of the section about samples, which a notebook leaves out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +29,12 @@ class Description:
     def as_dict(self) -> dict[str, Any]:
         """Values in SI by name, for programs; "warnings" holds the warnings."""
         return {**{row.name: row.value for row in self.rows}, "warnings": list(self.warnings)}
+
+    def _repr_html_(self) -> str:
+        chosen = [row for title, rows in self.sections if title != _COMPUTING for row in rows]
+        warned = [("warning", text) for text in self.warnings]
+        rows = [(row.name, f"{row.text}   {row.source and f'({row.source})'}".rstrip()) for row in chosen]
+        return picture.card(f"{self.title[0].upper()}{self.title[1:]}", [*warned, *rows])
 
     def __str__(self) -> str:
         name, value = (max(len(getattr(row, part)) for row in self.rows) for part in ("name", "text"))

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import ValidationError
 
-from lumigraph.core import picture
+from lumigraph.core.drawing import draw
 from lumigraph.errors import FormatError
 from lumigraph.instruments import files
 from lumigraph.instruments.description import Description
@@ -67,11 +67,11 @@ class Instrument(Part):
         return files.write({"kind": self.KIND, **self.model_dump(by_alias=True, exclude_defaults=True)})
 
     def _repr_html_(self) -> str:
-        table = self.describe()
-        chosen = [row for title, rows in table.sections if title != "Simulation" for row in rows]
-        warned = [("warning", text) for text in table.warnings]
-        rows = [(row.name, f"{row.text}   {row.source and f'({row.source})'}".rstrip()) for row in chosen]
-        return picture.card(f"{table.title[0].upper()}{table.title[1:]}", [*warned, *rows])
+        return self.describe()._repr_html_()
+
+    def plot(self) -> Any:
+        """A matplotlib Figure of its layout with rays: `lumigraph.plots.layout`."""
+        return draw("layout", self)
 
     def describe(self) -> Description:
         """The table of everything that follows from the description."""

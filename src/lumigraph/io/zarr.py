@@ -4,6 +4,7 @@ Volumes are OME-Zarr (NGFF 0.5), which microscopy programs open; those by other 
 """
 
 import time
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import prod
@@ -14,6 +15,7 @@ import numpy as np
 import zarr
 from zarr.abc.buffer import Buffer
 from zarr.codecs import ZstdCodec
+from zarr.errors import ZarrUserWarning
 from zarr.storage import LocalStore, ZipStore
 
 from lumigraph.core.arrays import to_numpy
@@ -108,6 +110,15 @@ def _write(path: Path, arrays: list[tuple[Any, ...]], attributes: dict[str, Any]
         group = zarr.create_group(store, zarr_format=3, attributes=attributes)
         for array in arrays:
             _add(group, array)
+        if isinstance(store, LocalStore):  # a ZIP would keep the group's description twice
+            _consolidate(store)
+
+
+def _consolidate(store: LocalStore) -> None:
+    """Describe all arrays in the group's own file, so that programs open the store by one request."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Consolidated metadata", ZarrUserWarning)
+        zarr.consolidate_metadata(store, zarr_format=3)
 
 
 def _add(group: zarr.Group, what: tuple[Any, ...]) -> None:

@@ -1,6 +1,6 @@
 """Drawings: every function returns a matplotlib Figure and opens no window.
 
-- `pictures`: `show` an image, a raw image, a field or a light field
+- `pictures`: `show` an image, or any noun that holds one; nouns' `plot` comes here
 - `trains`: `planes` of a train of elements
 - `lattices`: `lattice`, a calibration over its white image
 - `layout`: rays through a camera

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from lumigraph.preparation.vignetting import vignetting
 
 Options = ParamSpec("Options")
 Made = TypeVar("Made")
+Seen = TypeVar("Seen", covariant=True)
 
 
 def prepare(
@@ -184,7 +185,18 @@ def _counted(reasons: np.ndarray, lenslets: Verdicts | None) -> tuple[str, ...]:
     return tuple(told)
 
 
-def of_raw(function: Callable[Concatenate[RawImage, Calibration, Options], Made]) -> Callable[..., Made]:
+class OfRaw(Protocol[Options, Seen]):
+    """A function of a raw image, prepared or not, whose calibration may be left out."""
+
+    def __call__(
+        self, raw: RawImage | Array, calibration: Calibration | None = None,
+        *args: Options.args, **options: Options.kwargs,
+    ) -> Seen:  # fmt: skip
+        """What the function gives for the raw image."""
+        ...
+
+
+def of_raw(function: Callable[Concatenate[RawImage, Calibration, Options], Made]) -> OfRaw[Options, Made]:
     """The same function of any raw image: one that was not prepared is prepared before.
 
     The calibration may be left out where `prepare` has found one.

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from lumigraph.core import checks, memory
-from lumigraph.core.arrays import Array, like, namespace
+from lumigraph.core.arrays import A, Array, like, namespace
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
@@ -17,8 +17,8 @@ _BAND = 1 << 20  # pixels handled at a time
 
 
 def encode(
-    views: LightField, calibration: Calibration, *, interpolation: Interpolation = "cubic"
-) -> RawImage:
+    views: LightField[A], calibration: Calibration, *, interpolation: Interpolation = "cubic"
+) -> RawImage[A]:
     """Raw image (y, x[, c]) that decodes to the light field.
 
     Every pixel belongs to the lenslet whose micro-image's centre is nearest, and takes the radiance

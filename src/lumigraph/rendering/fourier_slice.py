@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from lumigraph.core import arrays, checks, memory
-from lumigraph.core.arrays import Array, like, namespace
+from lumigraph.core.arrays import A, Array, like, namespace
 from lumigraph.core.lightfield import LightField
 from lumigraph.rendering.geometry import lit
 from lumigraph.rendering.interpolate import as_float, take, weighted
@@ -14,7 +14,7 @@ _WIDTH = 6  # samples of the spectrum that the kernel spans
 _OVERSAMPLING = 2.0
 
 
-def refocus_fourier(views: LightField, alpha: float) -> Array:
+def refocus_fourier(views: LightField[A], alpha: float) -> A:
     r"""Picture (t, s[, c]) focused on F' = F / alpha, as in `refocus`, by the Fourier slice theorem.
 
     The spectrum of the picture is a plane through the spectrum of the light field,

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from lumigraph.core import checks
-from lumigraph.core.arrays import Array, like, namespace
+from lumigraph.core.arrays import A, Array, like, namespace
 from lumigraph.core.lightfield import LightField
 from lumigraph.errors import GeometryError
 from lumigraph.rendering.geometry import lit
@@ -20,8 +20,8 @@ _MOST_FRAMES = 10_000
 
 
 def view_path(
-    views: LightField, frames: int = 24, *, path: Path = "circle", radius: float = 0.7, alpha: float = 1.0
-) -> Array:
+    views: LightField[A], frames: int = 24, *, path: Path = "circle", radius: float = 0.7, alpha: float = 1.0
+) -> A:
     """Pictures (n, t, s[, c]) from a point of view that runs once round a closed path on the aperture.
 
     The plane of refocus factor `alpha` stands still while everything nearer or farther moves: parallax

@@ -10,7 +10,7 @@ from scipy.linalg import get_blas_funcs
 from scipy.ndimage import distance_transform_edt
 
 from lumigraph.core import checks, memory
-from lumigraph.core.arrays import Array, is_complex, is_numpy, like, namespace, to_numpy
+from lumigraph.core.arrays import A, Array, is_complex, is_numpy, like, namespace, to_numpy
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Progress
 from lumigraph.errors import GeometryError
@@ -23,8 +23,8 @@ _LEAST_SEEN = 0.05  # of one view; places that less light reaches stay dark
 
 
 def refocus(
-    views: LightField, alpha: float, *, interpolation: Interpolation = "cubic", oversample: int = 1
-) -> Array:
+    views: LightField[A], alpha: float, *, interpolation: Interpolation = "cubic", oversample: int = 1
+) -> A:
     r"""Picture (t, s[, c]) focused on the plane whose image lies at F' = F / alpha behind the main lens.
 
     .. math:: E(x) = \frac{1}{N} \sum_u L(x + u (1 - \alpha'), u), \qquad \alpha' = F / F'
@@ -65,13 +65,13 @@ def refocus(
 
 
 def refocus_stack(
-    views: LightField,
+    views: LightField[A],
     alphas: Sequence[float] | np.ndarray,
     *,
     interpolation: Interpolation = "cubic",
     oversample: int = 1,
     progress: Progress | None = None,
-) -> Array:
+) -> A:
     """Pictures (n, t, s[, c]) focused on one plane for each alpha; see `refocus`.
 
     Views are summed along u first, then along v, and all planes of the stack take from a piece of the light

@@ -1,19 +1,19 @@
 """Pictures out of a light field, and its two-dimensional layouts."""
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from lumigraph.core import checks
-from lumigraph.core.arrays import Array, like, namespace, to_numpy
+from lumigraph.core.arrays import A, Array, like, namespace, to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.errors import GeometryError
 from lumigraph.rendering.interpolate import as_float, neighbours
 
 
-def view(views: LightField, v: int, u: int) -> Array:
+def view(views: LightField[A], v: int, u: int) -> A:
     """Picture (t, s[, c]) seen from view (v, u) of the aperture; negative indices count from the end.
 
     Raises
@@ -30,7 +30,7 @@ def view(views: LightField, v: int, u: int) -> Array:
     return views.data[v, u, ...]
 
 
-def point_of_view(views: LightField, y: float, x: float) -> Array:
+def point_of_view(views: LightField[A], y: float, x: float) -> A:
     """Picture (t, s[, c]) seen from a place on the main lens (y, x) [m], between the views linearly.
 
     Raises
@@ -51,7 +51,8 @@ def point_of_view(views: LightField, y: float, x: float) -> Array:
     for axis, value in enumerate((y, x)):
         first = (grid.y, grid.x)[axis][0]
         places.append(neighbours(np.array((value - first) / grid.pitch[axis]), grid.shape[axis], "linear"))
-    data, total = as_float(views.data), None
+    data: Any = as_float(views.data)
+    total: Any = None
     for v, wv in places[0]:
         for u, wu in places[1]:
             term = data[int(v), int(u), ...] * float(wv * wu)
@@ -60,8 +61,11 @@ def point_of_view(views: LightField, y: float, x: float) -> Array:
 
 
 def reduce_aperture(
-    views: LightField, fraction: float = 1.0, *, shape: Literal["square", "round", "ring"] | Array = "square"
-) -> LightField:
+    views: LightField[A],
+    fraction: float = 1.0,
+    *,
+    shape: Literal["square", "round", "ring"] | Array = "square",
+) -> LightField[A]:
     """Light field of a smaller aperture: the outer views are left out, the middle one stays the middle.
 
     Parameters
@@ -121,17 +125,17 @@ def _opening(mask: Array, full: tuple[int, int]) -> np.ndarray:
     return np.asarray(to_numpy(mask)) != 0
 
 
-def views_mosaic(views: LightField) -> Array:
+def views_mosaic(views: LightField[A]) -> A:
     """All views side by side (v t, u s[, c]), as an array of cameras would take them."""
     return _mosaic(views.data, (0, 2, 1, 3))
 
 
-def lenslet_mosaic(views: LightField) -> Array:
+def lenslet_mosaic(views: LightField[A]) -> A:
     """All micro-images side by side (t v, s u[, c]), each with v and u ascending."""
     return _mosaic(views.data, (2, 0, 3, 1))
 
 
-def views_from_mosaic(mosaic: Array, aperture: Grid, lenslets: Grid, separation: float) -> LightField:
+def views_from_mosaic(mosaic: A, aperture: Grid, lenslets: Grid, separation: float) -> LightField[A]:
     """Light field of all views side by side (v t, u s[, c]): the inverse of `views_mosaic`.
 
     Raises

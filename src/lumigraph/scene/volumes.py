@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import checks, picture
 from lumigraph.core.arrays import Array, is_complex, namespace, to_numpy
-from lumigraph.core.brief import brief
+from lumigraph.core.brief import brief, table
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, LumigraphError
 
@@ -61,6 +61,14 @@ class Slice:
             )
         checks.finite("dz", self.dz)
         _check_intensity("a slice", self.intensity)
+
+    def _repr_html_(self) -> str:
+        rows = [("samples", picture.sized(self.grid.shape)), *self._rows()]
+        return picture.card("Slice", rows, picture.thumbnail(self.intensity))
+
+    def _rows(self) -> list[tuple[str, str]]:
+        size = " × ".join(map(picture.length, self.grid.size))
+        return [("size", size), ("depth", picture.length(self.dz))]
 
     @property
     def amplitude(self) -> Array:
@@ -114,6 +122,7 @@ class Points:
     intensities: np.ndarray
 
     __repr__ = brief
+    _repr_html_ = table
 
     def __post_init__(self) -> None:
         positions, intensities = (_floats(name, getattr(self, name)) for name in ("positions", "intensities"))
@@ -167,6 +176,18 @@ class Diffuser:
 
 Part = Slice | Points | Diffuser
 
+_LISTED = 6
+"""Parts of a scene that a notebook shows."""
+
+
+def _about(part: Part) -> str:
+    if isinstance(part, Slice):
+        return ", ".join(value for _, value in part._rows())
+    if isinstance(part, Diffuser):
+        return f"intensity {part.intensity:g}"
+    depths = [picture.length(float(dz)) for dz in (part.positions[:, 2].min(), part.positions[:, 2].max())]
+    return f"{len(part.positions)}, depths {' to '.join(depths)}" if len(part.positions) else "none"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
@@ -203,6 +224,14 @@ class Scene:
                     f"a scene has a part of type {type(part).__name__} but takes Slice, Points and Diffuser. "
                     "Add whole scenes with +."
                 )
+
+    def _repr_html_(self) -> str:
+        rows = [(type(part).__name__.lower(), _about(part)) for part in self.parts[:_LISTED]]
+        rest = len(self.parts) - _LISTED
+        rows += [("", f"and {rest} more")] if rest > 0 else []
+        flat = next((part for part in self.parts if isinstance(part, Slice)), None)
+        shown = "" if flat is None else picture.thumbnail(flat.intensity)
+        return picture.card("Scene", rows, shown, "Its first slice")
 
     def __add__(self, other: "Scene") -> "Scene":
         """Both scenes together."""

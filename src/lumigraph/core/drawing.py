@@ -1,0 +1,19 @@
+"""Where nouns find what draws them: core knows no drawing library, `lumigraph` itself says who does."""
+
+from collections.abc import Callable
+from typing import Any
+
+_home: Callable[[], Any] | None = None
+
+
+def done_by(home: Callable[[], Any]) -> None:
+    """Take the functions that draw from what `home` gives; it is called when the first thing is drawn."""
+    global _home
+    _home = home
+
+
+def draw(name: str, *things: Any, **options: Any) -> Any:
+    """The figure that the function `name` of the drawing module makes of things."""
+    if _home is None:
+        raise RuntimeError("nothing draws yet. Import lumigraph.")
+    return getattr(_home(), name)(*things, **options)

@@ -1,0 +1,61 @@
+"""What the nouns share: NumPy reads them, they draw themselves, and xarray carries them with named axes."""
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self
+
+import numpy as np
+
+from lumigraph.core import labelled
+from lumigraph.core.arrays import A, as_numpy
+from lumigraph.core.drawing import draw
+from lumigraph.core.labelled import Labels
+
+if TYPE_CHECKING:
+    from numpy.typing import DTypeLike
+
+
+class Noun(Generic[A]):
+    """A dataclass around one array."""
+
+    __slots__ = ()
+    pixels: ClassVar[str] = "data"
+    """Name of the field that holds the array."""
+
+    axes: ClassVar[str]
+    """Names of its axes; "c" may follow."""
+
+    def __array__(self, dtype: "DTypeLike | None" = None, copy: bool | None = None) -> np.ndarray:
+        """The array on the CPU, for `numpy.asarray`; shares memory where it can and `copy` is not true.
+
+        Raises
+        ------
+        ValueError
+            `copy` is false but the type, or a GPU, asks for a copy.
+        """
+        return as_numpy(getattr(self, self.pixels), dtype, copy)
+
+    def plot(self, **options: Any) -> Any:
+        """A matplotlib Figure of it, as `lumigraph.plots.show` draws it; no window is opened."""
+        return draw("show", self, **options)
+
+    def to_xarray(self) -> Any:
+        """An `xarray.DataArray` with named axes, coordinates in metres, and attributes."""
+        return labelled.to_xarray(as_numpy(getattr(self, self.pixels)), self._labels())
+
+    @classmethod
+    def from_xarray(cls, array: Any) -> Self:
+        """What `to_xarray` gave, also after a selection along its axes.
+
+        Raises
+        ------
+        GeometryError
+            Axes of other names or in another order, missing attributes, uneven coordinates.
+        """
+        return cls._of_labels(labelled.from_xarray(array, cls.__name__, cls.axes))
+
+    @abstractmethod
+    def _labels(self) -> Labels: ...
+
+    @classmethod
+    @abstractmethod
+    def _of_labels(cls, labels: Labels) -> Self: ...
