@@ -3,7 +3,7 @@
     python tests/fuzz/run.py --count 20000 [--readers tiff png] [--seed 0] [--keep folder]
 
 Mutants are read in forked children that may take 1 GiB of memory in all and 10 s for each; a child that dies,
-hangs or raises anything else is a failure, and its mutant is kept. In every fourth child the lines that are
+hangs or raises anything else is a failure, and its mutant is kept. In every eighth child the lines that are
 run are watched: a mutant that reaches a new one becomes a seed. The same seed makes the same mutants.
 """
 
@@ -42,7 +42,7 @@ from fuzz.damage import DAMAGES
 from fuzz.structure import Link, Pipe, structural
 
 SECONDS, MEMORY, BATCH, STRUCTURAL = 10, 1 << 30, 250, 0.3
-WATCHED, GUIDED = 4, 0.4  # one child of so many is watched; share of mutants made of those that it found
+WATCHED, GUIDED = 8, 0.4  # one child of so many is watched; share of mutants made of those that it found
 MOST_SEEDS, LARGEST_SEED = 300, 100_000  # of new seeds: their number, and the bytes of one
 PACKAGE = str(Path(lg.__file__).parent)
 Tree = dict[str, bytes]
