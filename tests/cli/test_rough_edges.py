@@ -51,6 +51,19 @@ def test_an_output_beside_its_input_is_written(lumigraph, views):
     assert lumigraph("refocus", "v.zarr", "--alpha", "1", "-o", "w.zarr").code == 0
 
 
+def test_a_picture_inside_the_output_folder_is_not_written_over(lumigraph, tmp_path, views):
+    (tmp_path / "out").mkdir()
+    inside = tmp_path / "out" / "refocused-000-alpha-1.0000.png"
+    lg.save(np.zeros((4, 4), np.uint8), inside)
+    before = inside.read_bytes()
+    words = ("refocus", "v.zarr", "--alpha", "1", "--alpha", "1.1", "-o", "out")
+    named = lumigraph(*words, "--report", "r.html", "--camera", str(inside))
+    assert named.code == 1
+    assert "refocused-000-alpha-1.0000.png would destroy" in named.err
+    assert inside.read_bytes() == before
+    assert lumigraph(*words).code == 0
+
+
 def run(words, redirection):
     line = f'exec "$0" -c "{PROGRAM}" {words} {redirection}'
     return subprocess.run(["sh", "-c", line, sys.executable], capture_output=True, text=True, timeout=60)
@@ -66,6 +79,13 @@ def test_a_closed_or_full_output_is_told_in_one_line(redirection, code, said):
     assert len(result.stderr.splitlines()) == bool(said)
     assert said in result.stderr
     assert "unexpected" not in result.stderr
+
+
+def test_where_outputs_are_closed_no_file_takes_their_numbers():
+    """Libraries print into number 2, whatever it is."""
+    words = "import os; from lumigraph.cli import main; main(['--version']); f = open(os.devnull); "
+    line = f'exec "$0" -c "{words}os._exit(f.fileno())" <&- >&- 2>&-'
+    assert subprocess.run(["sh", "-c", line, sys.executable], timeout=60).returncode > 2
 
 
 def test_no_line_on_standard_error_is_longer_than_400_characters(lumigraph):

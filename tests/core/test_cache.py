@@ -1,10 +1,12 @@
+import importlib
 import os
 import subprocess
 import sys
 
 import numpy as np
+import pytest
 
-from lumigraph.core.cache import Budget, ByteCache, shared_limit
+from lumigraph.core.cache import SHARED, Budget, ByteCache, remembered, shared_limit
 
 
 def test_a_cache_builds_once_and_forgets_the_least_recently_used_first():
@@ -61,3 +63,34 @@ print(SHARED.limit)
     said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment)
     assert said.stdout.strip() == str(100 * 2**20), said.stderr
     assert 2**28 <= shared_limit() <= 2**32
+
+
+def test_results_of_a_function_are_kept_by_its_arguments_within_the_shared_budget():
+    built = []
+
+    @remembered
+    def both(n, *, scale=1.0):
+        built.append(n)
+        return np.full(n, scale), [(n, np.zeros(n))]
+
+    before = SHARED.used
+    assert both(1000) is both(1000)
+    assert both(1000, scale=2.0)[0][0] == 2
+    assert built == [1000, 1000]
+    assert 32_000 <= SHARED.used - before < 33_000
+    assert both.__name__ == "both"
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "arguments"),
+    [
+        ("deconvolution.filters", "lanczos", (300, 2.5)),
+        ("operators.microscope_spectrum", "parts", (33,)),
+        ("operators.microscope_spectrum", "_factors", (15, 20)),
+    ],
+)
+def test_tables_that_grow_with_the_image_count_in_the_budget(module, name, arguments):
+    """64 filters of 4096 px could hold 8.6 GB, outside every budget."""
+    before = SHARED.used
+    getattr(importlib.import_module(f"lumigraph.{module}"), name)(*arguments)
+    assert SHARED.used - before >= 4 * arguments[0] ** 2

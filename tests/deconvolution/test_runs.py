@@ -7,6 +7,7 @@ import pytest
 
 import lumigraph as lg
 from deconvolution.models import Matrix, blurred, disc
+from lumigraph import store
 from lumigraph.deconvolution import (
     Checkpoint,
     Exposure,
@@ -115,6 +116,23 @@ def test_a_damaged_checkpoint_is_refused(content, raw, tmp_path):
     else:
         path.write_bytes(content)
     with pytest.raises(lg.FormatError, match=r"is damaged|no checkpoint"):
+        lg.deconvolve(raw, OPERATOR, 2, checkpoint=path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("done", np.arange(3)), ("done", np.array("x")), ("done", np.array(-5)), ("done", np.array(np.nan)),
+        ("estimate", np.full(SHAPE, "a")), ("estimate", np.zeros(SHAPE, "M8[s]")),
+        ("sensitivity", np.array(["a"])), ("memory.pace", np.array("x")),
+    ],
+)  # fmt: skip
+def test_a_checkpoint_of_the_wrong_types_is_refused(name, value, raw, tmp_path):
+    """A seal proves that a file is whole, not who wrote it."""
+    path = tmp_path / "state.npz"
+    lg.deconvolve(raw, OPERATOR, 2, checkpoint=path)
+    store.write(path, {**store.read(path), name: value})
+    with pytest.raises(lg.FormatError, match="no checkpoint of a deconvolution"):
         lg.deconvolve(raw, OPERATOR, 2, checkpoint=path)
 
 

@@ -2,7 +2,7 @@
 
     python tests/fuzz/run.py --count 20000 [--readers tiff png] [--seed 0] [--keep folder]
 
-Mutants are read in forked children that may take 1 GiB of memory in all and 10 s for each; a child that dies,
+Mutants are read in forked children that may take 1 GiB of memory in all and 20 s for each; a child that dies,
 hangs or raises anything else is a failure, and its mutant is kept. In every eighth child the lines that are
 run are watched: a mutant that reaches a new one becomes a seed. The same seed makes the same mutants.
 """
@@ -41,7 +41,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from fuzz.damage import DAMAGES
 from fuzz.structure import Link, Pipe, structural
 
-SECONDS, MEMORY, BATCH, STRUCTURAL = 10, 1 << 30, 250, 0.3
+SECONDS, MEMORY, BATCH, STRUCTURAL = 20, 1 << 30, 250, 0.3
 WATCHED, GUIDED = 8, 0.4  # one child of so many is watched; share of mutants made of those that it found
 MOST_SEEDS, LARGEST_SEED = 300, 100_000  # of new seeds: their number, and the bytes of one
 PACKAGE = str(Path(lg.__file__).parent)
@@ -181,7 +181,7 @@ def _child(
         board[:40] = struct.pack("=qqqqd", k, opened, refused, starved, slowest)
         tree, told = make(k), []
         signal.setitimer(signal.ITIMER_PROF, SECONDS)  # of the processor: others may be at work
-        signal.alarm(4 * SECONDS)
+        signal.alarm(6 * SECONDS)
         start = time.process_time()
         try:
             with watch:

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import lumigraph.io as io
+from lumigraph.core.grid import Grid
+from lumigraph.core.lightfield import LightField
 from lumigraph.errors import FormatError
 from lumigraph.store import atomic
 
@@ -64,6 +66,20 @@ def test_a_folder_that_is_no_store_is_never_replaced(tmp_path):
     with pytest.raises(FormatError, match=r"is a folder. Give the name of a file"):
         io.save(np.ones((4, 4)), tmp_path / "a.png")
     assert (tmp_path / "a.zarr" / "precious.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["v", "a.zarr"])
+def test_notes_beside_views_or_in_a_store_are_not_removed(tmp_path, name):
+    views = LightField(np.ones((2, 2, 3, 4), np.uint8), Grid((2, 2), 1e-3), Grid((3, 4), 1e-4), 0.01)
+    for _ in range(2):
+        io.save(views, tmp_path / name)
+    (tmp_path / name / ".hidden").write_text("by the system")
+    (tmp_path / name / "notes.txt").write_text("mine")
+    with pytest.raises(FormatError, match=r"would remove notes\.txt, which it holds too"):
+        io.save(views, tmp_path / name)
+    assert (tmp_path / name / "notes.txt").read_text() == "mine"
+    (tmp_path / name / "notes.txt").unlink()
+    io.save(views, tmp_path / name)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

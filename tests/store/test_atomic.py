@@ -107,6 +107,23 @@ def test_mode_and_group_of_the_old_file_stay(tmp_path):
         assert path.stat().st_gid == groups[0]
 
 
+def test_modes_inside_a_folder_stay_and_a_program_does_not_run_as_another_user(tmp_path):
+    folder, program = tmp_path / "v", tmp_path / "program"
+    for content in ("old", "new"):
+        with store.replacing(folder) as temporary:
+            (temporary / "c").mkdir(parents=True)
+            (temporary / "c" / "0").write_text(content)
+        if content == "old":
+            (folder / "c" / "0").chmod(0o640)
+            (folder / "c").chmod(0o2750)
+    assert (folder / "c" / "0").read_text() == "new"
+    assert [path.stat().st_mode & 0o7777 for path in (folder / "c", folder / "c" / "0")] == [0o2750, 0o640]
+    program.write_bytes(b"old")
+    program.chmod(0o4755)
+    store.write_bytes(program, b"new")
+    assert program.stat().st_mode & 0o7777 == 0o755
+
+
 def test_a_legal_name_of_255_bytes_is_written(tmp_path):
     path = tmp_path / ("a" * 250 + ".png")
     for content in (b"old", b"new"):

@@ -12,15 +12,18 @@
 Modules of verbs import what is slow inside their functions, so that `--help` answers at once.
 """
 
+import os
 import signal
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 
 __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code, see `app.main`; Ctrl-C while it starts is quiet, too."""
+    _fill_closed()
     handler = signal.getsignal(signal.SIGINT)
     ours = handler is signal.default_int_handler and threading.current_thread() is threading.main_thread()
     try:
@@ -33,3 +36,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return app.main(arguments)
     except KeyboardInterrupt:
         return 130
+
+
+def _fill_closed() -> None:
+    """Open what the shell has closed (`2>&-`): else a file would be number 2, into which libraries print."""
+    with suppress(OSError):
+        while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
+            pass
+        os.close(number)

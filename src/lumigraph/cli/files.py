@@ -1,6 +1,6 @@
 """Reading inputs, checking outputs before a computation, writing them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -31,15 +31,27 @@ def check_output(path: Path, endings: Sequence[str]) -> None:
         check_target(path, endings)
 
 
-def _check_inputs(path: Path) -> None:
-    """Refuse an output that would take the place of an input, or of another output."""
+def check_inside(paths: Iterable[Path]) -> None:
+    """Refuse files inside an output folder that would take the place of an input.
+
+    Raises
+    ------
+    FormatError
+        The first of them.
+    """
+    for path in paths:
+        _check_inputs(path, named=0)
+
+
+def _check_inputs(path: Path, *, named: int = 1) -> None:
+    """Refuse an output, `named` in the command itself, that would take the place of an input or an output."""
     place, same = path.resolve(), 0
     for word in COMMAND.get():
         other = Path(word.partition("=")[2] if word.startswith("--") else word).absolute()
         with suppress(OSError):
             other = other.resolve()
         same += other == place
-        if same > 1 or (place in other.parents and other.exists() and place.is_dir()):
+        if same > named or (place in other.parents and other.exists() and place.is_dir()):
             raise FormatError(
                 f"writing {path} would destroy {word}, which the command names too. Choose another."
             )

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lumigraph.cli import files
 from lumigraph.cli.refocus import MOST_SHOWN
 from lumigraph.core.result import Figure, Result
 from lumigraph.errors import FormatError
@@ -49,6 +50,7 @@ def unpack(path: Path, parts: list[str], output: Path) -> Result:
     if not output.parent.is_dir():
         raise FormatError(f"the folder {output.parent} for {output.name} does not exist. Make it first.")
     found = {name: picture for part in parts for name, picture in _named(part, io.open(path, what=part))}
+    files.check_inside(output / name for name in found)
     output.mkdir(exist_ok=True)
     for name, picture in found.items():
         io.save(picture, output / name)

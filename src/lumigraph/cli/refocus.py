@@ -226,10 +226,11 @@ def _write(images: list[Any], alphas: list[float], output: Path) -> list[Path]:
     if output.suffix:
         io.save(Stack(np.stack(images), tuple(alphas), "alpha"), output)
         return [output]
+    paths = [output / f"refocused-{k:03}-alpha-{alpha:.4f}.png" for k, alpha in enumerate(alphas)]
+    files.check_inside(paths)
     output.mkdir(exist_ok=True)
     # One white for all, so that the pictures of a folder can be compared.
     white = max(float(image.max()) for image in images) or None
-    paths = [output / f"refocused-{k:03}-alpha-{alpha:.4f}.png" for k, alpha in enumerate(alphas)]
     for image, path in zip(images, paths, strict=True):
         io.save(image, path, white=white)
     return paths

@@ -1,12 +1,17 @@
 """Remembering what is dearer to compute than to keep, within one bound of memory for all that is kept."""
 
 import os
+import sys
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from functools import wraps
 from threading import Lock
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 from lumigraph.core import memory
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
 
 _SHARE, _LEAST, _MOST = 0.25, 2**28, 4 * 2**30
 """Part of the machine's memory that all caches may hold together, and its bounds [bytes]."""
@@ -117,13 +122,37 @@ class ByteCache:
         self._budget.forget(self)
 
 
-def _bytes(array: Any) -> int:
-    if (told := getattr(array, "nbytes", None)) is not None:
+def remembered(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """The function, its results kept by its arguments within the budget of all caches, and to be read only.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> ramp = remembered(lambda n: np.arange(n))
+    >>> ramp(3) is ramp(3)
+    True
+    """
+    cache = ByteCache()
+
+    @wraps(function)
+    def found(*args: _P.args, **words: _P.kwargs) -> _R:
+        key = (args, tuple(sorted(words.items())))
+        return cache.get(key, lambda: function(*args, **words))
+
+    return found
+
+
+def _bytes(thing: Any) -> int:
+    if (told := getattr(thing, "nbytes", None)) is not None:
         return int(told)
+    if isinstance(thing, tuple | list):
+        return sum(map(_bytes, thing))
+    if not hasattr(thing, "shape"):
+        return sys.getsizeof(thing)
     size = 1
-    for n in array.shape:
+    for n in thing.shape:
         size *= n
-    return size * next((k for name, k in _WIDTHS if str(array.dtype).endswith(name)), 16)
+    return size * next((k for name, k in _WIDTHS if str(thing.dtype).endswith(name)), 16)
 
 
 _WIDTHS = (("complex128", 16), ("complex64", 8), ("float64", 8), ("float32", 4))

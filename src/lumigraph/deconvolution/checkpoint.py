@@ -160,6 +160,16 @@ def _read(path: Path) -> dict[str, np.ndarray] | None:
         return None
     except (FormatError, OSError) as error:
         raise FormatError(f"{path} is no checkpoint of a deconvolution. Give another name.") from error
-    if not {"estimate", "done", "key", "sensitivity"} <= content.keys():
+    if not _sound(content):
         raise FormatError(f"{path} is no checkpoint of a deconvolution. Give another name.")
     return content
+
+
+def _sound(content: dict[str, np.ndarray]) -> bool:
+    """Whether all that is needed is there, and of the right type: a seal proves no more than wholeness."""
+    if not {"estimate", "done", "key", "sensitivity"} <= content.keys():
+        return False
+    done, numbers = content["done"], [value for name, value in content.items() if name not in ("done", "key")]
+    if done.shape != () or done.dtype.kind not in "iu" or done < 0:
+        return False
+    return all(value.dtype.kind in "fiub" for value in numbers)

@@ -12,13 +12,13 @@ A. Stefanoiu et al., "Artifact-free deconvolution in light field microscopy", Op
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import cast
 
 import numpy as np
 
 from lumigraph.core import arrays, checks
 from lumigraph.core.arrays import Array
+from lumigraph.core.cache import remembered
 from lumigraph.errors import GeometryError
 
 LOBES = 4
@@ -76,7 +76,7 @@ def _filtered(plane: Array, width: float) -> Array:
     return rows @ plane @ arrays.namespace(plane).matrix_transpose(columns)
 
 
-@lru_cache(maxsize=64)
+@remembered
 def lanczos(n: int, width: float) -> np.ndarray:
     """Matrix (n, n) of the filter along one axis; its rows sum to 1. Never write into it."""
     off = (np.arange(n)[:, None] - np.arange(n)) / width

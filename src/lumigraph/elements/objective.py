@@ -22,6 +22,7 @@ import numpy as np
 from scipy.special import j0, j1, jv
 
 from lumigraph.core import checks
+from lumigraph.core.cache import remembered
 from lumigraph.elements.zernike import noll_to_nm, zernike
 from lumigraph.errors import GeometryError
 
@@ -294,7 +295,7 @@ def _apodised(
     ]  # fmt: skip
 
 
-@lru_cache(maxsize=256)
+@remembered
 def _tables(
     objective: Objective, dz: float, farthest: float
 ) -> tuple[np.ndarray, list[list[tuple[int, np.ndarray]]]]:

@@ -57,21 +57,27 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> RawImage:
 
 def _wide(path: Path, colour: int) -> RawImage:
     """Colour, or grey with transparency, of 16 bits: Pillow decodes 8 of them at a time, high, then low."""
-    parts, text = [], None
+    mode, (first, second) = _WIDE[colour]
     with source.decoding(path, "a PNG"):
-        for half in range(2):
-            with PngImageFile(path) as image:
-                mode, raw_modes = _WIDE[colour]
-                image._mode = mode
-                image.tile = [tile._replace(args=raw_modes[half]) for tile in image.tile]
-                parts.append(np.array(image))
-                text = image.text.get(_KEY)  # which decodes, and must come after the tiles are set
-    high, low = parts
-    if colour == _GREY_ALPHA:  # four bytes: high and low of grey, high and low of transparency
-        data = (high[..., 0].astype(np.uint16) << 8) | high[..., 1]
-    else:
-        data = ((high.astype(np.uint16) << 8) | low)[..., :3]
-    return header.restore(np.ascontiguousarray(data), header.loads(text), bit_depth=16)
+        decoded, text = _decoded(path, mode, first)
+        if colour == _GREY_ALPHA:  # four bytes: high and low of grey, high and low of transparency
+            data = decoded[..., 0].astype(np.uint16) << 8
+            data |= decoded[..., 1]
+        else:
+            data = decoded[..., :3].astype(np.uint16)
+            del decoded  # before the second half is there
+            data <<= 8
+            data |= _decoded(path, mode, second)[0][..., :3]
+    return header.restore(data, header.loads(text), bit_depth=16)
+
+
+def _decoded(path: Path, mode: str, raw_mode: str) -> tuple[np.ndarray, str | None]:
+    """Bytes (y, x, 3 or 4) of a mode, and our text."""
+    with PngImageFile(path) as image:
+        image._mode = mode
+        image.tile = [tile._replace(args=raw_mode) for tile in image.tile]
+        data = np.asarray(image)
+        return data, image.text.get(_KEY)  # which decodes, and must come after the tiles are set
 
 
 def save(raw: RawImage, path: Path, *, white: float | None = None) -> None:

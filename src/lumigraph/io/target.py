@@ -1,7 +1,8 @@
 """Where a result may be written; it is written atomically."""
 
 import os
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from lumigraph.errors import FormatError
 
 VIEWS = "views.json"
 """What marks a folder of views that lumigraph wrote."""
+
+_VIEW = re.compile(r"view_\d+_\d+\.(png|tif)")
 
 
 def check_target(path: str | os.PathLike[str], endings: Sequence[str] = (), *, folder: bool = False) -> Path:
@@ -40,12 +43,23 @@ def check_target(path: str | os.PathLike[str], endings: Sequence[str] = (), *, f
     if folder:
         if path.is_dir() and any(path.iterdir()) and not (path / VIEWS).is_file():
             raise FormatError(f"{path} is a folder that holds other things. Choose another name.")
+        _check_foreign(path, lambda entry: entry.name == VIEWS or _VIEW.fullmatch(entry.name) is not None)
         return path
     if path.is_dir() and not name.endswith(".zarr"):
         raise FormatError(f"{path} is a folder. Give the name of a file.")
     if path.is_dir() and any(path.iterdir()) and not (path / "zarr.json").is_file():
         raise FormatError(f"{path} is a folder that holds no Zarr store. Choose another name.")
+    _check_foreign(path, lambda entry: entry.name == "zarr.json" or entry.is_dir())
     return path
+
+
+def _check_foreign(path: Path, ours: Callable[[Path], bool]) -> None:
+    """Refuse a folder that holds more than is replaced, as notes beside views; hidden files may go."""
+    for entry in path.iterdir() if path.is_dir() else ():
+        if not (entry.name.startswith(".") or ours(entry)):
+            raise FormatError(
+                f"writing {path} would remove {entry.name}, which it holds too. Move that, or choose another."
+            )
 
 
 def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:

@@ -15,13 +15,13 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import scipy.fft
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
+from lumigraph.core.cache import remembered
 from lumigraph.core.threads import single_products
 from lumigraph.operators.microscope_kernels import SliceKernel
 
@@ -148,7 +148,7 @@ def _part(n: int, odd: int) -> slice:
     return slice(half, n) if odd else slice(0, half)
 
 
-@lru_cache(maxsize=16)
+@remembered
 def parts(n: int) -> np.ndarray:
     """Orthonormal matrix (n, n) from n samples to their even parts, then their odd ones.
 
@@ -229,7 +229,7 @@ def _unfolded(columns: Array, signs: Array, length: int) -> Array:
     return xp.concat([above, xp.flip(below, axis=0)])
 
 
-@lru_cache(maxsize=64)
+@remembered
 def _factors(n: int, planes: int) -> tuple[np.ndarray, np.ndarray]:
     """(-i)^|c| and (-1)^c_y of each channel: planes of parts (even, odd) along y and x."""
     odd = np.arange(n) >= (n + 1) // 2

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lumigraph import io
+from lumigraph import io, store
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Progress, Stage, part
 from lumigraph.errors import LumigraphError
@@ -67,7 +67,7 @@ def _scene(folder: Path, size: tuple[int, int], tell: Progress) -> list[Path]:
 def _bench(folder: Path, size: tuple[int, int], tell: Progress) -> list[Path]:
     sample = bench(progress=tell)
     files = [folder / f"bench-{name}" for name in ("camera.toml", "white.tiff", "raw.tiff")]
-    files[0].write_text(camera_file("plenoptic"), "utf-8")
+    store.write_bytes(files[0], camera_file("plenoptic").encode())
     io.save(sample.white, files[1])
     io.save(sample.raw, files[2])
     return files
@@ -76,7 +76,7 @@ def _bench(folder: Path, size: tuple[int, int], tell: Progress) -> list[Path]:
 def _volume(folder: Path, size: tuple[int, int], tell: Progress) -> list[Path]:
     sample = volume()
     files = [folder / "volume-camera.toml", folder / "volume-raw.tiff", folder / "volume-truth.ome.tif"]
-    files[0].write_text(camera_file("microscope"), "utf-8")
+    store.write_bytes(files[0], camera_file("microscope").encode())
     io.save(sample.raw, files[1])
     io.save(sample.volume, files[2])
     return files

@@ -178,13 +178,15 @@ def _clear(place: Path) -> None:
 
 
 def _take_over(target: Path, temporary: Path) -> None:
-    """Give what is new the mode and, where this user may, the group of what it replaces."""
-    with suppress(OSError):
-        old, new = target.stat(), temporary.stat()
-        if old.st_gid != new.st_gid:
-            with suppress(OSError):
-                os.chown(temporary, -1, old.st_gid)
-        temporary.chmod(old.st_mode & 0o7777)
+    """Give what is new the mode and, where this user may, the group of what it replaces, in folders too."""
+    inside = temporary.rglob("*") if temporary.is_dir() else ()
+    for path in (temporary, *inside):
+        with suppress(OSError):
+            old, new = (target / path.relative_to(temporary)).stat(), path.stat()
+            if old.st_gid != new.st_gid:
+                with suppress(OSError):
+                    os.chown(path, -1, old.st_gid)
+            path.chmod(old.st_mode & (0o7777 if path.is_dir() else 0o777))
 
 
 def _take_place(temporary: Path, target: Path) -> None:
@@ -210,9 +212,8 @@ def _exchanged(one: Path, other: Path) -> bool:
 
 
 def _flush(path: Path) -> None:
-    for file in path.rglob("*") if path.is_dir() else [path]:
-        if file.is_file():
-            _flush_entry(file)
+    for entry in [*path.rglob("*"), path] if path.is_dir() else [path]:
+        _flush_entry(entry)
 
 
 def _flush_entry(path: Path) -> None:

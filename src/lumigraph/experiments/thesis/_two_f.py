@@ -3,11 +3,11 @@
 import time
 import warnings
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 from scipy.special import j1
 
+from lumigraph.core.cache import remembered
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.elements import CircularAperture, ThinLens, Train
@@ -38,7 +38,7 @@ def train(name: str, diameter: float) -> Train:
     return Train((way, ThinLens(FOCAL_LENGTH, diameter), way))
 
 
-@lru_cache(maxsize=16)
+@remembered
 def point_image(name: str, diameter: float = DIAMETER, pinhole: float = 0.0) -> tuple[np.ndarray, float]:
     """Image (2000, 2000) of a point, 1 in its middle, and the time [s] that it took with warm caches.
 
