@@ -1,6 +1,9 @@
 """From a white image to the places of its micro-images.
 
-- `lattice_fit`: `calibrate`, the whole path: period, spots, robust fit, `Calibration`
+- `lattice_fit`: `calibrate`, from what is given to a `Calibration`
+- `whole`: the lattice of one picture: period, spots, robust fit
+- `tiles`: the same for large pictures, by their middle and tiles
+- `unlit`: which lenslets are dark or saturated
 - `period`: the lattice vectors, by autocorrelation, before any spot is known
 - `centres`: sub-pixel centre of every micro-image
 - `diagnosis`: `diagnose`, what a white image says about how a camera is put together

@@ -23,8 +23,36 @@ class Spots(NamedTuple):
     light: np.ndarray
 
 
+class Tried(NamedTuple):
+    """Spots that may be unlit or far off: `light` (k, 3), and whether they are `near` their place (k,)."""
+
+    indices: np.ndarray
+    centers: np.ndarray
+    light: np.ndarray
+    near: np.ndarray
+
+
+def lit(*tried: Tried) -> Spots:
+    """Those near their place that are bright and have dark edges, of all parts of a picture together."""
+    indices, centers, light, near = (np.concatenate(column) for column in zip(*tried, strict=True))
+    keep = _lit(light) & near
+    return Spots(indices[keep], centers[keep], light[keep, 0])
+
+
 def measure(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> Spots:
-    """Centres of the micro-images that lie wholly inside the picture and are lit.
+    """Lit micro-images by `measured`."""
+    return lit(measured(picture, model, part=part))
+
+
+def followed(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> Spots:
+    """Lit micro-images by `traced`."""
+    return lit(traced(picture, model, part=part))
+
+
+def measured(
+    picture: np.ndarray, model: Calibration, *, part: float = 1.0, rounds: int = _ITERATIONS
+) -> Tried:
+    """Centres of the micro-images that lie wholly inside the picture.
 
     The centre is where the phase of the first harmonic over one cell vanishes along y and along x:
     unbiased for every micro-image that is symmetric about its centre, round or square, ringed or flat,
@@ -38,6 +66,8 @@ def measure(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> Sp
         Where the micro-images are, to a third of a pitch [px].
     part
         Central part of the picture's height and width to look at.
+    rounds
+        In which the window follows the centre.
     """
     cell = _cell(model.lattice)
     ny, nx = picture.shape
@@ -51,14 +81,20 @@ def measure(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> Sp
     indices = model.indices_within(ranges[0], ranges[1])
     guess = model.position(indices)
     step = max(1, int(_CHUNK / np.prod([size + 6 for size in cell])))
-    parts = [_centre(picture, guess[k : k + step], cell) for k in range(0, len(guess), step)]
+    parts = [_centre(picture, guess[k : k + step], cell, rounds) for k in range(0, len(guess), step)]
     centers = np.concatenate([p[0] for p in parts]) if parts else guess
     light = np.concatenate([p[1] for p in parts]) if parts else np.zeros((0, 3))
-    keep = _lit(light) & (np.abs(centers - guess) < 0.35 * np.array(cell)).all(-1)
-    return Spots(indices[keep], centers[keep], light[keep, 0])
+    return Tried(indices, centers, light, np.all(np.abs(centers - guess) < 0.35 * np.array(cell), axis=-1))
 
 
-def followed(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> Spots:
+def placed(model: Calibration) -> Tried:
+    """Whole micro-images of a picture at the places where they should be, taken to be lit."""
+    margin, (ny, nx) = model.lattice.pitch / 2, model.shape
+    indices = model.indices_within((margin, ny - 1 - margin), (margin, nx - 1 - margin))
+    return Tried(indices, model.position(indices), np.ones((len(indices), 3)), np.ones(len(indices), bool))
+
+
+def traced(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> Tried:
     """Centres by the phases of the lattice's first harmonics, each over a few lenslets around.
 
     For raw images: what the scene adds to one micro-image differs from the next, the gaps do not.
@@ -66,7 +102,7 @@ def followed(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> S
     Parameters
     ----------
     picture, model, part
-        As for `measure`.
+        As for `measured`.
     """
     lattice, (ny, nx) = model.lattice, picture.shape
     u, v = _phases(model, (ny, nx))
@@ -94,8 +130,7 @@ def followed(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> S
         rest = (rest - np.rint(rest)) / 3
         steps = steps + np.stack([rest, sign * rest], -1)
     light = np.stack([np.sum(sizes, 0), *sizes[:2]], -1)
-    keep = _lit(light) & (np.abs(steps) < 0.35).all(-1)
-    return Spots(indices[keep], (guess + steps @ lattice.matrix.T)[keep], light[keep, 0])
+    return Tried(indices, guess + steps @ lattice.matrix.T, light, np.all(np.abs(steps) < 0.35, axis=-1))
 
 
 def _phases(model: Calibration, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
@@ -117,7 +152,7 @@ def _cell(lattice: Lattice) -> tuple[float, float]:
 
 
 def _centre(
-    picture: np.ndarray, guess: np.ndarray, cell: tuple[float, float]
+    picture: np.ndarray, guess: np.ndarray, cell: tuple[float, float], rounds: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Centres (k, 2) and light (k, 3): mean of the cell, first harmonic along y and along x."""
     first = np.rint(guess).astype(np.int64)
@@ -129,7 +164,7 @@ def _centre(
     shift = guess - first
     light = np.zeros((len(guess), 3))
     limit = 0.45 * np.array(cell)
-    for _ in range(_ITERATIONS):
+    for _ in range(rounds):
         distance = [offsets[a] - shift[:, a, None] for a in (0, 1)]
         window = [
             np.clip((size / 2 - np.abs(d)) / max(_SOFT * size, 1) + 0.5, 0, 1)

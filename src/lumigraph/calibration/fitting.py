@@ -17,7 +17,10 @@ _NEAR = 0.01  # of a pitch, within which a micro-image is not called missing
 _GAIN = 0.98  # of the residual's root mean square must a warp at least bring it down to
 _EVIDENCE = 12.0  # by how much the Bayesian information criterion must fall for a warp
 _FEWEST = 30  # micro-images that a warp is fitted to
+_MANY = 20000  # micro-images tell all that a fit can know
 _LARGEST_CHANGE = 1.15  # of the area of a cell
+_CONFIRMED, _COUNTED = 0.33, 16  # of a quarter's micro-images must be on the lattice, where it has as many
+_QUARTERS = ("upper left", "upper right", "lower left", "lower right")
 _HINT = "Check the white image, or pass pitch= and layout=."
 _FREE = ((False, False), (True, False), (False, True), (True, True))  # tilt, radial
 
@@ -60,12 +63,20 @@ def fit(spots: Spots, model: Calibration, *, warped: bool = True) -> Fitted:
     """
     check_count(spots, model.lattice, "lit micro-images")
     try:
-        best = _fitted(spots, model, warped)
+        best = _fitted(_some(spots), model, warped)
     except GeometryError as error:  # parallel basis vectors
         raise CalibrationError(f"the micro-images stand on no lattice. {_HINT}") from error
     distance = _distances(best, spots)
     keep = distance <= max(_NEAR * best.lattice.pitch, float(_distances(best, best.spots).max()))
     return best._replace(spots=Spots(*(column[keep] for column in spots)))
+
+
+def _some(spots: Spots) -> Spots:
+    """Enough of many micro-images, none at the border of the array."""
+    if len(spots.indices) <= _MANY:
+        return spots
+    inner = np.flatnonzero(surrounded(spots.indices))
+    return Spots(*(column[inner[:: -(-len(inner) // _MANY)]] for column in spots))
 
 
 def _fitted(spots: Spots, model: Calibration, warped: bool) -> Fitted:
@@ -80,7 +91,7 @@ def _fitted(spots: Spots, model: Calibration, warped: bool) -> Fitted:
             gained = value < least - _EVIDENCE and _rms(other) < _GAIN * straight
             if kept and gained:
                 best, least, straight = other, value, _rms(other)
-    _check(best, spots)
+    _check(best, spots, model.shape)
     if not _LARGEST_CHANGE > best.lattice.cell_area / model.lattice.cell_area > 1 / _LARGEST_CHANGE:
         raise CalibrationError(
             f"the micro-images lead from a lattice of pitch {model.lattice.pitch:.2f} px to one of "
@@ -172,7 +183,7 @@ def _vector(values: np.ndarray) -> Vector:
     return float(values[0]), float(values[1])
 
 
-def _check(fitted: Fitted, spots: Spots) -> None:
+def _check(fitted: Fitted, spots: Spots, shape: tuple[int, int]) -> None:
     kept, pitch, rms = len(fitted.spots.indices), fitted.lattice.pitch, _rms(fitted)
     if kept < 0.5 * len(spots.indices):
         raise CalibrationError(
@@ -184,7 +195,20 @@ def _check(fitted: Fitted, spots: Spots) -> None:
             f"the micro-images stand {rms:.2f} px rms away from a lattice of pitch {pitch:.1f} px, "
             f"where a tenth of the pitch is too much. {_HINT}"
         )
+    on, seen = (_quartered(some.centers, shape) for some in (fitted.spots, spots))
+    if np.any((seen >= _COUNTED) & (on < _CONFIRMED * seen)):
+        worst = int(np.argmin(on / np.maximum(seen, 1) + (seen < _COUNTED)))
+        raise CalibrationError(
+            f"only {on[worst]} of {seen[worst]} micro-images in the {_QUARTERS[worst]} quarter of the "
+            f"picture stand on the lattice of pitch {pitch:.2f} px that the others stand on. {_HINT}"
+        )
     check_count(fitted.spots, fitted.lattice, "micro-images on one lattice")
+
+
+def _quartered(centers: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """How many micro-images stand in each quarter of a picture (4,)."""
+    lower = centers > np.array(shape) / 2
+    return np.bincount(2 * lower[:, 0] + lower[:, 1], minlength=4)
 
 
 def surrounded(indices: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import j1
 
-from lumigraph.calibration.centres import Spots
+from lumigraph.calibration.centres import lit, placed
 from lumigraph.calibration.fitting import Fitted, fit, recentred
 from lumigraph.calibration.template import sharpened
 from lumigraph.core.lattice import Lattice
@@ -68,11 +68,8 @@ def separated(picture: np.ndarray, fitted: Fitted, discs: Discs) -> Fitted:
     """Lattice and centres by the mean micro-image alone, from where the discs have their centre."""
     shape, lattice = (picture.shape[0], picture.shape[1]), fitted.lattice
     lattice = lattice.moved(*(lattice.matrix @ discs.move))
-    margin = lattice.pitch / 2
     result = Fitted(fitted.spots, lattice, fitted.warp)
     for _ in range(_ROUNDS):
         model = result.model(shape)
-        indices = model.indices_within((margin, shape[0] - 1 - margin), (margin, shape[1] - 1 - margin))
-        spots = Spots(indices, model.position(indices), np.ones(len(indices)))
-        result = fit(sharpened(picture, spots, model), model)
+        result = fit(sharpened(picture, lit(placed(model)), model), model)
     return recentred(result, shape)

@@ -79,19 +79,22 @@ def _moves(
     on = on & ((columns >= 0) & (columns < picture.shape[1]))[:, None, :]
     rows, columns = np.clip(rows, 0, picture.shape[0] - 1), np.clip(columns, 0, picture.shape[1] - 1)
     values = picture[rows[:, :, None], columns[:, None, :]]
-    dy, dx = (rows - centers[:, :1])[:, :, None], (columns - centers[:, 1:])[:, None, :]
-    u, v = (inverse[k, 0] * dy + inverse[k, 1] * dx for k in (0, 1))
+    dy = (rows - centers[:, :1])[:, :, None].astype(np.float32)
+    dx = (columns - centers[:, 1:])[:, None, :].astype(np.float32)
+    u, v = (np.float32(inverse[k, 0]) * dy + np.float32(inverse[k, 1]) * dx for k in (0, 1))
     inside = on & (np.abs(u) < 0.62) & (np.abs(v) < 0.62)
     along = [(np.roll(mean, -1, a) - np.roll(mean, 1, a)) * size / 2 for a in (0, 1)]
     slopes = [inverse[0, k] * along[0] + inverse[1, k] * along[1] for k in (0, 1)]
-    shape, half = u.shape, reach / 1.0
     fine = max(1, round(_FINE / size)) * size
-    at = [np.rint(w * fine).astype(np.int32) % fine for w in (u, v)]
-    place = np.broadcast_to(at[0] * fine + at[1], shape)
-    t, ty, tx = (_refined(table, fine).ravel()[place] * inside for table in (mean, *slopes))
-    terms = [t, t * (dy / half), t * (dx / half), -ty, -tx]
-    flat = np.stack([np.broadcast_to(term, shape).reshape(len(centers), -1) for term in terms], 1)
-    normal = flat @ flat.transpose(0, 2, 1)
+    at = [np.rint(w * np.float32(fine)).astype(np.int32) % fine for w in (u, v)]
+    place = at[0] * fine + at[1]
+    terms = np.empty((len(centers), 5, *u.shape[1:]), np.float32)
+    for k, table in ((0, mean), (3, -slopes[0]), (4, -slopes[1])):
+        np.multiply(_refined(table, fine).ravel()[place], inside, out=terms[:, k])
+    np.multiply(terms[:, 0], dy / np.float32(reach), out=terms[:, 1])
+    np.multiply(terms[:, 0], dx / np.float32(reach), out=terms[:, 2])
+    flat = terms.reshape(len(centers), 5, -1)
+    normal = (flat @ flat.transpose(0, 2, 1)).astype(float)
     scale = np.sqrt(np.maximum(np.einsum("kii->ki", normal), 1e-12))
     normal = normal / (scale[:, :, None] * scale[:, None, :]) + _RIDGE * np.eye(5)
     right = (flat @ (values * inside).reshape(len(centers), -1, 1))[..., 0] / scale
