@@ -61,7 +61,7 @@ def test_every_verb_has_help_with_an_example(lumigraph, verb):
 
 
 def test_help_is_quick_because_nothing_slow_is_imported():
-    slow = "numpy|scipy|matplotlib|PIL|zarr|pydantic|pint|tifffile|jinja2"
+    slow = "numpy|scipy|matplotlib|PIL|zarr|pydantic|tifffile|jinja2"
     code = (
         "import sys; from lumigraph.cli import main; main(['--help']); main(['simulate', '--help']);"
         f"print([m for m in '{slow}'.split('|') if m in sys.modules], file=sys.stderr)"

@@ -8,13 +8,26 @@ from lumigraph.units import deg, mm, nm, parse, um
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("150 um", 150 * um), ("150µm", 150 * um), ("60mm", 60 * mm), ("-2.5e1 nm", -25 * nm), ("0", 0.0)],
+    [
+        ("150 um", 150 * um),
+        ("150µm", 150 * um),
+        ("60mm", 60 * mm),
+        ("-2.5e1 nm", -25 * nm),
+        ("0", 0.0),
+        ("1 in", 25.4 * mm),
+        ("2 Å", 0.2 * nm),
+        ("3 microns", 3 * um),
+        ("5\u03bcm", 5 * um),
+        ("1 m", 1.0),
+    ],
 )
 def test_lengths_become_metres(text, value):
     assert parse(text) == pytest.approx(value, rel=1e-12)
 
 
-@pytest.mark.parametrize(("text", "value"), [("2 deg", 2 * deg), ("90°", math.pi / 2), ("5 mrad", 5e-3)])
+@pytest.mark.parametrize(
+    ("text", "value"), [("2 deg", 2 * deg), ("90°", math.pi / 2), ("5 mrad", 5e-3), ("60 arcmin", deg)]
+)
 def test_angles_become_radians(text, value):
     assert parse(text, "angle") == pytest.approx(value, rel=1e-12)
 
@@ -33,3 +46,8 @@ def test_angles_become_radians(text, value):
 def test_what_is_not_a_length_is_refused(text, message):
     with pytest.raises(FormatError, match=message.replace("*", r"\*")):
         parse(text)
+
+
+def test_a_length_is_rounded_once():
+    assert parse("633 nm") == 633e-9
+    assert parse("0.3 um") == 0.3e-6

@@ -59,7 +59,7 @@ def test_the_band_limit_says_nothing_near_the_focused_plane():
     near = design.near_field(WAVE, M, PITCH)
     assert near == pytest.approx((PITCH / M) ** 2 / (2 * WAVE))
     with pytest.raises(
-        GeometryError, match=r"dz is 1 um but the band limit holds from 2\.342 um on either side"
+        GeometryError, match=r"dz is 1 µm but the band limit holds from 2\.342 µm on either side"
     ):
         design.band_limit(WAVE, M, PITCH, 1e-6)
 

@@ -67,10 +67,10 @@ def test_a_lens_keeps_library_and_precision(xp, name):
 def test_a_coarse_grid_warns_with_numbers_and_the_limit_does_not():
     lens = ThinLens(10e-3, diameter=1e-3)  # λf/(2r) = 6.33 um
     with pytest.warns(
-        SamplingWarning, match=r"a lens of f = 10 mm and radius 0\.5 mm has samples 7 um apart .*"
+        SamplingWarning, match=r"a lens of f = 10 mm and radius 0\.5 mm has samples 7 µm apart .*"
     ):
         lens(plane_wave(Grid.square(200, 7e-6), WAVELENGTH))
-    with pytest.warns(SamplingWarning, match=r"along y but needs 6\.33 um. Use a finer grid"):
+    with pytest.warns(SamplingWarning, match=r"along y but needs 6\.33 µm. Use a finer grid"):
         lens(plane_wave(Grid.square(200, 7e-6), WAVELENGTH))
     lens(plane_wave(Grid.square(200, 6.32e-6), WAVELENGTH))
     # Without a stop, or with one larger than the field, the field's own half width counts.

@@ -128,7 +128,7 @@ def test_lenslets_keep_library_and_precision(xp, name):
 def test_a_coarse_grid_warns_with_numbers():
     # λf/p = 21.9 um.
     wave = plane_wave(Grid.square(40, 25e-6), WAVELENGTH)
-    with pytest.warns(SamplingWarning, match=r"a lenslet of f = 5\.2 mm .* samples 25 um .* needs 21\.94 um"):
+    with pytest.warns(SamplingWarning, match=r"a lenslet of f = 5\.2 mm .* samples 25 µm .* needs 21\.94 µm"):
         LensletArray(Lattice.square(PITCH), FOCAL)(wave)
     LensletArray(Lattice.square(PITCH), FOCAL)(plane_wave(Grid.square(40, 21e-6), WAVELENGTH))
 

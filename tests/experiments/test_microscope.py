@@ -50,4 +50,4 @@ def test_a_paraxial_model_puts_the_bead_elsewhere():
     scope, rng = _bench.scope(9), np.random.default_rng(3)
     paraxial = scope.replace(objective={"model": "paraxial"})
     rows = bead_rows(scope, 25 * um, bead(scope, paraxial, 25 * um, rng))
-    assert [row.quantity for row in rows if row.passed is False] == ["bead at 25 um, depth found"]
+    assert [row.quantity for row in rows if row.passed is False] == ["bead at 25 µm, depth found"]

@@ -140,7 +140,7 @@ CHANGES = [  # what to replace in EXAMPLE, by what, which error, in which words
     ("= 0.5", "= 0.5\nfill_factor = 1.5", G, r"fill_factor: 1\.5 is not above 0 and at most 1"),
     ("= 0.5", '= 0.5\nrotation = "700 deg"', G, r"rotation: 700 deg is more than half a turn"),
     ("= 0.5", "= 0.5\nrotation = 2", F, r"rotation: 2 has no unit\. .* '2 deg'"),
-    ("= 0.5", '= 0.5\noffset = ["80 um", 0]', G, r"offset along y is 80 um but must stay below 75 um"),
+    ("= 0.5", '= 0.5\noffset = ["80 um", 0]', G, r"offset along y is 80 µm but must stay below 75 µm"),
     ("= 0.5", '= 0.5\noffset = "80 um"', F, r"lenslets\.offset: '80 um' is not two lengths"),
     ("= 0.5", '= 0.5\noffset = ["1e9 m", 0]', G, r"lenslets\.offset: 1e9 m is beyond 100 km"),
     ("= 0.5", '= 0.5\nshape = "hex"', G, r"shape 'hex' does not tile layout 'square'\. Use 'square'"),

@@ -39,7 +39,7 @@ def test_the_table_of_the_focused_camera():
 
 def test_values_come_in_units_of_their_size():
     assert Row("", 0.12, "m").text == "120 mm"
-    assert Row("", 1.6667e-6, "m").text == "1.6667 um"
+    assert Row("", 1.6667e-6, "m").text == "1.6667 µm"
     assert Row("", 30380.4, "1/m").text == "30.38 /mm"
     assert Row("", (3, 4)).text == "3 x 4"
     assert Row("", -10.5e-3, "m").text == "-10.5 mm"
@@ -57,7 +57,7 @@ def test_the_cameras_of_the_catalogue_have_no_warnings_that_matter():
         (
             "thesis-plenoptic-1",
             {"main_lens": {"diameter": "5 mm"}},
-            "micro-images overlap: 208.3 um wide, 156.2",
+            "micro-images overlap: 208.3 µm wide, 156.2",
         ),
         (
             "thesis-plenoptic-1",
@@ -80,7 +80,7 @@ def test_the_cameras_of_the_catalogue_have_no_warnings_that_matter():
             {"lenslets": {"count": [801, 801]}, "sensor": {"pixel_pitch": "25 um"}},
             "wide for its distance",
         ),
-        ("thesis-2f", {"sensor": {"pixel_pitch": "50 um"}}, "too coarsely: 20 um would keep all detail"),
+        ("thesis-2f", {"sensor": {"pixel_pitch": "50 um"}}, "too coarsely: 20 µm would keep all detail"),
     ],
 )
 def test_suspicious_cameras_are_warned_of(name, changes, message):

@@ -50,7 +50,7 @@ def test_the_table_tells_resolution_matching_and_band_limits():
     table = load_camera("lfm-guv").describe().as_dict()
     expected = {
         "matched f-number": 25.0, "lenslet in object space": 100e-6 / 60, "directions per axis": 7.176,
-        "near field": 2.342e-6, "band limit at 10 um": 299e3, "sampling at 0 um": 100e-6 / 60,
+        "near field": 2.342e-6, "band limit at 10 µm": 299e3, "sampling at 0 µm": 100e-6 / 60,
     }  # fmt: skip
     assert {key: table[key] for key in expected} == pytest.approx(expected, rel=1e-3)
 

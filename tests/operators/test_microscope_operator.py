@@ -208,7 +208,7 @@ def test_what_cannot_be_is_refused(operator, monkeypatch):
     with pytest.raises(GeometryError, match="depths must ascend or descend, and differ"):
         microscope_operator([SCOPE], LENSLET, LAYOUT, (0.0, 1e-6, 0.0))
     with pytest.raises(
-        SamplingError, match=r"image of a point at 1e\+06 um, which lights 184759 lenslets .* nearer"
+        SamplingError, match=r"image of a point at 1e\+06 µm, which lights 184759 lenslets .* nearer"
     ):
         microscope_operator([SCOPE], LENSLET, LAYOUT, (1.0,))
     with pytest.raises(FormatError, match=r"folder /dev/null/x cannot be made"):

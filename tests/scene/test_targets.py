@@ -92,7 +92,7 @@ def test_usaf_charts_that_do_not_fit_say_the_size_needed():
 
 
 def test_usaf_bars_narrower_than_samples_warn():
-    with pytest.warns(SamplingWarning, match=r"the finest bars are 17\.54 um wide, samples 20 um apart"):
+    with pytest.warns(SamplingWarning, match=r"the finest bars are 17\.54 µm wide, samples 20 µm apart"):
         targets.usaf1951(Grid.square(300, 20 * UM), groups=(2, 4))
 
 
@@ -117,7 +117,7 @@ def test_gratings_side_by_side_are_the_same_waves():
 
 def test_gratings_warn_beyond_the_grids_frequencies_and_refuse_none():
     with pytest.warns(
-        SamplingWarning, match=r"2\.94e\+04 /m is drawn on samples 20 um apart, which hold less than"
+        SamplingWarning, match=r"2\.94e\+04 /m is drawn on samples 20 µm apart, which hold less than"
     ):
         targets.gratings(Grid.square(100, 20 * UM), (2.94e4,))
     with pytest.raises(GeometryError, match="no frequencies were given"):

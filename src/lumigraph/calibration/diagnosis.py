@@ -121,9 +121,9 @@ class Diagnosis:
             "tilt": f"the lenslets are tilted by ({math.degrees(self.tilt[0]):+.2f}, "
             f"{math.degrees(self.tilt[1]):+.2f}) deg: the pitch changes by "
             f"({self.pitch_gradient[0] * um:+.2f}, {self.pitch_gradient[1] * um:+.2f}) um over the picture",
-            "gap": f"gaps of {self.gap * um:.1f} um between micro-images: open the main lens from "
+            "gap": f"gaps of {self.gap * um:.1f} µm between micro-images: open the main lens from "
             f"{self.diameter * mm:.2f} to {self.matching_diameter * mm:.2f} mm",
-            "overlap": f"micro-images overlap by {-self.gap * um:.1f} um: close the main lens from "
+            "overlap": f"micro-images overlap by {-self.gap * um:.1f} µm: close the main lens from "
             f"{self.diameter * mm:.2f} to {self.matching_diameter * mm:.2f} mm",
         }
         return "\n".join(texts[fault] for fault in self.faults) or "the camera is as it was meant"

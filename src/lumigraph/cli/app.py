@@ -1,17 +1,21 @@
 """The verbs, and `main`, which turns every error into one line and an exit code."""
 
+import inspect
 import os
+import re
 import sys
 import traceback
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
+from difflib import get_close_matches
 from importlib.metadata import version
 
 from cyclopts import App, Parameter
-from cyclopts.exceptions import CycloptsError
+from cyclopts.exceptions import CycloptsError, UnknownCommandError
 
 from lumigraph.cli.calibrate import calibrate
+from lumigraph.cli.catalogue import catalogue
 from lumigraph.cli.decode import decode
 from lumigraph.cli.deconvolve import deconvolve
 from lumigraph.cli.demo import demo
@@ -35,7 +39,7 @@ _LONGEST = 400  # characters of a line on standard error
 
 VERBS = (
     demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure, view, samples,
-    reproduce,
+    catalogue, reproduce,
 )  # fmt: skip
 """In the order of their use."""
 
@@ -57,6 +61,9 @@ app = App(
 )
 for _number, _verb in enumerate(VERBS):
     app.command(telling(_verb), sort_key=_number)
+app.register_install_completion_command(
+    help="Complete verbs and options on Tab: writes a file for your shell, and a line to its start-up file."
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -98,7 +105,7 @@ def _explained(error: BaseException) -> tuple[int, str]:
         case CycloptsError():
             return USAGE, f"error: {_usage(error)}"
         case LumigraphError():
-            return FAILED, f"error: {error}"
+            return FAILED, f"error: {_optional(str(error))}"
         case MemoryError():
             return FAILED, "error: not enough memory. Use a smaller image, grid or number of samples."
         case OSError():
@@ -108,11 +115,34 @@ def _explained(error: BaseException) -> tuple[int, str]:
     return FAILED, f"error: unexpected {what[:300]}. Run it again with --debug and report the traceback."
 
 
+def _optional(text: str) -> str:
+    """A message with the running verb's options in place of Python's parameters: "--pitch" for "pitch="."""
+    verb = next((verb for verb in VERBS if verb.__name__ in COMMAND.get()), None)
+    names = set() if verb is None else set(inspect.signature(verb).parameters)
+
+    def option(found: re.Match[str]) -> str:
+        name, value = found.groups()
+        return f"--{name}{' ' * bool(value)}{value}" if name in names else found[0]
+
+    return re.sub(r"\b([a-z_]+)=((?:[\w-]|\.\d)*)", option, text)
+
+
 def _usage(error: CycloptsError) -> str:
     """What was written wrongly, and where help is."""
+    if isinstance(error, UnknownCommandError) and error.unused_tokens:
+        return _unknown(error.unused_tokens[0])
     verb = " ".join(error.command_chain or ())
     hint = f"lumigraph {verb} --help".replace("  ", " ")
-    return f"{str(error).rstrip('.')}. Try '{hint}'."
+    text = str(error).rstrip(".")
+    return f"{text}{'' if text.endswith('?') else '.'} Try '{hint}'."
+
+
+def _unknown(word: str) -> str:
+    """A verb that there is not, those that there are, and the nearest."""
+    names = [verb.__name__ for verb in VERBS]
+    near = get_close_matches(word, names, 1)
+    hint = f" Did you mean {near[0]!r}?" if near else ""
+    return f"there is no verb {word!r}.{hint} The verbs are {', '.join(names)}; try 'lumigraph --help'."
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:

@@ -2,12 +2,16 @@
 
 import json
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from lumigraph.cli.options import Common
 from lumigraph.core.progress import Progress, what_of
+
+FIRST_LINE = 10.0
+"""Seconds before progress is written where there is no terminal."""
 
 
 def report(common: Common, text: str, values: Mapping[str, Any] | Sequence[Any]) -> None:
@@ -20,7 +24,7 @@ def report(common: Common, text: str, values: Mapping[str, Any] | Sequence[Any])
 
 @contextmanager
 def progress(task: str) -> Iterator[Progress]:
-    """Context that gives a function which moves a bar, shown on a terminal only.
+    """Context that gives a function which moves a bar on a terminal, or writes a line now and then.
 
     Until it is called, and where it never is, the bar only shows that something goes on.
     """
@@ -33,7 +37,7 @@ def progress(task: str) -> Iterator[Progress]:
 @contextmanager
 def _bar(task: str) -> Iterator[Callable[..., None]]:
     if not sys.stderr.isatty():
-        yield lambda **_: None
+        yield _Lines(task)
         return
     from rich.console import Console
     from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeRemainingColumn
@@ -43,6 +47,22 @@ def _bar(task: str) -> Iterator[Callable[..., None]]:
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         number = bar.add_task(task, total=None)
         yield lambda **changes: bar.update(number, **changes)
+
+
+class _Lines:
+    """Progress where there is no terminal: a line after ten seconds, then each time as long again."""
+
+    def __init__(self, task: str) -> None:
+        self.task, self.began, self.next = task, time.monotonic(), FIRST_LINE
+
+    def __call__(self, *, description: str = "", completed: float = 0.0, **_: object) -> None:
+        """Write what is done, if it is time to."""
+        passed = time.monotonic() - self.began
+        if passed >= self.next and completed < 1 and sys.stderr is not None:
+            self.next = 2 * passed
+            text = f"lumigraph: {description or self.task}: {completed:.0%} after {passed:.0f} s"
+            with suppress(OSError):
+                print(text, file=sys.stderr, flush=True)
 
 
 def _plain(value: Any) -> Any:

@@ -338,10 +338,10 @@ def _result(found: Any, raw: "PreparedImage", steps: "list[Step]", written: tupl
     text = " x ".join(map(str, values[0].value)) + " samples"
     if isinstance(found, Volume):
         values += [Quantity("spacing", found.spacing, "m"), Quantity("depths", found.depths, "m")]
-        text += " of " + " x ".join(f"{1e6 * step:.4g}" for step in found.spacing) + " um"
+        text += " of " + " x ".join(f"{1e6 * step:.4g}" for step in found.spacing) + " µm"
     elif found.pixel_pitch:
         values.append(Quantity("pixel_pitch", found.pixel_pitch, "m"))
-        text += f" of {1e6 * found.pixel_pitch:.4g} um"
+        text += f" of {1e6 * found.pixel_pitch:.4g} µm"
     lines = [text, "the checkpoint was finished already"]
     if steps:
         last, gain = steps[-1], Exposure.of(raw).gain

@@ -78,6 +78,7 @@ def design(
     found = Result(
         "Design", f"{table.title[0].upper()}{table.title[1:]}, and all that follows in closed form.",
         described, (str(table),), figures=lambda: _figures(described, table), extra=table.as_dict(),
+        written=() if plot is None else (plot,),
     )  # fmt: skip
     if not page.web:
         return found

@@ -64,6 +64,7 @@ class Origin:
         """
         from lumigraph import io
         from lumigraph.core import checks
+        from lumigraph.core.brief import called
         from lumigraph.core.lightfield import LightField
         from lumigraph.core.raw import RawImage
         from lumigraph.core.stack import Stack
@@ -73,8 +74,7 @@ class Origin:
         if isinstance(found, Stack | Volume | RawImage):
             return self.read(path)
         if not isinstance(found, LightField):
-            held = type(found).__name__.lower()
-            raise FormatError(f"{path} holds a {held} where views or a raw image are needed.")
+            raise FormatError(f"{path} holds a {called(found)} where views or a raw image are needed.")
         checks.finite_array(str(path), found.data, FormatError)
         if self.is_given:
             raise FormatError(

@@ -1,5 +1,6 @@
 """What an object shows of itself in a few lines: arrays by type and shape, long lists by their ends."""
 
+import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import fields
@@ -31,6 +32,18 @@ def brief(self: Any) -> str:
     )
     lines = textwrap.wrap(f"{type(self).__name__}({shown})", WIDTH, subsequent_indent="    ")
     return "\n".join(lines if len(lines) <= LINES else [*lines[: LINES - 1], "    ...)"])
+
+
+def called(thing: Any) -> str:
+    """What people call a thing of this type.
+
+    Examples
+    --------
+    >>> from lumigraph.core.grid import Grid
+    >>> called(Grid((1, 1), 1.0)), called(type("LightField", (), {})())
+    ('grid', 'light field')
+    """
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(thing).__name__).lower()
 
 
 def table(self: Any) -> str:

@@ -243,7 +243,7 @@ def band_limit(wavelength: float, magnification: float, pitch: float, dz: float)
     near = near_field(wavelength, magnification, pitch)
     if abs(checks.finite("dz", dz)) < near * (1 - 1e-9):
         raise GeometryError(
-            f"dz is {dz * 1e6:.4g} um but the band limit holds from {near * 1e6:.4g} um on either side. "
+            f"dz is {dz * 1e6:.4g} µm but the band limit holds from {near * 1e6:.4g} µm on either side. "
             "Use sampling_distance, which holds everywhere."
         )
     return pitch / (2 * SPARROW * wavelength * magnification * abs(dz))

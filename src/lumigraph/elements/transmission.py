@@ -52,7 +52,7 @@ def warn_if_coarse(what: str, grid: Grid, wavelength: float, focal_length: float
         if radius > 0 and pitch > (limit := wavelength * abs(focal_length) / (2 * radius)) * (1 + 1e-9):
             warnings.warn(
                 f"{what} of f = {focal_length * 1e3:.4g} mm and radius {radius * 1e3:.4g} mm has samples "
-                f"{pitch * 1e6:.4g} um apart along {name} but needs {limit * 1e6:.4g} um. "
+                f"{pitch * 1e6:.4g} µm apart along {name} but needs {limit * 1e6:.4g} µm. "
                 "Use a finer grid or a smaller diameter.",
                 SamplingWarning,
                 stacklevel=4,

@@ -29,7 +29,7 @@ class Row:
     got
         What came out, in `unit`.
     unit
-        As it is shown: "um", "dB", "1/m"; empty for a pure number.
+        As it is shown: "µm", "dB", "1/m"; empty for a pure number.
     thesis
         What is printed there, in the same unit; text where no number is; None where nothing is.
     expected
@@ -41,7 +41,7 @@ class Row:
 
     Examples
     --------
-    >>> Row("first zero", 48.9, "um", thesis=67.0, expected=48.8, tolerance=0.3).passed
+    >>> Row("first zero", 48.9, "µm", thesis=67.0, expected=48.8, tolerance=0.3).passed
     True
     >>> Row("SNR", 70.0, "dB", expected=57.0, tolerance=(0.0, np.inf)).passed
     True

@@ -232,8 +232,8 @@ def _warnings(camera: "Camera") -> Iterator[str]:
     pixel, airy = camera.pixels.pixel_pitch, resolution.airy_first_zero(camera.wavelength, camera.f_number)
     if camera.lenslet_distance is None and pixel > camera.wavelength * camera.f_number / 2:
         yield (
-            f"pixels of {pixel * 1e6:.3g} um sample the Airy radius of {airy * 1e6:.3g} um too coarsely: "
-            f"{camera.wavelength * camera.f_number / 2 * 1e6:.3g} um would keep all detail."
+            f"pixels of {pixel * 1e6:.3g} µm sample the Airy radius of {airy * 1e6:.3g} µm too coarsely: "
+            f"{camera.wavelength * camera.f_number / 2 * 1e6:.3g} µm would keep all detail."
         )
 
 
@@ -246,23 +246,23 @@ def _lenslet_warnings(camera: "LensletCamera") -> Iterator[str]:
         )
     if camera.micro_image_width > camera.micro_image_pitch * (1 + 1e-9):
         yield (
-            f"micro-images overlap: {camera.micro_image_width * 1e6:.4g} um wide, "
-            f"{camera.micro_image_pitch * 1e6:.4g} um apart. Reduce the main lens' diameter below "
+            f"micro-images overlap: {camera.micro_image_width * 1e6:.4g} µm wide, "
+            f"{camera.micro_image_pitch * 1e6:.4g} µm apart. Reduce the main lens' diameter below "
             f"{camera.micro_image_pitch * camera.separation / camera.lenslet_distance * 1e3:.4g} mm."
         )
     width, smallest = camera.lenslets.pitch * camera.lenslets.fill_factor, _smallest(camera)
     if width < smallest:
         yield (
-            f"cross-talk by diffraction: lenslets of {width * 1e6:.4g} um are narrower than "
-            f"sqrt(2.44 λ b) = {smallest * 1e6:.4g} um. Use wider lenslets or a shorter focal length."
+            f"cross-talk by diffraction: lenslets of {width * 1e6:.4g} µm are narrower than "
+            f"sqrt(2.44 λ b) = {smallest * 1e6:.4g} µm. Use wider lenslets or a shorter focal length."
         )
     pixel, nyquist = camera.pixels.pixel_pitch, camera.wavelength * camera.lenslet_distance / (2 * width)
     if pixel > camera.micro_image_pitch / 2:
-        yield f"pixels of {pixel * 1e6:.3g} um leave less than two per micro-image."
+        yield f"pixels of {pixel * 1e6:.3g} µm leave less than two per micro-image."
     elif pixel > nyquist * (1 + 1e-9):
         yield (
-            f"pixels of {pixel * 1e6:.3g} um are coarser than the lenslets' detail, "
-            f"λ b / (2 p) = {nyquist * 1e6:.3g} um."
+            f"pixels of {pixel * 1e6:.3g} µm are coarser than the lenslets' detail, "
+            f"λ b / (2 p) = {nyquist * 1e6:.3g} µm."
         )
     yield from _cropped(camera)
 

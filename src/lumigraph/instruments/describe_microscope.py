@@ -70,11 +70,11 @@ def _reconstruction(scope: "LightFieldMicroscope") -> Iterator[Row]:
     for dz in DEPTHS:
         if dz >= near:
             limit = design.band_limit(wave, M, pitch, dz)
-            yield Row(f"band limit at {dz * 1e6:g} um", limit, "1/m", "d / (0.94 λ M |dz|)")
+            yield Row(f"band limit at {dz * 1e6:g} µm", limit, "1/m", "d / (0.94 λ M |dz|)")
     at = (0.0, *DEPTHS)
     for dz, distance in zip(at, scope.sampling_distances(at), strict=True):
         yield Row(
-            f"sampling at {dz * 1e6:g} um",
+            f"sampling at {dz * 1e6:g} µm",
             distance,
             "m",
             "d/M up to d / (2 M tan θ), then what a lenslet resolves",
@@ -122,6 +122,6 @@ def _warnings(scope: "LightFieldMicroscope") -> Iterator[str]:
     nyquist = scope.wavelength * scope.lenslet_distance / (2 * scope.lenslets.pitch)
     if pixel > nyquist * 1.1:
         yield (
-            f"pixels of {pixel * 1e6:.3g} um at the lenslets are coarser than their detail, "
-            f"λ b / (2 d) = {nyquist * 1e6:.3g} um."
+            f"pixels of {pixel * 1e6:.3g} µm at the lenslets are coarser than their detail, "
+            f"λ b / (2 d) = {nyquist * 1e6:.3g} µm."
         )

@@ -89,7 +89,7 @@ def _samples(half: float, pitch: float) -> int:
 def _grid(name: str, shape: list[int], pitch: float) -> Grid:
     if math.prod(shape) > MOST_SAMPLES:
         raise SamplingError(
-            f"{name} needs {shape[0]} x {shape[1]} samples of {pitch * 1e6:.3g} um, more than the "
+            f"{name} needs {shape[0]} x {shape[1]} samples of {pitch * 1e6:.3g} µm, more than the "
             f"{MOST_SAMPLES:.3g} that can be simulated. Use fewer lenslets, a smaller sensor or a larger "
             "f-number."
         )

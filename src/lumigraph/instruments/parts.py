@@ -135,7 +135,7 @@ class Lenslets(Part):
         for name, shift, slack in zip("yx", self._turned(*self.offset), self._slack, strict=True):
             if abs(shift) >= slack:
                 raise GeometryError(
-                    f"offset along {name} is {shift * 1e6:.6g} um but must stay below {slack * 1e6:.6g} um. "
+                    f"offset along {name} is {shift * 1e6:.6g} µm but must stay below {slack * 1e6:.6g} µm. "
                     "Give what is left after whole lenslets, or change count."
                 )
         return self

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Any
 
 _PREFIXES = {
-    "m": ((1.0, "m"), (1e-3, "mm"), (1e-6, "um"), (1e-9, "nm")),
+    "m": ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")),
     "1/m": ((1e3, "/mm"), (1.0, "/m")),
-    "rad": ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "urad")),
+    "rad": ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "µrad")),
 }
 
 

@@ -71,7 +71,11 @@ def existing(path: str | os.PathLike[str]) -> Path:
     if not path.parent.is_dir():
         raise FormatError(f"{path} does not exist: there is no folder {path.parent}. Check the path.")
     near = difflib.get_close_matches(path.name, [p.name for p in path.parent.iterdir()], n=3, cutoff=0.6)
-    hint = f"Did you mean {' or '.join(near)}?" if near else f"Check the name; the folder is {path.parent}."
+    hint = (
+        f"Did you mean {' or '.join(near)}?"
+        if near
+        else f"Check the name; the folder is {path.parent.resolve()}."
+    )
     raise FormatError(f"{path} does not exist. {hint}")
 
 

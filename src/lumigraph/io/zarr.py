@@ -177,7 +177,7 @@ def _values(path: Path, group: zarr.Group, name: str, max_pixels: int) -> np.nda
 def _reading(path: Path) -> Iterator[zarr.Group]:
     store = LocalStore(path, read_only=True) if path.is_dir() else ZipStore(path, mode="r", read_only=True)
     try:
-        yield zarr.open_group(store, mode="r", zarr_format=3)
+        yield zarr.open_group(store, mode="r", zarr_format=3, use_consolidated=False)
     finally:
         store.close()
 

@@ -199,7 +199,7 @@ def require_window(objective: Objective, lenslet: Lenslet, sampling: CellSamplin
     spread = abs(dz) * objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
     cells = 2 * math.ceil(spread * lenslet.magnification / lenslet.pitch) + 5
     side = cells * _fineness(objective, lenslet, sampling) * sampling.pixels
-    what = f"the image of a point at {dz * 1e6:.4g} um, which lights {cells} lenslets across,"
+    what = f"the image of a point at {dz * 1e6:.4g} µm, which lights {cells} lenslets across,"
     memory.require(
         (16.0 * objective.modes + 64) * side**2,
         what,

@@ -51,8 +51,8 @@ def _remedy(camera: Any, share: float) -> str:
         relay = camera.relay_magnification
         return f"a relay of {relay * share:.4g} instead of {relay:.4g}. The picture's lattice is used"
     return (
-        f"pixels of {camera.calibration.pixel_pitch / share * 1e6:.4g} um instead of "
-        f"{camera.calibration.pixel_pitch * 1e6:.4g} um. The picture's lattice is used"
+        f"pixels of {camera.calibration.pixel_pitch / share * 1e6:.4g} µm instead of "
+        f"{camera.calibration.pixel_pitch * 1e6:.4g} µm. The picture's lattice is used"
     )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 from lumigraph import io
 from lumigraph.calibration import calibrate
 from lumigraph.core import checks
+from lumigraph.core.brief import called
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.raw import RawImage
@@ -56,7 +57,7 @@ def read_raw(path: Path, what: str = "raw image") -> RawImage:
     """
     raw = io.open(path)
     if not isinstance(raw, RawImage):
-        raise FormatError(f"{path} holds a {type(raw).__name__} where a {what} is needed.")
+        raise FormatError(f"{path} holds a {called(raw)} where a {what} is needed.")
     checks.finite_array(str(path), raw.data, FormatError)
     return raw
 
@@ -121,5 +122,5 @@ def read_calibration(path: Path, shape: tuple[int, int] | None = None) -> Calibr
     else:
         found = io.open(path)
     if not isinstance(found, Calibration):
-        raise FormatError(f"{path} holds a {type(found).__name__} where a calibration is needed.")
+        raise FormatError(f"{path} holds a {called(found)} where a calibration is needed.")
     return found

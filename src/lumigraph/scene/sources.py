@@ -154,7 +154,7 @@ def _warn_if_coarse(what: str, grid: Grid, wavelength: float, sines: Pair) -> No
     for name, pitch, sine in zip("yx", grid.pitch, sines, strict=True):
         if sine * pitch > wavelength / 2 * (1 + 1e-9):
             warnings.warn(
-                f"{what} reaches sin θ = {sine:.4g} along {name} but samples every {pitch * 1e6:.4g} um tell "
+                f"{what} reaches sin θ = {sine:.4g} along {name} but samples every {pitch * 1e6:.4g} µm tell "
                 f"directions apart up to {wavelength / (2 * pitch):.4g}. Use a finer or smaller grid.",
                 SamplingWarning,
                 stacklevel=3,

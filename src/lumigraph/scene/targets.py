@@ -218,8 +218,8 @@ def gratings(grid: Grid, frequencies: Sequence[float] = THESIS_FREQUENCIES, *, s
     for frequency in frequencies:
         if checks.positive("frequency", frequency, "1/m") >= (limit := 1 / (2 * grid.pitch[1])):
             warnings.warn(
-                f"a grating of {frequency:.4g} /m is drawn on samples {grid.pitch[1] * 1e6:.4g} um apart, "
-                f"which hold less than {limit:.4g} /m. Use a pitch below {5e5 / frequency:.4g} um.",
+                f"a grating of {frequency:.4g} /m is drawn on samples {grid.pitch[1] * 1e6:.4g} µm apart, "
+                f"which hold less than {limit:.4g} /m. Use a pitch below {5e5 / frequency:.4g} µm.",
                 SamplingWarning,
                 stacklevel=2,
             )
@@ -395,7 +395,7 @@ def _check_fits(grid: Grid, corner: Pair, size: Pair, what: str) -> None:
 def _warn_if_narrow(grid: Grid, width: float) -> None:
     if width < max(grid.pitch):
         warnings.warn(
-            f"the finest bars are {width * 1e6:.4g} um wide, samples {max(grid.pitch) * 1e6:.4g} um apart. "
+            f"the finest bars are {width * 1e6:.4g} µm wide, samples {max(grid.pitch) * 1e6:.4g} µm apart. "
             "Use a finer grid, or leave the last groups out.",
             SamplingWarning,
             stacklevel=3,

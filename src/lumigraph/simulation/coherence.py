@@ -255,9 +255,9 @@ class TiltedWaves:
             return found * wavelength, weights
         if (limit := wavelength / (2 * max(plane.grid.pitch))) < self.na:
             raise SamplingError(
-                f"na is {self.na:g} but the scene's pitch of {max(plane.grid.pitch) * 1e6:.3g} um tells "
+                f"na is {self.na:g} but the scene's pitch of {max(plane.grid.pitch) * 1e6:.3g} µm tells "
                 f"directions apart up to {limit:.3g}. Use a pitch of "
-                f"{wavelength / (2 * self.na) * 1e6:.3g} um or finer."
+                f"{wavelength / (2 * self.na) * 1e6:.3g} µm or finer."
             )
         found, weights = directions.over_a_disc(share, frequencies, self.na / wavelength, self.count)
         return found * wavelength, weights

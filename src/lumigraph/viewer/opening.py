@@ -11,6 +11,7 @@ import numpy as np
 from lumigraph import io
 from lumigraph.core import checks
 from lumigraph.core.arrays import to_numpy
+from lumigraph.core.brief import called
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.prepared import PreparedImage
@@ -94,7 +95,7 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
             return of_stack(path.name, found)
         case Volume():
             return of_volume(path.name, found)
-    raise FormatError(f"{path} holds a {type(found).__name__}, of which there is no picture.")
+    raise FormatError(f"{path} holds a {called(found)}, of which there is no picture.")
 
 
 def of_views(name: str, views: LightField) -> Exhibit:

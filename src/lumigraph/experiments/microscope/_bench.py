@@ -17,7 +17,7 @@ PIXELS = 15
 
 
 def scope(count: int) -> LightFieldMicroscope:
-    """20x/0.5 with lenslets of 125 um and f/20, the microscope of M. Broxton et al. (2013)."""
+    """20x/0.5 with lenslets of 125 µm and f/20, the microscope of M. Broxton et al. (2013)."""
     tables: dict[str, Any] = {  # as in a camera file: the model makes its own types of them
         "objective": {"magnification": 20.0, "numerical_aperture": 0.5},
         "lenslets": {"pitch": "125 um", "focal_length": "2.5 mm", "count": (count, count)},

@@ -38,7 +38,7 @@ def run(context: Context) -> Outcome:
     depths = (-25 * um, 0.0, 25 * um) if context.quick else DEPTHS
     beads = []
     for done, dz in enumerate(depths):
-        context.progress(0.7 * done / len(depths), f"bead at {dz / um:g} um")
+        context.progress(0.7 * done / len(depths), f"bead at {dz / um:g} µm")
         beads.append(context.cached(f"bead-{done}", lambda dz=dz: bead(bench, bench, dz, rng)))
     context.progress(0.7, "vesicle")
     vesicle = context.cached("vesicle", lambda: _vesicle(bench, context, rng))
@@ -94,20 +94,20 @@ def width(profile: np.ndarray, step: float) -> float:
 def bead_rows(bench: LightFieldMicroscope, dz: float, got: np.ndarray) -> list[Row]:
     """Rows of a bead; the axial width has no closed form and is only shown."""
     lateral, axial, depth, light = got
-    what, limit = f"bead at {dz / um:g} um", bench.sampling_distances((dz,))[0]
+    what, limit = f"bead at {dz / um:g} µm", bench.sampling_distances((dz,))[0]
     resolved = max(limit, 0.51 * bench.wavelength / bench.objective.numerical_aperture)
     rows = [
         Row(
-            f"{what}, lateral width", lateral / um, "um", None, resolved / um,
+            f"{what}, lateral width", lateral / um, "µm", None, resolved / um,
             ((math.inf, 0.0) if dz == 0 else (0.3 * resolved / um, 0.9 * resolved / um)),
             note="the sampling distance, or the objective's own width; narrower in focus, as beads are",
         ),
-        Row(f"{what}, axial width", axial / um, "um"),
+        Row(f"{what}, axial width", axial / um, "µm"),
         Row(f"{what}, its light", light, "of the true", None, 1.0, 0.03),
     ]  # fmt: skip
     if dz:
         rows.insert(
-            2, Row(f"{what}, depth found", depth / um, "um", None, dz / um, 0.4, note="paraxial: off by 8 %")
+            2, Row(f"{what}, depth found", depth / um, "µm", None, dz / um, 0.4, note="paraxial: off by 8 %")
         )
     return rows
 
@@ -141,7 +141,7 @@ def _vesicle_rows(vesicle: dict[str, np.ndarray]) -> list[Row]:
     correlation = float(np.corrcoef(found.ravel(), truth.ravel())[0, 1])
     right = shell_radius(truth, radius) / um
     return [
-        Row("vesicle, radius of the shell", shell_radius(found, radius) / um, "um", None, right, 0.8),
+        Row("vesicle, radius of the shell", shell_radius(found, radius) / um, "µm", None, right, 0.8),
         Row("vesicle, correlation with the true volume", correlation, "", None, 0.75, (0.03, math.inf)),
     ]
 
@@ -153,7 +153,7 @@ def _width_figure(
     sampling = np.array(bench.sampling_distances(depths)) / um
     lines = {"lateral width": lateral, "axial width": axial, "sampling distance": sampling}
     caption = "Full widths at half maximum of beads, and the distance between the lenslets' samples."
-    return curves(np.array(depths) / um, lines, xlabel="depth [um]", ylabel="[um]"), caption
+    return curves(np.array(depths) / um, lines, xlabel="depth [µm]", ylabel="[µm]"), caption
 
 
 def _vesicle_figure(vesicle: dict[str, Any]) -> tuple[object, str]:
@@ -163,4 +163,4 @@ def _vesicle_figure(vesicle: dict[str, Any]) -> tuple[object, str]:
         (truth[z], "true, focused plane"), (found[z], "found, focused plane"),
         (truth[:, y], "true, along the axis"), (found[:, y], "found, along the axis"),
     ]  # fmt: skip
-    return plots.images(pictures, columns=2), "A vesicle of 18 um radius from one exposure"
+    return plots.images(pictures, columns=2), "A vesicle of 18 µm radius from one exposure"

@@ -37,7 +37,7 @@ def run(context: Context) -> Outcome:
     depths = (0.0, 25 * um, 50 * um) if context.quick else DEPTHS
     pictures, rows, finest, limits = [], [], [], []
     for done, dz in enumerate(depths):
-        context.progress(done / len(depths), f"target at {dz / um:g} um")
+        context.progress(done / len(depths), f"target at {dz / um:g} µm")
         found = context.cached(f"usaf-{done}", lambda dz=dz: _found(bench, dz, (groups, samples), rng))
         grid = bench.operator((dz,), samples, pixels=PIXELS).object_grid
         assert grid is not None
@@ -45,9 +45,9 @@ def run(context: Context) -> Outcome:
         finest.append(finest_resolved(contrasts))
         limits.append(1 / (2 * bench.sampling_distances((dz,))[0]))
         rows += _rows(dz, finest[-1], limits[-1], contrasts)
-        pictures.append((found, f"from {dz / um:g} um"))
+        pictures.append((found, f"from {dz / um:g} µm"))
     lines = {"finest resolved": np.array(finest) / 1e3, "band limit": np.array(limits) / 1e3}
-    figure = curves(np.array(depths) / um, lines, xlabel="depth [um]", ylabel="[line pairs per mm]")
+    figure = curves(np.array(depths) / um, lines, xlabel="depth [µm]", ylabel="[line pairs per mm]")
     return Outcome(
         tuple(rows),
         (
@@ -106,7 +106,7 @@ def _rows(dz: float, finest: float, limit: float, contrasts: dict[float, float])
     tolerance = (expected * (1 - 1 / ratio), expected * (ratio - 1)) if expected else (0.0, 1.0)
     return [
         Row(
-            f"finest bars resolved at {dz / um:g} um", finest / 1e3, "line pairs/mm", None, expected / 1e3,
+            f"finest bars resolved at {dz / um:g} µm", finest / 1e3, "line pairs/mm", None, expected / 1e3,
             (tolerance[0] / 1e3, tolerance[1] / 1e3), note=f"the band limit is {limit / 1e3:.0f}",
         )
     ]  # fmt: skip

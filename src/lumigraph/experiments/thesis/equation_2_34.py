@@ -46,7 +46,7 @@ def run(context: Context) -> Outcome:
     )
     rows = (
         Row("step dz, N = 2000, W = 1 cm", found / mm, "mm", expected=78.989, tolerance=78.989e-4),
-        Row("pitch after the step", pitch / um, "um", expected=5.0, tolerance=1e-9),
+        Row("pitch after the step", pitch / um, "µm", expected=5.0, tolerance=1e-9),
         Row(
             f"largest difference of {STEPS} steps from the paraxial angular spectrum",
             error,

@@ -39,7 +39,7 @@ def run(context: Context) -> Outcome:
     ]  # fmt: skip
     samples = []
     for number, place in enumerate(_PLACES):
-        context.progress(number / 2, f"point at {place / um:.0f} um")
+        context.progress(number / 2, f"point at {place / um:.0f} µm")
         raw = simulate(camera, targets.points([(0.0, place / camera.magnification)]))
         samples.append(_samples(camera, raw))
         rows += _rows(samples[-1], place, _covered(camera, place))
@@ -49,7 +49,7 @@ def run(context: Context) -> Outcome:
         ((plots.images(pair, columns=2),
           "1.25: directions θ (up) over places X on the main-lens image. Every lenslet is a band of slope "
           "-1/a; two points (red, green) are columns that cross three or four of them"),
-         (plots.curves(*_rendered(samples), xlabel="X [um]", ylabel="light"),
+         (plots.curves(*_rendered(samples), xlabel="X [µm]", ylabel="light"),
           "1.26: a rendered pixel sums a column, pixels of several lenslets")),
         why="In 2.0 one place is spread over lenslets: the angular resolution is the lenslet's p/a, the "
         "spatial one the pixel's, divided by m. 1.22 and 1.23 are right with +x/f and +x/b.",
@@ -96,12 +96,12 @@ def _rows(samples: list[tuple[np.ndarray, np.ndarray, np.ndarray]], place: float
             top = np.maximum(light - light.max() / 2, 0)
             places.append(float(x @ top / top.sum()))
     return [
-        Row(f"lenslets that see the point at {place / um:.0f} um", float(seen), "", 3, covered, 0.0,
+        Row(f"lenslets that see the point at {place / um:.0f} µm", float(seen), "", 3, covered, 0.0,
             note="those that its cone of rays covers by more than a third; 1/m = 3.33 in the mean"),
-        Row(f"its place by these lenslets, mean, {place / um:.0f} um", float(np.mean(places)) / um, "um",
+        Row(f"its place by these lenslets, mean, {place / um:.0f} µm", float(np.mean(places)) / um, "µm",
             None, place / um, 5.0),
-        Row(f"largest difference between them, {place / um:.0f} um", float(np.ptp(places)) / um, "um",
-            None, 0.0, 20.0, note="only the well lit ones; a lenslet's lobe is 232 um wide here"),
+        Row(f"largest difference between them, {place / um:.0f} µm", float(np.ptp(places)) / um, "µm",
+            None, 0.0, 20.0, note="only the well lit ones; a lenslet's lobe is 232 µm wide here"),
     ]  # fmt: skip
 
 
@@ -140,7 +140,7 @@ def _scattered(camera: FocusedPlenopticCamera, samples: list) -> np.ndarray:
 
 
 def _rendered(samples: list) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Light of the pixels of all lenslets, summed by the place that they see [um]."""
+    """Light of the pixels of all lenslets, summed by the place that they see [µm]."""
     edges = np.linspace(-250, 250, 61)
     curves = {}
     for pixels, name in zip(samples, ("red point", "green point"), strict=True):

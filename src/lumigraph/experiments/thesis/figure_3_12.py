@@ -34,7 +34,7 @@ def run(context: Context) -> Outcome:
             expected=66.17, tolerance=0.5, note="λ²/(cΔλ) = 6.6e-14 s"),
         Row("coherence time, Gaussian spectrum", coherence_time(frequency, smooth) / femto, "fs",
             expected=0.6643 * 66.17, tolerance=0.5, note="sqrt(2 ln 2/π)/Δν"),
-        Row("coherence length", coherence_time(frequency, even) * LIGHT * 1e6, "um", expected=19.85,
+        Row("coherence length", coherence_time(frequency, even) * LIGHT * 1e6, "µm", expected=19.85,
             tolerance=0.2, note="λ²/Δλ"),
     )  # fmt: skip
     time = np.linspace(0, 200, 401) * femto

@@ -47,7 +47,7 @@ def run(context: Context) -> Outcome:
     figure = curves(
         x[near] / um,
         {"edge": edge, "coherent": coherent[near], "incoherent": incoherent[near]},
-        xlabel="x [um]",
+        xlabel="x [µm]",
         ylabel="intensity",
         marks={"edge": 0.0},
     )

@@ -30,7 +30,7 @@ WHY = (
     camera=two_f.CAMERA,
 )
 def run(context: Context) -> Outcome:
-    """A pinhole of 10 um, as in the thesis, through the whole system."""
+    """A pinhole of 10 µm, as in the thesis, through the whole system."""
     names = [name for name in two_f.METHODS if not (context.quick and name.startswith("multi"))]
     near, x = two_f.middle(250 * um), two_f.GRID.x
     pictures, profiles, spectra, rows = [], {}, {}, []
@@ -48,9 +48,9 @@ def run(context: Context) -> Outcome:
     spectra["theory"] = _theory(frequencies)
     shown = frequencies <= 4 * CUTOFF
     figures = (
-        (images(pictures, columns=3), "Image of a pinhole of 10 um (square root of the intensity)"),
+        (images(pictures, columns=3), "Image of a pinhole of 10 µm (square root of the intensity)"),
         (
-            curves(x[near] / um, profiles, xlabel="x [um]", ylabel="intensity", log=True),
+            curves(x[near] / um, profiles, xlabel="x [µm]", ylabel="intensity", log=True),
             "Profiles through the middle, and the Airy pattern",
         ),
         (

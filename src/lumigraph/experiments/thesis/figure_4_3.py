@@ -30,29 +30,29 @@ def run(context: Context) -> Outcome:
     kept = context.cached("kept", lambda: np.array([_kept(context, diameter) for diameter in diameters]))
     at = dict(zip((round(d / um) for d in diameters), kept, strict=True))
     rows = (
-        Row("smallest lenslet at 10 mm", smallest / um, "um", None, 124.28, 0.05),
+        Row("smallest lenslet at 10 mm", smallest / um, "µm", None, 124.28, 0.05),
         Row("Airy lobe of that lenslet over its width", lobe / smallest, "", 1.0, 1.0, 1e-9),
         Row("smallest lenslet at 100 mm, the printed length of figure 4.4", plenoptic1.smallest_lenslet(
-            wavelength, 100 * mm) / um, "um", 100.0, 393.0, 0.1, note="four times as wide as printed"),
+            wavelength, 100 * mm) / um, "µm", 100.0, 393.0, 0.1, note="four times as wide as printed"),
         Row("directions left at the limit", plenoptic1.resolvable_directions(wavelength, smallest, f), "",
             None, 2.0, 1e-9),
         Row("directions left in Table 4.1", plenoptic1.resolvable_directions(wavelength, 150 * um, f), "",
             30.0, 2.914, 1e-3),
-        Row("light kept by lenslets of 150 um", at[150], "", None, 0.904, 0.01),
+        Row("light kept by lenslets of 150 µm", at[150], "", None, 0.904, 0.01),
         Row("light kept at the limit", at[124], "", None, 0.808, 0.006, note="finer sum: 0.8082"),
-        Row("light kept by lenslets of 100 um", at[100], "", None, 0.827, 0.006, note="finer sum: 0.8271"),
-        Row("light lost by lenslets of 100 um over 150 um", (1 - at[100]) / (1 - at[150]), "", "more", 1.5,
+        Row("light kept by lenslets of 100 µm", at[100], "", None, 0.827, 0.006, note="finer sum: 0.8271"),
+        Row("light lost by lenslets of 100 µm over 150 µm", (1 - at[100]) / (1 - at[150]), "", "more", 1.5,
             (0.0, np.inf), note="below the limit"),
     )  # fmt: skip
     lengths = np.linspace(0.5, 20, 200)
     limit = [plenoptic1.smallest_lenslet(wavelength, length * mm) / um for length in lengths]
     condition = plots.curves(
         lengths,
-        {"d = sqrt(2.44 λ f_µ)": limit, "Table 4.1": ([10], [150]), "100 um at 10 mm": ([10], [100])},
-        xlabel="focal length of the lenslets [mm]", ylabel="lenslet diameter [um]",
+        {"d = sqrt(2.44 λ f_µ)": limit, "Table 4.1": ([10], [150]), "100 µm at 10 mm": ([10], [100])},
+        xlabel="focal length of the lenslets [mm]", ylabel="lenslet diameter [µm]",
     )  # fmt: skip
     light = plots.curves(
-        diameters / um, {"simulated": kept}, xlabel="lenslet diameter [um], f_µ = 10 mm",
+        diameters / um, {"simulated": kept}, xlabel="lenslet diameter [µm], f_µ = 10 mm",
         ylabel="light in its own micro-image", marks={"condition": smallest / um},
     )  # fmt: skip
     return Outcome(
@@ -66,7 +66,7 @@ def run(context: Context) -> Outcome:
 
 def _kept(context: Context, diameter: float) -> float:
     """Light of an in-focus point in its own micro-image, for lenslets of a diameter [m]; D is matched."""
-    context.progress(float(diameter / _DIAMETERS[-1]), f"lenslets of {diameter / um:.0f} um")
+    context.progress(float(diameter / _DIAMETERS[-1]), f"lenslets of {diameter / um:.0f} µm")
     camera = PlenopticCamera.from_catalogue("thesis-plenoptic-1").replace(
         lenslets={"pitch": float(diameter), "count": (25, 25)}, sensor={"pixel_pitch": float(diameter) / 30}
     )

@@ -38,10 +38,10 @@ def run(context: Context) -> Outcome:
             Row(f"width of the rendered point, rms, {name}", blur, "lenslets"),
         ]
     loss = (1 - rows[0].got) / (1 - rows[4].got)
-    rows.append(Row("light lost, 100 um over 150 um", loss, "", "more", 1.5, (0.0, np.inf)))
+    rows.append(Row("light lost, 100 µm over 150 µm", loss, "", "more", 1.5, (0.0, np.inf)))
     return Outcome(
         tuple(rows), tuple(figures),
-        why="The printed focal length of 100 mm cannot be meant: 100 um would need a main lens of 0.24 mm, "
+        why="The printed focal length of 100 mm cannot be meant: 100 µm would need a main lens of 0.24 mm, "
         "whose Airy lobe is 15 lenslets wide. With 10 mm, as in Table 4.1, the picture looks as printed.",
     )  # fmt: skip
 

@@ -45,7 +45,7 @@ def run(context: Context) -> Outcome:
         context.progress(0.9, "real letters")
         real, pitch = _real_views(folder)
         rows.append(
-            Row("real camera, lenslet pitch", pitch / um, "um", None, 297.3, 0.2, note="the maker says 300")
+            Row("real camera, lenslet pitch", pitch / um, "µm", None, 297.3, 0.2, note="the maker says 300")
         )
         figures.append(_figure(real, "a real plenoptic 1.0 picture of letters at three depths"))
     return Outcome(
@@ -83,7 +83,7 @@ def _view_rows(camera: PlenopticCamera, views: LightField) -> list[Row]:
     moved = (right @ x) / right.sum() - (left @ x) / left.sum()
     rays = (1 - camera.alpha(_DZ)) * (u[last] - u[first])
     return [
-        Row("shift between two points of view", moved / um, "um"),
+        Row("shift between two points of view", moved / um, "µm"),
         Row("shift between them over ray optics'", moved / rays, "", "moves", 1.0, (0.5, 0.05),
             note="diffraction brings a part of every direction into every pixel"),
     ]  # fmt: skip

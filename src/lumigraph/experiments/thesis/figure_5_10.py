@@ -35,14 +35,14 @@ def run(context: Context) -> Outcome:
     window = 1 - _outside(grid.size[0] / 2 * math.pi / (alone.wavelength * f_number))
     inside = encircled_energy(image, middle, right / 2, (0.0, 0.0)) * window
     rows = (
-        Row("central lobe", lobe * 1e6, "um", 2.44 * alone.wavelength * f_number * 1e6, right * 1e6, 0.4),
+        Row("central lobe", lobe * 1e6, "µm", 2.44 * alone.wavelength * f_number * 1e6, right * 1e6, 0.4),
         Row("light in the central lobe", inside, "", 0.9, 1 - _outside(_ZERO), 0.004,
             "1 - J0²(3.83) - J1²(3.83), less what falls beside the sensor"),
     )  # fmt: skip
     near = np.abs(grid.x) < 2 * right
     airy = {"behind the main lens": profile[near] / profile.max()}
     figure = curves(
-        grid.x[near] * 1e6, airy, xlabel="x in the main-lens image [um]", ylabel="intensity",
+        grid.x[near] * 1e6, airy, xlabel="x in the main-lens image [µm]", ylabel="intensity",
         marks={"zero": right * 5e5, " zero": -right * 5e5},
     )  # fmt: skip
     return Outcome(

@@ -32,7 +32,7 @@ def run(context: Context) -> Outcome:
         at = int(np.argmin(np.abs(magnifications - m)))
         wave_lobe, wave_cutoff = measured(a[at], b[at], WAVELENGTH)
         rows += [
-            Row(f"lobe of the wave, m = {m:g}", wave_lobe * 1e6, "um", None, lobe[at] * 1e6,
+            Row(f"lobe of the wave, m = {m:g}", wave_lobe * 1e6, "µm", None, lobe[at] * 1e6,
                 5e-3 * lobe[at] * 1e6,
                 "twice the first zero behind a simulated lenslet, against 2.44 λ a/p"),
             Row(f"cut-off of the wave, m = {m:g}", wave_cutoff, "1/m", 1e4 if m == 0.5 else None, cutoff[at],
@@ -49,7 +49,7 @@ def run(context: Context) -> Outcome:
                     "on the sensor: 2.44 λ b/p": lobe * magnifications * 1e6,
                 },
                 xlabel="magnification of the lenslets",
-                ylabel="lobe [um]",
+                ylabel="lobe [µm]",
             ),
             "Width of a point's central lobe (5.11).",
         ),

@@ -20,7 +20,7 @@ def run(context: Context) -> Outcome:
     rows: list[Row] = []
     figures = []
     for number, separation in enumerate((40e-6, 80e-6)):
-        context.progress(number / 2, f"points {separation * 1e6:.0f} um apart")
+        context.progress(number / 2, f"points {separation * 1e6:.0f} µm apart")
         points = PointImage.of(camera(0.5, lenslets), ((0.0, -separation / 2), (0.0, separation / 2)))
         rows += _rows(points, separation)
         figures += _figures(points, separation)
@@ -35,12 +35,12 @@ def _rows(points: PointImage, separation: float) -> list[Row]:
     main, tile = _dip(*points.main_profile), _dip(*points.rendered_profile)
     if separation < 60e-6:
         return [
-            Row("middle over peak, main lens, 40 um", main, "", "limit", 0.744, 0.04),
-            Row("middle over peak, rendered, 40 um", tile, "", "merged", 1.0, (0.04, 0.0)),
+            Row("middle over peak, main lens, 40 µm", main, "", "limit", 0.744, 0.04),
+            Row("middle over peak, rendered, 40 µm", tile, "", "merged", 1.0, (0.04, 0.0)),
         ]
     return [
-        Row("middle over peak, main lens, 80 um", main, "", None, 0.0, 0.01, "each other's first dark ring"),
-        Row("middle over peak, rendered, 80 um", tile, "", "limit", 0.62, 0.04),
+        Row("middle over peak, main lens, 80 µm", main, "", None, 0.0, 0.01, "each other's first dark ring"),
+        Row("middle over peak, rendered, 80 µm", tile, "", "limit", 0.62, 0.04),
     ]
 
 
@@ -56,11 +56,11 @@ def _figures(points: PointImage, separation: float) -> list[tuple[object, str]]:
     ):
         panels.append((image[np.ix_(np.abs(grid.y) < width, np.abs(grid.x) < width)], name))
         profiles[name] = (x[np.abs(x) < width] * 1e6, values[np.abs(x) < width] / values.max())
-    text = f"Two points {separation * 1e6:.0f} um apart, m = 0.5"
+    text = f"Two points {separation * 1e6:.0f} µm apart, m = 0.5"
     return [
         (images(panels, columns=2), f"{text}: main-lens image and rendered picture."),
         (
-            curves([], profiles, xlabel="x in the main-lens image [um]", ylabel="intensity"),
+            curves([], profiles, xlabel="x in the main-lens image [µm]", ylabel="intensity"),
             f"{text}: profiles.",
         ),
     ]

@@ -40,7 +40,7 @@ def run(context: Context) -> Outcome:
         grid = rendered_grid(found.calibration, found.patch)
         printed, wrong_grid = _printed(found, raw)
         place, wrong = _place(right, grid), _place(printed, wrong_grid)
-        rows.append(Row(f"error, m = {m:g}", 1e6 * (place - _PLACE), "um", None, 0.0, _MOST))
+        rows.append(Row(f"error, m = {m:g}", 1e6 * (place - _PLACE), "µm", None, 0.0, _MOST))
         # Patches are as far off as the nearest lenslets' a/z2, which two of them see one pitch apart.
         expected = (
             1e6
@@ -51,7 +51,7 @@ def run(context: Context) -> Outcome:
             / found.image_distance
         )
         rows.append(
-            Row(f"error with the printed geometry, m = {m:g}", 1e6 * (wrong - _PLACE), "um", None, expected,
+            Row(f"error with the printed geometry, m = {m:g}", 1e6 * (wrong - _PLACE), "µm", None, expected,
                 20.0, note="± half a pitch times a/z2")
         )  # fmt: skip
         panels += [

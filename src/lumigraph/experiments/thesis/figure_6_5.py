@@ -67,7 +67,7 @@ def _rows(name: str, found: Diagnosis, intended: MisplacedCamera) -> list[Row]:
     if name == "shifted":
         for axis, value, right in zip("yx", found.offset, _SHIFT, strict=True):
             # The raw image is turned by 180 degrees.
-            rows.append(Row(f"offset along {axis}", value * 1e6, "um", None, -right * spread * 1e6, 0.5))
+            rows.append(Row(f"offset along {axis}", value * 1e6, "µm", None, -right * spread * 1e6, 0.5))
     if name == "turned":
         rows.append(Row("rotation", math.degrees(found.rotation), "deg", None, math.degrees(_TURN), 0.01))
     if name == "wrong distance":
@@ -80,7 +80,7 @@ def _rows(name: str, found: Diagnosis, intended: MisplacedCamera) -> list[Row]:
         rows += [
             Row("tilt about y", math.degrees(found.tilt[1]), "deg", None, math.degrees(_TILT), 0.2),
             Row("tilt about x", math.degrees(found.tilt[0]), "deg", None, 0.0, 0.2),
-            Row("pitch gradient along x", found.pitch_gradient[1] * 1e6, "um", None, gradient,
+            Row("pitch gradient along x", found.pitch_gradient[1] * 1e6, "µm", None, gradient,
                 -0.05 * gradient, "over the width of the sensor"),
         ]  # fmt: skip
     return rows

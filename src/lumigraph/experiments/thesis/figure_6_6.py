@@ -38,14 +38,14 @@ def run(context: Context) -> Outcome:
         rows += [
             Row(f"right fault named, {name}", float(found.faults == faults), "", None, 1.0, 0.0,
                 ", ".join(found.faults) or "none"),
-            Row(f"gap (overlap below 0), {name}", found.gap * 1e6, "um", None, gap, 2.5),
+            Row(f"gap (overlap below 0), {name}", found.gap * 1e6, "µm", None, gap, 2.5),
             Row(f"diameter of the main lens, {name}", found.diameter * 1e3, "mm", None,
                 camera.pupil_diameter * 1e3, 0.05),
             Row(f"diameter that would match, {name}", found.matching_diameter * 1e3, "mm", None,
                 matched * 1e3, 0.03),
         ]  # fmt: skip
         n, half = picture.shape[0] // 2, int(3.5 * pitch / intended.sensor.pixel_pitch)
-        text = f"{name}: gap {found.gap * 1e6:+.0f} um"
+        text = f"{name}: gap {found.gap * 1e6:+.0f} µm"
         panels.append((np.asarray(picture.data)[n - half : n + half, n - half : n + half], text))
     return Outcome(
         tuple(rows),

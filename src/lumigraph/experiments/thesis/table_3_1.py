@@ -13,10 +13,10 @@ THESIS = {"angular spectrum": 67.5, "band limited (circle)": 77.5, "corrected ba
 METHODS = ("band limited (circle)", "band limited", "band limited, padded")
 ALIASING = ("angular spectrum", "corrected band limited")
 TOLERANCES = {two_f.DIAMETER: 0.3, two_f.DIAMETER_OF_TABLE_4_1: 0.4}
-"""A sixteenth of a sample: the unpadded methods ring by so much [um]."""
+"""A sixteenth of a sample: the unpadded methods ring by so much [µm]."""
 
 WHY = (
-    "1.22 λ z / D with the D = 5 mm of the text is 48.8 um, not the printed 67 um; 67.8 um belongs to the "
+    "1.22 λ z / D with the D = 5 mm of the text is 48.8 µm, not the printed 67 µm; 67.8 µm belongs to the "
     "D = 3.6 mm of Table 4.1's lens, which was probably simulated. Without padding the corrected method "
     "keeps aliased light, which moves the minimum."
 )
@@ -45,7 +45,7 @@ def run(context: Context) -> Outcome:
                 Row(
                     f"first zero, {name}, D = {diameter / mm:g} mm",
                     first_zero(x, cut) / um,
-                    "um",
+                    "µm",
                     thesis=THESIS.get(name),
                     expected=expected if checked else None,
                     tolerance=tolerance if checked else None,
@@ -58,7 +58,7 @@ def run(context: Context) -> Outcome:
     figure = curves(
         x / um,
         drawn,
-        xlabel="x [um]",
+        xlabel="x [µm]",
         ylabel="intensity",
         log=True,
         marks={"48.8 um": 48.8, "67.8 um": 67.8},

@@ -18,7 +18,7 @@ MOST = 1e-7
 
 WHY = (
     "The printed variances are those of another Airy pattern: with the right diameter (see table 3.1) the "
-    "band-limited methods agree with theory to 1e-9. A pinhole of 10 um, two samples wide, is a source that "
+    "band-limited methods agree with theory to 1e-9. A pinhole of 10 µm, two samples wide, is a source that "
     "the lens half resolves, which alone costs 1e-8."
 )
 
@@ -54,7 +54,7 @@ def run(context: Context) -> Outcome:
     image, _ = two_f.point_image("band limited (circle)", two_f.DIAMETER, 10 * um)
     rows.append(
         Row(
-            "variance against Airy, band limited (circle), pinhole of 10 um",
+            "variance against Airy, band limited (circle), pinhole of 10 µm",
             float(np.var(two_f.profile(image) - right)),
             thesis=THESIS["band limited (circle)"],
             expected=0.0,
@@ -67,7 +67,7 @@ def run(context: Context) -> Outcome:
     figure = curves(
         x[near] / um,
         {name: two_f.clipped(error[near], 1e-9) for name, error in errors.items()},
-        xlabel="x [um]",
+        xlabel="x [µm]",
         ylabel="|intensity - Airy|",
         log=True,
     )

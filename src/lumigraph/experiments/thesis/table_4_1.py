@@ -73,7 +73,7 @@ def run(context: Context) -> Outcome:
         Row("f-number, f/D", one.main_lens.focal_length / one.pupil_diameter, "", 33.6, 33.333, 1e-3),
         Row("working f-number, z2/D", one.f_number, "", None, 66.667, 1e-3),
         Row("width of 101 lenslets", 101 * one.lenslets.pitch / mm, "mm", 20.0, 15.15, 1e-6),
-        Row("micro-image pitch, on a white image", found.lattice.pitch * pixel / um, "um", 150.0, 156.25,
+        Row("micro-image pitch, on a white image", found.lattice.pitch * pixel / um, "µm", 150.0, 156.25,
             0.5 * pixel / um, note="half a pixel; it comes out to a hundredth"),
         Row("light of a point in its own micro-image", share[3, 3], "", None, 0.904, 0.01),
         Row("the same of the Airy pattern on the lenslet, by integration", airy_in_square(

@@ -168,7 +168,7 @@ def _corrected_rows(camera: PlenopticCamera, corrected: np.ndarray) -> list[Row]
     rows, places = [], PLACES if corrected.shape[1] == len(PLACES) else PLACES[::2]
     for dz, found in zip(DEPTHS, corrected, strict=True):
         for (y, x), one in zip(places, found, strict=True):
-            where = f"{dz / mm:+.0f} mm, point at ({y / um:.0f}, {x / um:.0f}) um"
+            where = f"{dz / mm:+.0f} mm, point at ({y / um:.0f}, {x / um:.0f}) µm"
             rows.append(Row(f"bias corrected, {where}", float(one), "", None, camera.alpha(dz), 0.02))
     return rows
 

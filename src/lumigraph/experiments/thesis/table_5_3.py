@@ -46,13 +46,13 @@ def _rows(point: PointImage, m: float) -> list[Row]:
     main, tile = _lobe(*point.main_profile), _lobe(grid.x, part[len(part) // 2])
     printed, right = _PRINTED[m], _RIGHT[m]
     return [
-        Row(f"main-lens lobe, m = {m:g}", main, "um", printed[0], right[0], 1.0),
-        Row(f"rendered lobe, m = {m:g}", tile, "um", printed[1], right[1], 0.1 * right[1],
+        Row(f"main-lens lobe, m = {m:g}", main, "µm", printed[0], right[0], 1.0),
+        Row(f"rendered lobe, m = {m:g}", tile, "µm", printed[1], right[1], 0.1 * right[1],
             note="Fresnel ripples of the main lens' blurred disc move the zero by some per cent"),
         Row(f"width over width, m = {m:g}", main / tile, "",
             round(printed[0] / printed[1], 2), right[0] / right[1], 0.1 * right[0] / right[1]),
-        Row(f"first minimum × 2 across seams, m = {m:g}", _lobe(*point.rendered_profile), "um",
-            note=f"seams ± {_seam(point):.0f} um from the middle"),
+        Row(f"first minimum × 2 across seams, m = {m:g}", _lobe(*point.rendered_profile), "µm",
+            note=f"seams ± {_seam(point):.0f} µm from the middle"),
         Row(f"views of the point per axis, m = {m:g}", _views(point), "", round(1 / m, 1),
             note="light of the row over its brightest micro-image; 1/m for the mean of all places"),
     ]  # fmt: skip
@@ -63,7 +63,7 @@ def _lobe(x: np.ndarray, profile: np.ndarray) -> float:
 
 
 def _seam(point: PointImage) -> float:
-    """Half a lenslet's share of the main-lens image [um]."""
+    """Half a lenslet's share of the main-lens image [µm]."""
     camera = point.camera
     return 5e5 * camera.lenslets.pitch * camera.image_distance / camera.separation
 
@@ -94,7 +94,7 @@ def _figures(point: PointImage, m: float) -> list[tuple[object, str]]:
     return [
         (images(panels, columns=2), f"A point, m = {m:g}: square root of the intensity (5.13 to 5.15)."),
         (
-            curves([], profiles, xlabel="x in the main-lens image [um]", ylabel="intensity", marks=marks),
+            curves([], profiles, xlabel="x in the main-lens image [µm]", ylabel="intensity", marks=marks),
             f"Profiles of the point's image, m = {m:g} (5.16).",
         ),
     ]

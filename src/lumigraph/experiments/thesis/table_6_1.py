@@ -61,7 +61,7 @@ _ROUNDING = {"F#": 1e-4, "ν main lens": 1e-3, "ν plenoptic": 1e-3}
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> Outcome:
-    """Every cell from m, f_µ = 5.2 mm, p = 150 um and 633 nm, against the printed digits."""
+    """Every cell from m, f_µ = 5.2 mm, p = 150 µm and 633 nm, against the printed digits."""
     rows: list[Row] = []
     lines: dict[str, list[float]] = {"main lens": [], "plenoptic": []}
     magnifications = []
