@@ -38,6 +38,7 @@ VERBS = (
         "view",
         "samples",
     ),
+    "catalogue",
     "reproduce",
 )
 PROGRAM = [sys.executable, "-c", "import sys; from lumigraph.cli import main; sys.exit(main())"]

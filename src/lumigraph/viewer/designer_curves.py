@@ -25,7 +25,7 @@ def trade_offs(camera: AnyCamera) -> dict[str, Any]:
         size, unit = own.scale
         values = [_finite(row[own.name].value / size) if own.name in row else None for row in rows]
         curves.append({
-            "name": own.name[0].upper() + own.name[1:], "unit": unit.replace("um", "µm"),
+            "name": own.name[0].upper() + own.name[1:], "unit": unit,
             "equation": own.source, "values": values, "here": _finite(own.value / size),
         })  # fmt: skip
     return {"label": span.label, "at": span.own, "positions": numbers, "curves": curves}
