@@ -1,19 +1,25 @@
-"""Faults on purpose: writers killed at every line and every byte, bits flipped in every kept file.
+"""Faults on purpose: writers killed at every system call and every byte, bits flipped in every kept file.
 
-    python tests/fuzz/faults.py kills --count 1000 [--writers a.png a.zarr]
+    python tests/fuzz/faults.py kills --count 1000 [--writers a.png a.zarr] [--lines]
+    python tests/fuzz/faults.py runs --count 200 [--runs cache-8 deconvolution]
     python tests/fuzz/faults.py flips --count 2000
 
-A writer is killed before the n-th line of lumigraph that it runs, for n = 1, 2, ..., or when its file would
-pass so many bytes. Then the next start must find the old content or the new, whole, and leave nothing else.
+A writer is killed at the n-th system call that changes a disk, for n = 1, 2, ... (by strace; where there is
+none, before the n-th line of lumigraph), or when its file would pass so many bytes. Then the next start must
+find the old content or the new, whole, and leave nothing else. Runs are killed anywhere, and started again:
+they must end with the bits of a run that was not (`scenarios`).
 """
 
 import argparse
 import os
+import re
 import resource
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
+import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,6 +35,10 @@ from lumigraph import io, store
 from lumigraph.experiments.registry import Context
 from lumigraph.store import atomic
 
+CALLS = (
+    "openat,write,pwrite64,writev,ftruncate,fsync,fdatasync,rename,renameat,renameat2,link,unlink,unlinkat,"
+    "mkdir,mkdirat,rmdir,chmod,fchmod,fchmodat,chown,fchown,lchown,fchownat,flock,close"
+)
 PACKAGE = str(Path(lg.__file__).parent)
 SHAPE = (64, 48)
 
@@ -71,6 +81,15 @@ def _views(path: Path, value: int) -> None:
     lg.save(_field(value), path)
 
 
+def _without_exchange(path: Path, value: int) -> None:
+    """Where the system cannot swap folders."""
+    exchanged, atomic._exchanged = atomic._exchanged, lambda *_: False
+    try:
+        _picture(path, value)
+    finally:
+        atomic._exchanged = exchanged
+
+
 def _open(path: Path) -> int:
     found = lg.open(path)
     return _only(found.points if isinstance(found, lg.PointCloud) else found.data)
@@ -101,11 +120,16 @@ WRITERS = {
         lambda path: _only(store.read(path)["a"]),
     ),
     "key.kept.npz": Writer(_kept, _found),
+    "two-step.zarr": Writer(_without_exchange, _open),
     "page.html": Writer(
         lambda path, value: store.write_bytes(path, bytes([value]) * 70_000),
         lambda path: _only(np.frombuffer(path.read_bytes(), np.uint8)),
     ),
 }
+
+
+Make = Callable[[Callable[[], object]], Callable[[], None]]
+"""What makes a killed function of a function."""
 
 
 def forked(function: Callable[[], object]) -> int:
@@ -148,6 +172,38 @@ def dying(function: Callable[[], object], line: int) -> Callable[[], None]:
     return run
 
 
+def traced(function: Callable[[], object], log: Path, call: str = "", which: int = 0) -> Callable[[], None]:
+    """The function watched by strace, which kills it at a system call, that one of its kind."""
+
+    def run() -> None:
+        inject = ["-e", f"inject={call}:signal=SIGKILL:when={which}"] if call else []
+        watched = ["strace", "-f", "-qq", "-o", str(log), "-e", f"trace={CALLS},chdir", *inject]
+        subprocess.Popen([*watched, "-p", str(os.getpid())], stderr=subprocess.DEVNULL)
+        while not log.exists() or log.stat().st_size == 0:  # from a call that it has seen on, it sees all
+            os.chdir(".")
+            time.sleep(0.001)
+        function()
+
+    return run
+
+
+def calls_of(name: str, old: Path) -> list[tuple[str, int]]:
+    """Every system call of a writer that changes something on a disk: its name, and which of its kind."""
+    seen: dict[str, int] = {}
+    with tempfile.TemporaryDirectory() as place:
+        folder, log = Path(place) / "f", Path(place) / "log"
+        shutil.copytree(old, folder)
+        assert forked(traced(lambda: WRITERS[name].write(folder / name, 2), log)) == 0
+        time.sleep(0.1)  # strace writes its last lines
+        found = re.findall(r"^\d+ +(\w+)\(", log.read_text(), re.MULTILINE)
+    calls = []
+    for call in found:
+        if call != "chdir":
+            seen[call] = seen.get(call, 0) + 1
+            calls.append((call, seen[call]))
+    return calls
+
+
 def choking(function: Callable[[], object], size: int) -> Callable[[], None]:
     """The function, killed by the system when a file would pass so many bytes."""
 
@@ -160,7 +216,7 @@ def choking(function: Callable[[], object], size: int) -> Callable[[], None]:
     return run
 
 
-def killed(name: str, make: Callable[[Callable[[], object]], Callable[[], None]], old: Path) -> str:
+def killed(name: str, make: Make, old: Path) -> str:
     """What a kill did: "" where the next start finds all in order, "done" where the writer was not killed."""
     writer = WRITERS[name]
     with tempfile.TemporaryDirectory() as place:
@@ -182,24 +238,34 @@ def killed(name: str, make: Callable[[Callable[[], object]], Callable[[], None]]
         return "" if code < 0 else "done" if code == 0 else f"exit code {code}"
 
 
-def kills(name: str, most: int) -> tuple[int, list[str]]:
-    """Kills of one writer, at most so many, and what went wrong; half of them in the middle of a write."""
+def kills(name: str, most: int, *, lines: bool = False) -> tuple[int, list[str]]:
+    """Kills of one writer, at most so many, a quarter in the middle of a write; and what went wrong."""
     failures, count = [], 0
-    with tempfile.TemporaryDirectory() as place:
+    with tempfile.TemporaryDirectory() as place, tempfile.TemporaryDirectory() as logs:
         old = Path(place)
         assert forked(lambda: WRITERS[name].write(old / name, 1)) == 0
-        size = max(path.stat().st_size for path in [old / name, *(old / name).rglob("*")])
-        sizes = np.unique(np.linspace(0, size, max(2, most // 4)).astype(int))
-        plans = [lambda work, k=k: choking(work, int(k)) for k in sizes]
-        for make in [*plans, *(lambda work, n=n: dying(work, n) for n in range(1, most + 1))]:
+        for make in [*_chokings(old, most // 4), *_deaths(name, old, Path(logs), most, lines=lines)]:
             if count >= most:
                 break
             found = killed(name, make, old)
-            if found == "done" and make not in plans:
-                break  # it has run to its end: every line was tried
             count += found != "done"
             failures += [f"{name}: {found}"] if found not in ("", "done") else []
     return count, failures
+
+
+def _chokings(old: Path, most: int) -> list[Make]:
+    size = max(path.stat().st_size for path in old.rglob("*"))
+    sizes = np.unique(np.linspace(0, size, max(2, most)).astype(int))
+    return [lambda work, k=k: choking(work, int(k)) for k in sizes]
+
+
+def _deaths(name: str, old: Path, logs: Path, most: int, *, lines: bool) -> list[Make]:
+    """Kills at every system call, or at lines; evenly spaced where there are more than asked for."""
+    if lines or shutil.which("strace") is None:
+        return [lambda work, n=n: dying(work, n) for n in range(1, most + 1)]
+    calls = calls_of(name, old)
+    places = np.unique(np.linspace(0, len(calls) - 1, most).astype(int))
+    return [lambda work, k=k: traced(work, logs / str(k), *calls[k]) for k in places]
 
 
 def flips(files: dict[str, dict[str, np.ndarray]], count: int, seed: int = 0) -> tuple[int, int, int]:
@@ -246,18 +312,24 @@ def kept_files() -> dict[str, dict[str, np.ndarray]]:
 def main() -> int:
     """Print what the faults did."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("what", choices=("kills", "flips"))
+    parser.add_argument("what", choices=("kills", "runs", "flips"))
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--writers", nargs="*", default=list(WRITERS))
+    parser.add_argument("--lines", action="store_true", help="kill at lines though there is strace")
+    parser.add_argument("--runs", nargs="*", help="only these")
     given = parser.parse_args()
     if given.what == "flips":
         files = kept_files()
         found, wrong, sick = flips(files, given.count)
         print(f"{given.count} flips in {len(files)} files: {found} found, {wrong} wrong, {sick} not healed")
         return int(wrong > 0 or sick > 0)
+    if given.what == "runs":
+        import scenarios
+
+        return scenarios.main(given.count, given.runs)
     failed = 0
     for name in given.writers:
-        count, failures = kills(name, given.count // len(given.writers))
+        count, failures = kills(name, given.count // len(given.writers), lines=given.lines)
         failed += len(failures)
         print(f"{name:14} {count} kills, {len(failures)} failures {failures[:3]}", flush=True)
     return int(failed > 0)

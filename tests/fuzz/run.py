@@ -181,7 +181,7 @@ def _child(
         board[:40] = struct.pack("=qqqqd", k, opened, refused, starved, slowest)
         tree, told = make(k), []
         signal.setitimer(signal.ITIMER_PROF, SECONDS)  # of the processor: others may be at work
-        signal.alarm(6 * SECONDS)
+        signal.alarm(30 * SECONDS)
         start = time.process_time()
         try:
             with watch:

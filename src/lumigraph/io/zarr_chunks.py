@@ -39,7 +39,7 @@ def check_entries(path: Path, limit: int) -> None:
                 )
             if entry.filename.endswith("zarr.json"):
                 _check_metadata(path, entry.file_size)
-            _check_packing(path, packed, entry)
+                _check_packing(path, packed, entry)
 
 
 def _check_packing(path: Path, file: BinaryIO, entry: zipfile.ZipInfo) -> None:
@@ -97,10 +97,11 @@ def _contents(path: Path, name: str, most: int) -> Iterator[bytes]:
                 _check_chunk(path, file.name, file.stat().st_size, most)
                 yield file.read_bytes()
         return
-    with zipfile.ZipFile(path) as file:
+    with path.open("rb") as packed, zipfile.ZipFile(packed) as file:
         for entry in file.infolist():
             if entry.filename.startswith(f"{name}/") and not entry.filename.endswith(("zarr.json", "/")):
                 _check_chunk(path, entry.filename, entry.file_size, most)
+                _check_packing(path, packed, entry)
                 yield file.read(entry)
 
 

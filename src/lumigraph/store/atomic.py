@@ -80,6 +80,13 @@ def sweep(folder: Path) -> None:
                 _clear(place)
 
 
+def sweep_once(folder: Path) -> None:
+    """As `sweep`, unless this process has done so."""
+    if folder not in _SWEPT:
+        _SWEPT.add(folder)
+        sweep(folder)
+
+
 def restored(path: Path) -> bool:
     """Whether something lies at `path` after all: a writer may stand, or have died, between two steps."""
     end = time.monotonic() + _PATIENCE
@@ -122,9 +129,7 @@ def _reason(error: OSError, folder: Path) -> str:
 
 @contextmanager
 def _workplace(folder: Path) -> Iterator[Path]:
-    if folder not in _SWEPT:
-        _SWEPT.add(folder)
-        sweep(folder)
+    sweep_once(folder)
     place, lock = _locked_folder(folder)
     try:
         yield place
