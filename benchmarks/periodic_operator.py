@@ -28,8 +28,8 @@ from benchmarks import _point_sums, plenoptic_snapshots
 from lumigraph.core import memory
 from lumigraph.core.arrays import WORKERS
 from lumigraph.operators import periodic_operator
-from lumigraph.operators.blocks import build_bytes
 from lumigraph.operators.optics import Optics
+from lumigraph.operators.sizes import build_bytes
 from lumigraph.units import mm, nm, um
 
 Row = dict[str, Any]
@@ -70,6 +70,9 @@ CAMERAS: dict[str, Callable[[], Any]] = {
     "2.0, m = 0.25": lambda: camera(magnification=0.25),
     "2.0, Galilean": lambda: camera(magnification=-0.4, focal_length=8 * mm),
     "2.0, hexagonal": lambda: camera(layout="hex", count=(8, 7)),
+    "2.0, three kinds": lambda: camera(
+        layout="hex", count=(8, 7), focal_length=(5.2 * mm, 5 * mm, 5.4 * mm), shape="round"
+    ),
     "1.0": plenoptic,
 }
 
@@ -155,7 +158,7 @@ def first_image(count: int, depths: int, repeats: int, pixel: float = 1.0) -> li
     full[top : top + target.shape[0], left : left + target.shape[1]] = target
     picture = full if depths == 1 else np.stack([full] * depths)
     before, start = _peak(), time.perf_counter()
-    building = build_bytes(Optics.of(found, found.object_distance, 1e-3), WORKERS) / GIB
+    building = build_bytes(Optics.of(found, found.object_distance, 1e-3).bricks, WORKERS) / GIB
     operator = periodic_operator(found, grid, found_depths)
     built = time.perf_counter() - start
     predicted = before + max(building, operator.memory_bytes / GIB)

@@ -66,6 +66,33 @@ def test_cells_cover_the_array(lenslets):
         assert edge + n * size >= whole / 2 - size / 2 - 1e-9
 
 
+HEX = {"layout": "hex", "focal_length": (5 * mm, 5.2 * mm, 5.4 * mm), "offset": (13 * um, -20 * um)}
+
+
+@pytest.mark.parametrize("lenslets", [{"layout": "hex"}, HEX, HEX | {"count": (4, 7), "rotation": 0.02}])
+def test_each_lenslet_of_a_hexagonal_array_stands_amid_a_brick_of_its_kind(lenslets):
+    camera = focused(**lenslets).optics()
+    array = cells.lenslet_array(camera)
+    found, (tall, wide) = cells.bricks_of(camera, array, Fineness(1e-3)), array.extent
+    assert all(n % 2 == 0 for n in (found.points[1], found.samples[1]))
+    pairs = array.lattice.indices((-tall / 2, tall / 2), (-wide / 2, wide / 2))
+    kinds, seen = array.lattice.kind(pairs[:, 0], pairs[:, 1]), set()
+    for (y, x), kind in zip(array.lattice.position(pairs), kinds, strict=True):
+        row = (y - found.edge[0]) / found.size[0] - 0.5
+        column = (x - found.edge[1]) / found.size[1] - 0.5 - round(row) % 2 / 2
+        assert abs(row - round(row)) + abs(column - round(column)) < 1e-6
+        i, j = round(row) + found.ring[0], round(column) + found.ring[1]
+        odd = round(row) % 2
+        assert i in found.rows(found.ring[0], found.ring[0] + found.count[0], odd)
+        assert j in found.columns(found.ring[1], found.ring[1] + found.count[1], odd, int(kind) % found.kinds)
+        seen.add((i, j))
+    assert len(seen) == len(pairs)
+    for kind in range(found.kinds):
+        i, j = array.lattice.index(*(np.array(c) for c in found.middle(kind)))
+        assert array.lattice.kind(i, j) % found.kinds == kind
+        np.testing.assert_allclose(array.lattice.position(np.array([i, j])), found.middle(kind), atol=1e-12)
+
+
 def test_points_hold_what_the_main_lens_resolves():
     """λL/(2D), half again as close; an even number of them."""
     camera = focused()

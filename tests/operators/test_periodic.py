@@ -4,13 +4,14 @@ from functools import partial
 
 import numpy as np
 import pytest
+from benchmarks import references
 from scipy.special import j1
 
 import cameras
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError
-from lumigraph.instruments import PlenopticCamera
+from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera
 from lumigraph.operators import band, cells, kernels, periodic_operator
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.streamed import stream_bytes
@@ -200,6 +201,29 @@ def test_what_is_too_large_to_hold_is_streamed_and_gives_the_same(name, monkeypa
     assert relative(held.adjoint(y), streamed.adjoint(y)) < 3e-3
     left = (image.astype(float) * y).sum()
     assert left == pytest.approx((x * streamed.adjoint(y).astype(float)).sum(), rel=1e-6)
+
+
+def test_what_takes_too_long_to_build_is_refused_at_once(monkeypatch):
+    from lumigraph.core import memory
+
+    monkeypatch.setattr(memory, "available", lambda: 2**40)
+    camera = FocusedPlenopticCamera.from_catalogue("multi-focus-hex")
+    with pytest.raises(SamplingError, match=r"8e\+14 operations to build, .* An accuracy of 0\.01 fits"):
+        periodic_operator(camera, Grid((4, 4), 30 * um))
+
+
+@pytest.mark.long  # quadrature over hexagons of three kinds, and all their borders
+def test_points_behind_three_kinds_are_as_exact_as_asked_in_the_middle_and_at_the_border():
+    """One kind in another's place, or a row that is not staggered, is off by half and more."""
+    camera = focused(layout="hex", count=(6, 5), focal_length=(5.2 * mm, 5 * mm, 5.4 * mm))
+    step = camera.lenslets.pitch * camera.object_distance / camera.separation
+    at = [(0.1 * step, -0.23 * step), (0.45 * step, 0.9 * step), (-2 * step, 0.2 * step)]
+    truth = references.points(camera, 0.0, at, references.Fineness(40, 3, 700, 64))
+    share = (1 * um * camera.separation / camera.object_distance) ** 2
+    for point, expected, limit in zip(at, truth, (1e-2, 1e-2, 2e-2), strict=True):
+        grid = Grid((1, 1), 1 * um, point)
+        image = periodic_operator(camera, grid, accuracy=1e-2).forward(np.ones((1, 1))) / share
+        assert relative(image, expected) < limit
 
 
 def test_an_operator_that_cannot_fit_is_refused(monkeypatch):

@@ -17,7 +17,7 @@ computed once.
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain, product
+from itertools import chain
 
 import numpy as np
 
@@ -25,23 +25,20 @@ from lumigraph.core import memory
 from lumigraph.core.arrays import WORKERS
 from lumigraph.core.progress import Progress
 from lumigraph.core.threads import each
-from lumigraph.elements import LensletArray
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.cell_response import INFINITE, Lenslets, Limits
 from lumigraph.operators.optics import Optics
+from lumigraph.operators.places import INSIDE, Place, State, alike, flipped, inside, places, terms
 from lumigraph.operators.point_images import Apart, Few, Line, Lit, factors, few, lit, mirrored, wave
-
-State = tuple[Limits, Limits]
-"""Limits of the lenslets that exist, along y and along x."""
-
-INSIDE: State = (INFINITE, INFINITE)
-"""Far from all borders."""
+from lumigraph.operators.sizes import build_bytes, states_of, symmetric, together
 
 Offset = tuple[int, int]
 
 Factors = tuple[np.ndarray, np.ndarray]
 
 Blocks = dict[Offset, Factors]
+
+Means = dict[Offset, np.ndarray]
 
 BORDER = 3.0
 """How much stronger than elsewhere factors are that are looked at in the border's blocks."""
@@ -58,15 +55,16 @@ class Part:
     rows, columns
         Cells of the image, counted from the outermost ring around the array.
     offsets
-        (dy, dx, rank): cells from the image's to the object's, row by row, and the factors' columns for it.
+        (dy, dx, rank): cells from the image's to the object's, row by row, and the factors' columns for it;
+        in a row, those that are as many columns apart as the image's cells follow one another.
     left
         (points, R) with the ranks side by side; None for one offset whose block `right` is.
     right
         (R, samples).
     """
 
-    rows: tuple[int, int]
-    columns: tuple[int, int]
+    rows: range
+    columns: range
     offsets: tuple[tuple[int, int, int], ...]
     left: np.ndarray | None
     right: np.ndarray
@@ -76,107 +74,6 @@ class Part:
         """The left one, of a part in factors."""
         assert self.left is not None  # a single block
         return self.left
-
-
-@dataclass(frozen=True, slots=True)
-class Band:
-    """Rows or columns of cells with the same lenslets around them.
-
-    Parameters
-    ----------
-    cells
-        The first and the one after the last, from the outermost ring around the array.
-    limits
-        Of the lenslets' centres, from a cell's centre [m]; infinite where the border is far.
-    ring
-        Whether it is of a ring.
-    close
-        Whether what is missing counts in corners too.
-    """
-
-    cells: tuple[int, int]
-    limits: Limits
-    ring: bool = False
-    close: bool = False
-
-
-def bands(optics: Optics, axis: int) -> list[Band]:
-    """Along y (0) or x (1); the first is all of the array's cells, as if it had no border."""
-    cells, extent = optics.cells, optics.array.extent
-    size, n, pitch = cells.size[axis], cells.count[axis], optics.array.lattice.pitch
-    first = cells.ring[axis]
-    result = [Band((first, first + n), INFINITE)]
-    if extent is None:
-        return result
-    fineness, fresnel = optics.fineness, _cells.fresnel_number(optics.camera)
-    far, close = (
-        size / 2 + border * pitch * (1 + 1e-9) + optics.spill
-        for border in (fineness.border(fresnel), fineness.corner(fresnel))
-    )
-    for row in range(cells.image[axis]):
-        middle = cells.edge[axis] + (row - first + 0.5) * size
-        low, high = -extent[axis] / 2 - middle, extent[axis] / 2 - middle
-        ring = not first <= row < first + n
-        limits = _near(low, far), _near(high, far)
-        if limits == INFINITE and not ring:
-            continue
-        result.append(Band((row, row + 1), limits, ring, ring or min(abs(low), abs(high)) < close))
-    return result
-
-
-def _near(border: float, far: float) -> float:
-    """A border at a distance from a cell's centre; infinite where it is far."""
-    return round(border, 12) if abs(border) < far else math.copysign(math.inf, border)
-
-
-def _flipped(limits: Limits) -> Limits:
-    return -limits[1], -limits[0]
-
-
-Place = tuple[Band, Band]
-
-Turn = tuple[bool, bool, bool]
-
-
-def places(optics: Optics) -> list[Place]:
-    """Where blocks are added: along the borders and, where both are close, in the corners."""
-    along_y, along_x = bands(optics, 0), bands(optics, 1)
-    edges = [(y, along_x[0]) for y in along_y[1:]] + [(along_y[0], x) for x in along_x[1:]]
-    return edges + [(y, x) for y in along_y[1:] for x in along_x[1:] if y.close and x.close]
-
-
-def terms(place: Place) -> dict[State, int]:
-    """What is added at a place: a sum of blocks with the lenslets of a state."""
-    y, x = place
-    if INFINITE in (y.limits, x.limits):  # along a border
-        inside = {} if y.ring or x.ring else {(INFINITE, INFINITE): -1}
-        return {(y.limits, x.limits): 1, **inside}
-    result = {(y.limits, x.limits): 1}
-    if not x.ring:
-        result[y.limits, INFINITE] = -1
-    if not y.ring:
-        result[INFINITE, x.limits] = -1
-    if not (x.ring or y.ring):
-        result[INFINITE, INFINITE] = 1
-    return result
-
-
-def build_bytes(optics: Optics, workers: int = 1) -> float:
-    """Memory that building all parts takes [bytes], from their sizes and the usual number of factors."""
-    cells, near = optics.cells, optics.near
-    even = _symmetric(optics.array) and _cells.mirrored(optics.camera)
-    square = even and cells.size[0] == cells.size[1]
-    wanted = [place for place, source, _ in alike(places(optics), even, square) if place is source]
-    states = {(INFINITE, INFINITE)} | {state for place in wanted for state in terms(place)}
-    kept = 1 + sum(INFINITE in state for state in states)
-    points, samples = math.prod(cells.points), math.prod(cells.samples)
-    block = 4.0 * points * samples
-    rows = workers * (2 * kept + 4) * block
-    factors = (1.3 * len(wanted) + 0.7 * len(places(optics))) * math.sqrt(points)  # of a block
-    factors /= optics.array.fill_factor  # small lenslets diffract more widely
-    rows += factors * math.prod(2 * n + 1 for n in near) * 4.0 * (points + samples)
-    images = {state[1] for state in states} if optics.straight else states
-    return rows + len(images) * optics.images_bytes(near)
 
 
 @dataclass(slots=True)
@@ -205,12 +102,12 @@ class Built:
     parts
         One after the other: those that mirror another one are copies, made when they are asked for.
     means
-        Mean images (samples,) of a cell's points at each offset.
+        Mean images (samples,) of a cell's points at each offset, for each kind of the image's cells.
     """
 
     ranks: int
     parts: Iterator[Part]
-    means: dict[Offset, np.ndarray]
+    means: list[Means]
 
 
 def build(optics: Optics, progress: Progress | None = None) -> Built:
@@ -222,22 +119,26 @@ def build(optics: Optics, progress: Progress | None = None) -> Built:
     while workers > 1 and build_bytes(optics, workers) > free / 2:
         workers -= 1
     builder = Builder(optics, progress or (lambda _: None), workers)
-    inside, means = builder.periodic()
-    rows, columns = (band[0].cells for band in (bands(optics, 0), bands(optics, 1)))
+    found, means = builder.periodic()
+    groups = [([place for place in inside(optics) if place.kind == k], found[k]) for k in range(len(found))]
+    whole = (part for mine, blocks in groups for part in _parts(optics.cells, mine, blocks))
     ranks, border = builder.border()
-    return Built(_ranks(inside) + ranks, chain([_part(rows, columns, inside)], border), means)
+    return Built(sum(map(_ranks, found)) + ranks, chain(whole, border), means)
 
 
 def _ranks(blocks: Blocks) -> int:
     return sum(left.shape[1] for left, _ in blocks.values())
 
 
-def _part(rows: tuple[int, int], columns: tuple[int, int], blocks: Blocks) -> Part:
-    order = sorted(key for key, (left, _) in blocks.items() if left.shape[1])
-    offsets = tuple((dy, dx, blocks[dy, dx][0].shape[1]) for dy, dx in order)
+def _parts(cells: _cells.Cells, mine: Iterable[Place], blocks: Blocks) -> Iterator[Part]:
+    """Of places that have the same blocks: their factors are the same arrays."""
+    lit = (key for key, (left, _) in blocks.items() if left.shape[1])
+    order = sorted(lit, key=lambda key: (key[0], key[1] % cells.kinds, key[1]))
     left = np.concatenate([blocks[key][0].T for key in order], axis=0, dtype=np.float32).T
     right = np.concatenate([blocks[key][1] for key in order], axis=0, dtype=np.float32)
-    return Part(rows, columns, offsets, left, right)
+    for place in mine:
+        offsets = [(*cells.seen_from(place.parity, *key), blocks[key][0].shape[1]) for key in order]
+        yield Part(place.rows, place.columns, tuple(offsets), left, right)
 
 
 class Builder:
@@ -247,33 +148,41 @@ class Builder:
         self.optics, self.axes, self.progress, self.workers = optics, optics.axes, progress, workers
         distance = _cells.telecentric_distance(optics.camera)
         self.lenslets = Lenslets(self.axes, optics.array, optics.camera.wavelength, distance)
-        self.light = wave(optics.camera, optics.distance, self.axes, optics.reach).dimmed(optics.image_scale)
-        self.even = self.light.even and _symmetric(optics.array)
+        light = wave(optics.camera, optics.distance, self.axes, optics.margin(optics.reach))
+        self.light = light.dimmed(optics.image_scale)
+        self.even = self.light.even, self.light.even and symmetric(optics.array)
         y, x = self.axes
         self.square = y == x and bool(np.allclose(self.light.data, self.light.data.T))
         self.norm = self.least = 0.0
 
-    def periodic(self) -> tuple[Blocks, dict[Offset, np.ndarray]]:
-        """Blocks inside the array, and the mean images (samples,) of a cell's points."""
-        inside, reach = (INFINITE, INFINITE), self.optics.reach
-        images = self.images([inside], reach)[inside]
-        own = images.line(0)(0)
-        self.least = 0.02 * self.optics.fineness.rank * float(np.linalg.norm(own))
+    def periodic(self) -> tuple[list[Blocks], list[Means]]:
+        """For each kind: blocks inside the array, and the mean images (samples,) of a cell's points."""
+        found, kinds = [], self.optics.cells.kinds
+        for kind in range(kinds):
+            found.append(self._inside(State(INFINITE, INFINITE, kind)))
+            self.progress(0.1 * (kind + 1) / kinds)
+        return self._completed(found)
+
+    def _inside(self, state: State) -> dict[Offset, _Found]:
+        reach = self.optics.reach
+        images, (up, left) = self.images([state], reach)[state], self.even
+        if not self.least:
+            own = images.line(0)(0)
+            self.least = 0.02 * self.optics.fineness.rank * float(np.linalg.norm(own))
 
         def piece(job: Job) -> tuple[float, dict[Offset, _Found]]:
             (dy, across), found, norm = job, {}, 0.0
             line = images.line(dy)
-            for dx in across if self.even else signed(across):
-                block, copies = line(dx), 2 ** ((dy != 0) + (dx != 0)) if self.even else 1
+            for dx in across if left else self.signed(dy, across):
+                block, copies = line(dx), 2 if up and dy else 1
+                copies *= 2 if left and self.optics.cells.mirrored(dy, dx) != dx else 1
                 norm += copies * float(np.linalg.norm(block)) ** 2
                 found[dy, dx] = self._factored(block, copies)
             return norm, found
 
-        pieces = list(each(piece, self.jobs(self.even, reach), self.workers))
-        self.norm = sum(norm for norm, _ in pieces)
-        found = {key: f for _, part in pieces for key, f in part.items()}
-        self.progress(0.1)
-        return self._completed(found)
+        pieces = list(each(piece, self.jobs(up, reach), self.workers))
+        self.norm += sum(norm for norm, _ in pieces) / self.optics.cells.kinds
+        return {key: f for _, part in pieces for key, f in part.items()}
 
     def jobs(self, folded: bool, reach: tuple[int, int]) -> list[Job]:
         """Offsets that share work, those of dx and -dx together."""
@@ -282,31 +191,39 @@ class Builder:
             return [(dy, (dx,)) for dy in rows for dx in across]
         return [(dy, across) for dy in rows]
 
-    def means_at_the_end(self) -> dict[Offset, np.ndarray]:
+    def signed(self, dy: int, across: Sequence[int]) -> list[int]:
+        """Columns on both sides, `dy` rows away."""
+        others = ((dx, self.optics.cells.mirrored(dy, dx)) for dx in across)
+        return [*across, *(other for dx, other in others if other != dx)]
+
+    def means_at_the_end(self) -> Means:
         """Mean images (samples,) of the points of the cells that are farthest, without any other block."""
         reach, found = self.optics.reach, {}
         images = self.images([INSIDE], reach)[INSIDE]
-        for dy, across in self.jobs(self.even, reach):
+        for dy, across in self.jobs(self.even[0], reach):
             line = images.line(dy)
-            for dx in across if self.even else signed(across):
+            for dx in across if self.even[1] else self.signed(dy, across):
                 if abs(dy) == reach[0] or abs(dx) == reach[1]:
                     found[dy, dx] = line(dx).mean(0, dtype=np.float64)
         return self._unfolded_means(found)
 
-    def _unfolded_means(self, means: dict[Offset, np.ndarray]) -> dict[Offset, np.ndarray]:
+    def _unfolded_means(self, means: Means) -> Means:
         none = np.zeros((math.prod(self.optics.cells.points), 1))
         blocks = {key: (none, mean[None]) for key, mean in means.items()}
-        return {key: mean[0] for key, (_, mean) in self._unfolded(blocks, (self.even, self.even)).items()}
+        return {key: mean[0] for key, (_, mean) in self._unfolded(blocks, self.even).items()}
 
-    def _completed(self, found: dict[Offset, _Found]) -> tuple[Blocks, dict[Offset, np.ndarray]]:
-        least = _least(found.values(), self.optics.fineness.rank**2 * self.norm)
-        folds = (self.even, self.even)
-        result = self._unfolded({key: f.cut(least) for key, f in found.items()}, folds)
-        means = self._unfolded_means({key: f.mean for key, f in found.items()})
+    def _completed(self, found: list[dict[Offset, _Found]]) -> tuple[list[Blocks], list[Means]]:
+        """The factors that are strong enough, and the light of what is left out."""
+        everything, result, means = [f for mine in found for f in mine.values()], [], []
+        least = _least(everything, self.optics.fineness.rank**2 * self.norm * len(found))
         even = np.ones((math.prod(self.optics.cells.points), 1), np.float32)
-        for key, (left, right) in result.items():
-            left_out = means[key] - left.mean(0, keepdims=True) @ right
-            result[key] = np.hstack([left, even]), np.vstack([right, left_out])
+        for mine in found:
+            blocks = self._unfolded({key: f.cut(least) for key, f in mine.items()}, self.even)
+            means.append(self._unfolded_means({key: f.mean for key, f in mine.items()}))
+            for key, (left, right) in blocks.items():
+                left_out = means[-1][key] - left.mean(0, keepdims=True) @ right
+                blocks[key] = np.hstack([left, even]), np.vstack([right, left_out])
+            result.append(blocks)
         return result, means
 
     def border(self) -> tuple[int, Iterator[Part]]:
@@ -316,35 +233,24 @@ class Builder:
         lit = [found for found in sources if _ranks(blocks[found[1]])]
 
         def parts() -> Iterator[Part]:
-            for (y, x), source, turn in lit:
-                yield _part(y.cells, x.cells, self._copied(blocks[source], *turn))
+            for place, source, turn in lit:
+                yield from _parts(self.optics.cells, [place], self._copied(blocks[source], *turn))
 
         return sum(_ranks(blocks[source]) for _, source, _ in lit), parts()
 
     def _border_blocks(self, wanted: Sequence[Place]) -> dict[Place, Blocks]:
         """Of some places: row after row of cells, so that what they share is computed once."""
-        reach = self.optics.near
-        known = self.images({state for place in wanted for state in terms(place)}, reach)
-
-        def piece(job: Job) -> dict[tuple[Place, Offset], _Found]:
-            (dy, across), found = job, {}
-            shared = _Shared(self, known, dy)
-            for dx in across:
-                for place in wanted:
-                    up, left = self._folds(place)
-                    for mine in [] if up and dy < 0 else [dx] if left else signed((dx,)):
-                        block = shared.total(terms(place), mine)
-                        found[place, (dy, mine)] = self._factored(block, 1, BORDER)
-                    shared.forget(lambda s: INFINITE not in s)  # those of corners serve once
-                shared.forget_blocks()
-            return found
-
         found: dict[Place, dict[Offset, _Found]] = {place: {} for place in wanted}
-        jobs = self.jobs(False, reach)
-        for done, part in enumerate(each(piece, jobs, self.workers)):
-            for (place, offset), block in part.items():
-                found[place][offset] = block
-            self.progress(0.1 + 0.9 * (done + 1) / len(jobs))
+        jobs, groups = self.jobs(False, self.optics.near), together(self.optics, wanted)
+        known: dict[State, Apart | Few] = {}
+        for number, group in enumerate(groups):
+            states = states_of(group)
+            known = {state: images for state, images in known.items() if state in states}
+            known |= self.images(states - known.keys(), self.optics.near)
+            for done, part in enumerate(each(self._border_piece(group, known), jobs, self.workers)):
+                for (place, offset), block in part.items():
+                    found[place][offset] = block
+                self.progress(0.1 + 0.9 * (number + (done + 1) / len(jobs)) / len(groups))
         # A row of cells is a small part of the picture: its error may be larger.
         budget = (2 * self.optics.fineness.rank) ** 2 * self.norm
         result = {}
@@ -355,22 +261,38 @@ class Builder:
             result[place] = self._unfolded(cut, self._folds(place))
         return result
 
+    def _border_piece(
+        self, wanted: Sequence[Place], known: dict[State, Apart | Few]
+    ) -> Callable[[Job], dict[tuple[Place, Offset], _Found]]:
+        def piece(job: Job) -> dict[tuple[Place, Offset], _Found]:
+            (dy, across), found = job, {}
+            shared = _Shared(self, known, dy)
+            for dx in across:
+                for place in wanted:
+                    up, left = self._folds(place)
+                    for mine in [] if up and dy < 0 else [dx] if left else self.signed(dy, (dx,)):
+                        block = shared.total(terms(place), mine)
+                        found[place, (dy, mine)] = self._factored(block, 1, BORDER)
+                    shared.forget(lambda s: INFINITE not in s)  # those of corners serve once
+                shared.forget_blocks()
+            return found
+
+        return piece
+
     def images(self, states: Iterable[State], reach: tuple[int, int]) -> dict[State, Apart | Few]:
         """Of points of `reach` cells to all sides, with the lenslets of each state."""
         cells, light = self.optics.cells, self.light
-        middle = [  # of any cell: only the border, as it is told, makes a difference
-            e + (n // 2 + 0.5) * s for e, n, s in zip(cells.edge, cells.count, cells.size, strict=True)
-        ]
         behind: dict[Limits, Lit] = {}
 
         def of(state: State) -> Apart | Few:
-            response = self.lenslets.response((middle[0], middle[1]), state)
+            # Any cell of the kind: only the border, as it is told, makes a difference.
+            response = self.lenslets.response(cells.middle(state.kind), (state.y, state.x))
             if response.core is not None:
-                return few(light, response, self.axes, reach)
-            if state[1] not in behind:
-                columns = self._columns(self.folded(state[1]), reach[1])
-                behind[state[1]] = lit(light, response.across, self.axes[1], columns)
-            return Apart(behind[state[1]], response.down, self.axes)
+                return few(light, response, self.axes, self.optics.margin(reach), cells.staggered)
+            if state.x not in behind:
+                columns = self._columns(self.folded(1, state.x), reach[1])
+                behind[state.x] = lit(light, response.across, self.axes[1], columns)
+            return Apart(behind[state.x], response.down, self.axes)
 
         states = list(states)
         return dict(zip(states, each(of, states, self.workers), strict=True))
@@ -378,18 +300,19 @@ class Builder:
     def _columns(self, folded: bool, reach: int) -> range:
         return range(0 if folded else -reach, reach + 1)
 
-    def folded(self, limits: Limits) -> bool:
+    def folded(self, axis: int, limits: Limits) -> bool:
         """Whether what is on one side mirrors what is on the other."""
-        return self.even and _flipped(limits) == limits
+        return self.even[axis] and flipped(limits) == limits
 
     def _folds(self, place: Place) -> tuple[bool, bool]:
-        return self.folded(place[0].limits), self.folded(place[1].limits)
+        return self.folded(0, place.y.limits), self.folded(1, place.x.limits)
 
     def _copied(self, blocks: Blocks, across: bool, up: bool, left: bool) -> Blocks:
         result = {}
         for (dy, dx), pair in blocks.items():
             (i, j), factor = ((dx, dy), self._crossed(pair)) if across else ((dy, dx), pair)
-            result[-i if up else i, -j if left else j] = self._turned(factor, up, left)
+            side = self.optics.cells.mirrored(i, j) if left else j
+            result[-i if up else i, side] = self._turned(factor, up, left)
         return result
 
     def _crossed(self, pair: Factors) -> Factors:
@@ -406,7 +329,7 @@ class Builder:
         for (dy, dx), pair in blocks.items():
             for up in {False, folds[0]}:
                 for left in {False, folds[1]}:
-                    key = (-dy if up else dy, -dx if left else dx)
+                    key = (-dy if up else dy, self.optics.cells.mirrored(dy, dx) if left else dx)
                     if key not in result:
                         result[key] = self._turned(pair, up, left)
         return result
@@ -447,45 +370,14 @@ class _Shared:
         return self.blocks[state, dx]
 
     def _computed(self, state: State, dx: int) -> np.ndarray:
-        if dx < 0 and self.builder.folded(state[1]):
-            cells, block = self.builder.optics.cells, self._block(state, -dx)
+        cells = self.builder.optics.cells
+        other = cells.mirrored(self.dy, dx)
+        if dx < other and self.builder.folded(1, state.x):
+            block = self._block(state, other)
             return mirrored(mirrored(block, cells.points, False, True).T, cells.samples, False, True).T
         if state not in self.lines:
             self.lines[state] = self.known[state].line(self.dy)
         return self.lines[state](dx)
-
-
-def signed(across: Sequence[int]) -> list[int]:
-    """Both signs of each number that is not 0."""
-    return [*across, *(-dx for dx in across if dx)]
-
-
-def alike(wanted: Sequence[Place], even: bool, square: bool) -> list[tuple[Place, Place, Turn]]:
-    """Each place, the first that it mirrors, and how: across the diagonal, up and down, left and right."""
-    both, first, result = (False, True) if even else (False,), {}, []
-    for place in wanted:
-        for turn in product(both if square else (False,), both, both):
-            if (key := _turned_key(place, *turn)) in first:
-                break
-        else:
-            turn = (False, False, False)
-            first[key := _turned_key(place, *turn)] = place
-        result.append((place, first[key], turn))
-    return result
-
-
-def _turned_key(place: Place, across: bool, up: bool, left: bool) -> tuple:
-    """What the blocks of the mirrored place depend on."""
-    y, x = (
-        (_flipped(band.limits) if flip else band.limits, band.ring)
-        for band, flip in zip(place, (up, left), strict=True)
-    )
-    return (x, y) if across else (y, x)
-
-
-def _symmetric(array: LensletArray) -> bool:
-    """Whether a lenslet's surroundings are the same in a mirror."""
-    return array.lattice.kinds == 1 or isinstance(array.focal_length, float)
 
 
 def _least(found: Iterable[_Found], budget: float) -> float:

@@ -24,10 +24,12 @@ HALF_WIDTH = 20
 COARSEST, FINEST = 1e-2, 1e-5
 """Accuracies that can be asked for."""
 
+Offset = tuple[int, int]
+
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """Rectangular cells that tile a lenslet array, one lenslet or more in each.
+    """Cells that tile a lenslet array: rectangles, in rows that may be staggered as those of bricks.
 
     Parameters
     ----------
@@ -43,6 +45,12 @@ class Cells:
         Samples of the image along y and x of a cell.
     ring
         Cells of the image on each side of the array, at least one.
+    staggered
+        Whether odd rows, counted from the array's first, stand half a cell towards larger x.
+    kinds
+        A cell's row and column tell its kind: those of one kind have the same surroundings.
+    kind
+        Of the array's first cell.
     """
 
     size: tuple[float, float]
@@ -51,6 +59,9 @@ class Cells:
     points: tuple[int, int]
     samples: tuple[int, int]
     ring: tuple[int, int] = (1, 1)
+    staggered: bool = False
+    kinds: int = 1
+    kind: int = 0
 
     @property
     def image(self) -> tuple[int, int]:
@@ -61,14 +72,58 @@ class Cells:
     def grid(self, per_cell: tuple[int, int], scale: float, margin: tuple[int, int]) -> Grid:
         """`per_cell` samples of each cell and of `margin` more on all sides, times `scale`.
 
-        The samples stand evenly inside their cell; a negative scale turns the plane by 180°.
+        The samples stand evenly inside their cell; a negative scale turns the plane by 180°. Beside staggered
+        rows there is half a cell more.
         """
-        shape, pitch, center = [], [], []
-        for size, edge, n, k, m in zip(self.size, self.edge, self.count, per_cell, margin, strict=True):
-            shape.append((n + 2 * m) * k)
+        shape, pitch, center, more = [], [], [], (0, self.step(per_cell))
+        for size, edge, n, k, m, half in zip(
+            self.size, self.edge, self.count, per_cell, margin, more, strict=True
+        ):
+            shape.append((n + 2 * m) * k + half)
             pitch.append(size / k * abs(scale))
             center.append((edge - m * size + (shape[-1] // 2 + 0.5) * size / k) * scale)
         return Grid((shape[0], shape[1]), (pitch[0], pitch[1]), (center[0], center[1]))
+
+    def step(self, per_cell: tuple[int, int]) -> int:
+        """Samples, `per_cell` of them to a cell, from an even row's first to an odd row's."""
+        return per_cell[1] // 2 if self.staggered else 0
+
+    @property
+    def parities(self) -> range:
+        """Rows that differ in where their cells stand: 0 the even ones or all, 1 the odd ones."""
+        return range(2 if self.staggered else 1)
+
+    def shift(self, dy: int) -> int:
+        """Half cells from an even row to cell (dy, 0), as offsets from even rows are counted."""
+        return dy % 2 if self.staggered else 0
+
+    def mirrored(self, dy: int, dx: int) -> int:
+        """The column that is on the left what `dx` is on the right, `dy` rows away."""
+        return -dx - self.shift(dy)
+
+    def seen_from(self, parity: int, dy: int, dx: int) -> Offset:
+        """Rows and columns to the cell that is at (dy, dx) from an even row, from a row of a parity."""
+        return dy, dx + parity * self.shift(dy)
+
+    def rows(self, first: int, last: int, parity: int) -> range:
+        """Rows of the image from `first` to before `last` of a parity."""
+        if not self.staggered:
+            return range(first, last)
+        return range(first + (first - self.ring[0] - parity) % 2, last, 2)
+
+    def columns(self, first: int, last: int, parity: int, kind: int) -> range:
+        """Columns of the image from `first` to before `last` with cells of a kind, in rows of a parity."""
+        start = (kind - self.kind + parity - (first - self.ring[1])) % self.kinds
+        return range(first + start, last, self.kinds)
+
+    def middle(self, kind: int) -> tuple[float, float]:
+        """Centre (y, x) of a cell of a kind, amid the array [m]."""
+        row, column = (n // 2 for n in self.count)
+        if self.staggered:
+            row -= row % 2
+        column += (kind - self.kind - column) % self.kinds
+        y, x = (e + (k + 0.5) * s for e, k, s in zip(self.edge, (row, column), self.size, strict=True))
+        return y, x
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +165,12 @@ class Fineness:
         """
         return (6 * fresnel_number + 6 + 2 * blur) * (1e-3 / self.accuracy) ** 0.2
 
-    def neighbours(self, fresnel_number: float) -> int:
-        """Lenslets on each side of an image's cell whose light is followed into it."""
-        return math.ceil(5 * (1e-3 / self.accuracy) ** 0.23 * _tail(fresnel_number))
+    def neighbours(self, fresnel_number: float, *, gaps: bool = False) -> int:
+        """Lenslets on each side of an image's cell whose light is followed into it.
+
+        Between discs there are gaps: what their edges send aside goes farther than that of edges that meet.
+        """
+        return math.ceil((6 if gaps else 5) * (1e-3 / self.accuracy) ** 0.23 * _tail(fresnel_number))
 
     @property
     def rank(self) -> float:
@@ -201,18 +259,49 @@ def cells_of(camera: CameraOptics, array: LensletArray, fineness: Fineness) -> C
     edge = tuple(
         _nearest(-n * s / 2, o - s / 2, s) for n, s, o in zip(count, size, lattice.origin, strict=True)
     )
+    return _sampled(camera, fineness, Cells(_pair(size), _pair(edge), _pair(count), (2, 2), (1, 1)))
+
+
+def bricks_of(camera: CameraOptics, array: LensletArray, fineness: Fineness) -> Cells:
+    """A rectangle around each lenslet; those of a hexagonal array are staggered."""
+    lattice = array.lattice
+    if lattice.layout == "square":
+        return cells_of(camera, array, fineness)
+    height, pitch = math.sqrt(3) / 2 * lattice.pitch, lattice.pitch
+    tall, wide = array.extent or camera.sensor.grid.size
+    rows = max(1, math.ceil(tall / height - 1e-6))
+    low = _nearest(-rows * height / 2, lattice.origin[0] - height / 2, height)
+    i = round((low + height / 2 - lattice.origin[0]) / height)
+    start = lattice.origin[1] + (i - 1) * pitch / 2
+    # Odd rows begin half a brick later, and hold as many.
+    steps = math.ceil((-wide / 2 - start) / pitch - 1 - 1e-6)
+    left = start + steps * pitch
+    columns = max(1, math.ceil((wide / 2 - left) / pitch - 0.5 + 1e-6))
+    kinds = 1 if isinstance(array.focal_length, float) else lattice.kinds
+    bricks = Cells(
+        (height, pitch), (low, left), (rows, columns), (2, 2), (1, 1),
+        staggered=True, kinds=kinds, kind=int(lattice.kind(np.array(i), np.array(steps))) % kinds,
+    )  # fmt: skip
+    return _sampled(camera, fineness, bricks)
+
+
+def _sampled(camera: CameraOptics, fineness: Fineness, cells: Cells) -> Cells:
+    """The cells with as many points and samples, and as wide a ring, as the accuracy asks for."""
     finest = airy(camera) / 2 / OVERSAMPLING
-    pitch = lattice.pitch
+    assert camera.lattice is not None  # asked by `lenslet_array`
+    pitch = camera.lattice.pitch
     widest, beyond = blur(camera, camera.object_distance) / pitch, spill(camera)
     # Where micro-images overlap, light of more lenslets interferes.
     image = pitch / fineness.samples(fresnel_number(camera) * (1 + 2 / 3 * beyond / pitch), widest)
-    points = tuple(2 * math.ceil(s / finest / 2) for s in size)
-    samples = tuple(math.ceil(s / image) for s in size)
+    points = tuple(2 * math.ceil(s / finest / 2) for s in cells.size)
+    samples = [math.ceil(s / image) for s in cells.size]
+    if cells.staggered:
+        samples[1] += samples[1] % 2
     lit, ring = beyond + fineness.ring * pitch, []
-    for seen, e, n, s in zip(_seen(camera), edge, count, size, strict=True):
+    for seen, e, n, s in zip(_seen(camera), cells.edge, cells.count, cells.size, strict=True):
         looked_at = math.ceil((seen + max(e, -e - n * s)) / s - 1e-6)
         ring.append(max(1, min(math.ceil(lit / s), looked_at)))
-    return Cells(_pair(size), _pair(edge), _pair(count), _pair(points), _pair(samples), _pair(ring))
+    return replace(cells, points=_pair(points), samples=_pair(samples), ring=_pair(ring))
 
 
 def _seen(camera: CameraOptics) -> tuple[float, float]:

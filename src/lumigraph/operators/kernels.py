@@ -15,9 +15,10 @@ from lumigraph.core import memory
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.progress import Progress
 from lumigraph.errors import SamplingError
-from lumigraph.operators.blocks import Part, build, build_bytes
+from lumigraph.operators.blocks import Part, build
 from lumigraph.operators.glare import Glare, glare
 from lumigraph.operators.optics import Optics
+from lumigraph.operators.sizes import build_bytes, build_operations
 from lumigraph.operators.streamed import Streamed, stream_bytes, streamed
 
 
@@ -42,14 +43,17 @@ class Matrix:
     @property
     def nbytes(self) -> int:
         """Memory that it takes [bytes]."""
-        parts = sum(part.factor.nbytes + part.right.nbytes for part in self.parts)
-        return parts + self.glare.spectra.nbytes + self.glare.pictures.nbytes
+        shared = {part.right.ctypes.data: part.factor.nbytes + part.right.nbytes for part in self.parts}
+        return sum(shared.values()) + self.glare.spectra.nbytes + self.glare.pictures.nbytes
 
 
 _MATRICES = ByteCache()
 
 HELD = 2.0**32
 """Matrices that take more than this to build [bytes] are computed whenever they are applied."""
+
+LONGEST = 3e14
+"""Operations that building may take: some 50 minutes of one processor that does 1e11 a second."""
 
 
 def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None = None) -> Matrix | Streamed:
@@ -78,11 +82,13 @@ def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None
 
     # Packed and unpacked, built or found: products with other strides would round otherwise.
     key = optics.key
-    return _MATRICES.get((key, folder), lambda: _unpacked(store.kept(key, built, folder)))
+    return _MATRICES.get((key, folder), lambda: _unpacked(store.kept(key, built, folder), optics))
 
 
 def _held(optics: Optics) -> bool:
     limit = HELD if optics.straight else math.inf  # what cannot be streamed is held where it fits at all
+    if build_operations(optics) > LONGEST:
+        return False
     return build_bytes(optics) <= min(limit, memory.available() or math.inf)
 
 
@@ -96,9 +102,14 @@ def _require(optics: Optics) -> None:
     if _streams(optics):
         return
     coarser = (a for a in (1e-4, 1e-3, 1e-2) if a > optics.fineness.accuracy)
-    others = (Optics.of(optics.camera, optics.distance, a) for a in coarser)
+    others = (Optics.of(optics.camera, optics.distance, a).bricks for a in coarser)
     fits = next((o.fineness.accuracy for o in others if _held(o) or _streams(o)), None)
     remedy = "Use slower lenslets" if fits is None else f"An accuracy of {fits:g} fits: ask for that"
+    if (operations := build_operations(optics)) > LONGEST:
+        raise SamplingError(
+            f"the periodic operator takes {operations:.0e} operations to build, {operations / 6e12:.0f} min "
+            f"of a processor that does 1e11 a second; {LONGEST:.0e} are allowed. {remedy}, or use Snapshots."
+        )
     needed = stream_bytes(optics) if optics.straight else build_bytes(optics)
     memory.require(needed, "the periodic operator", f"{remedy}, or use Snapshots.", SamplingError)
 
@@ -106,15 +117,19 @@ def _require(optics: Optics) -> None:
 def _build(optics: Optics, progress: Progress | None = None) -> dict[str, np.ndarray]:
     """The matrix as a few arrays: the factors of all parts side by side."""
     found, per = build(optics, progress), optics.cells
-    rest = glare(found.means, per.size, per.image)
+    rest = glare(found.means, per)
     left = np.empty((found.ranks, math.prod(per.points)), np.float32)
     right = np.empty((found.ranks, math.prod(per.samples)), np.float32)
-    places, offsets, start = [], [], 0
+    places, offsets, mine, last = [], [], slice(0, 0), None
     for part in found.parts:
-        places.append((*part.rows, *part.columns, len(part.offsets)))
+        if part.right is not last:
+            mine, last = slice(mine.stop, mine.stop + len(part.right)), part.right
+            left[mine], right[mine] = part.factor.T, part.right
+        ranges = (part.rows, part.columns)
+        places.append(
+            [n for r in ranges for n in (r.start, r.stop, r.step)] + [len(part.offsets), mine.start]
+        )
         offsets += part.offsets
-        mine = slice(start, start + len(part.right))
-        left[mine], right[mine], start = part.factor.T, part.right, mine.stop
     return {
         "places": np.array(places),
         "offsets": np.array(offsets),
@@ -122,22 +137,16 @@ def _build(optics: Optics, progress: Progress | None = None) -> dict[str, np.nda
         "right": right,
         "spectra": rest.spectra,
         "pictures": rest.pictures,
-        "shape": np.array([*rest.image, *rest.margin, *optics.reach]),
     }
 
 
-def _unpacked(arrays: dict[str, np.ndarray]) -> Matrix:
+def _unpacked(arrays: dict[str, np.ndarray], optics: Optics) -> Matrix:
     """The matrix of what `_build` returns."""
-    parts, first, column = [], 0, 0
-    for top, bottom, left, right, count in arrays["places"].tolist():
+    parts, first, margin = [], 0, optics.margin(optics.reach)
+    for *ranges, count, column in arrays["places"].tolist():
         offsets = [(int(dy), int(dx), int(rank)) for dy, dx, rank in arrays["offsets"][first : first + count]]
         ranks = slice(column, column + sum(rank for _, _, rank in offsets))
-        parts.append(
-            Part(
-                (top, bottom), (left, right), tuple(offsets), arrays["left"][:, ranks], arrays["right"][ranks]
-            )
-        )
-        first, column = first + count, ranks.stop
-    rows, columns, *margins = arrays["shape"].tolist()
-    glare = Glare(arrays["spectra"], arrays["pictures"], (rows, columns), (margins[0], margins[1]))
-    return Matrix(tuple(parts), glare, (margins[2], margins[3]))
+        left, right = arrays["left"][:, ranks], arrays["right"][ranks]
+        parts.append(Part(range(*ranges[:3]), range(*ranges[3:]), tuple(offsets), left, right))
+        first += count
+    return Matrix(tuple(parts), Glare(arrays["spectra"], arrays["pictures"], optics.cells, margin), margin)

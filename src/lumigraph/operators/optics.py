@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.cell_response import SLACK, Axis
 from lumigraph.operators.cells import Cells, Fineness
 
-VERSION = 6
+VERSION = 7
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 
@@ -40,6 +40,11 @@ class Optics:
         plain, fineness = camera.optics(), Fineness(accuracy)
         array = _cells.lenslet_array(plain)
         return cls(plain, array, _cells.cells_of(plain, array, fineness), fineness, distance)
+
+    @property
+    def bricks(self) -> "Optics":
+        """With a cell around each lenslet, as the matrices have them."""
+        return replace(self, cells=_cells.bricks_of(self.camera, self.array, self.fineness))
 
     @property
     def rotation(self) -> float:
@@ -71,7 +76,8 @@ class Optics:
     def axes(self) -> tuple[Axis, Axis]:
         """Sampling of a cell along y and along x."""
         band = SLACK / 2 / _cells.airy(self.camera)
-        neighbours = self.fineness.neighbours(_cells.fresnel_number(self.camera))
+        gaps = self.array.shape == "round"
+        neighbours = self.fineness.neighbours(_cells.fresnel_number(self.camera), gaps=gaps)
         neighbourhood = neighbours * self.array.lattice.pitch + self.spill
         y, x = (
             Axis(size, points, samples, neighbourhood, band)
@@ -84,8 +90,9 @@ class Optics:
     @property
     def reach(self) -> tuple[int, int]:
         """Cells along y and x to which a point's light is followed in full."""
-        far = self.fineness.reach(*self._spread)
-        y, x = (max(1, math.ceil(far / size)) for size in self.cells.size)
+        far, pitch = self.fineness.reach(*self._spread), self.array.lattice.pitch
+        lenslets = max(1, math.ceil(far / pitch)) + 0.5
+        y, x = (math.ceil(lenslets * pitch / size - 0.5 - 1e-6) for size in self.cells.size)
         return y, x
 
     @property
@@ -94,6 +101,10 @@ class Optics:
         far = self.fineness.near(*self._spread)
         y, x = (max(1, round(far / size)) for size in self.cells.size)
         return min(y, self.reach[0]), min(x, self.reach[1])
+
+    def margin(self, reach: tuple[int, int]) -> tuple[int, int]:
+        """Cells on each side that hold those `reach` away: one more where rows are staggered."""
+        return reach[0], reach[1] + self.cells.staggered
 
     @property
     def _spread(self) -> tuple[float, float]:
@@ -111,10 +122,26 @@ class Optics:
         if self.straight:
             (y, x), n = self.axes, 2 * reach[0] + 1
             return 8.0 * (n * y.points + 2 * y.margin) * (2 * reach[1] + 1) * x.points * x.samples
-        few = 8.0 * samples
-        for axis, r in zip(self.axes, reach, strict=True):
-            few *= (2 * r + 1) * axis.size * 2 * axis.band + 12
-        return few + 8.0 * math.prod(axis.samples * len(axis.window) for axis in self.axes)
+        return 8.0 * samples * math.prod(self.few(reach))
+
+    def line_bytes(self, reach: tuple[int, int]) -> float:
+        """As `images_bytes`, of all points of one row of cells behind lenslets that are not square."""
+        return 8.0 * math.prod(self.cells.samples) * self.cells.points[0] * self.few(reach)[1]
+
+    @property
+    def core_bytes(self) -> float:
+        """Memory of what such lenslets do to the light around one cell [bytes]."""
+        return 8.0 * math.prod(
+            axis.samples * (2 * axis.band * (axis.size + 2 * axis.neighbourhood) + 12) for axis in self.axes
+        )
+
+    def few(self, reach: tuple[int, int]) -> tuple[float, float]:
+        """Points along y and x from whose light follows that of all, some more than the band has."""
+        y, x = (
+            (2 * r + 1) * axis.size * 2 * axis.band + 12
+            for axis, r in zip(self.axes, self.margin(reach), strict=True)
+        )
+        return y, x
 
     @property
     def image_scale(self) -> float:

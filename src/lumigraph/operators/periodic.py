@@ -100,17 +100,19 @@ class PeriodicOperator(Linear):
         like = {"dtype": intensity.dtype, "device": intensity.device}
         image = xp.zeros((rows, columns, math.prod(self.cells.samples)), **like)
         for k, plane in enumerate(self.planes):
-            points = _by_cell(plane.spread.forward(layers[k, ...]), self.cells.points)
+            points = _by_cell(
+                plane.spread.forward(layers[k, ...]), self.cells, self.cells.points, plane.matrix.margin[0]
+            )
             for part in _pieces(plane.matrix.parts):
-                (top, bottom), (first, last) = part.rows, part.columns
+                mine = (_slice(part.rows), _slice(part.columns), slice(None))
                 for group in _groups(part, plane.matrix.margin):
-                    image[top:bottom, first:last, :] += group.seen(points) @ arrays.like(group.right, image)
+                    image[mine] += group.seen(points) @ arrays.like(group.right, image)
             image += plane.matrix.glare.forward(xp.sum(points, axis=2))
-        return self.readout.forward(_as_plane(image, self.cells.samples))
+        return self.readout.forward(_as_plane(image, self.cells, self.cells.samples))
 
     def _adjoint(self, raw: Array) -> Array:
         xp = arrays.namespace(raw)
-        image = _by_cell(self.readout.adjoint(raw), self.cells.samples)
+        image = _by_cell(self.readout.adjoint(raw), self.cells, self.cells.samples)
         layers = [self._returned(plane, image) for plane in self.planes]
         return layers[0] if self.depths is None else xp.stack(layers, axis=0)
 
@@ -120,11 +122,11 @@ class PeriodicOperator(Linear):
         size = (*shape, math.prod(self.cells.points))
         points = xp.zeros(size, dtype=image.dtype, device=image.device)
         for part in _pieces(plane.matrix.parts):
-            mine = image[part.rows[0] : part.rows[1], part.columns[0] : part.columns[1], :]
+            mine = image[_slice(part.rows), _slice(part.columns), :]
             for group in _groups(part, margin):
                 group.return_to(points, mine @ xp.matrix_transpose(arrays.like(group.right, image)))
         points += xp.expand_dims(plane.matrix.glare.adjoint(image), axis=2)
-        return plane.spread.adjoint(_as_plane(points, self.cells.points))
+        return plane.spread.adjoint(_as_plane(points, self.cells, self.cells.points, margin[0]))
 
     @property
     def memory_bytes(self) -> float:
@@ -140,24 +142,28 @@ class PeriodicOperator(Linear):
         return self.accuracy
 
 
+def _slice(numbers: range) -> slice:
+    return slice(numbers.start, numbers.stop, numbers.step)
+
+
 def _pieces(parts: Iterable[Part]) -> Iterator[Part]:
     """The parts, those of many cells in rows that stay in the processor's cache."""
     for part in parts:
-        (top, bottom), (first, last) = part.rows, part.columns
-        step = max(1, PIECE // (last - first))
-        for row in range(top, bottom, step):
-            yield replace(part, rows=(row, min(row + step, bottom)))
+        step = max(1, PIECE // len(part.columns))
+        for row in range(0, len(part.rows), step):
+            yield replace(part, rows=part.rows[row : row + step])
 
 
 def _groups(part: Part, margin: tuple[int, int]) -> "Iterator[_Group]":
-    """The part's offsets, row by row."""
-    start = 0
-    for dy, offsets in groupby(part.offsets, key=lambda offset: offset[0]):
+    """The part's offsets, row by row, those together whose object's cells are the same."""
+    start, apart = 0, part.columns.step
+    for (dy, _), offsets in groupby(part.offsets, key=lambda offset: (offset[0], offset[1] % apart)):
         across = tuple((dx, rank) for _, dx, rank in offsets)
         ranks = slice(start, start + sum(rank for _, rank in across))
         start = ranks.stop
-        rows = slice(part.rows[0] + margin[0] + dy, part.rows[1] + margin[0] + dy)
-        columns = part.columns[0] + margin[1], part.columns[1] + margin[1]
+        rows = slice(part.rows.start + margin[0] + dy, part.rows.stop + margin[0] + dy, part.rows.step)
+        first = part.columns.start + margin[1]
+        columns = range(first, first + len(part.columns) * apart, apart)
         left = None if part.left is None else part.left[:, ranks]
         yield _Group(rows, columns, across, left, part.right[ranks])
 
@@ -167,26 +173,32 @@ class _Group:
     """Offsets of one part in one row: (dx, rank) for each, and the columns that dx = 0 takes."""
 
     rows: slice
-    columns: tuple[int, int]
+    columns: range
     across: tuple[tuple[int, int], ...]
     left: np.ndarray | None
     right: np.ndarray
 
-    def _span(self) -> slice:
-        return slice(self.columns[0] + self.across[0][0], self.columns[1] + self.across[-1][0])
+    def _span(self) -> range:
+        columns = self.columns
+        return range(columns.start + self.across[0][0], columns.stop + self.across[-1][0], columns.step)
+
+    @property
+    def _seen(self) -> tuple[slice, slice, slice]:
+        """Of the object's cells."""
+        return self.rows, _slice(self._span()), slice(None)
 
     def _places(self) -> Iterator[tuple[slice, slice]]:
         """Columns of cells within the span, and of factors, of each offset."""
-        start, width = 0, self.columns[1] - self.columns[0]
+        start, width = 0, len(self.columns)
         for dx, rank in self.across:
-            shift = dx - self.across[0][0]
+            shift = (dx - self.across[0][0]) // self.columns.step
             yield slice(shift, shift + width), slice(start, start + rank)
             start += rank
 
     def seen(self, points: Array) -> Array:
         """Points (rows, columns, points) through the left factors: (rows, columns, ranks)."""
         xp = arrays.namespace(points)
-        wide = points[self.rows, self._span(), :]
+        wide = points[self._seen]
         if self.left is None:
             return wide
         wide = wide @ arrays.like(self.left, points)
@@ -195,15 +207,14 @@ class _Group:
     def return_to(self, points: Array, seen: Array) -> None:
         """The transpose of `seen`, added to points."""
         xp = arrays.namespace(seen)
-        span = self._span()
         if self.left is None:
-            points[self.rows, span, :] += seen
+            points[self._seen] += seen
             return
-        shape = (seen.shape[0], span.stop - span.start, seen.shape[2])
+        shape = (seen.shape[0], len(self._span()), seen.shape[2])
         wide = xp.zeros(shape, dtype=seen.dtype, device=seen.device)
         for cells, ranks in self._places():
             wide[:, cells, ranks] = seen[:, :, ranks]
-        points[self.rows, span, :] += wide @ xp.matrix_transpose(arrays.like(self.left, seen))
+        points[self._seen] += wide @ xp.matrix_transpose(arrays.like(self.left, seen))
 
 
 def periodic_operator(
@@ -250,7 +261,7 @@ def periodic_operator(
     depths = tuple(float(d) for d in np.ravel(np.asarray(dz, np.float64)))
     plain, planes, optics = camera.optics(), [], None
     for k, depth in enumerate(depths):
-        optics = Optics.of(plain, plain.object_distance + depth, accuracy)
+        optics = Optics.of(plain, plain.object_distance + depth, accuracy).bricks
         report = part_of(progress, k, len(depths))
         planes.append(_plane(optics, matrix(optics, report, None if folder is None else Path(folder)), grid))
         report(1.0)
@@ -307,12 +318,42 @@ def _widened(grid: Grid, optics: Optics) -> tuple[int, int]:
     return wide[0], wide[1]
 
 
-def _by_cell(plane: Array, per_cell: tuple[int, int]) -> Array:
-    """(rows ky, columns kx) to (rows, columns, ky kx)."""
-    tiles = arrays.tiled(plane, per_cell)
-    return arrays.namespace(plane).reshape(tiles, (*tiles.shape[:2], math.prod(per_cell)))
+def _by_cell(plane: Array, cells: Cells, per_cell: tuple[int, int], margin: int = 0) -> Array:
+    """(rows ky, columns kx) to (rows, columns, ky kx); there are `margin` more rows beyond the image's."""
+    step = cells.step(per_cell)
+    if not step:
+        tiles = arrays.tiled(plane, per_cell)
+        return arrays.namespace(plane).reshape(tiles, (*tiles.shape[:2], math.prod(per_cell)))
+    xp, (rows, columns) = arrays.namespace(plane), _inside(plane.shape, per_cell)
+    found = xp.zeros((rows, columns, math.prod(per_cell)), dtype=plane.dtype, device=arrays.device(plane))
+    lines = xp.reshape(plane, (rows, per_cell[0], plane.shape[1]))
+    for mine, across in _staggered(cells, columns * per_cell[1], step, margin):
+        tiles = xp.reshape(lines[mine, :, across], (-1, per_cell[0], columns, per_cell[1]))
+        tiles = xp.permute_dims(tiles, (0, 2, 1, 3))
+        found[mine, :, :] = xp.reshape(tiles, (*tiles.shape[:2], math.prod(per_cell)))
+    return found
 
 
-def _as_plane(cells: Array, per_cell: tuple[int, int]) -> Array:
-    """(rows, columns, ky kx) to (rows ky, columns kx): the inverse of `_by_cell`."""
-    return arrays.untiled(arrays.namespace(cells).reshape(cells, (*cells.shape[:2], *per_cell)))
+def _as_plane(image: Array, cells: Cells, per_cell: tuple[int, int], margin: int = 0) -> Array:
+    """(rows, columns, ky kx) to (rows ky, columns kx): the transpose of `_by_cell`."""
+    xp, (rows, columns, _), step = arrays.namespace(image), image.shape, cells.step(per_cell)
+    if not step:
+        return arrays.untiled(xp.reshape(image, (rows, columns, *per_cell)))
+    width = columns * per_cell[1]
+    lines = xp.zeros((rows, per_cell[0], width + step), dtype=image.dtype, device=arrays.device(image))
+    for mine, across in _staggered(cells, width, step, margin):
+        tiles = xp.reshape(image[mine, :, :], (-1, columns, *per_cell))
+        lines[mine, :, across] = xp.reshape(xp.permute_dims(tiles, (0, 2, 1, 3)), (-1, per_cell[0], width))
+    return xp.reshape(lines, (rows * per_cell[0], width + step))
+
+
+def _inside(shape: Sequence[int], per_cell: tuple[int, int]) -> tuple[int, int]:
+    """Whole cells in a plane of so many samples."""
+    return shape[0] // per_cell[0], shape[1] // per_cell[1]
+
+
+def _staggered(cells: Cells, width: int, step: int, margin: int) -> Iterator[tuple[slice, slice]]:
+    """Rows of a parity, and the samples of a line that lie in their cells."""
+    for parity in cells.parities:
+        across = slice(parity * step, parity * step + width)
+        yield slice((cells.ring[0] + margin + parity) % 2, None, 2), across

@@ -148,12 +148,15 @@ class Few:
         (points, few) along y and x, for the points of all cells.
     reach
         Cells (y, x) on each side.
+    staggered
+        Whether odd rows of cells stand half a cell towards larger x.
     """
 
     fields: np.ndarray
     down: np.ndarray
     across: np.ndarray
     reach: tuple[int, int]
+    staggered: bool = False
 
     def line(self, dy: int) -> "Line":
         """As `Apart.line`."""
@@ -161,9 +164,10 @@ class Few:
         parts, samples = self.fields.view(np.float32), self.fields.shape[2]
         down = self.down[(dy + self.reach[0]) * y :][:y]
         rows = (down @ parts.reshape(len(parts), -1)).reshape(y, *parts.shape[1:])
+        first = self.reach[1] * x + (dy % 2 * x // 2 if self.staggered else 0)
 
         def block(dx: int) -> np.ndarray:
-            across = self.across[(dx + self.reach[1]) * x :][:x]
+            across = self.across[first + dx * x :][:x]
             result = np.empty((y, x, samples), np.float32)
             for row, image in zip(rows, result, strict=True):
                 _intensity((across @ row).view(np.complex64), image)
@@ -172,7 +176,9 @@ class Few:
         return block
 
 
-def few(light: Wave, lenslets: Response, axes: tuple[Axis, Axis], reach: tuple[int, int]) -> Few:
+def few(
+    light: Wave, lenslets: Response, axes: tuple[Axis, Axis], reach: tuple[int, int], staggered: bool = False
+) -> Few:
     """For the points of all cells up to `reach` away."""
     assert lenslets.core is not None
     (y, x), core = axes, lenslets.core.T
@@ -187,7 +193,7 @@ def few(light: Wave, lenslets: Response, axes: tuple[Axis, Axis], reach: tuple[i
         part = behind[top : top + STEP * down.shape[1] : STEP].reshape(down.shape[1], -1)
         part = (down @ part).reshape(len(down), len(columns), -1).transpose(1, 0, 2)
         field[:] = part.reshape(len(columns), -1) @ core
-    return Few(fields, along_y, along_x, reach)
+    return Few(fields, along_y, along_x, reach, staggered)
 
 
 def _skeleton(axis: Axis, reach: int) -> tuple[np.ndarray, np.ndarray]:

@@ -13,24 +13,12 @@ from lumigraph.core.arrays import WORKERS
 from lumigraph.core.progress import Progress
 from lumigraph.core.progress import part as part_of
 from lumigraph.core.threads import each
-from lumigraph.operators.blocks import (
-    INSIDE,
-    Builder,
-    Job,
-    Offset,
-    Part,
-    State,
-    Turn,
-    alike,
-    bands,
-    places,
-    signed,
-    terms,
-)
+from lumigraph.operators.blocks import Builder, Job, Offset, Part
 from lumigraph.operators.glare import Glare, glare
 from lumigraph.operators.optics import Optics
+from lumigraph.operators.places import INSIDE, State, Turn, alike, inside, places, terms
 
-Cells = tuple[tuple[int, int], tuple[int, int]]
+Cells = tuple[range, range]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +65,12 @@ class Streamed:
     def _parts(self, state: State, mine: Sequence[Use], progress: Progress) -> Iterator[Part]:
         builder, reach = self.builder, max(use.reach for use in mine)
         images = builder.images([state], reach)[state]
-        folds = builder.folded(state[0]), builder.folded(state[1])
+        folds = builder.folded(0, state.y), builder.folded(1, state.x)
         jobs = builder.jobs(folds[0], reach)
 
         def piece(job: Job) -> dict[Offset, np.ndarray]:
             (dy, across), line = job, images.line(job[0])
-            return {(dy, dx): line(dx) for dx in (across if folds[1] else signed(across))}
+            return {(dy, dx): line(dx) for dx in (across if folds[1] else builder.signed(dy, across))}
 
         for done, blocks in enumerate(each(piece, jobs, WORKERS)):
             for offset, block in blocks.items():
@@ -113,17 +101,18 @@ def streamed(optics: Optics, progress: Progress | None = None) -> Streamed:
     """Of one depth."""
     builder = Builder(optics, lambda _: None, WORKERS)
     means = builder.means_at_the_end()
-    return Streamed(builder, glare(means, optics.cells.size, optics.cells.image), optics.reach, progress)
+    return Streamed(builder, glare([means], optics.cells), optics.reach, progress)
 
 
 def uses(builder: Builder) -> dict[State, list[Use]]:
     """Where the blocks of each state are used; those that mirror others' are not among the states."""
     optics = builder.optics
-    everywhere = bands(optics, 0)[0].cells, bands(optics, 1)[0].cells
+    (everywhere,) = ((place.rows, place.columns) for place in inside(optics))
     result: dict[State, list[Use]] = {INSIDE: [Use(everywhere, (False, False, False), 1, optics.reach)]}
-    for (y, x), source, turn in alike(places(optics), builder.even, builder.square):
+    for place, source, turn in alike(places(optics), builder.even, builder.square):
         for state, sign in terms(source).items():
-            result.setdefault(state, []).append(Use((y.cells, x.cells), turn, sign, optics.near))
+            use = Use((place.rows, place.columns), turn, sign, optics.near)
+            result.setdefault(state, []).append(use)
     return result
 
 
