@@ -23,7 +23,8 @@ def build_bytes(optics: Optics, workers: int = 1) -> float:
     points, samples = math.prod(cells.points), math.prod(cells.samples)
     block = 4.0 * points * samples
     factors = (1.3 * len(wanted) + 0.7 * len(places(optics))) * math.sqrt(points)  # of a block
-    factors /= optics.array.fill_factor  # small lenslets diffract more widely
+    # Small lenslets diffract more widely, and so do the gaps between discs.
+    factors /= optics.array.fill_factor * (0.5 if optics.array.shape == "round" else 1.0)
     held = factors * math.prod(2 * n + 1 for n in near) * 4.0 * (points + samples)
     if optics.straight:
         states = {INSIDE} | {state for place in wanted for state in terms(place)}
