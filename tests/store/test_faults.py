@@ -1,11 +1,13 @@
 """A short run of tests/fuzz/faults.py: writers that are killed, and bits that flip."""
 
+import os
 import sys
 
 import numpy as np
 import pytest
 
-from fuzz import faults, run
+from fuzz import faults, run, scenarios
+from lumigraph import store
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -24,6 +26,20 @@ def test_killed_writers_leave_the_old_content_or_the_new_and_nothing_else(name):
 def test_flipped_bits_are_found_and_healed():
     files = {"one": {"a": np.arange(50.0)}, "two": {"b": np.ones((3, 4), np.float32), "c": np.eye(2)}}
     assert faults.flips(files, 60) == (60, 0, 0)
+
+
+@pytest.mark.parametrize("processes", [2, 8])
+def test_processes_that_share_a_cache_are_killed_and_lose_nothing(processes):
+    assert scenarios.cache(processes, 6) == (6, [])
+
+
+def test_a_run_that_is_killed_ends_with_the_same_bits_and_the_harness_sees_others(tmp_path):
+    def summed(folder):
+        found = [store.kept(f"k{k}", lambda k=k: {"a": np.arange(40_000.0) ** k}) for k in range(4)]
+        return sum(one["a"] for one in found).tobytes()
+
+    assert scenarios.killed(summed, 2)[1] == []
+    assert "other bits" in scenarios.killed(lambda folder: summed(folder) + os.urandom(4), 1)[1]
 
 
 def test_the_harness_sees_a_torn_file_and_leftovers(monkeypatch):

@@ -5,6 +5,7 @@ import pytest
 
 from lumigraph import store
 from lumigraph.errors import FormatError
+from lumigraph.store import atomic
 
 ARRAYS = {
     "c": np.arange(30.0).reshape(2, 3, 5),
@@ -58,3 +59,13 @@ def test_files_cut_short_and_files_by_others_are_told_apart(tmp_path):
         assert type(refused.value) is FormatError
     with pytest.raises(OSError, match="No such file"):
         store.read(tmp_path / "none.npz")
+
+
+def test_reading_removes_what_dead_writers_left(tmp_path, monkeypatch):
+    """A run that finds all it needs writes nothing, and what the last one left would stay."""
+    monkeypatch.setattr(atomic, "_SWEPT", set())
+    store.write(tmp_path / "a.npz", ARRAYS)
+    (tmp_path / ".lumigraph-dead").mkdir()
+    atomic._SWEPT.clear()  # as in another process
+    store.read(tmp_path / "a.npz")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.npz"]
