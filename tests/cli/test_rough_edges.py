@@ -113,3 +113,15 @@ def test_an_interruption_while_the_program_starts_is_quiet():
         _, err = process.communicate(timeout=60)
         assert "Traceback" not in err
         assert process.returncode in (0, 130, -signal.SIGINT)
+
+
+def test_an_exact_pitch_is_kept_by_calibrate(lumigraph, tmp_path):
+    """A rectified picture of 19 px was measured as 19.014 px even with --pitch 19."""
+    y, x = np.mgrid[:96, :115]
+    white = (np.cos(np.pi * (y - 47) / 19.02) * np.cos(np.pi * (x - 57) / 19.02)) ** 2
+    lg.save(lg.RawImage(np.uint8(200 * white)), tmp_path / "white.png")
+    result = lumigraph("calibrate", "white.png", "--pitch", "19", "--exact", "-o", "c.toml")
+    assert (result.code, lg.open(tmp_path / "c.toml").lattice.pitch) == (0, 19)
+    result = lumigraph("calibrate", "white.png", "--exact", "-o", "c.toml")
+    assert result.code == 1
+    assert "--pitch 19" in result.err

@@ -9,13 +9,15 @@
 - `diagnosis`: `diagnose`, what a white image says about how a camera is put together
 - `aligned`: a maker's lattice moved to the borders of micro-images on a raw image
 - `following`: `followed`, the lattice near a known one that a picture repeats on
+- `exact`: `exactly`, the lattice of a rectified picture, whose pitch is known
 - `devignette`: divide a raw image by its white image; grey versions of colour images
 """
 
 from lumigraph.calibration.borders import aligned
 from lumigraph.calibration.devignette import devignette
 from lumigraph.calibration.diagnosis import Diagnosis, diagnose
+from lumigraph.calibration.exact import exactly
 from lumigraph.calibration.following import followed
 from lumigraph.calibration.lattice_fit import calibrate
 
-__all__ = ["Diagnosis", "aligned", "calibrate", "devignette", "diagnose", "followed"]
+__all__ = ["Diagnosis", "aligned", "calibrate", "devignette", "diagnose", "exactly", "followed"]

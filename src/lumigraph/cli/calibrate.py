@@ -73,6 +73,7 @@ def calibrate(
     layout: Literal["square", "hex"] | None = None,
     pitch: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
     rotation: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
+    exact: Annotated[bool, Parameter(negative=())] = False,
     explain: Annotated[bool, Parameter(negative=())] = False,
     overlay: Path | None = None,
     bench: Bench = Bench(),
@@ -95,6 +96,8 @@ def calibrate(
         Distance of micro-images in pixels, if it is not found by itself.
     rotation
         Of the rows of lenslets from +x towards +y in degrees, if it is not found by itself.
+    exact
+        Of a rectified picture: the pitch is --pitch, not nearly so, and the rotation --rotation, or none.
     explain
         Say what to turn on the bench: rotation, shift, distance, tilt and aperture, against --camera.
     overlay
@@ -115,12 +118,16 @@ def calibrate(
     above_zero("--pitch", pitch, "px")
     if explain and bench.camera is None:
         raise CalibrationError("--explain compares with what was meant: give the camera file, --camera FILE.")
+    if exact and pitch is None:
+        raise CalibrationError("--exact takes the pitch as it is given: add --pitch, such as --pitch 19.")
     known = bench.lengths()
     pictures = [read_raw(path) for path in white]
     picture = pictures[0]
     turn = None if rotation is None else math.radians(rotation)
     with progress("calibrate"):
         found = verbs.calibrate(pictures, layout, pitch, rotation=turn, **known)
+        if exact and pitch is not None:
+            found = verbs.exactly(found, pitch, turn or 0.0)
         if overlay is not None:
             from lumigraph import plots
 
