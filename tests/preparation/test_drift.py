@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.drift import drawn, is_bad, judged
 from scipy import ndimage
 
 import calibration_drawing
@@ -167,3 +168,11 @@ def test_real_cameras_fit_their_calibration_and_drift_is_seen(name):
         assert seen.pitch == pytest.approx(found.lattice.pitch, rel=2e-3)
         assert seen.expected_pitch == pytest.approx(found.lattice.pitch * stretch, rel=1e-6)
         assert seen.slip > 0.2
+
+
+@pytest.mark.parametrize("number", [0, 3, 4, 13])  # points, a grating, a chart, a texture
+def test_drawn_pairs_are_right_or_wrong_as_they_were_drawn(number):
+    """A few of the pairs of `python -m benchmarks.drift`."""
+    rows = judged(drawn(number))
+    assert not [row for row in rows if is_bad(row)]
+    assert [row.said for row in rows] == (["nothing"] * 3 if number == 0 else ["fits", "warned", "warned"])

@@ -126,18 +126,30 @@ def check_drift(data: Array, calibration: Calibration) -> Drift | None:
     return found
 
 
-def _tell(found: Drift) -> None:
+def verdict(found: Drift) -> str:
+    """What a drift means for a calibration: "refused", "warned", "shifted" or "fits"."""
     if found.slip >= _CERTAIN:
+        return "refused"
+    if found.slip >= (_SLIGHT if found.evidence >= _CLEAR else _LIKELY):
+        return "warned"
+    if found.shift is not None and max(map(abs, found.shift)) > _SHIFTED * found.pitch:
+        return "shifted"
+    return "fits"
+
+
+def _tell(found: Drift) -> None:
+    said = verdict(found)
+    if said == "refused":
         raise CalibrationError(
             f"{found.report()}. Calibrate on a white image taken with the settings of the raw image."
         )
-    if found.slip >= (_SLIGHT if found.evidence >= _CLEAR else _LIKELY):
+    if said == "warned":
         warnings.warn(
             f"{found.report()}. A white image taken with the settings of the raw image would fit better.",
             SamplingWarning,
             stacklevel=4,
         )
-    elif found.shift is not None and max(map(abs, found.shift)) > _SHIFTED * found.pitch:
+    elif said == "shifted" and found.shift is not None:
         warnings.warn(
             f"the micro-images of the raw image stand ({found.shift[0]:+.1f}, {found.shift[1]:+.1f}) px "
             f"(y, x) from where the calibration has them, with a pitch of {found.pitch:.2f} px. A white "
