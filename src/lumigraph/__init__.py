@@ -17,7 +17,7 @@ from lumigraph.core import drawing
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from lumigraph import analysis, depth, design, plots, samples, units
+    from lumigraph import analysis, depth, design, metric, plots, samples, units
     from lumigraph.calibration import calibrate, devignette
     from lumigraph.core.calibration import Calibration
     from lumigraph.core.cloud import PointCloud
@@ -74,7 +74,7 @@ if TYPE_CHECKING:
     from lumigraph.viewer import view_inline
 
 _HOMES = {
-    "lumigraph": ("analysis", "depth", "design", "plots", "samples", "units"),
+    "lumigraph": ("analysis", "depth", "design", "metric", "plots", "samples", "units"),
     "lumigraph.calibration": ("calibrate", "devignette"),
     "lumigraph.core.calibration": ("Calibration",),
     "lumigraph.core.cloud": ("PointCloud",),
@@ -194,6 +194,7 @@ __all__ = [
     "encode",
     "hot_pixels",
     "load_camera",
+    "metric",
     "open",
     "plots",
     "prepare",

@@ -25,8 +25,8 @@ class Quantity:
     --------
     >>> str(Quantity("spacing", 6.5e-6, "m")), Quantity("spacing", 6.5e-6, "m").label
     ('6.5 µm', 'spacing')
-    >>> str(Quantity("slope", 2.0, "px", (1.9, 2.2)))
-    '2 px (1.9 to 2.2)'
+    >>> str(Quantity("slope", 2.0, "px", (1.9, 2.2))), str(Quantity("distance", 0.05, "m", (0.049, 0.052)))
+    ('2 px (1.9 to 2.2)', '50 mm (49 mm to 52 mm)')
     """
 
     name: str
@@ -41,8 +41,9 @@ class Quantity:
 
     def __str__(self) -> str:
         several = isinstance(self.value, tuple | list)
+        shown = self._one if self.unit == "m" else self._bare
         text = " to ".join(map(self._one, _ends(self.value))) if several else self._one(self.value)
-        return text if self.interval is None else f"{text} ({' to '.join(map(self._bare, self.interval))})"
+        return text if self.interval is None else f"{text} ({' to '.join(map(shown, self.interval))})"
 
     def _one(self, value: Any) -> str:
         if self.unit == "m" and (value is None or isinstance(value, float)):

@@ -1,0 +1,35 @@
+"""Cameras with lengths: calibrated from boards of known size, and distances of what they see.
+
+- `Board`: the known object; `Corners`: where its corners show on raw images.
+- `MetricCamera`: main lens, lenslets, sensor, as a geometry of rays (`geometry`).
+- `board`: the camera from corners, by bundle adjustment (`adjustment`) from a coarse search (`start`),
+  with the noise of corners that are seen many times (`noise`). `Measured` holds it, its errors, the poses.
+- `triangulate`: positions of points from their micro-images.
+
+T. Georgiev and A. Lumsdaine, "Focused plenoptic camera and rendering", J. Electron. Imaging 19 (2010),
+has the geometry; M. Labussiere et al., "Leveraging blur information for plenoptic camera calibration",
+IJCV 130 (2022), calibrate multi-focus cameras from such boards.
+"""
+
+from lumigraph.metric.calibration import Measured, Pose, board
+from lumigraph.metric.camera import MetricCamera, Nominal
+from lumigraph.metric.corners import Board, Corners
+from lumigraph.metric.files import load, load_compote, load_corners, save, save_corners
+from lumigraph.metric.triangulation import Triangulated, triangulate
+
+__all__ = [
+    "Board",
+    "Corners",
+    "Measured",
+    "MetricCamera",
+    "Nominal",
+    "Pose",
+    "Triangulated",
+    "board",
+    "load",
+    "load_compote",
+    "load_corners",
+    "save",
+    "save_corners",
+    "triangulate",
+]

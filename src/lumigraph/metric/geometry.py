@@ -1,0 +1,88 @@
+r"""Rays from points through a main lens and the centres of lenslets to the sensor.
+
+The frame is upright, as raw images are: x to the right, y down, z away from the camera. A point at
+distance Z, in direction n = (y, x)/Z, has its image at V = fZ/(Z - f) behind the main lens, V n' from the
+axis with distortion. The ray through lenslet c, at L, meets the sensor b behind it at
+
+.. math:: s = c + b (c - V n')/(L - V)
+
+and the lenslet whose micro-image stands at s0 is at c = s0 E/(E + b). Every function here takes complex
+numbers too, for `slope`.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+NAMES = (
+    "f", "L", "b", "L/E", "axis y", "axis x", "tilt y", "tilt x", "k1", "k2", "k3", "p1", "p2",
+)  # fmt: skip
+"""Of a camera's numbers; the gains of its kinds of lenslets follow."""
+
+_TINY = 1e-24
+
+_STEP = 1e-20
+
+
+def slope(function: Callable[[np.ndarray], np.ndarray], at: np.ndarray, which: int | slice) -> np.ndarray:
+    """Derivative of a function of numbers `at` by one of them, or by several together, to the last bit.
+
+    By a complex step: W. Squire and G. Trapp, SIAM Rev. 40, 110 (1998).
+    """
+    step = at.astype(np.complex128)
+    step[which] += 1j * _STEP
+    return np.imag(function(step)) / _STEP
+
+
+def project(
+    numbers: np.ndarray, points: np.ndarray, center: np.ndarray, kind: np.ndarray, pixel_pitch: float
+) -> np.ndarray:
+    """Places (n, 2) [px] of points (n, 3) as (z, y, x) behind lenslets: see `MetricCamera.project`."""
+    f, L, b, ratio = numbers[:4]
+    axis, tilt, gains = numbers[4:6], numbers[6:8], numbers[len(NAMES) :]
+    distance = points[:, :1]
+    image = f * distance / (distance - f)
+    lateral = image * distorted(points[:, 1:] / distance, numbers[8:11], numbers[11:13])
+    seen = (center - axis) * pixel_pitch
+    lenslet, sag = lenslets(seen, L, b, L / ratio, tilt)
+    place = lenslet + (lenslet - lateral) * (b - sag) / (L + sag - image)
+    return (seen + gains[kind][:, None] * (place - seen)) / pixel_pitch + axis
+
+
+def lenslets(
+    seen: np.ndarray, L: complex, b: complex, pupil: complex, tilt: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (n, 2) and distances beyond L (n, 1) of the lenslets of micro-images at `seen` [m]."""
+    sag = (seen * (L / (L + b))) @ tilt[:, None]
+    return seen * ((pupil + sag) / (pupil + b)), sag
+
+
+def distorted(direction: np.ndarray, radial: np.ndarray, tangential: np.ndarray) -> np.ndarray:
+    """Directions (n, 2) as (y, x) after Brown's distortion (Photogramm. Eng. 32, 444, 1966)."""
+    y, x = direction[:, :1], direction[:, 1:]
+    r2 = y * y + x * x
+    grown = direction * (1 + r2 * (radial[0] + r2 * (radial[1] + r2 * radial[2])))
+    p1, p2 = tangential
+    skew_y = p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+    skew_x = 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+    return grown + np.concatenate([skew_y, skew_x], axis=1)
+
+
+def moved(points: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    """Points (n, 3) of a board in the camera's frame.
+
+    Parameters
+    ----------
+    points
+        As (z, y, x) [m].
+    poses
+        (n, 6) or (6,): rotation vector (z, y, x) [rad], right-handed in the frame (x, y, z), then
+        displacement (z, y, x) [m].
+    """
+    vector, shift = poses[..., :3], poses[..., 3:]
+    squared = np.sum(vector * vector, axis=-1, keepdims=True) + _TINY
+    angle = np.sqrt(squared)
+    # (z, y, x) is left-handed: the cross product changes its sign.
+    once = -np.cross(vector, points)
+    twice = -np.cross(vector, once)
+    return points + np.sin(angle) / angle * once + (1 - np.cos(angle)) / squared * twice + shift

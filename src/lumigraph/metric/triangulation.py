@@ -1,0 +1,113 @@
+"""Positions of points from the micro-images that show them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from lumigraph.core import checks
+from lumigraph.core.brief import brief
+from lumigraph.errors import CalibrationError
+from lumigraph.metric import geometry
+from lumigraph.metric.calibration import Measured
+from lumigraph.metric.start import Virtual
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Triangulated:
+    """A point in space.
+
+    Parameters
+    ----------
+    position
+        (z, y, x) from the main lens [m].
+    covariance
+        (3, 3) by the noise of the places; and with the camera's uncertainty, which other points share.
+    residual_px
+        Root mean square along an axis.
+    """
+
+    position: np.ndarray
+    covariance: np.ndarray
+    residual_px: float
+
+    __repr__ = brief
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Standard deviations (z, y, x) [m]."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def triangulate(
+    measured: Measured, place: np.ndarray, center: np.ndarray, kind: np.ndarray | int = 0
+) -> Triangulated:
+    """Position of a point that several lenslets show.
+
+    Parameters
+    ----------
+    measured
+        The camera.
+    place
+        (n, 2) Where it shows (y, x) [px], n >= 2.
+    center
+        (n, 2) The micro-images' centres (y, x) [px].
+    kind
+        Of the lenslets, (n,) or one for all.
+
+    Raises
+    ------
+    CalibrationError
+        Fewer than two micro-images, shapes that differ, or rays that do not meet before the camera.
+    """
+    place, center = (np.asarray(value, np.float64) for value in (place, center))
+    if place.ndim != 2 or place.shape != center.shape or place.shape[1] != 2 or len(place) < 2:
+        raise CalibrationError(
+            f"place and center have shapes {place.shape} and {center.shape} but must both be (n, 2), n >= 2."
+        )
+    checks.finite_array("place", place, CalibrationError)
+    checks.finite_array("center", center, CalibrationError)
+    kinds = np.broadcast_to(np.asarray(kind), len(place))
+    camera, noise = measured.camera, measured.noise
+    own, start = noise.own[kinds][:, None], _first(measured, place, center)
+
+    def misfit(numbers: np.ndarray, point: np.ndarray) -> np.ndarray:
+        return geometry.project(numbers, point[None], center, kinds, camera.pixel_pitch) - place
+
+    def white(numbers: np.ndarray, point: np.ndarray) -> np.ndarray:
+        return (misfit(numbers, point) / own).ravel()
+
+    def slopes(point: np.ndarray) -> np.ndarray:
+        return np.stack(
+            [geometry.slope(lambda p: white(camera.numbers, p), point, k) for k in range(3)], axis=1
+        )
+
+    jacobian: Any = slopes
+    found = least_squares(
+        lambda p: white(camera.numbers, p), start, jacobian, x_scale=float(np.abs(start[0]))
+    )
+    inverse = np.linalg.pinv(slopes(found.x))
+    numbers = range(len(camera.numbers))
+    sway = inverse @ np.stack(
+        [geometry.slope(lambda n: white(n, found.x), camera.numbers, k) for k in numbers], axis=1
+    )
+    covariance = inverse @ inverse.T + sway @ measured.covariance @ sway.T
+    return Triangulated(found.x, covariance, float(np.sqrt(np.mean(misfit(camera.numbers, found.x) ** 2))))
+
+
+def _first(measured: Measured, place: np.ndarray, center: np.ndarray) -> np.ndarray:
+    """Where the rays meet, without distortion."""
+    camera = measured.camera
+    inner = center - center.mean(0)
+    slope = float(np.sum(inner * (place - place.mean(0))) / np.sum(inner**2))
+    shift = (place - camera.axis).mean(0) - slope * (center - camera.axis).mean(0)
+    one = Virtual(np.zeros(1, int), np.zeros(1, int), np.array([slope]), shift[None])
+    f, L, b = camera.focal_length, camera.separation, camera.lenslet_distance
+    (point,) = one.points(f, L, b, camera.pixel_pitch)
+    if not np.isfinite(point).all():
+        raise CalibrationError(
+            f"the places move by {slope:.4g} of what the lenslets do: no point before the camera does so. "
+            "Check that they show the same point."
+        )
+    return point

@@ -1,0 +1,41 @@
+"""`lumigraph board`."""
+
+import json
+
+import numpy as np
+import pytest
+
+import lumigraph as lg
+from lumigraph.cli import main
+from metric.scenes import BOARD, corners
+
+KNOWN = ["--focal-length", "50 mm", "--pixel-pitch", "5.5 um", "--shape", "3068", "4080"]
+
+
+@pytest.fixture
+def table(tmp_path):
+    lg.metric.save_corners(corners(np.random.default_rng(2), frames=4), tmp_path / "corners.csv")
+    return tmp_path / "corners.csv"
+
+
+def test_a_table_of_corners_gives_a_camera_with_intervals(table, capsys) -> None:
+    made = table.with_name("camera.json")
+    board = ["--board", f"{BOARD.shape[1]} x {BOARD.shape[0]} corners, 10 mm"]
+    assert main(["board", str(table), *board, *KNOWN, "-o", str(made), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    low, high = found["lenslet_distance_interval"]
+    assert low < 0.42e-3 < high
+    assert lg.metric.load(made).camera.focal_length == found["focal_length"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (KNOWN, "give --board"),
+        (["--board", "7 x 5, 10 mm"], "give --focal-length, --pixel-pitch and --shape"),
+        (["--board", "seven", *KNOWN], "must be written as '9 x 5 corners, 10 mm'"),
+    ],
+)
+def test_what_is_missing_is_named(table, capsys, words, said) -> None:
+    assert main(["board", str(table), *words]) == 1
+    assert said in capsys.readouterr().err

@@ -1,0 +1,37 @@
+"""Boards drawn through a known camera: corners with noise, and the truth."""
+
+import numpy as np
+
+from lumigraph.metric import Board, Corners, MetricCamera, Nominal, geometry
+
+BOARD = Board((5, 7), 10e-3)
+CAMERA = MetricCamera(
+    50e-3, 57e-3, 0.42e-3, 45e-3, 5.5e-6, (1540.0, 2060.0),
+    tilt=(6e-4, -4e-4), radial=(0.05, 0.0, 0.0), gains=(1.01, 0.99),
+)  # fmt: skip
+NOMINAL = Nominal(50e-3, 5.5e-6, (3068, 4080))
+PITCH, STEP = 23.3, 46.6  # px; every second lenslet
+
+
+def corners(rng: np.random.Generator, *, frames: int = 6, noise: float = 0.3, shared: float = 0.0) -> Corners:
+    """Of boards at 0.22 to 0.33 m that lean, through every lenslet that shows them."""
+    y, x = np.mgrid[60:3000:STEP, 60:4000:STEP]
+    centers, kinds = np.stack([y.ravel(), x.ravel()], 1), (np.indices(y.shape).sum(0) % 2).ravel()
+    rows = []
+    for frame in range(frames):
+        turn = rng.uniform(-0.7, 0.7, 3) * (1, 1, 0) if frame else np.zeros(3)
+        turn = np.array([rng.uniform(-0.1, 0.1), *turn[:2]])
+        shift = np.array([rng.uniform(0.22, 0.33), -0.02, -0.03]) + rng.uniform(-0.01, 0.01, 3)
+        points = geometry.moved(BOARD.points(), np.concatenate([turn, shift]))
+        for corner, point in enumerate(points):
+            places = CAMERA.project(point, centers, kinds)
+            lit = np.hypot(*(places - centers).T) < 0.42 * PITCH
+            off = rng.normal(0, noise, (lit.sum(), 2)) + rng.normal(0, shared, 2)
+            rows.append(
+                np.column_stack(
+                    [np.full((lit.sum(), 2), (frame, corner)), places[lit] + off, centers[lit], kinds[lit]]
+                )
+            )
+    table = np.concatenate(rows)
+    whole = table.astype(int)
+    return Corners(whole[:, 0], whole[:, 1], table[:, 2:4], table[:, 4:6], whole[:, 6])
