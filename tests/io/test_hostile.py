@@ -11,6 +11,7 @@ import sys
 import time
 import zipfile
 import zlib
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 import lumigraph as lg
-from fuzz import structure
+from fuzz import seeds, structure
 from lumigraph.errors import FormatError
 from lumigraph.io import source
 
@@ -57,6 +58,26 @@ def test_a_tiff_whose_pixels_have_no_place_is_refused(tmp_path, tag, value):
     (tmp_path / "a.tiff").write_bytes(content)
     with pytest.raises(FormatError, match=r"has no place in it|cut short"):
         lg.open(tmp_path / "a.tiff")
+
+
+def test_libtiff_prints_no_lines_of_its_own_and_standard_error_stays(tmp_path, capfd):
+    """Two threads put back what the other had kept: nothing was printed any more."""
+    whole = bytearray(
+        seeds.by_pillow(np.random.default_rng(0).integers(0, 255, (120, 170), np.uint8), "tiff_lzw")
+    )
+    for k in range(24):
+        whole[900 * k + 500 : 900 * k + 508] = b"\xff" * 8
+        (tmp_path / f"{k}.tif").write_bytes(whole)
+
+    def refused(k):
+        with pytest.raises(FormatError):
+            lg.open(tmp_path / f"{k}.tif")
+
+    before = os.fstat(2)
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(refused, range(24)))
+    assert os.path.samestat(os.fstat(2), before)
+    assert capfd.readouterr().err == ""
 
 
 @pytest.mark.parametrize("kind", ["link", "folder link", "pipe"])

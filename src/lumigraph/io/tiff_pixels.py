@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from math import ceil
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 import tifffile
@@ -24,6 +25,7 @@ _PILLOW = {
     "F": "float32",
     "I": "int32",
 }
+_STANDARD_ERROR = Lock()
 _SMALL = 64 << 20  # bytes of one strip that may be inflated without counting first
 
 
@@ -124,18 +126,19 @@ def _packed(path: Path, image: tifffile.TiffPage) -> np.ndarray:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Context in which libtiff's own lines on standard error go nowhere: its failures are raised."""
-    try:
-        kept = os.dup(2)
-    except OSError:  # closed
-        yield
-        return
-    try:
-        with open(os.devnull, "wb") as nowhere:  # noqa: PTH123
-            os.dup2(nowhere.fileno(), 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+    with _STANDARD_ERROR:  # of the whole process: a second thread would keep, and put back, the first one's
+        try:
+            kept = os.dup(2)
+        except OSError:  # closed
+            yield
+            return
+        try:
+            with open(os.devnull, "wb") as nowhere:  # noqa: PTH123
+                os.dup2(nowhere.fileno(), 2)
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
 
 
 def _by_pillow(path: Path, image: tifffile.TiffPage) -> np.ndarray:
