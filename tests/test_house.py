@@ -95,3 +95,26 @@ def test_every_module_has_a_docstring_that_opens_it():
         name = ".".join(path.relative_to(ROOT / "src").with_suffix("").parts).removesuffix(".__init__")
         if not name.endswith("__main__"):
             assert importlib.import_module(name).__doc__, name
+
+
+CAMERAS = r"(?:camera|scope|instrument|microscope|described|optics|bench)"
+BY_NAME = {
+    "a kind's name": r"\.KIND\b|\.noun (?:==|!=|in)\b",
+    "hasattr of a camera": rf"(?:hasattr|getattr)\((?:self\.)?{CAMERAS},",
+    "a camera of any type": rf"\b{CAMERAS}: Any\b(?!, receive)",
+    "a kind of instrument": r"isinstance\([^()]*(?:SingleLensCamera|PlenopticCamera|LightFieldMicroscope)",
+}
+
+
+@pytest.mark.parametrize("what", BY_NAME)
+def test_instruments_are_told_apart_by_what_they_can_do(what):
+    """A new kind of instrument touches `instruments` only; see `instruments.capabilities`."""
+    sources = ROOT / "src" / "lumigraph"
+    told = [
+        f"{path.relative_to(sources)}: {line.strip()}"
+        for path in sources.rglob("*.py")
+        if "instruments" not in path.parts and "demo" not in path.parts
+        for line in path.read_text("utf-8").splitlines()
+        if re.search(BY_NAME[what], line)
+    ]
+    assert not told

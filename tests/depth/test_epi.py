@@ -10,6 +10,7 @@ from data_folder import real
 from lumigraph.core.arrays import namespace, to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
+from lumigraph.core.progress import silent
 from lumigraph.depth import alpha_of, disparity_of, epi
 from lumigraph.depth.lines import visible
 from lumigraph.depth.pictures import Pictures
@@ -216,7 +217,7 @@ def bar(paint):
 def test_a_place_hidden_from_one_side_still_agrees_at_its_own_depth(bar):
     views, truth = bar
     pictures = Pictures.of(views)
-    cost = costs(pictures, np.array([0.0, 6.0], np.float32), 0.1, lambda done, total: None)
+    cost = costs(pictures, np.array([0.0, 6.0], np.float32), 0.1, silent)
     # Three columns beside the bar: it hides them from the views of that side, up to 6 px away.
     beside = [slice(25, 28), slice(45, 48)]
     assert (truth[:, beside[0]] == 0).all()

@@ -25,6 +25,8 @@ IDS = (
     "table-6.1",
     "figure-6.5",
     "figure-6.6",
+    "figure-6.8",
+    "figure-6.10",
 )
 
 

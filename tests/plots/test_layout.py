@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from lumigraph.design.layout import Layout
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import load_camera
 from lumigraph.plots.layout import layout
@@ -79,8 +80,8 @@ def test_rays_of_one_place_on_the_main_lens_meet_on_one_pixel_of_the_plenoptic_c
 
 def test_a_camera_without_an_image_is_refused():
     class Near:
-        object_distance = 0.05
-        main_lens = type("Lens", (), {"focal_length": 0.06})
+        def layout(self):
+            return Layout(0.05, 0.06, 0.002, -0.3, 0.1, 0.01)
 
     with pytest.raises(
         GeometryError, match=r"the object at 50 mm is inside the focal length of 60 mm.* Move it"

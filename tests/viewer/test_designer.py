@@ -12,8 +12,6 @@ from lumigraph import viewer
 from lumigraph.errors import FormatError, GeometryError, LumigraphError, SamplingError
 from lumigraph.viewer.designer import designed
 from lumigraph.viewer.designer_curves import trade_offs
-from lumigraph.viewer.designer_parameters import changed, parameters
-from lumigraph.viewer.designer_point import point_image
 
 FOCUSED = lg.load_camera("thesis-plenoptic-2-m050")
 
@@ -21,21 +19,21 @@ FOCUSED = lg.load_camera("thesis-plenoptic-2-m050")
 @pytest.mark.parametrize("name", lg.catalogue())
 def test_the_parameters_of_every_camera_give_that_camera_back(name):
     camera = lg.load_camera(name)
-    values = {each.key: each.value for each in parameters(camera)}
-    assert changed(camera, values) == camera
-    for each in parameters(camera):
+    values = {each.key: each.value for each in camera.parameters()}
+    assert camera.changed(values) == camera
+    for each in camera.parameters():
         if each.kind != "choice" and each.value is not None:
             assert each.low <= each.value <= each.high, each.key
 
 
 def test_a_slider_changes_one_value_and_the_file_says_so():
-    camera = changed(FOCUSED, {"lenslets.pitch": 120.0, "lenslets.count.0": 21, "main_lens.diameter": 2.0})
+    camera = FOCUSED.changed({"lenslets.pitch": 120.0, "lenslets.count.0": 21, "main_lens.diameter": 2.0})
     assert camera.lenslets.pitch == pytest.approx(120e-6)
     assert camera.lenslets.count == (21, FOCUSED.lenslets.count[1])
     assert camera.main_lens.diameter == pytest.approx(2e-3)
     answer = viewer.designer_site(FOCUSED, "f").calls["design"]({"values": {"lenslets.pitch": 120.0}})
     assert 'pitch = "120 um"' in answer["toml"]
-    matched = changed(camera, {"main_lens.diameter": None})
+    matched = camera.changed({"main_lens.diameter": None})
     assert matched.pupil_diameter == pytest.approx(matched.matched_diameter)
 
 
@@ -55,7 +53,7 @@ def test_a_slider_changes_one_value_and_the_file_says_so():
 )
 def test_values_that_cannot_be_are_refused_in_one_line(values, error, said):
     with pytest.raises(error, match=said):
-        changed(FOCUSED, values)
+        FOCUSED.changed(values)
 
 
 def test_depths_that_cannot_be_are_refused():
@@ -67,7 +65,7 @@ def test_depths_that_cannot_be_are_refused():
     with pytest.raises(LumigraphError, match="inside its focal length"):
         calls["point"]({"values": {}, "dz": -0.1})
     with pytest.raises(SamplingError, match="samples"):
-        point_image(FOCUSED.replace(main_lens={"diameter": 0.02}))
+        FOCUSED.replace(main_lens={"diameter": 0.02}).point_view()
 
 
 def test_curves_pass_through_the_camera_and_follow_the_closed_forms():
@@ -115,7 +113,7 @@ def test_the_axial_resolution_of_a_plenoptic_1_moves_the_outermost_views_by_one_
 
 def test_the_image_of_a_point_is_that_of_simulate():
     camera = FOCUSED.replace(lenslets={"count": (11, 11)})
-    found = point_image(FOCUSED, 5e-3)
+    found = FOCUSED.point_view(5e-3)
     whole = lg.simulate(camera, lg.targets.points([(0.0, 0.0, 5e-3)])).data
     cut = [slice((n - m) // 2, (n - m) // 2 + m) for n, m in zip(whole.shape, found.data.shape, strict=True)]
     # What the few lenslets that are left out would have sent there is below a hundredth of the brightest.

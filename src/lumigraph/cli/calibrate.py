@@ -50,8 +50,10 @@ class Bench:
             from lumigraph.instruments import load_camera
 
             described = load_camera(self.camera)
-            known = {name: getattr(described, name, None) for name in ("separation", "lenslet_distance")}
-            known["pixel_pitch"] = described.sensor.pixel_pitch
+            known = {
+                "pixel_pitch": described.sensor.pixel_pitch, "separation": described.separation,
+                "lenslet_distance": described.lenslet_distance,
+            }  # fmt: skip
         for name in known:
             option = f"--{name.replace('_', '-')}"
             given = above_zero(option, length(option, getattr(self, name)), "m")
@@ -60,11 +62,11 @@ class Bench:
 
     def compared(self, found: "Calibration") -> tuple[str, ...]:
         """What the picture says about the camera of --camera, in a line."""
-        from lumigraph.instruments import SingleLensCamera, load_camera
+        from lumigraph.instruments import load_camera
         from lumigraph.preparation import implied
 
         camera = None if self.camera is None else load_camera(self.camera)
-        return () if camera is None or isinstance(camera, SingleLensCamera) else (implied(found, camera)[0],)
+        return () if camera is None or camera.calibration is None else (implied(found, camera)[0],)
 
 
 def calibrate(
@@ -154,7 +156,7 @@ def _advice(white: "RawImage", bench: Bench) -> Any:
     camera = load_camera(str(bench.camera))
     if not isinstance(camera, LensletCamera):
         raise CalibrationError(
-            f"{bench.camera} is a {camera.KIND}: --explain is for plenoptic cameras. Leave it out."
+            f"{bench.camera} is a {camera.noun}: --explain is for plenoptic cameras. Leave it out."
         )
     return diagnose(white, camera)
 

@@ -1,9 +1,12 @@
 """`lumigraph catalogue`."""
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from lumigraph.cli.options import COMMON, Common
 from lumigraph.core.result import Result
+
+if TYPE_CHECKING:
+    from lumigraph.instruments import Instrument
 
 _FIGURES = {
     "kind": (), "wavelength": ("wavelength",), "lenslets": ("lenslets",), "pitch": ("lenslet pitch",),
@@ -28,18 +31,20 @@ def catalogue(*, common: Common = COMMON) -> Result:
     cameras = {name: load_camera(name) for name in names()}
     rows = [_row(name, camera) for name, camera in cameras.items()]
     lines = _aligned([("name", *_FIGURES), *rows])
-    values = {name: {"kind": camera.KIND, **camera.describe().as_dict()} for name, camera in cameras.items()}
+    values = {name: {"kind": camera.noun, **camera.describe().as_dict()} for name, camera in cameras.items()}
     return Result("Catalogue", "Cameras that come with lumigraph.", cameras, tuple(lines), extra=values)
 
 
-def _row(name: str, camera: Any) -> tuple[str, ...]:
+def _row(name: str, camera: "Instrument") -> tuple[str, ...]:
+    from lumigraph.instruments.capabilities import WithObjective
+
     found = {row.name: row.text for row in camera.quantities()}
-    if "numerical aperture" in found and camera.KIND == "light-field-microscope":
+    if isinstance(camera, WithObjective):
         found["numerical aperture"] = f"NA {found['numerical aperture']}"
     else:
         found["numerical aperture"] = f"f/{found['f-number']}"
     figures = [next((found[each] for each in names if each in found), "") for names in _FIGURES.values()]
-    return name, camera.KIND, *figures[1:]
+    return name, camera.noun, *figures[1:]
 
 
 def _aligned(rows: list[tuple[str, ...]]) -> list[str]:

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from lumigraph.cli import files, pictures
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output
-from lumigraph.cli.origin import NO_ORIGIN, PLENOPTIC, Origin
+from lumigraph.cli.origin import NO_ORIGIN, Origin
 from lumigraph.cli.reporting import REPORTED, Reported, enlarged
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
@@ -98,7 +98,7 @@ def decode(
     options = sampling.chosen()
     picture = origin.read(raw)
     with progress("decode"):
-        ready = origin.prepared(picture, kind=PLENOPTIC, devignette=devignette)
+        ready = origin.prepared(picture, use="decode", devignette=devignette)
         bad = ready.dead if sampling.hot_pixels else None
         if bad is not None and origin.dark is None:
             bad = bad | rendering.hot_pixels(picture)

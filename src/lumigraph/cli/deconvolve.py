@@ -11,7 +11,7 @@ from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, above_zero, length
 from lumigraph.cli.reporting import REPORTED, Reported
-from lumigraph.core.progress import Progress, Stage
+from lumigraph.core.progress import Progress, Stage, silent, within
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
@@ -21,8 +21,11 @@ if TYPE_CHECKING:
     import numpy as np
 
     from lumigraph.core.calibration import Calibration
+    from lumigraph.core.linear import Linear
     from lumigraph.core.prepared import PreparedImage
-    from lumigraph.deconvolution import Step
+    from lumigraph.core.raw import RawImage
+    from lumigraph.deconvolution import RichardsonLucy, Step
+    from lumigraph.instruments import Instrument
 
 MOST_DEPTHS = 1000
 
@@ -64,14 +67,12 @@ class Seen:
         if self.background is not None and not (math.isfinite(self.background) and self.background >= 0):
             raise FormatError(f"--background is {self.background:g} but must be at least 0.")
 
-    def prepared(self, raw: Any, camera: Any) -> "PreparedImage":
+    def prepared(self, raw: "RawImage", camera: "Instrument") -> "PreparedImage":
         """The raw image as it was read, with what the model of a deconvolution takes."""
-        from lumigraph.instruments import SingleLensCamera
         from lumigraph.preparation import Given
 
-        lenslets = None if isinstance(camera, SingleLensCamera) else camera
         given = Given(self.calibration, self.white, self.dark)
-        ready = given.prepared(raw, camera=lenslets, mask=self._mask(raw.shape), divide=False)
+        ready = given.prepared(raw, camera=camera, mask=self._mask(raw.shape), divide=False)
         return ready if self.background is None else replace(ready, background=self.background)
 
     def _mask(self, shape: tuple[int, int]) -> "np.ndarray | None":
@@ -165,16 +166,18 @@ class Way:
         above_zero("--strength", self.strength)
         above_zero("--deviance", self.deviance)
 
-    def method(self, camera: Any, operator: Any) -> Any:
+    def method(self, camera: "Instrument", operator: "Linear") -> "RichardsonLucy":
         """`RichardsonLucy` with what was asked for."""
         from lumigraph.deconvolution import LowPass, RichardsonLucy, TotalVariation, Wavelets
         from lumigraph.deconvolution.filters import widths_of
-        from lumigraph.instruments import LightFieldMicroscope
+        from lumigraph.instruments.capabilities import WithObjective
 
         given: dict[str, Any] = {} if self.strength is None else {"strength": self.strength}
         prior = {"none": None, "tv": TotalVariation(**given), "wavelets": Wavelets(**given)}[self.prior]
         smooth = None
-        if isinstance(camera, LightFieldMicroscope) and not self.raw_lattice:
+        if isinstance(camera, WithObjective) and not self.raw_lattice:
+            assert operator.depths is not None  # a camera's operators stand somewhere
+            assert operator.object_grid is not None
             distances = camera.low_pass_distances(operator.depths)
             smooth = LowPass(widths_of(distances, operator.object_grid.pitch[0]))
         return RichardsonLucy(prior, smooth, accelerated=self.accelerated)
@@ -223,8 +226,9 @@ def deconvolve(
     written, steps, found = [], [], None
     with progress("deconvolve") as shown:
         ready = seen.prepared(frames[0][1], described)
-        shown(Stage(0.0, "point images"))
-        operator = operator_of(described, wanted_depths, wanted.samples, ready.calibration)
+        made = within(shown, 0.0, 1.0, "point images")
+        made(0.0)
+        operator = operator_of(described, wanted_depths, wanted.samples, ready.calibration, made)
         task = _Task(operator, way, way.method(described, operator), output)
         for name, frame in frames:
             if frame is not frames[0][1]:
@@ -318,16 +322,13 @@ def depths(option: str, text: str) -> tuple[float, ...]:
 
 
 def operator_of(
-    camera: Any, planes: tuple[float, ...] | None, samples: int | None, calibration: "Calibration | None"
-) -> Any:
+    camera: "Instrument", planes: tuple[float, ...] | None, samples: int | None,
+    calibration: "Calibration | None", progress: Progress = silent,
+) -> "Linear":  # fmt: skip
     """The camera's model of how it sees planes [m]."""
-    from lumigraph.instruments import LightFieldMicroscope, SingleLensCamera
-
-    if isinstance(camera, LightFieldMicroscope):
-        return camera.operator(planes or (0.0,), samples, pixels=calibration)
-    if isinstance(camera, SingleLensCamera) and samples is not None:
-        raise FormatError(f"a {camera.KIND} camera has no lenslets to count --samples by. Leave it out.")
-    return camera.operator(planes, samples)
+    if camera.calibration is None and samples is not None:
+        raise FormatError(f"a {camera.noun} camera has no lenslets to count --samples by. Leave it out.")
+    return camera.operator_for(calibration, planes, samples, progress)
 
 
 def _result(found: Any, raw: "PreparedImage", steps: "list[Step]", written: tuple[Path, ...]) -> Result:

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, above_zero, length
-from lumigraph.cli.origin import FOCUSED, NO_ORIGIN, PLENOPTIC, Origin
+from lumigraph.cli.origin import NO_ORIGIN, Origin
 from lumigraph.cli.refocus import range_of
 from lumigraph.cli.reporting import REPORTED, Reported, enlarged
 from lumigraph.core.progress import Progress, silent
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from lumigraph.core.lightfield import LightField
     from lumigraph.core.raw import RawImage
     from lumigraph.depth import DepthMap
+    from lumigraph.instruments import Instrument
 
 MAPS = (".pfm", ".tif", ".tiff", ".png", ".zarr", ".ply")
 _PLANES = "0.9:1.1:21"
@@ -128,13 +129,16 @@ class Lengths:
     focal_length: str | None = None
     object_distance: str | None = None
 
-    def known(self, camera: Any, views: "LightField | None") -> tuple[float, float | None] | None:
+    def known(
+        self, camera: "Instrument | None", views: "LightField | None"
+    ) -> tuple[float, float | None] | None:
         """Focal length and distance [m], or None where the lens is not known."""
         from lumigraph.design import thin_lens
+        from lumigraph.instruments.capabilities import WithMainLens
 
         focal = above_zero("--focal-length", length("--focal-length", self.focal_length), "m")
         distance = above_zero("--object-distance", length("--object-distance", self.object_distance), "m")
-        if camera is not None:
+        if isinstance(camera, WithMainLens):
             focal, distance = focal or camera.main_lens.focal_length, distance or camera.object_distance
         if focal is None:
             return None
@@ -183,9 +187,9 @@ def depth(
         files.check_output(confidence, MAPS[:-1])
     if output.suffix.lower() == ".ply" and origin.camera is None and lengths.focal_length is None:
         raise FormatError("points need the camera's lengths. Give --camera FILE, or --focal-length.")
-    if search.correct and getattr(origin.described(PLENOPTIC), "KIND", None) != PLENOPTIC:
+    camera = origin.described("decode" if search.correct else None)
+    if search.correct and not _is_correctable(camera):
         raise FormatError("--correct simulates a camera. Give --camera FILE of a plenoptic camera 1.0.")
-    camera = origin.described()
     with progress("depth") as shown:
         found, grounds, picture, notes = _measured(source, (origin, search), shown)
         if search.correct:
@@ -220,33 +224,40 @@ def _measured(
     return search.of_views(found, shown), found, found.view(v, u), notes
 
 
-def _is_focused(camera: Any, calibration: "Calibration") -> bool:
-    return calibration.lattice.kinds > 1 if camera is None else camera.KIND == FOCUSED
+def _is_correctable(camera: "Instrument | None") -> bool:
+    from lumigraph.instruments.capabilities import Correctable
+
+    return isinstance(camera, Correctable)
+
+
+def _is_focused(camera: "Instrument | None", calibration: "Calibration") -> bool:
+    from lumigraph.instruments.capabilities import Rendered
+
+    return calibration.lattice.kinds > 1 if camera is None else isinstance(camera, Rendered)
 
 
 def _corrected(found: "DepthMap", views: Any, how: tuple[Any, Search], shown: Progress) -> "DepthMap":
     """Refocus factors without the bias of diffraction, which planes of known depth tell."""
     from lumigraph import depth as verbs
-    from lumigraph.simulation import plane_views
 
     camera, search = how
     return verbs.unbiased(
         verbs.alpha_of(found, views),
-        lambda alpha: plane_views(camera, alpha),
+        camera.plane_views,
         lambda known: verbs.alpha_of(search.of_views(known, silent), known),
         farthest=camera.alpha(9 * camera.object_distance), progress=shown,
     )  # fmt: skip
 
 
 def _in_metres(
-    found: "DepthMap", grounds: Any, lengths: Lengths, camera: Any
+    found: "DepthMap", grounds: Any, lengths: Lengths, camera: "Instrument | None"
 ) -> "tuple[DepthMap, float | None]":
     """The map in metres where the lens is known, and the distance of the plane in focus."""
     from lumigraph import depth as verbs
     from lumigraph.core.lightfield import LightField
-    from lumigraph.instruments import LightFieldMicroscope
+    from lumigraph.instruments.capabilities import WithObjective
 
-    if isinstance(camera, LightFieldMicroscope):
+    if isinstance(camera, WithObjective):
         return verbs.defocus(found, grounds, camera.depth_per_alpha), None
     lens = lengths.known(camera, grounds if isinstance(grounds, LightField) else None)
     if lens is None:

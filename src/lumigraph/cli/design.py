@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -15,8 +15,7 @@ from lumigraph.errors import FormatError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-if TYPE_CHECKING:
-    pass
+    from lumigraph.instruments import Description, Instrument
 
 
 @Parameter(name="*")
@@ -74,7 +73,9 @@ def design(
     if plot is not None:
         from lumigraph import plots
 
-        files.save_figure(plots.layout(_with_rays(described)), plot)
+        if described.layout() is None:
+            raise FormatError(f"a {described.noun} has no drawing of rays. Leave out --plot.")
+        files.save_figure(plots.layout(described), plot)
     found = Result(
         "Design", f"{table.title[0].upper()}{table.title[1:]}, and all that follows in closed form.",
         described, (str(table),), figures=lambda: _figures(described, table), extra=table.as_dict(),
@@ -90,18 +91,12 @@ def design(
     return None
 
 
-def _with_rays(camera: Any) -> Any:
-    if not hasattr(camera, "main_lens"):
-        raise FormatError("a light-field microscope has no drawing of rays. Leave out --plot.")
-    return camera
-
-
-def _figures(camera: Any, table: Any) -> "Iterator[Figure]":
+def _figures(camera: "Instrument", table: "Description") -> "Iterator[Figure]":
     from lumigraph import plots
 
     if table.warnings:
         yield Figure("\n".join(table.warnings), section="Warnings")
-    if hasattr(camera, "main_lens"):
+    if camera.layout() is not None:
         yield Figure(plots.layout(camera), "Rays through the camera.", "Layout", {"wide": True})
     for title, rows in table.sections:
         cells = [(row.name, row.text, row.source) for row in rows]

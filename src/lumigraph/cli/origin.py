@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -12,8 +12,10 @@ if TYPE_CHECKING:
     from lumigraph.core.lightfield import LightField
     from lumigraph.core.prepared import PreparedImage
     from lumigraph.core.raw import RawImage
+    from lumigraph.instruments.loading import AnyCamera
 
-FOCUSED, PLENOPTIC = "focused-plenoptic", "plenoptic"
+Use = Literal["decode", "render"]
+"""The verb that a camera's raw images are for; None for all of them."""
 
 
 @Parameter(name="*")
@@ -82,24 +84,25 @@ class Origin:
             )
         return found
 
-    def described(self, kind: str | None = None) -> Any:
-        """The camera, or None; refused if it is of another kind than the verb is for."""
+    def described(self, use: Use | None = None) -> "AnyCamera | None":
+        """The camera, or None; refused if its raw images are for another verb."""
         if self.camera is None:
             return None
-        from lumigraph.instruments import SingleLensCamera, load_camera
+        from lumigraph.instruments import load_camera
+        from lumigraph.instruments.capabilities import Rendered
 
-        camera: Any = load_camera(self.camera)
-        told = f"--camera {self.camera} is a {camera.KIND}, which"
-        if isinstance(camera, SingleLensCamera):
+        camera = load_camera(self.camera)
+        told = f"--camera {self.camera} is a {camera.noun}, which"
+        if camera.calibration is None:
             raise FormatError(f"{told} has no lenslets: use 'lumigraph deconvolve'.")
-        if kind == FOCUSED != camera.KIND:
+        if use == "render" and not isinstance(camera, Rendered):
             raise FormatError(f"{told} is decoded: use 'lumigraph decode'.")
-        if kind == PLENOPTIC and camera.KIND == FOCUSED:
+        if use == "decode" and isinstance(camera, Rendered):
             raise FormatError(f"{told} is rendered: use 'lumigraph render'.")
         return camera
 
     def prepared(
-        self, raw: "RawImage", *, kind: str | None = None, devignette: bool | None = None
+        self, raw: "RawImage", *, use: Use | None = None, devignette: bool | None = None
     ) -> "PreparedImage":
         """The raw image, ready to use; refused where nothing tells where its micro-images stand.
 
@@ -107,14 +110,14 @@ class Origin:
         ----------
         raw
             As it was read.
-        kind
-            Of cameras that the verb is for; None for all.
+        use
+            What the camera's raw images must be for; None for anything.
         devignette
             Whether to divide by the white image; None for yes where there is one.
         """
         from lumigraph.preparation import Given
 
-        camera = self.described(kind)
+        camera = self.described(use)
         if camera is None and self.calibration is None and self.white is None:
             raise CalibrationError(
                 "where the micro-images stand is not known. Give --calibration FILE or --white FILE."

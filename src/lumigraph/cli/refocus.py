@@ -3,14 +3,14 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, length
-from lumigraph.cli.origin import NO_ORIGIN, PLENOPTIC, Origin
+from lumigraph.cli.origin import NO_ORIGIN, Origin
 from lumigraph.cli.reporting import REPORTED, Reported, enlarged
 from lumigraph.core.progress import Progress
 from lumigraph.core.result import Figure, Quantity, Result
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from lumigraph.core.arrays import Array
     from lumigraph.core.lightfield import LightField
+    from lumigraph.instruments.capabilities import Decoded
 
 _MOST = 1000
 _MOST_SAMPLES = 64
@@ -48,7 +49,7 @@ class Focus:
     alphas: str | None = None
     depth: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True)] = None
 
-    def check(self, camera: Any) -> None:
+    def check(self, camera: "Decoded | None") -> None:
         """Refuse what can be seen to be wrong before anything is read."""
         if not (self.alpha or self.alphas or self.depth):
             raise FormatError("where to focus is not known. Give --alpha 0.95 or --alphas 0.9:1.1:9.")
@@ -63,22 +64,15 @@ class Focus:
         several = range_of("--alphas", self.alphas) if self.alphas else []
         return len(self.alpha or []) + len(several) + len(self.depth or [])
 
-    def chosen(self, camera: Any, views: "LightField") -> list[float]:
+    def chosen(self, camera: "Decoded | None", views: "LightField") -> list[float]:
         """All factors, as given."""
         found = [*(self.alpha or []), *(range_of("--alphas", self.alphas) if self.alphas else [])]
         depths = [length("--depth", text) or 0.0 for text in self.depth or []]
-        found += [_factor(camera, dz, views) for dz in depths]
+        if camera is not None:
+            found += [camera.refocus_factor(dz, views.separation) for dz in depths]
         for alpha in found:
             _check_alpha(alpha)
         return found
-
-
-def _factor(camera: Any, dz: float, views: "LightField") -> float:
-    from lumigraph.instruments import LightFieldMicroscope
-
-    if isinstance(camera, LightFieldMicroscope):
-        return 1 + dz / camera.depth_per_alpha(views.separation)
-    return camera.alpha(dz)
 
 
 def _check_alpha(alpha: float) -> None:
@@ -169,7 +163,7 @@ def refocus(
     """
     common.check()
     quality.check()
-    camera = origin.described(PLENOPTIC) if focus.depth else None
+    camera = cast("Decoded | None", origin.described("decode")) if focus.depth else None
     focus.check(camera)
     _check_output(output, focus.count)
     with progress("refocus") as shown:
@@ -202,7 +196,7 @@ def light_field(path: Path, origin: Origin) -> "LightField":
     found = origin.views(path)
     if isinstance(found, LightField):
         return found
-    return preparation.decode(origin.prepared(found, kind=PLENOPTIC))
+    return preparation.decode(origin.prepared(found, use="decode"))
 
 
 def _check_output(output: Path, count: int) -> None:

@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, length
-from lumigraph.cli.origin import FOCUSED, NO_ORIGIN, Origin
+from lumigraph.cli.origin import NO_ORIGIN, Origin
 from lumigraph.cli.refocus import MOST_SHOWN, range_of
 from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.core.progress import Progress
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from lumigraph.core.depth_map import DepthMap
     from lumigraph.core.lightfield import LightField
     from lumigraph.core.raw import RawImage
+    from lumigraph.instruments.capabilities import Rendered
 
 _MOST_FINER = 8
 _MOST_FRAMES = 1000
@@ -113,19 +114,20 @@ class Tiles:
                 f"--focus is {self.focus!r} but must be three sizes in pixels, such as -13.5,-10.5,-7.5."
             ) from None
 
-    def known(self, camera: Any) -> float | None:
+    def known(self, camera: "Rendered | None") -> float | None:
         """The one patch [px] that is given, or that the camera has at the depth; None where it is found."""
         if self.patch is not None or camera is None or self.is_auto:
             return self.patch
         return camera.patch_at(length("--depth", self.depth) or 0.0)
 
-    def sharp(self, camera: Any, calibration: "Calibration", origin: Origin) -> list[float] | None:
+    def sharp(
+        self, camera: "Rendered | None", calibration: "Calibration", origin: Origin
+    ) -> list[float] | None:
         """The patch at which each kind of lenslets is sharp, where there are three and it is known."""
         if self.focus is not None or calibration.lattice.kinds == 1:
             return self.chosen_focus()
-        if camera is not None and len(camera.lenslets.focal_length) == 3:
-            first, second, third = camera.sharp_patches
-            return [first, third, second]  # the raw image is turned: the second and third kind trade places
+        if camera is not None and len(sizes := camera.patches_on_raw()) == calibration.lattice.kinds:
+            return list(sizes)
         if origin.calibration is not None and origin.calibration.suffix.lower() == ".xml":
             from lumigraph.io.raytrix import lens_types
             from lumigraph.rendering import sharp_patches
@@ -264,9 +266,9 @@ def _from_raw(found: "RawImage", how: tuple[Origin, Tiles], output: Path, shown:
     from lumigraph import depth, io, preparation, rendering
 
     origin, tiles = how
-    camera = origin.described(FOCUSED)
+    camera = cast("Rendered | None", origin.described("render"))
     size: Any = tiles.known(camera)
-    ready = origin.prepared(found, kind=FOCUSED)
+    ready = origin.prepared(found, use="render")
     calibration: Any = ready.calibration
     sharp = tiles.sharp(camera, calibration, origin)
     extra = None

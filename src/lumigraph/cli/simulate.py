@@ -1,6 +1,5 @@
 """`lumigraph simulate`."""
 
-import math
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from lumigraph.core.grid import Grid
+    from lumigraph.core.raw import RawImage
+    from lumigraph.instruments import Instrument
     from lumigraph.scene import Scene
 
 SCENES = ("white", "usaf1951", "siemens_star", "gratings", "slanted_edge", "edge", "pinhole", "photo")
@@ -171,7 +172,7 @@ def simulate(
     if seed < 0:
         raise FormatError(f"--seed is {seed} but must be at least 0.")
     described, coherence, spectrum = load_camera(camera), light.chosen(seed), light.spectrum()
-    scene = stage.built(_drawn_on(described))
+    scene = stage.built(described.scene_grid)
     try:
         with progress("simulate") as shown:
             raw = simulate(described, scene, coherence, spectrum=spectrum, progress=shown)
@@ -209,28 +210,13 @@ def simulate(
     )  # fmt: skip
 
 
-def _drawn_on(camera: Any) -> "Grid":
-    """Samples of the scene's pictures: a microscope's as fine as its objective resolves, within reason."""
-    from lumigraph.core.grid import Grid
-    from lumigraph.instruments import LightFieldMicroscope
-
-    grid = camera.object_grid
-    if not isinstance(camera, LightFieldMicroscope) or camera.configuration == "fourier":
-        return grid
-    finest = camera.wavelength / (4 * camera.objective.numerical_aperture)
-    finer = min(3, math.ceil(grid.pitch[0] / finest))
-    pitch = grid.pitch[0] / finer
-    ny, nx = (n * finer for n in grid.shape)
-    return Grid((ny, nx), (pitch, pitch), (0.0 if ny % 2 else pitch / 2, 0.0 if nx % 2 else pitch / 2))
-
-
-def _figures(raw: Any, camera: Any) -> "Iterator[Figure]":
+def _figures(raw: "RawImage", camera: "Instrument") -> "Iterator[Figure]":
     from lumigraph import plots
 
     yield Figure(raw, "Upright, as a camera reads it out.", "Raw image", {"wide": True})
     rows, columns = (slice(max(0, n // 2 - 80), n // 2 + 80) for n in raw.shape)
     yield Figure(raw.data[rows, columns], "The middle, pixel by pixel.", "Raw image", {"zoom": 3})
-    if hasattr(camera, "main_lens"):
+    if camera.layout() is not None:
         yield Figure(plots.layout(camera), "Rays through the camera.", "Camera")
     yield Figure(camera.to_toml(), section="Camera file")
 

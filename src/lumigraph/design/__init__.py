@@ -5,6 +5,7 @@
 - `plenoptic1`: the plenoptic camera 1.0, lenslets at the main-lens image
 - `plenoptic2`: the focused plenoptic camera 2.0, lenslets relay the main-lens image
 - `microscope`: the light-field microscope, by depth
+- `layout`: the lengths that a ray diagram shows
 
 Distances are positive along the light unless a function says otherwise. "The thesis" in a source is the
 PhD thesis that this project started from; equations that are misprinted there are given corrected here.

@@ -8,7 +8,6 @@ from lumigraph import plots, report
 from lumigraph.experiments.registry import Experiment, Row
 from lumigraph.experiments.run import Result
 from lumigraph.instruments import load_camera
-from lumigraph.instruments.camera import Camera
 from lumigraph.report.pictures import Picture, picture
 
 INTRODUCTION = """
@@ -75,9 +74,7 @@ def _section(section: report.Section, one: Experiment, result: Result) -> None:
 @cache
 def _drawn(camera: str) -> Picture:
     caption = f"The set-up: camera {camera}; heights are exaggerated"
-    described = load_camera(camera)
-    assert isinstance(described, Camera)  # experiments with a drawn set-up
-    return picture(plots.layout(described), caption, wide=True)
+    return picture(plots.layout(load_camera(camera)), caption, wide=True)
 
 
 def cells(row: Row) -> tuple[str, ...]:

@@ -13,8 +13,6 @@ from lumigraph import store
 from lumigraph.core.progress import Progress, Stage
 from lumigraph.errors import FormatError, LumigraphError
 
-"""Called with the fraction of an experiment that is done, and what goes on."""
-
 Tolerance = float | tuple[float, float]
 
 

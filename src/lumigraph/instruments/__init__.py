@@ -3,10 +3,11 @@
 - `single_lens`: `SingleLensCamera`
 - `plenoptic1`: `PlenopticCamera`, lenslets at the main-lens image
 - `plenoptic2`: `FocusedPlenopticCamera`, lenslets that relay the main-lens image
-- `microscope`: `LightFieldMicroscope`, its objective and its operator
+- `microscope`: `LightFieldMicroscope` and its operator; `microscope_objective`: its `MicroscopeObjective`
 - `parts`: `MainLens`, `Lenslets`, `Pixels`: the tables of a camera file
 - `loading`: `load_camera` for every kind
-- `instrument`, `camera`, `lenslet_camera`: what the kinds share
+- `instrument`, `camera`, `lenslet_camera`: what the kinds share; `capabilities`: what some of them can do
+- `parameters`: what a designer can change; `point_view`: a point's image at once
 - `grids`: how finely and widely planes are sampled
 - `describe`, `describe_microscope`: the table of everything that follows from a description, a `Description`
   of rows (`row`); `trade_offs`: those that change with the magnification
@@ -16,9 +17,11 @@
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.files import catalogue
+from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.loading import load_camera
-from lumigraph.instruments.microscope import LightFieldMicroscope, MicroscopeObjective
+from lumigraph.instruments.microscope import LightFieldMicroscope
+from lumigraph.instruments.microscope_objective import MicroscopeObjective
 from lumigraph.instruments.parts import Lenslets, MainLens, Pixels
 from lumigraph.instruments.plenoptic1 import PlenopticCamera
 from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
@@ -29,6 +32,7 @@ __all__ = [
     "Camera",
     "Description",
     "FocusedPlenopticCamera",
+    "Instrument",
     "LensletCamera",
     "Lenslets",
     "LightFieldMicroscope",

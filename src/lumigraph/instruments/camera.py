@@ -9,16 +9,21 @@ from os import PathLike
 from pydantic import Field
 
 from lumigraph.core import checks
+from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.linear import Linear, Sum
 from lumigraph.core.progress import Progress, part
 from lumigraph.design import plenoptic1, resolution, thin_lens
+from lumigraph.design.layout import Layout, LensletLayout
 from lumigraph.elements import LensletArray, ThinLens, Train, ZernikePlate
 from lumigraph.errors import GeometryError
+from lumigraph.instruments import parameters, point_view
 from lumigraph.instruments.grids import Sampling
 from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.parameters import Parameter
 from lumigraph.instruments.parts import MainLens, Pixels
+from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.quantities import Length, Wavelength
 from lumigraph.instruments.trade_offs import Range
 from lumigraph.operators import CameraOptics
@@ -58,11 +63,6 @@ class Camera(Instrument):
     def separation(self) -> float:
         """Main lens to lenslets, L, or to the sensor where there are none [m]."""
         return self.image_distance
-
-    @property
-    def lenslet_distance(self) -> float | None:
-        """Lenslets to sensor, b [m]; None without lenslets."""
-        return None
 
     @property
     def lattice(self) -> Lattice | None:
@@ -140,6 +140,53 @@ class Camera(Instrument):
         # The plate is also the stop: two grey edges would be darker than one.
         plate = ZernikePlate({j: 2 * math.pi * rms for j, rms in waves.items()}, diameter)
         return Train((plate, ThinLens(focal_length)))
+
+    def layout(self) -> Layout:
+        """Distances and sizes that a ray diagram shows."""
+        width = self.sensor.shape[1] * self.sensor.pixel_pitch
+        return Layout(
+            self.object_distance, self.main_lens.focal_length, self.pupil_diameter, self.image_distance,
+            self.separation, width, self._lenslet_layout(),
+        )  # fmt: skip
+
+    def _lenslet_layout(self) -> LensletLayout | None:
+        return None
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Wavelength, distances, diameter, what is the kind's own, and pixels."""
+        focal_length, diameter = self.main_lens.focal_length, self.pupil_diameter
+        return (
+            parameters.wavelength(self.wavelength),
+            parameters.length("object_distance", "Object distance z1", self.object_distance, "mm"),
+            parameters.length("main_lens.focal_length", "Main lens focal length f", focal_length, "mm"),
+            self._stop(parameters.length("main_lens.diameter", "Main lens diameter D", diameter, "mm")),
+            *self._own_parameters(), parameters.pixel(self.pixels),
+        )  # fmt: skip
+
+    def _stop(self, diameter: Parameter) -> Parameter:
+        return diameter
+
+    def _own_parameters(self) -> tuple[Parameter, ...]:
+        return ()
+
+    def depth_reach(self) -> float:
+        """A third of the way to the focal length."""
+        return 0.3 * (self.object_distance - self.main_lens.focal_length)
+
+    def point_view(self, dz: float = 0.0) -> PointImage:
+        """Image of a point on the axis at a depth `dz` [m] from the focused plane."""
+        self.defocused(dz)
+        return point_view.of_camera(self, dz)
+
+    def operator_for(
+        self,
+        calibration: Calibration | None,
+        depths: Sequence[float] | None = None,
+        samples_per_lenslet: int | None = None,
+        progress: Progress | None = None,
+    ) -> Linear:
+        """The operator of its own pixels, wherever a raw image's lenslets stand."""
+        return self.operator(depths, samples_per_lenslet, progress=progress)
 
     def magnifications(self) -> Range:
         """Of the main lens, by the distance of the object."""

@@ -1,26 +1,139 @@
 """Reading, checking, changing and writing the description of an instrument."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 from os import PathLike
 from typing import Any, ClassVar, Self
 
 from pydantic import ValidationError
 
+from lumigraph.core.calibration import Calibration
 from lumigraph.core.drawing import draw
+from lumigraph.core.grid import Grid
+from lumigraph.core.linear import Linear
+from lumigraph.core.progress import Progress
+from lumigraph.design.layout import Layout
 from lumigraph.errors import FormatError
 from lumigraph.instruments import files
 from lumigraph.instruments.description import Description
+from lumigraph.instruments.parameters import Parameter, changes
 from lumigraph.instruments.parts import Part
+from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.problems import readable
 from lumigraph.instruments.quantities import FROM_FILE
 from lumigraph.instruments.row import Row
 from lumigraph.instruments.trade_offs import Range
+from lumigraph.sensor import Sensor
 
 
 class Instrument(Part):
-    """What a camera file describes; see its children."""
+    """What a camera file describes; see its children.
+
+    What only some kinds can do is told by the protocols of `instruments.capabilities`.
+    """
 
     KIND: ClassVar[str]
+
+    @property
+    def noun(self) -> str:
+        """What it is called in messages: its kind in camera files."""
+        return self.KIND
+
+    @property
+    def sensor(self) -> Sensor:
+        """Its pixels."""
+        raise NotImplementedError
+
+    @property
+    def pupil_diameter(self) -> float:
+        """Of what limits the light [m]."""
+        raise NotImplementedError
+
+    @property
+    def object_grid(self) -> Grid:
+        """Samples of the focused plane."""
+        raise NotImplementedError
+
+    @property
+    def scene_grid(self) -> Grid:
+        """Samples that pictures in the focused plane are drawn on."""
+        return self.object_grid
+
+    @cached_property
+    def calibration(self) -> Calibration | None:
+        """Where the micro-images stand on the raw image [px]; None without lenslets."""
+        return None
+
+    @property
+    def separation(self) -> float | None:
+        """Main lens to lenslets, or to the sensor where there are none [m]; None without a main lens."""
+        return None
+
+    @property
+    def lenslet_distance(self) -> float | None:
+        """Lenslets to sensor, b [m]; None without lenslets."""
+        return None
+
+    @property
+    def patch(self) -> float | None:
+        """Piece of a micro-image that tiles the picture of the focused plane [px]; None if views do."""
+        return None
+
+    def layout(self) -> Layout | None:
+        """What a ray diagram shows; None where there is none."""
+        return None
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """What can be changed of it by sliders, at its values."""
+        raise NotImplementedError
+
+    def changed(self, values: Mapping[str, Any] | None) -> Self:
+        """The same with other values of its `parameters`, by their keys and in their units.
+
+        Raises
+        ------
+        FormatError
+            An unknown key, or a value of another type.
+        GeometryError
+            Values that no camera can have.
+        """
+        found = changes(self.parameters(), values, self._count())
+        return self.replace(**found) if found else self
+
+    def _count(self) -> tuple[int, int] | None:
+        """Of its lenslets; None without them."""
+        return None
+
+    def depth_reach(self) -> float:
+        """How far from the focused plane a point is worth a look [m]."""
+        raise NotImplementedError
+
+    def point_view(self, dz: float = 0.0) -> PointImage:
+        """Image of a point on the axis at a depth `dz` [m] from the focused plane, in some seconds.
+
+        Raises
+        ------
+        GeometryError
+            A depth that the instrument does not image.
+        SamplingError
+            Planes too large for an answer at once.
+        """
+        raise NotImplementedError
+
+    def operator_for(
+        self,
+        calibration: Calibration | None,
+        depths: Sequence[float] | None = None,
+        samples_per_lenslet: int | None = None,
+        progress: Progress | None = None,
+    ) -> Linear:
+        """The model of a raw image with that calibration, or, as the kind has none, of its own pixels."""
+        raise NotImplementedError
+
+    def would_be(self, share: float) -> str:
+        """What of the description would explain a lattice that is so many times as large as its own."""
+        pitch = self.sensor.pixel_pitch
+        return f"pixels of {pitch / share * 1e6:.4g} µm instead of {pitch * 1e6:.4g} µm"
 
     @classmethod
     def from_toml(cls, path: str | PathLike[str]) -> Self:

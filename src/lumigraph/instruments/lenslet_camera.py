@@ -11,11 +11,14 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.linear import Linear
 from lumigraph.design import plenoptic1, plenoptic2, resolution
+from lumigraph.design.layout import LensletLayout
 from lumigraph.elements import LensletArray, Train
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import grids
+from lumigraph.instruments import grids, point_view
 from lumigraph.instruments.camera import Camera, Making
+from lumigraph.instruments.parameters import Parameter, optional
 from lumigraph.instruments.parts import Lenslets
+from lumigraph.instruments.point_view import PointImage
 from lumigraph.operators import CameraOptics, periodic_operator
 from lumigraph.propagation import Propagate
 
@@ -75,6 +78,27 @@ class LensletCamera(Camera):
             lattice, sensor.shape, indices[inside], centers[inside], 0.0,
             pixel_pitch=pitch, separation=self.separation, lenslet_distance=self.lenslet_distance,
         )  # fmt: skip
+
+    def _count(self) -> tuple[int, int]:
+        return self.lenslets.count
+
+    def _lenslet_layout(self) -> LensletLayout:
+        pitch, offset = self.lattice.pitches[1], self.lattice.origin[1]
+        return LensletLayout(self.lenslet_distance, pitch, offset, self.lenslets.focal_length)
+
+    def _stop(self, diameter: Parameter) -> Parameter:
+        return optional(diameter, given=self.main_lens.diameter is not None)
+
+    def point_view(self, dz: float = 0.0) -> PointImage:
+        """Image of a point on the axis at a depth `dz` [m], with as many lenslets as its light reaches."""
+        focal_length, diameter = self.main_lens.focal_length, self.pupil_diameter
+        blur = diameter * abs(1 - self.separation * (1 / focal_length - 1 / self.defocused(dz)))
+        airy = 2.44 * self.wavelength * self.separation / diameter
+        count = point_view.reached(blur + 2 * airy, self.lenslets.pitch, self.lenslets.count)
+        small = self.replace(
+            lenslets={"count": count}, sensor={"shape": None}, main_lens={"diameter": diameter}
+        )
+        return point_view.of_camera(small, dz, count)
 
     def _planes(
         self, optics: CameraOptics, depths: Sequence[float] | None, samples: int | None, making: Making

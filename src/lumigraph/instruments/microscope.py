@@ -18,11 +18,14 @@ from lumigraph.core.progress import Progress
 from lumigraph.design import microscope as closed_forms
 from lumigraph.elements.objective import Mismatch, Model, Objective
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import describe_microscope, trade_offs
+from lumigraph.instruments import describe_microscope, microscope_design, trade_offs
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.instrument import Instrument
-from lumigraph.instruments.parts import Lenslets, Part, Pixels
-from lumigraph.instruments.quantities import Aberrations, Displacement, Fraction, Length, Positive, Wavelength
+from lumigraph.instruments.microscope_objective import MicroscopeObjective
+from lumigraph.instruments.parameters import Parameter
+from lumigraph.instruments.parts import Lenslets, Pixels
+from lumigraph.instruments.point_view import PointImage
+from lumigraph.instruments.quantities import Displacement, Length, Positive, Wavelength
 from lumigraph.instruments.row import Row
 from lumigraph.operators.fourier_microscope import Mosaic, fourier_operator
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
@@ -34,57 +37,6 @@ from lumigraph.simulation.microscope_scene import SAMPLES, point_image
 
 FINENESS = 1.7
 """Samples of a lenslet's image over what its cut-off asks for, where pixels are interpolated from them."""
-
-
-class MicroscopeObjective(Part):
-    """Table ``[objective]``.
-
-    Parameters
-    ----------
-    magnification
-        As engraved.
-    numerical_aperture, immersion_index
-        NA and n.
-    maker
-        Whose tube lens the engraved magnification is for, such as "Nikon": `design.microscope.TUBE_LENSES`.
-    tube_lens
-        Focal length of the tube lens in use; with a maker it changes the magnification.
-    model
-        "scalar", "vector", "paraxial" or "rays" (for images traced by rays); left out, vector from NA 0.8 on.
-    axial_share
-        Of dipoles, with "vector"; 1/3 for all directions.
-    aberrations
-        Zernike terms: Noll index to waves rms.
-    sample_index, focus_depth
-        Of the medium around the object, and how deep in it the focused plane lies; left out, the immersion.
-    """
-
-    magnification: Positive
-    numerical_aperture: Positive
-    immersion_index: Positive = 1.0
-    maker: str | None = None
-    tube_lens: Length | None = None
-    model: Literal["scalar", "vector", "paraxial", "rays"] | None = None
-    axial_share: Fraction = 1 / 3
-    aberrations: Aberrations = Field(default_factory=dict)
-    sample_index: Positive | None = None
-    focus_depth: Length | None = None
-
-    @model_validator(mode="after")
-    def _is_possible(self) -> Self:
-        closed_forms.sine(self.numerical_aperture, self.immersion_index)
-        if self.maker is not None:
-            closed_forms.tube_lens(self.maker)
-        if self.focus_depth is not None and self.sample_index is None:
-            raise GeometryError("focus_depth says how deep in the sample; give sample_index too.")
-        return self
-
-    @property
-    def actual_magnification(self) -> float:
-        """From the object to the native image: the engraved one, times the tube lens over the maker's."""
-        if self.maker is None or self.tube_lens is None:
-            return self.magnification
-        return self.magnification * self.tube_lens / closed_forms.tube_lens(self.maker)
 
 
 class LightFieldMicroscope(Instrument):
@@ -261,6 +213,18 @@ class LightFieldMicroscope(Instrument):
         pitch = self.lenslet_size / 5
         return Grid((ny, nx), (pitch, pitch), tuple(0.0 if n % 2 else pitch / 2 for n in (ny, nx)))  # type: ignore[arg-type]
 
+    @property
+    def scene_grid(self) -> Grid:
+        """As fine as the objective resolves, up to three times finer than `object_grid`."""
+        grid = self.object_grid
+        if self.configuration == "fourier":
+            return grid
+        finest = self.wavelength / (4 * self.objective.numerical_aperture)
+        finer = min(3, math.ceil(grid.pitch[0] / finest))
+        pitch = grid.pitch[0] / finer
+        ny, nx = (n * finer for n in grid.shape)
+        return Grid((ny, nx), (pitch, pitch), (0.0 if ny % 2 else pitch / 2, 0.0 if nx % 2 else pitch / 2))
+
     def sampling_distances(self, depths: Sequence[float]) -> tuple[float, ...]:
         """Distance between the samples that the lenslets take of each depth [m]: finer is not measured.
 
@@ -293,6 +257,10 @@ class LightFieldMicroscope(Instrument):
             )
         aperture = (self.objective.numerical_aperture, self.objective.immersion_index)
         return closed_forms.depth_per_alpha(self.magnification, aperture, (separation, self.lenslet_distance))
+
+    def refocus_factor(self, dz: float, separation: float) -> float:
+        """α' that focuses views of a separation [m] at a depth `dz` [m] from the focused plane."""
+        return 1 + dz / self.depth_per_alpha(separation)
 
     def _each(self, closed_form: Callable[..., float], depths: Sequence[float]) -> tuple[float, ...]:
         aperture = (self.objective.numerical_aperture, self.objective.immersion_index)
@@ -347,6 +315,37 @@ class LightFieldMicroscope(Instrument):
             self.objectives, self.lenslet, self._layout(samples, pixels), planes,
             dropped=dropped, folder=folder, progress=progress,
         )  # fmt: skip
+
+    def operator_for(
+        self,
+        calibration: Calibration | None,
+        depths: Sequence[float] | None = None,
+        samples_per_lenslet: int | None = None,
+        progress: Progress | None = None,
+    ) -> Linear:
+        """The operator of a real camera's pixels; its object is a volume, of one plane without depths."""
+        planes = depths or (0.0,)
+        return self.operator(planes, samples_per_lenslet, pixels=calibration, progress=progress)
+
+    def would_be(self, share: float) -> str:
+        """A relay that explains a lattice so many times as large."""
+        relay = self.relay_magnification
+        return f"a relay of {relay * share:.4g} instead of {relay:.4g}"
+
+    def depth_reach(self) -> float:
+        """A tenth of a millimetre [m]."""
+        return 1e-4
+
+    def point_view(self, dz: float = 0.0) -> PointImage:
+        """Image of a point on the axis at a depth `dz` [m], by the scalar model and one wavelength."""
+        return microscope_design.point_view(self, checks.finite("dz", dz))
+
+    def _count(self) -> tuple[int, int]:
+        return self.lenslets.count
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Wavelength, objective, distances, lenslets, relay and pixels."""
+        return microscope_design.parameters(self)
 
     def point_image(self, y: float, x: float, dz: float = 0.0) -> np.ndarray:
         """Raw image (ny, nx) of a point anywhere [m] that is as bright as a sample of `object_grid` of 1.

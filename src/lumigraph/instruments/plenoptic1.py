@@ -4,11 +4,18 @@ from typing import ClassVar
 
 from pydantic import model_validator
 
+from lumigraph.core.lightfield import LightField
+from lumigraph.design import plenoptic1
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import describe, trade_offs
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.lenslet_camera import LensletCamera
+from lumigraph.instruments.parameters import Parameter, lenslets
 from lumigraph.instruments.row import Row
+from lumigraph.simulation import plane_views
+
+_MOST_KNOWN = 33
+"""Lenslets along each side of the camera that known planes are simulated with."""
 
 
 class PlenopticCamera(LensletCamera):
@@ -69,6 +76,20 @@ class PlenopticCamera(LensletCamera):
     def lenslet_distance(self) -> float:
         """Lenslets to sensor, b = f_µ [m]."""
         return self.lenslets.focal_length[0]
+
+    def refocus_factor(self, dz: float, separation: float) -> float:
+        """α' that focuses its views at a depth `dz` [m] from the focused plane, whatever their separation."""
+        return self.alpha(dz)
+
+    def plane_views(self, alpha: float) -> LightField:
+        """Views of a textured plane at a refocus factor, by wave optics and a part of the lenslets."""
+        count = tuple(min(n, _MOST_KNOWN) for n in self.lenslets.count)
+        small = self.replace(lenslets={"count": count}, sensor={"shape": None})
+        dz = plenoptic1.defocus(self.main_lens.focal_length, self.object_distance, alpha)
+        return plane_views(small, small.calibration, dz)
+
+    def _own_parameters(self) -> tuple[Parameter, ...]:
+        return lenslets(self.lenslets, layouts=True)
 
     def trade_offs(self) -> tuple[Row, ...]:
         """Resolution, depth of field and views, to first order."""

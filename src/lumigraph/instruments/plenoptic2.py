@@ -10,6 +10,7 @@ from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments import describe, trade_offs
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.lenslet_camera import LensletCamera
+from lumigraph.instruments.parameters import Parameter, choice, lenslets, number
 from lumigraph.instruments.row import Row
 
 
@@ -130,6 +131,23 @@ class FocusedPlenopticCamera(LensletCamera):
             width = closed_forms.patch(self.lenslets.pitch, m, image_distance, self.separation)
             sizes.append(width / self.pixels.pixel_pitch)
         return tuple(sizes)
+
+    def patches_on_raw(self) -> tuple[float, ...]:
+        """Patch [px] at which each kind of lenslets is sharp, in the order of the calibration.
+
+        The raw image is turned by 180°, so that the second and third kind trade places.
+        """
+        first, *rest = self.sharp_patches
+        return (first, *reversed(rest))
+
+    def _own_parameters(self) -> tuple[Parameter, ...]:
+        m = self.lenslet_magnification
+        ends, kind = ((0.05, 2.0), "log") if m > 0 else ((-0.95, -0.05), "linear")
+        return (
+            number("lenslets.magnification", "Lenslet magnification m", m, ends, kind=kind),
+            choice("matching", "Diameter matched for", self.matching, ("views", "full")),
+            *lenslets(self.lenslets, layouts=len(self.lenslets.focal_length) == 1),
+        )
 
     def magnifications(self) -> trade_offs.Range:
         """Of the lenslets."""

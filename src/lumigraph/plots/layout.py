@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Rectangle
 
-from lumigraph.core.lattice import Lattice
+from lumigraph.design.layout import Layout, LensletLayout
 from lumigraph.errors import GeometryError
 
 MM = 1e3
@@ -21,37 +21,8 @@ FAN = ("#7a4fa3", "#c1272d", "#e08a00", "#2e8b57", "#0071bc")
 class Camera(Protocol):
     """What `layout` asks of an instrument."""
 
-    object_distance: float
-    main_lens: Any
-
-    @property
-    def image_distance(self) -> float:
-        """Main lens to its image [m]."""
-        ...
-
-    @property
-    def separation(self) -> float:
-        """Main lens to lenslets, or to the sensor [m]."""
-        ...
-
-    @property
-    def lenslet_distance(self) -> float | None:
-        """Lenslets to sensor [m]."""
-        ...
-
-    @property
-    def pupil_diameter(self) -> float:
-        """Of the main lens' stop [m]."""
-        ...
-
-    @property
-    def lattice(self) -> Lattice | None:
-        """Where the lenslets stand [m]."""
-        ...
-
-    @property
-    def sensor(self) -> Any:
-        """Pixels."""
+    def layout(self) -> Layout | None:
+        """Its distances and sizes; None where there are no rays to draw."""
         ...
 
 
@@ -75,37 +46,37 @@ def layout(camera: Camera) -> Figure:
     --------
     ``lumigraph.plots.layout(camera).savefig("layout.png")``
     """
-    if not hasattr(camera, "object_distance"):
+    drawn = camera.layout()
+    if drawn is None:
         raise GeometryError(
             f"there is no ray diagram of a {type(camera).__name__}. Its describe() tells its distances."
         )
-    if camera.object_distance <= camera.main_lens.focal_length:
+    if drawn.object_distance <= drawn.focal_length:
         raise GeometryError(
-            f"the object at {camera.object_distance * MM:.6g} mm is inside the focal length of "
-            f"{camera.main_lens.focal_length * MM:.6g} mm: there is no image to draw. Move it farther away."
+            f"the object at {drawn.object_distance * MM:.6g} mm is inside the focal length of "
+            f"{drawn.focal_length * MM:.6g} mm: there is no image to draw. Move it farther away."
         )
-    if camera.lattice is None:
+    if drawn.lenslets is None:
         figure = Figure(figsize=(9.0, 3.6), layout="constrained")
-        _whole(figure.subplots(), camera)
+        _whole(figure.subplots(), drawn)
         return figure
     figure = Figure(figsize=(9.0, 7.4), layout="constrained")
     upper, lower = figure.subplots(2, 1, height_ratios=(1.0, 1.15))
-    _whole(upper, camera)
-    _enlarged(lower, camera)
+    _whole(upper, drawn)
+    _enlarged(lower, drawn, drawn.lenslets)
     return figure
 
 
-def _whole(axes: Axes, camera: Camera) -> None:
+def _whole(axes: Axes, drawn: Layout) -> None:
     """Object to sensor: one bundle from the axis, one from the field, chief rays dashed."""
-    z1, length, radius = camera.object_distance, camera.separation, camera.pupil_diameter / 2
-    end = length + (camera.lenslet_distance or 0.0)
-    half_sensor = camera.sensor.shape[1] * camera.sensor.pixel_pitch / 2
+    z1, length, radius = drawn.object_distance, drawn.separation, drawn.pupil_diameter / 2
+    end, half_sensor = drawn.length, drawn.sensor_width / 2
     field = half_sensor * z1 / end
     top = max(field, 1.6 * radius, half_sensor)
     axes.plot([-z1 * MM, end * MM], [0, 0], color=AXIS_COLOUR, lw=0.8, ls="-.")
     for height, colour in zip((0.0, 0.75 * field), BUNDLES, strict=True):
         for u in (-radius, 0.0, radius):
-            after = u + (-height * camera.image_distance / z1 - u) / camera.image_distance * length
+            after = u + (-height * drawn.image_distance / z1 - u) / drawn.image_distance * length
             axes.plot(
                 np.array([-z1, 0, length]) * MM, np.array([height, u, after]) * MM,
                 color=colour, lw=1.0, ls="--" if u == 0 else "-",
@@ -118,15 +89,15 @@ def _whole(axes: Axes, camera: Camera) -> None:
         )
     _plane(axes, -z1, field, DARK)
     _plane(axes, end, half_sensor, DARK, lw=3.5)
-    if camera.lattice is not None:
+    if drawn.lenslets is not None:
         _plane(axes, length, half_sensor, "#3b83ad", ls=(0, (1.2, 0.6)), lw=3)
     _name(axes, -z1, 1.25 * top, "object", "left")
-    _name(axes, 0, 1.25 * top, f"main lens\nf = {_mm(camera.main_lens.focal_length)}", "center")
+    _name(axes, 0, 1.25 * top, f"main lens\nf = {_mm(drawn.focal_length)}", "center")
     close = end < 0.4 * z1  # the name would run into the main lens'
-    behind = "sensor" if camera.lattice is None else "lenslets, sensor"
+    behind = "sensor" if drawn.lenslets is None else "lenslets, sensor"
     _name(axes, end, (1.75 if close else 1.25) * top, behind, "right")
     _dimension(axes, (-z1, 0.0), -1.35 * top, f"z1 = {_mm(z1)}")
-    symbol = "z2" if camera.lattice is None else _separation_name(camera)
+    symbol = "z2" if drawn.lenslets is None else _separation_name(drawn)
     _dimension(axes, (0.0, length), -1.35 * top, f"{symbol} = {_mm(length)}")
     axes.annotate(
         f"D = {_mm(2 * radius)}", (0, -radius * MM), (-0.25 * z1 * MM, -0.85 * top * MM), fontsize=9,
@@ -135,26 +106,24 @@ def _whole(axes: Axes, camera: Camera) -> None:
     _frame(axes, (-1.04 * z1, end + 0.04 * z1), (-1.75 * top, 2.0 * top))
 
 
-def _separation_name(camera: Camera) -> str:
-    return "F = z2" if math.isclose(camera.separation, camera.image_distance) else "L"
+def _separation_name(drawn: Layout) -> str:
+    return "F = z2" if math.isclose(drawn.separation, drawn.image_distance) else "L"
 
 
-def _enlarged(axes: Axes, camera: Camera) -> None:
+def _enlarged(axes: Axes, drawn: Layout, lenslets: LensletLayout) -> None:
     """Five lenslets, the main-lens image and the sensor: rays of one or three image points."""
-    assert camera.lattice is not None
-    assert camera.lenslet_distance is not None
-    pitch, b, length = camera.lattice.pitches[1], camera.lenslet_distance, camera.separation
-    relay = length - camera.image_distance
-    shown = _lenslets_shown(camera)
+    pitch, b, length = lenslets.pitch, lenslets.distance, drawn.separation
+    relay = length - drawn.image_distance
+    shown = _lenslets_shown(drawn, lenslets.pitch)
     first, last = _range(relay, b)
     top = (shown / 2 + 0.25) * pitch * (1 + b / length)
-    _rays(axes, camera, first, shown)
+    _rays(axes, (drawn, lenslets), first, shown)
     for k in _numbers(shown):
         height, width = 0.97 * pitch * MM, 0.035 * (last - first) * MM
-        center = _center(camera, k) * MM
+        center = lenslets.center(k) * MM
         axes.add_patch(Ellipse((0, center), width, height, color=GLASS, zorder=3, alpha=0.85))
     _plane(axes, b, top, DARK, lw=3.5)
-    _micro_images(axes, camera, shown, last - first)
+    _micro_images(axes, (drawn, lenslets), shown, last - first)
     if abs(relay) > 1e-9 * length:
         axes.plot([-relay * MM] * 2, [-top * MM, top * MM], color=DARK, lw=1.2, ls=":")
     name = "main-lens image" if relay >= 0 else "virtual main-lens image"
@@ -169,11 +138,10 @@ def _enlarged(axes: Axes, camera: Camera) -> None:
     _frame(axes, (first, last), (-2.0 * top, 1.5 * top))
 
 
-def _lenslets_shown(camera: Camera) -> int:
+def _lenslets_shown(drawn: Layout, pitch: float) -> int:
     """Enough lenslets for the light of one image point, odd like a count with one on the axis."""
-    assert camera.lattice is not None
-    relay = abs(camera.separation - camera.image_distance)
-    lit = camera.pupil_diameter * relay / camera.image_distance / camera.lattice.pitches[1]
+    relay = abs(drawn.separation - drawn.image_distance)
+    lit = drawn.pupil_diameter * relay / drawn.image_distance / pitch
     return int(min(max(5, 2 * math.ceil(lit / 2) + 3), 11))
 
 
@@ -189,60 +157,53 @@ def _numbers(shown: int) -> Iterable[int]:
     return range(-(shown // 2), shown // 2 + 1)
 
 
-def _center(camera: Camera, k: int) -> float:
-    assert camera.lattice is not None
-    return camera.lattice.origin[1] + k * camera.lattice.pitches[1]
-
-
-def _rays(axes: Axes, camera: Camera, first: float, shown: int) -> None:
+def _rays(axes: Axes, camera: tuple[Layout, LensletLayout], first: float, shown: int) -> None:
     """Rays of image points, coloured by lenslet (2.0) or by the place on the main lens (1.0)."""
-    z2, radius = camera.image_distance, camera.pupil_diameter / 2
-    focused_on_lenslets = math.isclose(camera.separation, z2)
-    middle, pitch = _center(camera, 0), _center(camera, 1) - _center(camera, 0)
+    drawn, lenslets = camera
+    z2, radius = drawn.image_distance, drawn.pupil_diameter / 2
+    focused_on_lenslets = math.isclose(drawn.separation, z2)
     if focused_on_lenslets:
         # Light of the whole lenslet, from three places on the main lens: one pixel each.
         for k in (-1, 0, 1):
             for u, colour in zip((-0.92 * radius, 0.0, 0.92 * radius), FAN[1:], strict=False):
                 for part in (-0.35, 0.0, 0.35):
-                    _ray(axes, camera, first, (_center(camera, k) + part * pitch, u), colour)
+                    _ray(axes, camera, first, (lenslets.center(k) + part * lenslets.pitch, u), colour)
         return
     for u in np.linspace(-0.97 * radius, 0.97 * radius, 4 * shown - 1):
-        _ray(axes, camera, first, (middle * z2 / camera.separation, float(u)), None)
+        _ray(axes, camera, first, (lenslets.offset * z2 / drawn.separation, float(u)), None)
 
 
-def _ray(axes: Axes, camera: Camera, first: float, ends: tuple[float, float], colour: str | None) -> None:
+def _ray(
+    axes: Axes,
+    camera: tuple[Layout, LensletLayout],
+    first: float,
+    ends: tuple[float, float],
+    colour: str | None,
+) -> None:
     """From height u on the main lens towards the image point Y, through the nearest lenslet to the sensor."""
-    assert camera.lattice is not None
-    assert camera.lenslet_distance is not None
-    image, u = ends
-    slope = (image - u) / camera.image_distance
-    at_lenslets = u + slope * camera.separation
-    k = round((at_lenslets - camera.lattice.origin[1]) / camera.lattice.pitches[1])
-    center, b = _center(camera, k), camera.lenslet_distance
-    after = slope - (at_lenslets - center) / _focal_length(camera, k)
+    (drawn, lenslets), (image, u) = camera, ends
+    slope = (image - u) / drawn.image_distance
+    at_lenslets = u + slope * drawn.separation
+    k, b = lenslets.nearest(at_lenslets), lenslets.distance
+    after = slope - (at_lenslets - lenslets.center(k)) / lenslets.focal_length(k)
     colour = FAN[(k + 2) % len(FAN)] if colour is None else colour
     heights = np.array([at_lenslets + slope * first, at_lenslets, at_lenslets + after * b])
     axes.plot(np.array([first, 0, b]) * MM, heights * MM, color=colour, lw=0.9)
-    relay = camera.separation - camera.image_distance
+    relay = drawn.separation - drawn.image_distance
     if relay < 0:  # where the light would have gone
         axes.plot(
             np.array([0, -relay]) * MM, np.array([at_lenslets, image]) * MM, color=colour, lw=0.5, ls=":"
         )
 
 
-def _focal_length(camera: Any, k: int) -> float:
-    values = camera.lenslets.focal_length
-    return values[k % len(values)]
-
-
-def _micro_images(axes: Axes, camera: Camera, shown: int, width: float) -> None:
+def _micro_images(axes: Axes, camera: tuple[Layout, LensletLayout], shown: int, width: float) -> None:
     """Brackets behind the sensor: where each micro-image lies."""
-    assert camera.lenslet_distance is not None
-    b, length = camera.lenslet_distance, camera.separation
-    half = camera.pupil_diameter * b / length / 2
-    by_lenslet = not math.isclose(length, camera.image_distance)
+    drawn, lenslets = camera
+    b, length = lenslets.distance, drawn.separation
+    half = drawn.pupil_diameter * b / length / 2
+    by_lenslet = not math.isclose(length, drawn.image_distance)
     for k in _numbers(shown):
-        center = _center(camera, k) * (1 + b / length)
+        center = lenslets.center(k) * (1 + b / length)
         corner = ((b + 0.012 * width) * MM, (center - half) * MM)
         face = FAN[(k + 2) % len(FAN)] if by_lenslet else AXIS_COLOUR
         axes.add_patch(Rectangle(corner, 0.012 * width * MM, 2 * half * MM, color=face, alpha=0.55, lw=0))

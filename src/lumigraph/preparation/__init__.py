@@ -11,13 +11,14 @@
 """
 
 from lumigraph.core.prepared import PreparedImage, Reason
-from lumigraph.preparation.agreement import implied
+from lumigraph.preparation.agreement import Described, implied
 from lumigraph.preparation.drift import Drift, drift
 from lumigraph.preparation.given import Given, read_calibration, read_pages, read_raw
 from lumigraph.preparation.prepare import decode, of_raw, prepare, render, render_stack, super_resolve
 from lumigraph.preparation.vignetting import vignetting
 
 __all__ = [
+    "Described",
     "Drift",
     "Given",
     "PreparedImage",

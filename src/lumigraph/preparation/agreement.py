@@ -1,25 +1,30 @@
 """What a picture says about the camera that its file describes: `implied`."""
 
 import math
-from typing import Any, Protocol, runtime_checkable
+from functools import cached_property
+from typing import Protocol
 
 from lumigraph.core.calibration import Calibration
+from lumigraph.errors import CalibrationError
 
 _PITCH, _TURN = 0.005, math.radians(0.3)
 """Differences of pitch and rotation that a camera file cannot mean."""
 
 
-@runtime_checkable
-class Relayed(Protocol):
-    """A camera with lenses between the lenslets' images and the sensor."""
+class Described(Protocol):
+    """A camera, as a raw image of it is judged."""
 
-    @property
-    def relay_magnification(self) -> float:
-        """Of those lenses."""
+    @cached_property
+    def calibration(self) -> Calibration | None:
+        """Where its micro-images should stand; None without lenslets."""
+        ...
+
+    def would_be(self, share: float) -> str:
+        """What of it would explain a lattice that is so many times as large."""
         ...
 
 
-def implied(found: Calibration, camera: Any) -> tuple[str, bool]:
+def implied(found: Calibration, camera: Described) -> tuple[str, bool]:
     """One line on what a picture's lattice says about the camera, and whether the two agree.
 
     Parameters
@@ -34,6 +39,8 @@ def implied(found: Calibration, camera: Any) -> tuple[str, bool]:
     tuple
         The line, and whether pitches agree to 0.5 %, rotations to 0.3° and kinds of lenslets.
     """
+    if camera.calibration is None:
+        raise CalibrationError("the camera has no lenslets whose micro-images could be compared.")
     told, seen = camera.calibration.lattice, found.lattice
     share, turn = seen.pitch / told.pitch, _between(seen.rotation, told.rotation, seen.layout)
     alike = seen.layout == told.layout and (seen.kinds == told.kinds or seen.kinds == 1)
@@ -43,17 +50,8 @@ def implied(found: Calibration, camera: Any) -> tuple[str, bool]:
         f"({_lenslets(found)}); by the camera file it has {told.pitch:.3f} px "
         f"({_lenslets(camera.calibration)}): "
     )
-    return line + ("they agree" if agree else _remedy(camera, share)), agree
-
-
-def _remedy(camera: Any, share: float) -> str:
-    if isinstance(camera, Relayed):
-        relay = camera.relay_magnification
-        return f"a relay of {relay * share:.4g} instead of {relay:.4g}. The picture's lattice is used"
-    return (
-        f"pixels of {camera.calibration.pixel_pitch / share * 1e6:.4g} µm instead of "
-        f"{camera.calibration.pixel_pitch * 1e6:.4g} µm. The picture's lattice is used"
-    )
+    verdict = "they agree" if agree else f"{camera.would_be(share)}. The picture's lattice is used"
+    return line + verdict, agree
 
 
 def _between(seen: float, told: float, layout: str) -> float:

@@ -16,7 +16,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.prepared import PreparedImage, Reason, Verdicts
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError, SamplingWarning
-from lumigraph.preparation.agreement import implied
+from lumigraph.preparation.agreement import Described, implied
 from lumigraph.preparation.beside import Beside, above, black_plane, coloured
 from lumigraph.preparation.drift import check_drift
 from lumigraph.preparation.validity import pixel_reasons, verdicts
@@ -33,7 +33,7 @@ def prepare(
     *,
     white: RawImage | Array | None = None,
     dark: RawImage | Array | None = None,
-    camera: Any | None = None,
+    camera: Described | None = None,
     mask: Array | None = None,
     divide: bool = True,
 ) -> PreparedImage:
@@ -54,7 +54,8 @@ def prepare(
     dark
         Picture with the lens covered: tells which pixels shine by themselves, too.
     camera
-        Its description: gives lengths, and the lattice where nothing else does.
+        Its description: gives lengths, and the lattice where nothing else does; one without lenslets is
+        not looked at.
     mask
         Pixels to use (y, x), true or false; None for all.
     divide
@@ -102,16 +103,17 @@ def prepare(
 
 
 def _placed(
-    raw: RawImage, calibration: Calibration | None, white: RawImage | None, camera: Any | None
+    raw: RawImage, calibration: Calibration | None, white: RawImage | None, camera: Described | None
 ) -> tuple[Calibration | None, list[str]]:
     """Where the micro-images stand, by whom, and whether raw image and camera agree."""
+    told = None if camera is None else camera.calibration
     if calibration is not None:
         found, notes = calibration, ["the lattice is that of the calibration"]
     elif white is not None:
         found = calibrate(white)
         notes = ["the lattice was found on the white image", *found.notes]
-    elif camera is not None:
-        found, notes = camera.calibration, ["the lattice is that of the camera file"]
+    elif told is not None:
+        found, notes = told, ["the lattice is that of the camera file"]
     else:
         return None, ["where the micro-images stand is not known"]
     found.check_fits(raw.shape)
@@ -121,10 +123,10 @@ def _placed(
             _warn(notes, f"the maker's lattice was {found.notes[-1]}")
     judged = check_drift(raw.data, found)
     notes += [] if judged is None else [judged.told()]
-    if camera is not None and found is not camera.calibration:
+    if camera is not None and told is not None and found is not told:
         line, agree = implied(found, camera)
         notes.append(line) if agree else _warn(notes, line)
-        found = _with_lengths(found, camera.calibration)
+        found = _with_lengths(found, told)
     return found, notes
 
 

@@ -1,6 +1,6 @@
 """What a simulation asks of an instrument."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
@@ -9,7 +9,16 @@ from lumigraph.operators import CameraOptics
 from lumigraph.sensor import Sensor
 
 
-class Camera(Protocol):
+@runtime_checkable
+class Imaging(Protocol):
+    """Anything with elements that light goes through to a sensor."""
+
+    def image_train(self) -> Train:
+        """From the field just before the main lens to the sensor."""
+        ...
+
+
+class Camera(Imaging, Protocol):
     """An instrument, as `simulate` sees it; what belongs to lenslets is None without them."""
 
     def optics(self) -> CameraOptics:
@@ -73,10 +82,6 @@ class Camera(Protocol):
 
     def lens_train(self) -> Train:
         """The main lens: phase, stop and aberrations."""
-        ...
-
-    def image_train(self) -> Train:
-        """From the field just before the main lens to the sensor."""
         ...
 
     def relay_train(self) -> Train | None:

@@ -25,7 +25,7 @@ from lumigraph.propagation import Propagate, propagate
 from lumigraph.scene import Diffuser, Points, Scene, Slice, sources
 from lumigraph.sensor import integrate
 from lumigraph.simulation import error
-from lumigraph.simulation.camera import Camera
+from lumigraph.simulation.camera import Camera, Imaging
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Plane, Snapshots, TiltedWaves
 from lumigraph.simulation.microscope_scene import Microscope, microscope_image
 from lumigraph.simulation.spectrum import Spectrum, by_wavelength
@@ -276,7 +276,7 @@ def _check(camera: Camera, scene: Scene, coherence: Coherence | Incoherent) -> N
             f"coherence is of type {type(coherence).__name__} but must be Incoherent(), Coherent(), "
             "Snapshots(...) or TiltedWaves(...)."
         )
-    if not hasattr(camera, "image_train"):
+    if not isinstance(camera, Imaging):
         raise GeometryError(
             f"camera is of type {type(camera).__name__} but must be a camera, such as PlenopticCamera."
         )

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -101,8 +101,20 @@ class Spectrum:
         return image if self.bayer is None else mosaic(image, self.bayer)
 
 
+@runtime_checkable
+class Tunable(Protocol):
+    """An instrument whose wavelength can be replaced."""
+
+    def replace(self, *, wavelength: float) -> Self:
+        """The same at another wavelength [m]."""
+        ...
+
+
+Instrument = TypeVar("Instrument")
+
+
 def by_wavelength(
-    camera: Any, scene: Scene, spectrum: Spectrum, image: Callable[[Any, Scene, int], RawImage]
+    camera: Instrument, scene: Scene, spectrum: Spectrum, image: Callable[[Instrument, Scene, int], RawImage]
 ) -> RawImage:
     """Raw image of a scene through ``image(camera, scene, number)`` at each wavelength of a spectrum.
 
@@ -112,7 +124,7 @@ def by_wavelength(
         A camera that cannot change its wavelength.
     """
     checks.instance("spectrum", spectrum, Spectrum)
-    if not hasattr(camera, "replace"):
+    if not isinstance(camera, Tunable):
         raise GeometryError(
             f"camera is of type {type(camera).__name__}, whose wavelength cannot be replaced. "
             "Leave spectrum out, or use a camera such as PlenopticCamera."

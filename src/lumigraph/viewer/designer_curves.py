@@ -5,14 +5,13 @@ from collections.abc import Callable
 from typing import Any
 
 from lumigraph.errors import LumigraphError
-from lumigraph.instruments import Row
-from lumigraph.instruments.loading import AnyCamera
+from lumigraph.instruments import Instrument, Row
 
 POINTS = 41
 """Magnifications along a curve."""
 
 
-def trade_offs(camera: AnyCamera) -> dict[str, Any]:
+def trade_offs(camera: Instrument) -> dict[str, Any]:
     """Curves over the magnification and where the camera stands on them, as JSON can hold them.
 
     They are the rows of the camera's own `trade_offs`; what no camera can have is None.
@@ -31,7 +30,7 @@ def trade_offs(camera: AnyCamera) -> dict[str, Any]:
     return {"label": span.label, "at": span.own, "positions": numbers, "curves": curves}
 
 
-def _by_name(camera: AnyCamera) -> dict[str, Row]:
+def _by_name(camera: Instrument) -> dict[str, Row]:
     return {row.name: row for row in camera.trade_offs()}
 
 

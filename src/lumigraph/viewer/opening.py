@@ -20,7 +20,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError, SamplingWarning
-from lumigraph.preparation import Given, prepare
+from lumigraph.preparation import Described, Given, prepare
 from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_map
 
 _CAMERA_FILE = 1 << 20  # bytes; camera files have some hundred
@@ -48,7 +48,7 @@ class Origin(Given):
         Of a camera 2.0 [px]: pictures with patches about this size.
     """
 
-    camera: Any = None
+    camera: Described | None = None
     patch: float | None = None
 
     @property
@@ -192,13 +192,12 @@ def _simulated(path: Path, tell: Progress) -> Exhibit:
     from lumigraph.scene import targets
     from lumigraph.simulation import simulate
 
-    camera: Any = load_camera(path)
+    camera = load_camera(path)
     raw = simulate(
         camera, targets.photo(camera.object_grid),
         progress=within(tell, 0.0, 1.0, "simulating"),
     )  # fmt: skip
-    calibration, patch = getattr(camera, "calibration", None), getattr(camera, "patch", None)
-    return of_raw(path.name, raw, calibration, patch)
+    return of_raw(path.name, raw, camera.calibration, camera.patch)
 
 
 def _raw(name: str, raw: RawImage, origin: Origin, tell: Progress) -> Exhibit:

@@ -1,14 +1,12 @@
 """The finest bars of a USAF-1951 target that a light-field microscope resolves, at several depths."""
 
-from typing import Any
-
 import numpy as np
-from scipy.ndimage import map_coordinates
 
 from lumigraph import plots
-from lumigraph.core.grid import Grid
+from lumigraph.experiments.charts import contrast, elements, finest_resolved
 from lumigraph.experiments.microscope._bench import PIXELS, exposed, found_by, scope
 from lumigraph.experiments.registry import Context, Outcome, Row, experiment
+from lumigraph.instruments import LightFieldMicroscope
 from lumigraph.plots.curves import curves
 from lumigraph.scene import Slice, targets
 from lumigraph.units import um
@@ -42,7 +40,7 @@ def run(context: Context) -> Outcome:
         grid = bench.operator((dz,), samples, pixels=PIXELS).object_grid
         assert grid is not None
         contrasts = {f: contrast(found, grid, corner, w) for f, corner, w in elements(groups)}
-        finest.append(finest_resolved(contrasts))
+        finest.append(finest_resolved(contrasts, RESOLVED))
         limits.append(1 / (2 * bench.sampling_distances((dz,))[0]))
         rows += _rows(dz, finest[-1], limits[-1], contrasts)
         pictures.append((found, f"from {dz / um:g} µm"))
@@ -59,43 +57,17 @@ def run(context: Context) -> Outcome:
     )
 
 
-def _found(bench: Any, dz: float, chart: tuple[tuple[int, int], int], rng: np.random.Generator) -> np.ndarray:
+def _found(
+    bench: LightFieldMicroscope, dz: float, chart: tuple[tuple[int, int], int], rng: np.random.Generator
+) -> np.ndarray:
     groups, samples = chart
     operator = bench.operator((dz,), samples, pixels=PIXELS)
+    assert operator.object_grid is not None
     (chart_slice,) = targets.usaf1951(operator.object_grid, groups).parts
     assert isinstance(chart_slice, Slice)
     truth = chart_slice.intensity * PHOTONS
     raw = exposed(truth[None].astype(np.float32), operator, rng)
     return found_by(bench.sampling_distances((dz,)), operator, raw, 40, accelerated=True)[0]
-
-
-def elements(groups: tuple[int, int]) -> list[tuple[float, tuple[float, float], float]]:
-    """Frequency [1/m], corner (y, x) and bar width [m], coarse to fine."""
-    return [(1 / (2 * width), corner, width) for _, _, corner, width in targets.usaf_elements(groups)]
-
-
-def contrast(picture: np.ndarray, grid: Grid, corner: tuple[float, float], width: float) -> float:
-    """Contrast of an element's bars and gaps, mean of its upright and its lying ones."""
-    at, along = (np.arange(5) + 0.5) * width, np.linspace(1, 4, 7) * width
-    values = []
-    for axis, left in ((1, corner[1]), (0, corner[1] + 7 * width)):
-        across, beside = np.meshgrid(at, along, indexing="ij")
-        y, x = (beside, across) if axis == 1 else (across, beside)
-        places = ((corner[0] + y - grid.y[0]) / grid.pitch[0], (left + x - grid.x[0]) / grid.pitch[1])
-        profile = map_coordinates(picture, places, order=1).mean(1)
-        bright, dark = profile[::2].mean(), profile[1::2].mean()
-        values.append((bright - dark) / max(bright + dark, 1e-30))
-    return float(np.mean(values))
-
-
-def finest_resolved(contrasts: dict[float, float]) -> float:
-    """The highest frequency up to which all elements are resolved [1/m]; 0 if the coarsest is not."""
-    finest = 0.0
-    for frequency, value in sorted(contrasts.items()):
-        if value < RESOLVED:
-            break
-        finest = frequency
-    return finest
 
 
 def _rows(dz: float, finest: float, limit: float, contrasts: dict[float, float]) -> list[Row]:

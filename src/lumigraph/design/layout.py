@@ -1,0 +1,67 @@
+"""What a ray diagram shows of a camera: plain lengths, for `lumigraph.plots.layout`."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class LensletLayout:
+    """A row of lenslets behind the main lens.
+
+    Parameters
+    ----------
+    distance
+        To the sensor, b [m].
+    pitch, offset
+        Between lenslets, and from the axis to the middle one [m].
+    focal_lengths
+        Of neighbours in turn [m].
+    """
+
+    distance: float
+    pitch: float
+    offset: float
+    focal_lengths: tuple[float, ...]
+
+    def center(self, number: int) -> float:
+        """Height of a lenslet [m], counted from the middle one."""
+        return self.offset + number * self.pitch
+
+    def nearest(self, height: float) -> int:
+        """Number of the lenslet that a ray of that height [m] meets."""
+        return round((height - self.offset) / self.pitch)
+
+    def focal_length(self, number: int) -> float:
+        """Of a lenslet, counted from the middle one [m]."""
+        return self.focal_lengths[number % len(self.focal_lengths)]
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """A main lens, a sensor, and lenslets between them or none.
+
+    Parameters
+    ----------
+    object_distance
+        To the main lens, z1 [m].
+    focal_length, pupil_diameter
+        Of the main lens and of its stop [m].
+    image_distance, separation
+        From the main lens to its image, z2, and to the lenslets or the sensor, L [m].
+    sensor_width
+        [m].
+    lenslets
+        None without them.
+    """
+
+    object_distance: float
+    focal_length: float
+    pupil_diameter: float
+    image_distance: float
+    separation: float
+    sensor_width: float
+    lenslets: LensletLayout | None = None
+
+    @property
+    def length(self) -> float:
+        """Main lens to sensor [m]."""
+        return self.separation + (0.0 if self.lenslets is None else self.lenslets.distance)

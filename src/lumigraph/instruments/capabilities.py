@@ -1,0 +1,63 @@
+"""What only some kinds of instruments can do, told by their methods: ``isinstance(camera, Decoded)``."""
+
+from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
+
+from lumigraph.core.lightfield import LightField
+from lumigraph.instruments.parts import MainLens
+
+
+@runtime_checkable
+class Decoded(Protocol):
+    """Its raw images are decoded into views, which are refocused by a factor."""
+
+    def refocus_factor(self, dz: float, separation: float) -> float:
+        """α' that focuses views of a separation [m] at a depth `dz` [m] from the focused plane."""
+        ...
+
+
+@runtime_checkable
+class Correctable(Protocol):
+    """What a measure of depth makes of its views can be told by planes whose depth is known."""
+
+    def plane_views(self, alpha: float) -> LightField:
+        """Views of a textured plane at a refocus factor."""
+        ...
+
+
+@runtime_checkable
+class Rendered(Protocol):
+    """Its raw images are rendered from a patch of each micro-image."""
+
+    def patch_at(self, dz: float) -> float:
+        """Patch [px] that tiles the picture of an object at a depth `dz` [m] from the focused plane."""
+        ...
+
+    def patches_on_raw(self) -> tuple[float, ...]:
+        """Patch [px] at which each kind of lenslets is sharp, in the order of the calibration."""
+        ...
+
+
+@runtime_checkable
+class WithMainLens(Protocol):
+    """A main lens forms its image: depths follow from the lens equation."""
+
+    main_lens: MainLens
+    object_distance: float
+
+    def alpha(self, dz: float) -> float:
+        """Refocus factor of a depth `dz` [m] from the focused plane."""
+        ...
+
+
+@runtime_checkable
+class WithObjective(Protocol):
+    """An objective forms its image: depths are small and go with the refocus factor."""
+
+    def depth_per_alpha(self, separation: float) -> float:
+        """Depth from the focused plane [m] over α' - 1, of views with a separation [m]."""
+        ...
+
+    def low_pass_distances(self, depths: Sequence[float]) -> tuple[float, ...]:
+        """Widths [m] of a low-pass that keeps lenslet-shaped artefacts out of each depth [m]."""
+        ...
