@@ -1,9 +1,11 @@
 """`lumigraph deconvolve`."""
 
+import importlib
 import json
 
 import numpy as np
 import pytest
+import tifffile
 
 import lumigraph as lg
 from lumigraph.cli.deconvolve import depths
@@ -91,7 +93,7 @@ def test_a_run_goes_on_from_its_checkpoint(focused, tmp_path):
 def test_ctrl_c_keeps_what_was_reached(focused, tmp_path, monkeypatch):
     from lumigraph import deconvolution
 
-    real = deconvolution.deconvolve
+    real = deconvolution.deconvolve_series
 
     def interrupted(*arguments, progress, **options):
         def stop(step):
@@ -100,12 +102,26 @@ def test_ctrl_c_keeps_what_was_reached(focused, tmp_path, monkeypatch):
 
         return real(*arguments, progress=stop, **options)
 
-    monkeypatch.setattr(deconvolution, "deconvolve", interrupted)
+    monkeypatch.setattr(deconvolution, "deconvolve_series", interrupted)
     found = focused("deconvolve", "raw.tiff", "--camera", "camera.toml", "-o", "picture.tiff")
     assert found.code == 130
     assert "2 iterations are in picture.partial.tiff" in found.err
     assert not (tmp_path / "picture.tiff").exists()
     assert float(lg.open(tmp_path / "picture.partial.tiff").data.max()) > 0
+
+
+def test_pages_of_a_series_share_one_sensitivity(focused, tmp_path, monkeypatch):
+    """It was computed again for each page, and the object widened again."""
+    module = importlib.import_module("lumigraph.deconvolution.deconvolve")  # the function has its name, too
+    calls, widened = [], module.beyond
+    monkeypatch.setattr(module, "beyond", lambda operator: calls.append(1) or widened(operator))
+    frame = lg.open(tmp_path / "raw.tiff").data
+    tifffile.imwrite(tmp_path / "film.tif", np.stack([frame, 2 * frame]).astype(np.uint16))
+    said = ("deconvolve", "film.tif", "--page", "all", "--camera", "camera.toml", "--iterations", 2)
+    found = focused(*said, "-o", "picture.tiff")
+    assert (found.code, len(calls)) == (0, 1), found.err
+    pictures = [lg.open(path).data for path in sorted(tmp_path.glob("picture*.tiff"))]
+    np.testing.assert_allclose(pictures[1], 2 * pictures[0], rtol=0.02, atol=0.02 * pictures[1].max())
 
 
 def test_a_microscope_gives_a_volume_with_its_places(lumigraph, tmp_path):

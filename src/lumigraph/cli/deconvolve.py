@@ -230,13 +230,11 @@ def deconvolve(
         made(0.0)
         operator = operator_of(described, wanted_depths, wanted.samples, ready.calibration, made)
         task = _Task(operator, way, way.method(described, operator), output)
-        for name, frame in frames:
-            if frame is not frames[0][1]:
-                ready = replace(ready, data=frame.data)
-            found = task.run(ready, name, (steps, shown))
+        pages = [(name, replace(ready, data=frame.data)) for name, frame in frames]
+        for name, found in task.run(pages, (steps, shown)):
             written.append(_named(output, name))
             io.save(found, written[-1])
-    return _result(found, ready, steps, tuple(written))
+    return _result(found, pages[-1][1], steps, tuple(written))
 
 
 @dataclass(frozen=True)
@@ -248,17 +246,25 @@ class _Task:
     method: Any
     output: Path
 
-    def run(self, ready: "PreparedImage", name: str, followed: "tuple[list[Step], Progress]") -> Any:
-        """The object of one page; steps are kept, and shown."""
+    def run(
+        self, pages: "list[tuple[str, PreparedImage]]", followed: "tuple[list[Step], Progress]"
+    ) -> "Iterator[tuple[str, Any]]":
+        """The name and the object of each page; the steps of one are kept, and shown."""
         from lumigraph import deconvolution, io
 
-        exposure, (steps, shown) = deconvolution.Exposure.of(ready), followed
+        exposure, (steps, shown), name = deconvolution.Exposure.of(pages[0][1]), followed, ""
         if self.way.deviance is not None and exposure.gain is None:
             raise FormatError(
                 "--deviance counts electrons, but the raw image does not say how many make a value. "
                 "Leave it out and use --iterations."
             )
-        steps.clear()
+
+        def raws() -> "Iterator[PreparedImage]":
+            nonlocal name
+            for title, ready in pages:
+                name = title
+                steps.clear()
+                yield ready
 
         def follow(step: "Step") -> None:
             steps.append(step)
@@ -266,10 +272,11 @@ class _Task:
             shown(Stage(step.iteration / step.iterations, what))
 
         try:
-            return deconvolution.deconvolve(
-                ready, self.operator, deconvolution.Stop(self.way.iterations, self.way.deviance),
+            for found in deconvolution.deconvolve_series(
+                raws(), self.operator, deconvolution.Stop(self.way.iterations, self.way.deviance),
                 method=self.method, exposure=exposure, progress=follow, checkpoint=self.way.checkpoint,
-            )  # fmt: skip
+            ):  # fmt: skip
+                yield name, found
         except deconvolution.Interrupted as stopped:
             kept = _named(self.output, f"{name}.partial")
             io.save(stopped.partial, kept)

@@ -119,19 +119,8 @@ def deconvolve(
         A KeyboardInterrupt; it carries the estimate that was reached, and the checkpoint is written.
 
     """
-    limits = iterations if isinstance(iterations, Stop) else Stop(iterations)
-    _check(operator, method)
-    exposure = _known(raw, exposure)
-    data = values(raw, operator, exposure)
-    wide, inside = beyond(operator)
-    _require(wide, data)
-    scale = Scale.of(wide, exposure, data, least_seen(operator))
-    problem = Problem.of(raw, exposure, scale)
-    run = _Run(problem, method, limits, progress, (operator, inside))
-    if checkpoint is not None:
-        run.checkpoint = Checkpoint.of(checkpoint)
-        run.key = fingerprint(data, exposure, method)
-    return _finished(run, raw)
+    options: dict[str, Any] = {"method": method, "exposure": exposure, "progress": progress}
+    return next(deconvolve_series([raw], operator, iterations, **options, checkpoint=checkpoint))
 
 
 def deconvolve_series(
@@ -142,6 +131,7 @@ def deconvolve_series(
     method: Method = RichardsonLucy(),  # noqa: B008 - frozen
     exposure: Exposure | None = None,
     progress: Report | None = None,
+    checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
 ) -> Iterator[Any]:
     """The result of each frame of a time series, one after the other, as `deconvolve` gives it.
 
@@ -152,8 +142,9 @@ def deconvolve_series(
     ----------
     frames
         Raw images, such as a generator that opens one file after the other.
-    operator, iterations, method, exposure, progress
-        As in `deconvolve`; the exposure is that of the first frame for all of them.
+    operator, iterations, method, exposure, progress, checkpoint
+        As in `deconvolve`; the exposure is that of the first frame for all of them, and a checkpoint keeps
+        the frame that is being worked on.
     """
     limits = iterations if isinstance(iterations, Stop) else Stop(iterations)
     _check(operator, method)
@@ -167,7 +158,11 @@ def deconvolve_series(
             scale = Scale.of(wide, exposure, data, least_seen(operator))
         assert exposure is not None
         problem = Problem.of(raw, exposure, scale)
-        yield _finished(_Run(problem, method, limits, progress, (operator, inside)), raw)
+        run = _Run(problem, method, limits, progress, (operator, inside))
+        if checkpoint is not None:
+            run.checkpoint = Checkpoint.of(checkpoint)
+            run.key = fingerprint(values(raw, operator, exposure), exposure, method)
+        yield _finished(run, raw)
 
 
 @dataclass(slots=True)

@@ -64,7 +64,9 @@ def correlation(
     -------
     DepthMap
         Patches (rows, cols) of `lumigraph.rendering.lenslet_indices`, finite everywhere. Confidence is how
-        well the micro-images agree, 0 to 1, times how sharply that depends on the size.
+        well the micro-images agree, 0 to 1, times how sharply that depends on the size. Of a maker's
+        calibration they are those of the lattice as `lumigraph.prepare` moves it, which `lumigraph.render`
+        uses, too: ``prepare(raw, calibration).calibration``.
 
     Raises
     ------
