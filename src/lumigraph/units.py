@@ -21,39 +21,39 @@ s = 1.0
 ms = 1e-3
 
 _EXAMPLE = {"length": "150 um", "angle": "2 deg", "time": "10 ms"}
-_UNITS: dict[str, tuple[str, float, float]] = {}
-"""By name: dimension, and what to multiply and to divide by; each is exact, so that results round once."""
+_UNITS: dict[str, tuple[str, float]] = {}
+"""Dimension and size by name: what is parsed is what Python's ``150 * um`` is, to the last bit."""
 
 
-def _name(dimension: str, names: str, times: float = 1.0, over: float = 1.0) -> None:
-    _UNITS.update(dict.fromkeys(names.split(), (dimension, times, over)))
+def _name(dimension: str, size: float, names: str) -> None:
+    _UNITS.update(dict.fromkeys(names.split(), (dimension, size)))
 
 
-_name("length", "km kilometer kilometre kilometers kilometres", 1e3)
-_name("length", "m meter metre meters metres")
-_name("length", "dm decimeter decimetre", over=1e1)
-_name("length", "cm centimeter centimetre centimeters centimetres", over=1e2)
-_name("length", "mm millimeter millimetre millimeters millimetres", over=1e3)
-_name("length", "um µm μm micron microns micrometer micrometre micrometers micrometres", over=1e6)
-_name("length", "nm nanometer nanometre nanometers nanometres", over=1e9)
-_name("length", "Å angstrom angstroms", over=1e10)
-_name("length", "pm picometer picometre", over=1e12)
-_name("length", "in inch inches", 254.0, 1e4)
-_name("length", "ft foot feet", 3048.0, 1e4)
-_name("angle", "rad radian radians")
-_name("angle", "mrad milliradian milliradians", over=1e3)
-_name("angle", "urad µrad μrad microradian microradians", over=1e6)
-_name("angle", "deg degree degrees °", math.pi, 180.0)
-_name("angle", "arcmin arcminute arcminutes", math.pi, 180.0 * 60)
-_name("angle", "arcsec arcsecond arcseconds", math.pi, 180.0 * 3600)
-_name("time", "h hour hours", 3600.0)
-_name("time", "min minute minutes", 60.0)
-_name("time", "s sec second seconds")
-_name("time", "ms millisecond milliseconds", over=1e3)
-_name("time", "us µs μs microsecond microseconds", over=1e6)
-_name("mass", "kg g mg")
-_name("frequency", "Hz kHz MHz")
-_name("time", "ns nanosecond nanoseconds", over=1e9)
+_name("length", 1e3, "km kilometer kilometre kilometers kilometres")
+_name("length", m, "m meter metre meters metres")
+_name("length", 1e-1, "dm decimeter decimetre")
+_name("length", cm, "cm centimeter centimetre centimeters centimetres")
+_name("length", mm, "mm millimeter millimetre millimeters millimetres")
+_name("length", um, "um µm μm micron microns micrometer micrometre micrometers micrometres")
+_name("length", nm, "nm nanometer nanometre nanometers nanometres")
+_name("length", 1e-10, "Å angstrom angstroms")
+_name("length", 1e-12, "pm picometer picometre")
+_name("length", 0.0254, "in inch inches")
+_name("length", 0.3048, "ft foot feet")
+_name("angle", rad, "rad radian radians")
+_name("angle", mrad, "mrad milliradian milliradians")
+_name("angle", 1e-6, "urad µrad μrad microradian microradians")
+_name("angle", deg, "deg degree degrees °")
+_name("angle", deg / 60, "arcmin arcminute arcminutes")
+_name("angle", deg / 3600, "arcsec arcsecond arcseconds")
+_name("time", 3600.0, "h hour hours")
+_name("time", 60.0, "min minute minutes")
+_name("time", s, "s sec second seconds")
+_name("time", ms, "ms millisecond milliseconds")
+_name("time", 1e-6, "us µs μs microsecond microseconds")
+_name("time", 1e-9, "ns nanosecond nanoseconds")
+_name("mass", 1.0, "kg g mg")
+_name("frequency", 1.0, "Hz kHz MHz")
 # A number, then one unit name. Expressions are refused: "9**9**9 m" would keep the parser busy for ever.
 _LONGEST = 100
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d_]*|°)\s*")
@@ -97,7 +97,7 @@ def parse(text: str | float, dimension: str = "length") -> float:
         raise FormatError(f"{text!r} has no unit. {hint}")
     if unit not in _UNITS:
         raise FormatError(f"{text!r} has an unknown unit {unit!r}. {hint}")
-    known, times, over = _UNITS[unit]
+    known, size = _UNITS[unit]
     if known != dimension:
         raise FormatError(f"{text!r} is not a {dimension}. {hint}")
-    return number * times / over
+    return number * size

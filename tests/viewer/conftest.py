@@ -1,5 +1,6 @@
 """A headless Chromium where there is one, and pages in it."""
 
+import importlib.util
 from pathlib import Path
 
 import pytest
@@ -42,3 +43,23 @@ def open_page(browser):
     for page in pages:
         page.close()
         assert not page.complaints
+
+
+RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+
+
+@pytest.fixture(scope="session")
+def violations():
+    """Function of a page: what axe-core finds wrong with it, and where."""
+    found = importlib.util.find_spec("axe_playwright_python")
+    if found is None:
+        pytest.skip("axe-playwright-python is not installed")
+    script = (Path(found.origin).parent / "axe.min.js").read_text("utf-8")
+
+    def checked(page):
+        page.evaluate(script)
+        result = page.evaluate("rules => axe.run({runOnly: rules})", RULES)
+        assert result["passes"]
+        return [(v["id"], [node["target"] for node in v["nodes"]]) for v in result["violations"]]
+
+    return checked

@@ -81,3 +81,10 @@ def test_a_link_restores_the_values(page):
         settle(page)
         assert "magnification = 0.4" in page.text_content("#toml")
         assert page.inner_text("#depth-out") == "5 mm, farther"
+
+
+def test_the_designer_is_accessible(page, violations):
+    with designer("lfm-guv") as address:
+        page.goto(address)
+        settle(page)
+        assert violations(page) == []

@@ -227,7 +227,7 @@ def test_a_raw_image_with_a_calibration_is_decoded(tmp_path, rng):
         open_exhibit(tmp_path / "raw.png", viewer.Origin(white=tmp_path / "other.toml"))
     with pytest.raises(FormatError, match="where a calibration is needed"):
         open_exhibit(tmp_path / "raw.png", viewer.Origin(calibration=tmp_path / "raw.png"))
-    with pytest.raises(FormatError, match="holds a Calibration, of which there is no picture"):
+    with pytest.raises(FormatError, match="holds a calibration, of which there is no picture"):
         open_exhibit(tmp_path / "other.toml")
 
 

@@ -2,6 +2,7 @@
 
 import { freedom, keptViews, middleView, viewShifts } from "./aperture.js";
 import { MAPS } from "./colours.js";
+import { Histogram } from "./histogram.js";
 import { depthMap } from "./models.js";
 import { lengthText } from "./overlay.js";
 import { cachedMap } from "./tone.js";
@@ -29,6 +30,7 @@ export class Controls {
     by("close").addEventListener("click", () => app.set({ aperture: 0.001 }));
     for (const button of by("modes").children) button.addEventListener("click", () => app.set({ mode: button.dataset.mode }));
     by("modes").addEventListener("keydown", (event) => this.walk(event));
+    this.histogram = new Histogram(by("histogram"));
     this.pad();
   }
 
@@ -100,6 +102,7 @@ export class Controls {
     }
     by("modes").hidden = [...by("modes").children].filter((button) => !button.hidden).length < 2;
     for (const group of document.querySelectorAll("[data-modes]")) group.hidden = !group.dataset.modes.includes(state.mode);
+    by("sway").hidden = false;
     for (const part of document.querySelectorAll('[data-part="views"]')) part.hidden ||= !model.views;
     for (const part of document.querySelectorAll('[data-part="lattice"]')) part.hidden = !about.raw?.lattice;
     this.focus(model, state);
@@ -110,6 +113,7 @@ export class Controls {
     document.querySelector('[data-colour="channel"]').hidden = channels !== 3 || state.mode === "depth";
     document.querySelector('[data-colour="map"]').hidden = channels === 3 && state.channel === "colour" && state.mode !== "depth";
     for (const part of document.querySelectorAll("[data-light]")) part.hidden = state.mode === "depth";
+    if (state.mode !== "depth") this.histogram.draw(model, state, this.app.main.image);
     for (const id of ["ev", "black", "gamma"]) by(id).value = state[id];
     tell("ev-out", `${state.ev > 0 ? "+" : ""}${state.ev.toFixed(2)} EV`);
     tell("black-out", `${Math.round(100 * state.black)} %`);

@@ -117,7 +117,7 @@ class Designer {
 
   tables(sections) {
     at("tables").replaceChildren(...sections.map(({ title, rows }) => {
-      const table = document.createElement("table"), box = document.createElement("div");
+      const table = document.createElement("table"), box = Object.assign(document.createElement("div"), { tabIndex: 0, role: "group", ariaLabel: title });
       table.createCaption().textContent = title;
       const body = table.createTBody();
       for (const [name, text, source] of rows) {

@@ -3,7 +3,9 @@
 import { Controls } from "./controls.js";
 import { listenToKeys } from "./keys.js";
 import { Model } from "./models.js";
+import { drawScaleBar } from "./overlay.js";
 import { Pane } from "./pane.js";
+import { Player } from "./play.js";
 import { isExported, loadAbout } from "./source.js";
 import { defaults, linkOf, parseLink } from "./state.js";
 
@@ -127,19 +129,27 @@ function fileName(app) {
   return `${stem}-${what}.png`;
 }
 
-/** Every pane's picture side by side, in its own size, with square pixels. */
+const LEAST_BAR = 240; // pixels across a saved picture that shows a scale bar
+
+/** Every pane's picture side by side, in its own size, with square pixels and a scale bar where lengths are known. */
 export function pictureCanvas(app) {
   const parts = app.panes.map((pane) => pane.pixels()).filter(Boolean), sheet = document.createElement("canvas");
   const sizes = parts.map(({ width, height, aspect }) => [width, Math.max(1, Math.round(height * aspect))]);
   sheet.width = sizes.reduce((sum, [w]) => sum + w, 0);
   sheet.height = Math.max(...sizes.map(([, h]) => h));
   let left = 0;
-  parts.forEach(({ width, height, data }, k) => {
+  parts.forEach(({ width, height, data, unit }, k) => {
     const one = document.createElement("canvas");
     Object.assign(one, { width, height });
     one.getContext("2d").putImageData(new ImageData(data, width, height), 0, 0);
-    sheet.getContext("2d").drawImage(one, left, 0, ...sizes[k]);
+    const context = sheet.getContext("2d");
+    context.drawImage(one, left, 0, ...sizes[k]);
     left += sizes[k][0];
+    if (unit && sizes[k][0] >= LEAST_BAR) {
+      context.save(); context.translate(left - sizes[k][0], 0);
+      drawScaleBar(context, unit, { width: sizes[k][0], height: sizes[k][1] });
+      context.restore();
+    }
   });
   return sheet;
 }
@@ -159,16 +169,21 @@ async function copyLink(app) {
   try { await navigator.clipboard.writeText(location.href); app.tell("Link copied."); } catch { app.tell("The address bar holds the link."); }
 }
 
+async function fullScreen(app) {
+  try { await (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()); } catch { app.tell("This browser does not fill the screen here."); }
+}
+
 function wire(app) {
   const actions = {
     s: () => savePicture(app), 0: () => app.set({ zoom: 1, at: null }), "?": () => document.getElementById("keys").showModal(),
-    "+": () => zoom(1.25), "=": () => zoom(1.25), "-": () => zoom(0.8),
+    f: () => fullScreen(app), "+": () => zoom(1.25), "=": () => zoom(1.25), "-": () => zoom(0.8),
   };
   const zoom = (factor) => { const box = app.main.stage.getBoundingClientRect(); app.main.zoomAt([box.width / 2, box.height / 2], factor); };
   const on = (id, act) => document.getElementById(id).addEventListener("click", act);
-  on("save", actions.s); on("fit", actions[0]); on("help", actions["?"]); on("link", () => copyLink(app));
+  on("save", actions.s); on("fit", actions[0]); on("help", actions["?"]); on("full", actions.f); on("link", () => copyLink(app));
   on("reset", () => { app.state = { ...app.base, mode: app.state.mode, renderer: app.state.renderer }; app.touched(); });
   on("pixel", () => zoom(1 / ((app.main.scale[0] / app.main.image.detail) / app.main.ratio)));
+  app.player = new Player(app);
   listenToKeys(app, actions);
 }
 

@@ -175,16 +175,10 @@ export class Model {
     return { nx, ny, channels: 3, bits: 8, scale: 1, offset: 0, white: 255, numbers: this.depthColours, base: [ny, nx], aspect, detail: 1, plain: true, sharp: true };
   }
 
-  /** Least and largest depth. */
+  /** The depths that the colours span. */
   depthRange() {
-    const depth = this.arrays.depth;
-    if (!depth) return null;
-    if (!depth.range) {
-      let low = Infinity, high = -Infinity;
-      for (const x of depth.numbers) { if (x < low) low = x; if (x > high) high = x; }
-      depth.range = [low, high];
-    }
-    return depth.range.map((x) => depth.offset + depth.scale * x);
+    const { depth, confidence } = this.arrays;
+    return depth && confidence ? ends(depth, confidence).map((x) => depth.offset + depth.scale * x) : null;
   }
 
   depthAt(y, x) {
@@ -223,17 +217,25 @@ function projection(numbers, [nz, ny, nx, channels], kind) {
   return { nx: columns, ny: rows, numbers: out };
 }
 
+/** 1st and 99th percentile of the numbers of a depth map that are not mere guesses: a few wrong places would take all colours. */
+function ends(depth, confidence) {
+  if (!depth.range) {
+    const sure = depth.numbers.filter((_, i) => confidence.numbers[i] > 0), sorted = (sure.length ? sure : depth.numbers.slice()).sort();
+    depth.range = [0.01, 0.99].map((part) => sorted[Math.round(part * (sorted.length - 1))]);
+  }
+  return depth.range;
+}
+
 function coloured(depth, confidence, name, trust) {
   const map = cachedMap(name), n = depth.numbers.length, nx = depth.shape[1], out = new Uint8Array(3 * n);
-  let low = Infinity, high = -Infinity;
-  for (const x of depth.numbers) { if (x < low) low = x; if (x > high) high = x; }
+  const [low, high] = ends(depth, confidence);
   for (let i = 0; i < n; i++) {
     if (confidence.numbers[i] < 255 * trust) {
       const grey = ((i % nx) + Math.floor(i / nx)) % 8 < 4 ? 116 : 134;
       out[3 * i] = out[3 * i + 1] = out[3 * i + 2] = grey;
       continue;
     }
-    const k = 4 * Math.round((255 * (depth.numbers[i] - low)) / Math.max(high - low, 1));
+    const part = (depth.numbers[i] - low) / Math.max(high - low, 1), k = 4 * Math.round(255 * Math.min(1, Math.max(0, part)));
     for (let c = 0; c < 3; c++) out[3 * i + c] = map[k + c];
   }
   return out;

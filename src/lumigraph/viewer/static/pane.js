@@ -246,7 +246,7 @@ export class Pane {
   /** The picture in its own size, as bytes. */
   pixels() {
     const image = this.model.image(this.app.state, this.device, true);
-    return image && { width: image.nx, height: image.ny, data: this.device.pixels(image, this.tone ?? toneOf(this.app.state, image)), aspect: image.aspect };
+    return image && { width: image.nx, height: image.ny, data: this.device.pixels(image, this.tone ?? toneOf(this.app.state, image)), aspect: image.aspect, unit: image.unit && image.unit / image.detail };
   }
 
   /** How many views are kept (v, u). */
