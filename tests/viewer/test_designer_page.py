@@ -56,7 +56,7 @@ def test_values_change_everything_and_wrong_ones_are_told(page, tmp_path):
         page.press("[id='lenslets.pitch']", "Tab")
         settle(page)
         assert 'pitch = "200 um"' in page.text_content("#toml")
-        assert "200 um" in page.inner_text("#tables")
+        assert "200 µm" in page.inner_text("#tables")
         assert page.get_attribute("#point", "src") != before[0]
         assert page.get_attribute("#drawing", "src") != before[1]
         assert page.locator(".chart circle").count() == 6
