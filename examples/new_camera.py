@@ -19,7 +19,7 @@ def main() -> None:
     lg.plots.layout(camera).savefig("rays.png")
 
     target = lg.targets.siemens_star(camera.object_grid)
-    raw = lg.simulate(camera, target, lg.Incoherent(snapshots=40))
+    raw = lg.simulate(camera, target)
     picture = lg.render(raw, camera.calibration, patch=camera.patch)
     lg.save(raw, "raw.tiff")
     lg.save(picture, "picture.png")

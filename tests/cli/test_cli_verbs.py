@@ -115,7 +115,7 @@ def test_simulate_adds_noise_that_the_seed_repeats(lumigraph, bench):
     ("words", "expected"),
     [
         (("--coherence", "coherent"), "Coherent()"),
-        (("--count", "3"), "Incoherent(snapshots=3, rng=7, accuracy=0.001)"),
+        ((), "Incoherent(accuracy=0.001)"),
         (("--coherence", "snapshots"), "Snapshots(count=100, coherence_index=None, rng=7)"),
         (("--coherence", "tilted", "--na", "0.01", "--count", "5"), "TiltedWaves(count=5, na=0.01)"),
     ],

@@ -78,7 +78,7 @@ def test_a_picture_stands_upright_and_is_not_mirrored():
         picture = np.zeros(camera.object_grid.shape)
         picture[n // 5 : 3 * n // 10, n // 5 : 4 * n // 5] = 1  # a bar along the top
         picture[n // 5 : 4 * n // 5, n // 5 : 3 * n // 10] = 1  # and one down the left side
-        raw = simulate(camera, targets.photo(camera.object_grid, picture), Incoherent(15, rng=1))
+        raw = simulate(camera, targets.photo(camera.object_grid, picture), Incoherent())
         if camera is one:
             shown = refocus(decode(raw, camera.calibration), 1.0)
         else:

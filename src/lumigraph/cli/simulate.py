@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SCENES = ("white", "usaf1951", "siemens_star", "gratings", "slanted_edge", "edge", "pinhole", "photo")
 _FINEST_GROUP = 12
-_COUNTS = {"incoherent": 100, "snapshots": 100, "tilted": 64}
+_COUNTS = {"snapshots": 100, "tilted": 64}
 
 
 @Parameter(name="*")
@@ -39,7 +39,6 @@ class Light:
         times; tilted: plane waves from many directions.
     count
         Snapshots (100 if left out) or tilted waves (64) to add up: more of them, less speckle.
-        Incoherent light needs none where the camera has no lenslets, or lenslets along the axes.
     na
         Numerical aperture of the tilted waves; all directions if left out.
     wavelength
@@ -70,22 +69,24 @@ class Light:
         """The coherence that `lumigraph.simulate` takes."""
         from lumigraph import simulation
 
+        if self.count is not None and self.coherence not in _COUNTS:
+            raise FormatError(
+                f"--count has no meaning with --coherence {self.coherence}. Leave it out, or use snapshots."
+            )
         if self.coherence == "coherent":
-            if self.count is not None:
-                raise FormatError("--count has no meaning with --coherence coherent. Leave it out.")
             return simulation.Coherent()
         if self.na is not None and self.coherence != "tilted":
             raise FormatError(
                 f"--na has no meaning with --coherence {self.coherence}. Use --coherence tilted."
             )
+        if self.coherence == "incoherent":
+            return simulation.Incoherent()
         count = _COUNTS[self.coherence] if self.count is None else self.count
         if count < 1:
             raise FormatError(f"--count is {count} but must be at least 1.")
         if self.coherence == "tilted":
             return simulation.TiltedWaves(count, self.na)
-        if self.coherence == "snapshots":
-            return simulation.Snapshots(count, rng=seed)
-        return simulation.Incoherent(count, seed)
+        return simulation.Snapshots(count, rng=seed)
 
 
 @Parameter(name="*")

@@ -204,22 +204,27 @@ class Lenslets:
             return known
         axis, (_, light) = self.axes[1], self._bases[1]
         wavelength, result = self.optics[0], []
-        for y, _, chord in zip(*self.lines, strict=True):
+        lines, _, chords = self.lines
+        chords, like = np.unique(chords.round(12), return_inverse=True)
+        for chord in chords.tolist():
             at, weight = legendre(
                 middle - chord, middle + chord, nodes(chord, focal_length, axis, self.optics)
             )
-            phase = np.exp(-1j * np.pi * ((at - middle) ** 2 + y**2) / (wavelength * focal_length))
+            phase = np.exp(-1j * np.pi * (at - middle) ** 2 / (wavelength * focal_length))
             weight = weight * axis.fade(at, self.array.lattice.pitch)
             spread = fresnel(axis.image, at, wavelength * self.optics[1])
             result.append(((spread * (weight * phase)) @ light(at)).astype(np.complex64).ravel())
-        return self._members.setdefault((middle, focal_length), np.array(result))
+        bend = np.exp(-1j * np.pi * lines**2 / (wavelength * focal_length)).astype(np.complex64)
+        return self._members.setdefault((middle, focal_length), np.array(result)[like] * bend[:, None])
 
     @cached_property
     def lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Lines across a lenslet: y from its centre, quadrature weight, half the chord [m]."""
         half = self.array.fill_factor * self.array.lattice.pitch / 2
-        count = nodes(half, min(map(abs, focal_lengths(self.array))), self.axes[0], self.optics)
-        if self.array.shape == "round":
+        steepest = min(map(abs, focal_lengths(self.array)))
+        count = nodes(half, steepest, self.axes[0], self.optics)
+        if self.array.shape == "round":  # nodes of the angle stand farther apart in the middle
+            count = nodes(math.pi / 2 * half, steepest, self.axes[0], self.optics)
             angle, weight = legendre(-math.pi / 2, math.pi / 2, count)
             chord = half * np.cos(angle)
             return half * np.sin(angle), weight * chord, chord

@@ -1,78 +1,172 @@
-r"""White images before square lenslets: the evenly lit stop of the main lens, without speckle.
+r"""White images before lenslets: the evenly lit stop of the main lens, without speckle.
 
-Light of each place u of the stop is a tilted wave in the lenslet plane, whose image behind square lenslets is
-a product of one factor along y and one along x. So the white image is a double sum,
+Light of a place u of the stop is a tilted wave in the lenslet plane. In the Fresnel approximation, without
+the phase exp(iπw²/(λL)) of that plane, tilting a wave moves its image by bu/L and changes its phase alone. So
+the white image is the image H of one wave along the axis, averaged over the image of the stop,
 
-.. math:: I(y, x) = \sum_{ij} |E_y(y; v_i)|^2 \, W_{ij} \, |E_x(x; u_j)|^2
+.. math:: I(s) = \frac{4}{\pi D^2} \int_{|u| < D/2} |H(s + b u / L)|^2 \, d^2u,
 
-with weights W that integrate polynomials over the disc exactly: Gauss-Legendre nodes along y, by the angle,
-and along x the integral over each chord of what interpolates the nodes.
+which multiplies its frequencies by 2 J₁(x)/x. What lenslets send farther than they are followed falls on all
+cells around; its faint fringes are left out.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import legendre
+from scipy import fft
+from scipy.signal import fftconvolve
+from scipy.special import j1
 
+from lumigraph.core import arrays
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import HasOptics
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.periodic import readout
-from lumigraph.operators.relay import Straight
+from lumigraph.operators.wave_image import WaveImage
 
-NODES = 32
-"""Along each axis of the stop, and two for each turn of the images' phase across it."""
+ASIDE = 0.16
+"""Of the light through lenslets with opaque rims, 1/n of this goes farther than n λb/p (square and round)."""
+
+FRINGES = 0.15
+"""Of the light that goes far, rms of its fringes over its mean (square and round: 0.11 to 0.16)."""
+
+PROMISED = 0.8
+"""Part of the accuracy that the fringes may take."""
+
+FARTHER = 1.6
+"""How much farther than in the operator light is followed: the border shines far into a white image."""
+
+LARGEST = 2.0**25
+"""Samples of a wave's image."""
 
 
-def separable(camera: HasOptics, accuracy: float) -> bool:
-    """Whether a camera's white image is a sum of products."""
-    camera = camera.optics()
-    return Optics.of(camera, camera.object_distance, accuracy).straight
-
-
-def white_image(camera: HasOptics, accuracy: float) -> np.ndarray:
-    """Raw image (ny, nx) of light of 1 on square lenslets, to a relative rms error of `accuracy`."""
+def white_image(camera: HasOptics, accuracy: float) -> tuple[np.ndarray, float]:
+    """Raw image (ny, nx) of light of 1 on the lenslets, and the relative rms of the fringes that it lacks."""
     camera = camera.optics()
     optics = Optics.of(camera, camera.object_distance, accuracy)
-    lenslets, half = Straight(optics), camera.pupil_diameter / 2
-    count = NODES + max(map(math.ceil, (2 * _turns(optics, which) for which in (0, 1))))
-    angles, across, weights = disc(count)
-    along_y, along_x = (_seen(lenslets, which, half * at) for which, at in ((0, np.sin(angles)), (1, across)))
-    image = along_y @ weights @ along_x.T / optics.image_scale**2
-    return readout(optics).forward(image.astype(np.float32))
+    pitches, cells = _pitches(optics), optics.cells
+    wave = WaveImage.of(optics, pitches)
+    short = _averaged(np.abs(wave.amplitude()) ** 2, optics)
+    image = short[wave.sides[0].like][:, :, wave.sides[1].like]
+    far = _far(wave)[:, None, :, None]
+    image += wave.aside() * wave.through * far
+    image = image.reshape([n * k for n, k in zip(cells.image, cells.samples, strict=True)])
+    raw = readout(optics).forward(image.astype(np.float32) / optics.image_scale**2)
+    return raw, FRINGES * _aside(optics, pitches) * float(far.max())
 
 
-def _turns(optics: Optics, which: int) -> float:
-    """Turns across the stop of the phase between the light of the farthest lenslets that meet."""
-    axis = optics.axes[which]
-    return (axis.size + 2 * axis.neighbourhood) / _cells.airy(optics.camera)
+def _pitches(optics: Optics) -> float:
+    """How far light is followed: as the accuracy asks, and no farther than the image or the memory reach."""
+    array, cells = optics.array, optics.cells
+    pitches = FARTHER * optics.fineness.neighbours(_cells.fresnel_number(optics.camera))
+    pitches += optics.spill / array.lattice.pitch
+    pitches = max(pitches, FRINGES * _aside(optics, 1.0) / (PROMISED * optics.fineness.accuracy))
+    if array.extent:
+        pitches = min(
+            pitches, max(map(math.prod, zip(cells.image, cells.size, strict=True))) / array.lattice.pitch
+        )
+    while pitches > 2 and WaveImage.of(optics, pitches).samples > LARGEST:
+        pitches *= 0.9
+    return pitches
 
 
-def _seen(lenslets: Straight, which: int, stop: np.ndarray) -> np.ndarray:
-    """Intensity (samples, places) along one axis of all cells, of light of each place of the stop [m]."""
-    optics = lenslets.optics
-    cells = range(optics.cells.image[which])
-    at = lenslets.places(cells, cells)[which]
-    turn = -2j * np.pi / (optics.camera.wavelength * optics.camera.separation)
-    field = lenslets.along(which, np.exp(turn * np.outer(at, stop)).astype(np.complex64), cells)
-    return np.abs(field) ** 2
+def _aside(optics: Optics, pitches: float) -> float:
+    """Part of the light that goes so far from lenslets with an opaque rim; next to none does from others."""
+    array = optics.array
+    if array.shape != "round" and array.fill_factor == 1:
+        return 0.0
+    return ASIDE / (array.fill_factor * _cells.fresnel_number(optics.camera) * pitches)
 
 
-def disc(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Angles (count,), places along x (count,), and weights (angles, places) of means over the unit disc.
+def _stop_radius(optics: Optics) -> float:
+    """Of the stop's image behind a lenslet [m]."""
+    camera = optics.camera
+    return camera.pupil_diameter / 2 * _cells.telecentric_distance(camera) / camera.separation
 
-    Exact for polynomials of a degree below `count` along x.
 
-    >>> t, x, w = disc(12)
-    >>> round(float(w.sum()), 12), round(float(np.sin(t) ** 2 @ w @ x**2), 8)  # 1, and 1/24
-    (1.0, 0.04166667)
+def _far(wave: WaveImage) -> np.ndarray:
+    """What all lenslets bring to each cell of the image from farther than they are followed: up to 1."""
+    cells, reach = wave.optics.cells, wave.sides[0].axis.neighbourhood
+    if wave.sides[0].endless:
+        return np.ones(cells.image)
+    y, x = (np.arange(1 - n, n) * size for n, size in zip(cells.image, cells.size, strict=True))
+    distance = np.hypot(y[:, None], x)
+    law = np.where(distance > reach, reach / (2 * np.pi * np.maximum(distance, reach) ** 3), 0.0)
+    law *= math.prod(cells.size)
+    there = np.pad(np.ones(cells.count), [(r, r) for r in cells.ring])
+    return fftconvolve(there, law, mode="same")
+
+
+def _averaged(image: np.ndarray, optics: Optics) -> np.ndarray:
+    """Mean of an image (cells, samples, cells, samples) over the stop's image, on the samples of `optics`."""
+    y, x = (_Frequencies(optics, k, *image.shape[2 * k : 2 * k + 2]) for k in (0, 1))
+    spectrum = arrays.rfft2(image.reshape(y.given, x.given), (y.fine, x.fine))
+    spectrum = spectrum[y.number][:, : x.coarse // 2 + 1]
+    across = slice(x.coarse // 2 + 1)
+    turns = np.pi * np.hypot((y.number / y.length)[:, None], (x.number / x.length)[across])
+    turns *= 2 * _stop_radius(optics)
+    spectrum *= np.where(turns == 0, 1, 2 * j1(turns) / np.where(turns == 0, 1, turns))
+    spectrum *= np.outer(y.moved(), x.moved()[across])
+    found = arrays.irfft2(spectrum, (y.coarse, x.coarse))
+    tiles = found.reshape(-1, y.samples, x.coarse // x.samples, x.samples)
+    return tiles[: y.cells, :, : x.cells]
+
+
+@dataclass(frozen=True, slots=True)
+class _Frequencies:
+    """Of an image along one axis, with dark cells beside it into which it may spread.
+
+    Parameters
+    ----------
+    optics, which
+        Of the cells; the axis.
+    cells, found
+        Cells, and samples of each that the image has now.
     """
-    x, weight = legendre.leggauss(count)
-    angles, chord = np.pi / 2 * x, np.cos(np.pi / 2 * x)
-    at_nodes, at_ends = legendre.legvander(x, count - 1), legendre.legvander(chord, count)
-    # The integral of P_k over a chord is 2 (P_{k+1} - P_{k-1}) / (2k + 1) for even k, and 0 for odd.
-    integrals = at_ends[:, 1:].copy()
-    integrals[:, 1:] -= at_ends[:, : count - 1]
-    integrals[:, 1::2] = 0
-    rows = integrals @ (at_nodes.T * weight)
-    return angles, x, rows * (np.pi / 2 * weight * chord)[:, None] / np.pi
+
+    optics: Optics
+    which: int
+    cells: int
+    found: int
+
+    @property
+    def samples(self) -> int:
+        """Samples of each cell that it gets."""
+        return self.optics.cells.samples[self.which]
+
+    @property
+    def _all(self) -> int:
+        if self.optics.array.extent is None:
+            return self.cells
+        return self.cells + 1 + math.ceil(_stop_radius(self.optics) / self.optics.cells.size[self.which])
+
+    @property
+    def given(self) -> int:
+        """Samples of the image."""
+        return self.cells * self.found
+
+    @property
+    def fine(self) -> int:
+        """The same with the dark cells."""
+        return self._all * self.found
+
+    @property
+    def coarse(self) -> int:
+        """Samples that all cells get."""
+        return self._all * self.samples
+
+    @property
+    def length(self) -> float:
+        """Of all cells [m]."""
+        return self._all * self.optics.cells.size[self.which]
+
+    @property
+    def number(self) -> np.ndarray:
+        """Periods along the length, of the frequencies that are kept (coarse,), in the order of an FFT."""
+        return np.round(fft.fftfreq(self.coarse) * self.coarse).astype(int)
+
+    def moved(self) -> np.ndarray:
+        """From the middle of the fine samples to that of the coarse ones, and their number (coarse,)."""
+        shift = 1 / self.coarse - 1 / self.fine
+        return np.exp(1j * np.pi * self.number * shift) * (self.coarse / self.fine)

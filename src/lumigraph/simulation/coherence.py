@@ -15,6 +15,7 @@ from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.elements import masks
 from lumigraph.errors import LumigraphError, SamplingError
+from lumigraph.operators.cells import COARSEST, FINEST
 from lumigraph.simulation import directions
 
 Seed = int | np.random.Generator | None
@@ -177,7 +178,7 @@ class Snapshots:
         return wavelength**2 * distance**2 / (sample_area * pupil_area) / self.count
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, init=False)
 class Incoherent:
     """Spatially incoherent light, like every lit scene.
 
@@ -188,22 +189,31 @@ class Incoherent:
     is refused, with the accuracy that could be had; nothing is replaced by `Snapshots`. The raw image's
     ``metadata["error"]`` holds the estimated relative rms error and its source.
 
-    White images of hexagonal and round lenslets are propagated on grids, to some 3 % rms, and say so.
-
     Parameters
     ----------
-    snapshots, rng
-        Not used any more: ask for `Snapshots` by name.
     accuracy
         Relative rms error, 1e-2 to 1e-5; within a lenslet of the array's border it may be twice as large.
+
+    Raises
+    ------
+    LumigraphError
+        An accuracy out of range, or `snapshots` and `rng`, which are those of `Snapshots`.
     """
 
-    snapshots: int = 100
-    rng: Seed = 0
     accuracy: float = 1e-3
 
-    def __post_init__(self) -> None:
-        _positive_count(self.snapshots)
+    def __init__(self, accuracy: float = 1e-3, **others: object) -> None:
+        if others:
+            raise LumigraphError(
+                f"Incoherent takes no {' and no '.join(others)}: its images are exact and have no snapshots. "
+                "Leave it out, or use Snapshots(count, rng=...)."
+            )
+        accuracy = checks.finite("accuracy", accuracy, "1", LumigraphError)
+        if not FINEST <= accuracy <= COARSEST:
+            raise SamplingError(
+                f"accuracy is {accuracy:g} but must lie between {FINEST:g} and {COARSEST:g}, relative rms."
+            )
+        object.__setattr__(self, "accuracy", accuracy)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,13 +1,11 @@
 """White images of a camera whose parts are not where they should be, for figures 6.5 to 6.7."""
 
 import math
-import warnings
 
 import numpy as np
 from scipy.ndimage import map_coordinates
 
 from lumigraph.core.raw import RawImage
-from lumigraph.errors import SamplingWarning
 from lumigraph.experiments.thesis.point_images import camera
 from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.scene import targets
@@ -65,13 +63,8 @@ def _sensor_shape(found: FocusedPlenopticCamera, lenslets: int) -> tuple[int, in
 
 
 def white(found: FocusedPlenopticCamera) -> RawImage:
-    """White image through a diffuser before the main lens.
-
-    Behind round lenslets it is propagated and some 3 % off, which moves no centre.
-    """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SamplingWarning)
-        return simulate(found, targets.white())
+    """White image through a diffuser before the main lens."""
+    return simulate(found, targets.white())
 
 
 def tilted_white(found: MisplacedCamera, angle: float) -> RawImage:
