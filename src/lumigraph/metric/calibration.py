@@ -152,37 +152,37 @@ class Measured:
         return tuple(self._located(corners[corners.frame == frame]) for frame in corners.frames)
 
     def _located(self, corners: Corners) -> Pose:
-        pose = _start(corners, self.board, self.camera)
-        sight, frame = corners.sights(), np.zeros(len(corners), int)
-        problem = Problem(corners, self.board, frame, self.camera, [], self.noise, sight)
-        camera = problem.free.shape[1]
+        start = _start(corners, self.board, self.camera)
+        frame = np.zeros(len(corners), int)
+        problem = Problem(corners, self.board, frame, self.camera, [], self.noise, corners.sights())
+        fixed = np.zeros(problem.free.shape[1])
 
         def unknowns(pose: np.ndarray) -> np.ndarray:
-            return np.concatenate([np.zeros(camera), pose])
+            return np.concatenate([fixed, pose])
 
-        def slopes(pose: np.ndarray) -> np.ndarray:
-            return problem.jacobian(unknowns(pose))[:, camera:]
+        jacobian: Any = lambda pose: problem.jacobian(unknowns(pose))[:, len(fixed) :]  # noqa: E731
+        found = least_squares(lambda p: problem.residual(unknowns(p)), start, jacobian, x_scale="jac")
+        covariance, expected = self._predicted(problem, unknowns(found.x))
+        residual = math.sqrt(float(np.mean(problem.misfit(unknowns(found.x)) ** 2)))
+        return Pose(int(corners.frame[0]), found.x[:3], found.x[3:], covariance, residual, expected)
 
-        jacobian: Any = slopes
-        found = least_squares(lambda p: problem.residual(unknowns(p)), pose, jacobian, x_scale="jac")
-        white = problem.jacobian(unknowns(found.x))
-        mine, inverse = white[:, camera:], np.linalg.pinv(white[:, camera:])
-        numbers = np.linalg.lstsq(problem.free, self.covariance, rcond=None)[0]
-        inner = np.linalg.lstsq(problem.free, numbers.T, rcond=None)[0]
-        sway = -inverse @ white[:, :camera]  # of the pose with the camera
-        covariance = np.linalg.inv(mine.T @ mine) + sway @ inner @ sway.T
-        slopes = problem.slopes(unknowns(found.x)).reshape(-1, camera + 6)
-        seen = slopes[:, :camera] + slopes[:, camera:] @ sway
-        free = 1 - min(1.0, 6 / (2 * len(np.unique(sight))))
-        expected = (
+    def _predicted(self, problem: Problem, unknowns: np.ndarray) -> tuple[np.ndarray, float]:
+        """Covariance (6, 6) of a pose by a camera that is uncertain, and the rms that is expected [px]."""
+        fixed, corners = problem.free.shape[1], problem.corners
+        white = problem.jacobian(unknowns)
+        mine = white[:, fixed:]
+        back = np.linalg.pinv(problem.free)
+        camera = back @ self.covariance @ back.T
+        sway = -np.linalg.pinv(mine) @ white[:, :fixed]  # of the pose with the camera
+        slopes = problem.slopes(unknowns).reshape(-1, fixed + 6)
+        seen = slopes[:, :fixed] + slopes[:, fixed:] @ sway
+        free = 1 - min(1.0, 6 / (2 * int(problem.sight.max() + 1)))
+        variance = (
             np.mean(self.noise.own[corners.kind] ** 2)
             + self.noise.shared**2 * free
-            + np.mean(np.sum((seen @ inner) * seen, axis=1))
+            + np.mean(np.sum((seen @ camera) * seen, axis=1))
         )
-        residual = math.sqrt(float(np.mean(problem.misfit(unknowns(found.x)) ** 2)))
-        return Pose(
-            int(corners.frame[0]), found.x[:3], found.x[3:], covariance, residual, math.sqrt(float(expected))
-        )
+        return np.linalg.inv(mine.T @ mine) + sway @ camera @ sway.T, math.sqrt(float(variance))
 
 
 def board(corners: Corners, board: Board, nominal: Nominal) -> Measured:
