@@ -42,6 +42,8 @@ def test_the_axial_zero_is_near_that_of_the_debye_integral(na, n, zero):
 
 
 def test_the_axial_resolution_is_paraxial_for_small_apertures():
+    """1 - cos θ was 0 where an index of 1e9 stood in a camera file."""
+    assert design.axial_resolution(500e-9, 1.2, 1e9) == pytest.approx(2e9 * 500e-9 / 1.2**2, rel=1e-12)
     assert design.axial_resolution(500e-9, 0.05, 1.0) == pytest.approx(2 * 500e-9 / 0.05**2, rel=1e-3)
 
 

@@ -158,8 +158,9 @@ def axial_resolution(wavelength: float, numerical_aperture: float, index: float)
     >>> round(axial_resolution(525e-9, 0.5, 1.0) * 1e6, 3)
     3.919
     """
-    cosine = math.sqrt(1 - sine(numerical_aperture, index) ** 2)
-    return checks.positive("wavelength", wavelength) / (index * (1 - cosine))
+    squared = sine(numerical_aperture, index) ** 2
+    versine = squared / (1 + math.sqrt(1 - squared))  # 1 - cos θ, exact for small angles too
+    return checks.positive("wavelength", wavelength) / (index * versine)
 
 
 def depth_of_field(wavelength: float, numerical_aperture: float, index: float, spot: float = 0.0) -> float:
