@@ -302,9 +302,13 @@ def _result(found: "DepthMap", picture: Any, notes: tuple[str, ...], written: tu
         f"{found.quantity} of {rows} x {columns} places: {low} to {high}, median {middle}; half of them "
         f"with a confidence above {np.median(trust):.2f}"
     )
+    usual = found.usual_error
+    expected = [] if usual is None else [Quantity("expected_error", usual, unit)]
+    text += f" and an expected error below {expected[0]}" if expected else ""
     values = (
         Quantity("quantity", found.quantity), Quantity("unit", found.unit), Quantity("shape", found.shape),
         Quantity("confidence", float(np.median(trust))), low, middle, high,
+        *expected,
     )  # fmt: skip
     return Result(
         "Depth", "How far what is seen stands, and how sure that is.", found, (text,), values,
@@ -320,6 +324,8 @@ def _figures(found: "DepthMap", picture: Any) -> "Iterator[Figure]":
 
     yield Figure(plots.show(found.values), f"{found.quantity.capitalize()} [{found.unit}].", "Map")
     yield Figure(plots.show(found.confidence), "Confidence, 0 to 1.", "Map")
+    if found.error is not None:
+        yield Figure(plots.show(found.error), f"Expected error [{found.unit}].", "Map")
     if picture is not None:
         zoom = {"zoom": enlarged(picture)}
         yield Figure(picture, "The picture of the same places.", "Map", zoom)

@@ -39,11 +39,14 @@ class DepthMap(Noun[A]):
         0 (a guess) to 1 (as sharp as the data can be) for each value.
     quantity
         One of `QUANTITIES`.
+    error
+        Mean distance from the truth to expect of each value (y, x), in its unit; None where the method
+        cannot tell.
 
     Raises
     ------
     GeometryError
-        Values that are not (y, x), a confidence of another shape, an unknown quantity.
+        Values that are not (y, x), a confidence or error of another shape, an unknown quantity.
 
     Examples
     --------
@@ -58,6 +61,7 @@ class DepthMap(Noun[A]):
     values: A
     confidence: A
     quantity: str
+    error: A | None = None
 
     __repr__ = brief
 
@@ -69,6 +73,14 @@ class DepthMap(Noun[A]):
         if len(shape) != 2 or other != shape:
             raise GeometryError(
                 f"values have shape {shape} and confidence {other} but both must be (y, x), the same."
+            )
+        if self.error is None:
+            return
+        checks.array("error", self.error)
+        if tuple(self.error.shape) != shape:
+            raise GeometryError(
+                f"values have shape {shape} and error {tuple(self.error.shape)} but both must be (y, x), "
+                "the same."
             )
 
     @property
@@ -87,6 +99,13 @@ class DepthMap(Noun[A]):
         self.check("alpha")
         return self.values
 
+    @property
+    def usual_error(self) -> float | None:
+        """Median of the expected errors; None where none is known."""
+        known = np.zeros(0) if self.error is None else to_numpy(self.error)
+        known = known[np.isfinite(known)]
+        return float(np.median(known)) if known.size else None
+
     def _repr_html_(self) -> str:
         values, trust = to_numpy(self.values), to_numpy(self.confidence)
         known = values[np.isfinite(values)]
@@ -98,6 +117,8 @@ class DepthMap(Noun[A]):
             ("size", picture.sized(self.shape)), (self.quantity, " to ".join(ends) or "nothing is known"),
             ("mean confidence", f"{float(np.nanmean(trust)):.3g}"),
         ]  # fmt: skip
+        if self.usual_error is not None:
+            rows.append(("expected error, median", f"{self.usual_error:.3g} {self.unit}".removesuffix(" 1")))
         low = float(known.min()) if known.size else 0.0
         return picture.card(
             "Depth map", rows, picture.thumbnail(values - low), f"{self.quantity}, least black"
@@ -108,14 +129,21 @@ class DepthMap(Noun[A]):
         values, trust = to_numpy(self.values), to_numpy(self.confidence)
         return like(np.where(trust >= lowest, values, np.nan), self.values)
 
-    def replaced(self, values: np.ndarray, quantity: str) -> "DepthMap":
-        """The map with other values; of what cannot be told, NaN, the confidence becomes 0."""
+    def replaced(
+        self, values: np.ndarray, quantity: str, slope: np.ndarray | float | None = None
+    ) -> "DepthMap":
+        """The map with other values; of what cannot be told, NaN, the confidence becomes 0.
+
+        `slope` is how much they change with the values before; where None, expected errors are not known.
+        """
         trust = np.where(np.isfinite(values), to_numpy(self.confidence), 0.0)
+        error = None if self.error is None or slope is None else np.abs(slope) * to_numpy(self.error)
         return replace(
             self,
             values=like(values, self.values),
             confidence=like(trust, self.confidence),
             quantity=quantity,
+            error=None if error is None else like(error, self.values),
         )
 
     def _labels(self) -> Labels:

@@ -8,7 +8,8 @@
 - `bias`: `unbiased`, a map corrected by planes of known depth
 - `fuse`: several maps as one, smooth but for kinks and jumps
 - `metric`: distances through the camera's geometry: metres, virtual depths, points in space
-- `pictures`, `sweep`, `lines`: the steps of `epi`: even views, a plane sweep, least squares on all views
+- `pictures`, `sweep`, `lines`: the steps of `epi`: even views, a plane sweep, least squares on all views;
+  `shading`: how a place's brightness changes from view to view
 - `volume`: costs of many labels: guided filter, semi-global matching, the best label
 - `smooth`: surfaces through uncertain values that may be slanted, bent and torn
 """

@@ -8,6 +8,7 @@ from scipy.ndimage import map_coordinates, maximum_filter, spline_filter
 
 from lumigraph.core.progress import Progress
 from lumigraph.depth.pictures import Pictures
+from lumigraph.depth.shading import WINDOW, Fit, Shading
 from lumigraph.depth.smooth import Stiffness, tears, update
 from lumigraph.depth.volume import box
 
@@ -18,12 +19,17 @@ _ROUNDS = (2.0, 1.2)
 
 _KINK = 4e-3  # px in the outermost view
 _STIFFNESS = 3e5
+_EDGE = 0.003  # contrast between neighbours [of a picture from 0 to 1] where a surface may end
+_USUAL, _AROUND = 1.3, 8  # times the mean contrast within so many px, which is texture
+_LOOSEST = 0.1  # part of its stiffness that a surface keeps at the sharpest edge
 _BEFORE = 1.2  # how much nearer an occluder is [px in the outermost view]
 _TEAR = 2.0  # px in the outermost view between neighbours that are not of one surface
 _BESIDE = 2  # px beside an occluder whose differences show its edge
 
 
-def refined(pictures: Pictures, moves: np.ndarray, progress: Progress) -> tuple[np.ndarray, np.ndarray]:
+def refined(
+    pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Progress
+) -> tuple[np.ndarray, np.ndarray]:
     """Movements (y, x) in the outermost view [px], refined on all views, and their standard deviation.
 
     Each round asks every view that sees a place by how much it should move there, r = g Δ: the residual r
@@ -34,13 +40,22 @@ def refined(pictures: Pictures, moves: np.ndarray, progress: Progress) -> tuple[
     lines = np.stack([[_spline(view, 3, output=np.float32) for view in row] for row in grey])
     moves = moves.astype(np.float32)
     information = np.zeros_like(moves)
+    edges = _edges(grey[pictures.middle])
     for k, jump in enumerate(_ROUNDS):
-        pull, information = _asked(pictures, grey[pictures.middle], lines, moves)
+        pull, information, shading = _asked(pictures, lines, moves, shading)
         how = Stiffness(_STIFFNESS * pictures.noise**2 * _share(pictures), _KINK, jump)
-        change = update(moves, information, pull, how, tears=tears(moves, _TEAR)) - moves
+        change = update(moves, information, pull, how, edges, tears(moves, _TEAR)) - moves
         moves = moves + np.clip(change, -_BEFORE, _BEFORE)
         progress((k + 1) / len(_ROUNDS))
     return moves, pictures.noise / np.sqrt(box(information, 3) + 1e-12)
+
+
+def _edges(picture: np.ndarray) -> np.ndarray:
+    """Part (y, x) of the stiffness that a surface keeps at each place of its picture (y, x)."""
+    contrast = np.hypot(*np.gradient(picture))
+    usual = box(contrast, _AROUND)
+    above = np.maximum(contrast - _USUAL * usual, 0)
+    return np.maximum(np.exp(-above / (_EDGE + usual)), _LOOSEST)
 
 
 def _share(pictures: Pictures) -> float:
@@ -49,28 +64,42 @@ def _share(pictures: Pictures) -> float:
 
 
 def _asked(
-    pictures: Pictures, center: np.ndarray, lines: np.ndarray, moves: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """What the views pull at each place (y, x), and their information about it."""
-    pull, information = np.zeros_like(moves), np.zeros_like(moves)
+    pictures: Pictures, lines: np.ndarray, moves: np.ndarray, shading: Shading
+) -> tuple[np.ndarray, np.ndarray, Shading]:
+    """What the views pull at each place (y, x), their information about it, and the shading that is left."""
+    center = pictures.center.mean(0)
     slope = np.gradient(center)
-    places = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in moves.shape), indexing="ij")
-    usual = 2.5 * pictures.noise
-    for v, u, seen in visible(pictures, moves):
-        at = [
-            place + moves * w for place, w in zip(places, (pictures.down[v], pictures.right[u]), strict=True)
-        ]
-        view = map_coordinates(lines[v, u], at, order=3, mode="nearest", prefilter=False)
-        residual = view - center
-        along = np.gradient(view)
-        gradient = 0.5 * (along[0] + slope[0]) * np.float32(pictures.down[v])
-        gradient += 0.5 * (along[1] + slope[1]) * np.float32(pictures.right[u])
-        weight = seen / (1 + (box(np.abs(residual), 1) / usual) ** 2)
-        weight *= (at[0] >= 0) & (at[0] <= moves.shape[0] - 1) & (at[1] >= 0) & (at[1] <= moves.shape[1] - 1)
-        pull -= weight * residual * gradient
-        information += weight * gradient * gradient
+    pull, information, down, right = (np.zeros_like(moves) for _ in range(4))
+    fit, usual = Fit(moves.shape, pictures.noise), 2.5 * pictures.noise
+    for (y, x), seen, view in _warped(pictures, lines, moves):
+        residual, along = view - center, np.gradient(view)
+        gradient = 0.5 * y * (along[0] + slope[0]) + 0.5 * x * (along[1] + slope[1])
+        weight = seen / (1 + (box(np.abs(residual - shading.at(y, x)), 1) / usual) ** 2)
+        fit.add(residual, weight, gradient, y, x)
+        pulled = weight * gradient
+        pull -= pulled * residual
+        information += pulled * gradient
+        down += y * pulled
+        right += x * pulled
+    shading = fit.solved(WINDOW)
+    pull += shading.down * down + shading.right * right
     clear = maximum_filter(moves, 2 * _BESIDE + 1) - moves < _BEFORE
-    return pull * clear, information * clear
+    return pull * clear, information * clear, shading
+
+
+def _warped(
+    pictures: Pictures, lines: np.ndarray, moves: np.ndarray
+) -> Iterator[tuple[tuple[np.float32, np.float32], np.ndarray, np.ndarray]]:
+    """For each view where it stands, which places (y, x) of the middle one it sees, and what there."""
+    places = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in moves.shape), indexing="ij")
+    for v, u, seen in visible(pictures, moves):
+        stands = np.float32(pictures.down[v]), np.float32(pictures.right[u])
+        at = [place + moves * w for place, w in zip(places, stands, strict=True)]
+        view = map_coordinates(lines[v, u], at, order=3, mode="nearest", prefilter=False)
+        seen = (
+            seen & (at[0] >= 0) & (at[0] <= moves.shape[0] - 1) & (at[1] >= 0) & (at[1] <= moves.shape[1] - 1)
+        )
+        yield stands, seen, view
 
 
 def visible(pictures: Pictures, moves: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:

@@ -79,12 +79,15 @@ def metric(
             raise GeometryError("patches do not tell where the camera is focused. Give object_distance= [m].")
     else:
         views = _views(source)
-        alpha = to_numpy(alpha_of(found, views).values).astype(float)
+        found = alpha_of(found, views)
+        alpha = to_numpy(found.values).astype(float)
         alpha = alpha if correction is None else np.asarray(correction(alpha), float)
         image = views.separation / np.where(alpha > 0, alpha, np.nan)
         focused = object_distance or thin_lens.object_distance(f, views.separation)
     distance = 1 / (1 / f - 1 / np.where(image > f, image, np.nan))
-    return found.replaced(distance - checks.positive("object_distance", focused), "depth")
+    known = found.quantity == "alpha" and correction is None
+    slope = distance**2 / (image * to_numpy(found.values)) if known else None
+    return found.replaced(distance - checks.positive("object_distance", focused), "depth", slope)
 
 
 def defocus(found: DepthMap, views: LightField, depth_per_alpha: Callable[[float], float]) -> DepthMap:
@@ -99,8 +102,8 @@ def defocus(found: DepthMap, views: LightField, depth_per_alpha: Callable[[float
     depth_per_alpha
         Metres per unit of α' of views with a separation [m]: `LightFieldMicroscope.depth_per_alpha`.
     """
-    alpha = to_numpy(alpha_of(found, views).values).astype(float)
-    return found.replaced((alpha - 1) * depth_per_alpha(views.separation), "depth")
+    found, per = alpha_of(found, views), depth_per_alpha(views.separation)
+    return found.replaced((to_numpy(found.values).astype(float) - 1) * per, "depth", per)
 
 
 def _views(source: LightField | Calibration) -> LightField:

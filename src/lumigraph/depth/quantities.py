@@ -35,7 +35,8 @@ def alpha_of(found: DepthMap, views: LightField) -> DepthMap:
     found.check("disparity", "alpha")
     if found.quantity == "alpha":
         return found
-    return found.replaced(1 - to_numpy(found.values) / disparity_per_alpha(views)[1], "alpha")
+    per = disparity_per_alpha(views)[1]
+    return found.replaced(1 - to_numpy(found.values) / per, "alpha", 1 / per)
 
 
 def disparity_of(found: DepthMap, views: LightField) -> DepthMap:
@@ -43,4 +44,5 @@ def disparity_of(found: DepthMap, views: LightField) -> DepthMap:
     found.check("disparity", "alpha")
     if found.quantity == "disparity":
         return found
-    return found.replaced((1 - to_numpy(found.values)) * disparity_per_alpha(views)[1], "disparity")
+    per = disparity_per_alpha(views)[1]
+    return found.replaced((1 - to_numpy(found.values)) * per, "disparity", per)

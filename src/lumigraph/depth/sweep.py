@@ -6,12 +6,15 @@ better of the upper and the lower.
 """
 
 import math
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import gaussian_filter, map_coordinates
 
 from lumigraph.core import memory
 from lumigraph.core.progress import Progress, silent
 from lumigraph.depth.pictures import Pictures
+from lumigraph.depth.shading import WINDOW, Fit, Shading
 from lumigraph.depth.volume import box, cheapest, guided, semi_global
 from lumigraph.errors import GeometryError
 
@@ -20,6 +23,7 @@ _MOST_LABELS = 2000
 _MOST_DIFFERENCE = 0.017  # of a picture from 0 to 1: more says only that the label is wrong
 _FAR = 0.15  # part of a picture's width that a point may cross from the middle view to the outermost
 _COARSE = 4
+_SLOW = 2.0  # px of the small pictures: what varies over more may be shading
 _MODEST = 0.05  # preference for small movements where the views do not say
 
 
@@ -35,7 +39,7 @@ def labels(low: float, high: float) -> np.ndarray:
     return (middle + _STEP * np.linspace(-half, half, count + 4)).astype(np.float32)
 
 
-def swept(pictures: Pictures, moves: np.ndarray, progress: Progress) -> np.ndarray:
+def swept(pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Progress) -> np.ndarray:
     """Movement (y, x) of each place in the outermost view [px], to a fraction of a label.
 
     Raises
@@ -50,53 +54,105 @@ def swept(pictures: Pictures, moves: np.ndarray, progress: Progress) -> np.ndarr
         "Give a range of disparities {factor:.1f}x narrower.",
     )
     most = max(_MOST_DIFFERENCE, 3 * pictures.noise)
-    cost = costs(pictures, moves, most, progress)
+    cost = costs(pictures, moves, most, progress, shading)
     guide = pictures.center.mean(0)
     cost = guided(cost, guide, 3)
     cost = semi_global(cost, guide, 0.2 * most, most)
     return moves[0] + cheapest(cost)[0] * (moves[1] - moves[0])
 
 
-def costs(pictures: Pictures, moves: np.ndarray, most: float, progress: Progress) -> np.ndarray:
+def costs(
+    pictures: Pictures, moves: np.ndarray, most: float, progress: Progress, shading: Shading | None = None
+) -> np.ndarray:
     """Disagreement (n, y, x) of the cross of views for each movement, at most 2 `most`."""
-    halves = _halves(pictures)
+    pad = math.ceil(float(np.abs(moves).max())) + 1
+    halves = _halves(pictures, shading or Shading.none(pictures.center.shape[1:]), pad)
     out = np.zeros((len(moves), *pictures.center.shape[1:]), np.float32)
+    room = np.empty_like(pictures.center), np.empty_like(pictures.center[0])
     for k, move in enumerate(moves):
         for sides in halves:
-            means = [_disagreement(pictures, side, float(move), most) for side in sides]
+            means = [_disagreement(side, float(move), most, room) for side in sides]
             out[k] += np.minimum(*means) if len(means) == 2 else means[0]
         progress((k + 1) / len(moves))
     return out
 
 
-_Side = list[tuple[np.ndarray, float, int]]
+@dataclass(frozen=True, slots=True)
+class _View:
+    """A view of the cross, and the middle view as bright as it is seen from there (c, y, x).
+
+    `place` is where it stands along `axis` of its array; `data` goes on at its edges.
+    """
+
+    data: np.ndarray
+    middle: np.ndarray
+    place: float
+    axis: int
+
+    def difference(self, move: float, out: np.ndarray) -> np.ndarray:
+        """From the middle view (c, y, x) if all places move by `move`, linearly between samples."""
+        below = math.floor(move * self.place)
+        part = np.float32(move * self.place - below)
+        first, second = self._read(below), self._read(below + 1)
+        np.subtract(second, first, out=out)
+        out *= part
+        out += first
+        out -= self.middle
+        return np.abs(out, out=out)
+
+    def _read(self, start: int) -> np.ndarray:
+        count = self.middle.shape[self.axis]
+        start += (self.data.shape[self.axis] - count) // 2
+        places = slice(start, start + count)
+        return self.data[:, places] if self.axis == 1 else self.data[:, :, places]
 
 
-def _halves(pictures: Pictures) -> list[list[_Side]]:
-    """For each axis the views (c, y, x) on its two sides, with where they stand and the axis they move on."""
+def _halves(pictures: Pictures, shading: Shading, pad: int) -> list[list[list[_View]]]:
+    """For each axis the views on its two sides."""
     v, u = pictures.middle
     arms = [
-        [(pictures.data[k, u], pictures.down[k], 1) for k in np.flatnonzero(pictures.lit[:, u])],
-        [(pictures.data[v, k], pictures.right[k], 2) for k in np.flatnonzero(pictures.lit[v])],
+        [
+            _view(pictures, (k, u), (pictures.down[k], 1), shading, pad)
+            for k in np.flatnonzero(pictures.lit[:, u])
+        ],
+        [
+            _view(pictures, (v, k), (pictures.right[k], 2), shading, pad)
+            for k in np.flatnonzero(pictures.lit[v])
+        ],
     ]
-    halves = [[[one for one in arm if side * one[1] > 0] for side in (-1, 1)] for arm in arms]
+    halves = [[[one for one in arm if side * one.place > 0] for side in (-1, 1)] for arm in arms]
     kept = [[side for side in arm if side] for arm in halves]
     if not any(kept):
         raise GeometryError("only the middle view is lit: there is no parallax. Decode without a stop.")
     return [arm for arm in kept if arm]
 
 
-def _disagreement(pictures: Pictures, side: _Side, move: float, most: float) -> np.ndarray:
+def _view(
+    pictures: Pictures, which: tuple[int, int], stands: tuple[float, int], shading: Shading, pad: int
+) -> _View:
+    place, axis = float(stands[0]), stands[1]
+    data = np.pad(pictures.data[which], [(pad, pad) if k == axis else (0, 0) for k in range(3)], "edge")
+    seen = shading.at(place, 0.0) if axis == 1 else shading.at(0.0, place)
+    return _View(data, pictures.center + seen, place, axis)
+
+
+def _disagreement(
+    side: list[_View], move: float, most: float, room: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
     """Mean over the views of one side of how much they differ from the middle one (y, x)."""
-    total = np.zeros(pictures.center.shape[1:], np.float32)
-    for view, place, axis in side:
-        difference = moved(view, move * place, axis)
-        difference -= pictures.center
-        np.abs(difference, out=difference)
-        difference = np.minimum(difference.mean(0), most)
-        _outside(difference, move * place, axis - 1)[...] = most
+    total = np.zeros(room[1].shape, np.float32)
+    difference = room[1]
+    for view in side:
+        colours = view.difference(move, room[0])
+        np.copyto(difference, colours[0])
+        for colour in colours[1:]:
+            difference += colour
+        difference /= len(colours)
+        np.minimum(difference, np.float32(most), out=difference)
+        _outside(difference, move * view.place, view.axis - 1)[...] = most
         total += difference
-    return total / len(side)
+    total /= len(side)
+    return total
 
 
 def _outside(image: np.ndarray, distance: float, axis: int) -> np.ndarray:
@@ -106,48 +162,74 @@ def _outside(image: np.ndarray, distance: float, axis: int) -> np.ndarray:
     return image[places] if axis == 0 else image[:, places]
 
 
-def moved(picture: np.ndarray, distance: float, axis: int) -> np.ndarray:
-    """The picture read `distance` samples farther along an axis, linearly between samples; edges repeated."""
-    count, below = picture.shape[axis], math.floor(distance)
-    part = np.float32(distance - below)
-    places = np.arange(count) + below
-    first = np.take(picture, np.clip(places, 0, count - 1), axis)
-    if part == 0:
-        return first
-    second = np.take(picture, np.clip(places + 1, 0, count - 1), axis)
-    second -= first
-    second *= part
-    second += first
-    return second
+def span(pictures: Pictures) -> tuple[tuple[float, float], Shading]:
+    """Least and most movement in the outermost view [px] that the picture shows, with some to spare; shading.
 
-
-def span(pictures: Pictures) -> tuple[float, float]:
-    """Least and most movement in the outermost view [px] that the picture shows, with some to spare.
-
-    A sweep of pictures `_COARSE` times smaller over all that a lens camera could show.
+    Sweeps of pictures `_COARSE` times smaller over all that a lens camera could show: of their texture first,
+    which shading does not touch, then, with the shading so found, of all that they show.
     """
     size = _COARSE if min(pictures.center.shape[1:]) >= 16 * _COARSE else 1
     small = _shrunk(pictures, size)
     most = max(2.0, _FAR * max(pictures.center.shape[1:]))
     moves = np.arange(-most, most + 0.5, 0.5).astype(np.float32) / np.float32(size)
     limit = 3 * max(_MOST_DIFFERENCE, 3 * pictures.noise / size)
+    radius = max(1, WINDOW // size)
     guide = small.center.mean(0)
-    cost = guided(costs(small, moves, limit, silent), guide, 2)
-    texture = np.maximum(np.median(cost, axis=0) - cost.min(0) - 2 * pictures.noise / size, 0)
-    cost += (_MODEST * limit * np.abs(moves) / moves[-1])[:, None, None]
-    cost = semi_global(cost, guide, 0.1 * limit, limit)
-    best, _ = cheapest(cost)
-    found = (moves[0] + best * (moves[1] - moves[0])) * size
-    low, high = _quantiles(found, texture**2, (0.01, 0.99))
+    shading, texture = Shading.none(guide.shape), guide
+    for grounds in (_textures(small), small):
+        cost = guided(costs(grounds, moves, limit, silent, shading if grounds is small else None), guide, 2)
+        texture = np.maximum(np.median(cost, axis=0) - cost.min(0) - 2 * pictures.noise / size, 0)
+        cost += (_MODEST * limit * np.abs(moves) / moves[-1])[:, None, None]
+        best, _ = cheapest(semi_global(cost, guide, 0.1 * limit, limit))
+        found = moves[0] + best * (moves[1] - moves[0])
+        shading = _shading(small, found.astype(np.float32), radius, limit)
+    low, high = _quantiles(found * size, texture**2, (0.01, 0.99))
     spare = 0.1 * (high - low) + 2 * _STEP
-    return low - spare, high + spare
+    return (low - spare, high + spare), _enlarged(shading, pictures.center.shape[1:])
+
+
+def _textures(pictures: Pictures) -> Pictures:
+    """The pictures less what varies slowly over them."""
+    slow = gaussian_filter(pictures.data, (0, 0, 0, _SLOW, _SLOW))
+    return replace(pictures, data=pictures.data - slow)
+
+
+def _shading(pictures: Pictures, moves: np.ndarray, radius: int, most: float) -> Shading:
+    """What the cross of views sees brighter or darker than the middle one, places moved by `moves`."""
+    fit = Fit(moves.shape, pictures.noise)
+    grey, (v, u) = pictures.data.mean(2), pictures.middle
+    slope = np.gradient(grey[v, u])
+    places = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in moves.shape), indexing="ij")
+    for k, m in np.argwhere(pictures.lit):
+        if (k, m) == (v, u):
+            continue
+        down, right = float(pictures.down[k]), float(pictures.right[m])
+        at = [places[0] + moves * np.float32(down), places[1] + moves * np.float32(right)]
+        residual = map_coordinates(grey[k, m], at, order=1, mode="nearest") - grey[v, u]
+        inside = (at[0] >= 0) & (at[0] <= moves.shape[0] - 1) & (at[1] >= 0) & (at[1] <= moves.shape[1] - 1)
+        gradient = np.float32(down) * slope[0] + np.float32(right) * slope[1]
+        fit.add(residual, inside / (1 + (residual / most) ** 2) ** 2, gradient, down, right)
+    return fit.solved(radius)
+
+
+def _enlarged(shading: Shading, shape: tuple[int, ...]) -> Shading:
+    return Shading(*(_resized(part, shape) for part in (shading.down, shading.right)))
+
+
+def _resized(part: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    size = shape[0] // part.shape[0]
+    at = [
+        np.clip((np.arange(n, dtype=np.float32) + 0.5) / size - 0.5, 0, m - 1)
+        for n, m in zip(shape, part.shape, strict=True)
+    ]
+    return map_coordinates(part, np.meshgrid(*at, indexing="ij"), order=1, mode="nearest")
 
 
 def _shrunk(pictures: Pictures, size: int) -> Pictures:
     ny, nx = (n // size for n in pictures.center.shape[1:])
     data = pictures.data[..., : ny * size, : nx * size]
     data = data.reshape(*data.shape[:3], ny, size, nx, size).mean((4, 6))
-    return Pictures(data, pictures.down, pictures.right, pictures.lit, pictures.noise, pictures.reach)
+    return replace(pictures, data=data)
 
 
 def _quantiles(values: np.ndarray, weights: np.ndarray, parts: tuple[float, float]) -> tuple[float, float]:
