@@ -63,7 +63,8 @@ def test_noise_costs_confidence_and_little_else(paint, rng):
     views, truth = views_of([(paint[0], lambda y, x: 0.4 + 0.01 * x, None)])
     clear, rough = epi(views), epi(noisy(views, 0.1, rng))
     assert np.abs(rough.values - truth).mean() < 0.01
-    assert np.median(rough.confidence) < np.median(clear.confidence) - 0.05
+    assert np.median(rough.confidence) < np.median(clear.confidence) - 0.02
+    assert np.median(rough.error) > 1.5 * np.median(clear.error)
 
 
 def test_sure_places_have_smaller_errors(paint, rng):
@@ -75,7 +76,9 @@ def test_sure_places_have_smaller_errors(paint, rng):
     error, trust = np.abs(found.values - truth), np.asarray(found.confidence)
     sure = trust > np.median(trust)
     assert error[sure].mean() < 0.5 * error[~sure].mean()
-    assert trust[:, :8].max() < 0.5 < trust[:, 34:38].min()
+    assert trust[:, :8].max() < 0.9 < trust[:, 34:38].min()
+    # The expected error is that of the whole scene to a factor of two, though it was never seen.
+    assert 0.5 < np.mean(found.error) / error.mean() < 2
 
 
 def test_nearer_is_positive_and_alpha_below_one(paint):
