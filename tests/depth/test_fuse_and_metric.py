@@ -168,3 +168,18 @@ def calibration_with_lengths(calibration):
     from dataclasses import replace
 
     return replace(calibration, pixel_pitch=1e-5, separation=0.2, lenslet_distance=5e-3)
+
+
+def test_expected_errors_go_with_their_values_into_other_quantities():
+    views = LightField(np.zeros((3, 3, 1, 2)), Grid((3, 3), 2.0), Grid((1, 2), 0.1), 20.0)
+    found = DepthMap(np.array([[0.5, 0.0]]), np.ones((1, 2)), "disparity", np.array([[0.04, np.nan]]))
+    # Δs/Δu = 1/20.
+    np.testing.assert_allclose(alpha_of(found, views).error, [[0.002, np.nan]])
+    near = DepthMap(found.values + 1e-4, found.confidence, "disparity")
+    first, second = (metric(one, views, focal_length=8.0) for one in (found, near))
+    slope = abs(np.asarray(second.values) - np.asarray(first.values))[0, 0] / 1e-4
+    assert first.error[0, 0] == pytest.approx(0.04 * slope, rel=1e-3)
+    assert found.usual_error == 0.04
+    assert DepthMap(found.values, found.confidence, "alpha").usual_error is None
+    with pytest.raises(GeometryError, match=r"values have shape \(1, 2\) and error \(2,\) but both"):
+        DepthMap(found.values, found.confidence, "disparity", np.zeros(2))

@@ -85,9 +85,8 @@ def epi(
     found, deviation = refined(pictures, first, shading, within(progress, share, 1))
     found, error = found / pictures.reach, _expected(found / pictures.reach, deviation / pictures.reach)
     trust = np.exp(-error / min(_DOUBT, _DOUBT * 4 / pictures.reach))
-    return DepthMap(
-        *(like(part, views.data) for part in (found, trust)), "disparity", like(error, views.data)
-    )
+    found, trust, error = (like(part, views.data) for part in (found, trust, error))
+    return DepthMap(found, trust, "disparity", error)
 
 
 def _expected(values: np.ndarray, deviation: np.ndarray) -> np.ndarray:

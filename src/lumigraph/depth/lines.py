@@ -89,11 +89,11 @@ def _asked(
 
 def _warped(
     pictures: Pictures, lines: np.ndarray, moves: np.ndarray
-) -> Iterator[tuple[tuple[np.float32, np.float32], np.ndarray, np.ndarray]]:
+) -> Iterator[tuple[tuple[float, float], np.ndarray, np.ndarray]]:
     """For each view where it stands, which places (y, x) of the middle one it sees, and what there."""
     places = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in moves.shape), indexing="ij")
     for v, u, seen in visible(pictures, moves):
-        stands = np.float32(pictures.down[v]), np.float32(pictures.right[u])
+        stands = float(pictures.down[v]), float(pictures.right[u])
         at = [place + moves * w for place, w in zip(places, stands, strict=True)]
         view = map_coordinates(lines[v, u], at, order=3, mode="nearest", prefilter=False)
         seen = (

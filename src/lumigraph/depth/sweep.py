@@ -112,11 +112,11 @@ def _halves(pictures: Pictures, shading: Shading, pad: int) -> list[list[list[_V
     v, u = pictures.middle
     arms = [
         [
-            _view(pictures, (k, u), (pictures.down[k], 1), shading, pad)
+            _view(pictures, (int(k), u), (pictures.down[k], 1), shading, pad)
             for k in np.flatnonzero(pictures.lit[:, u])
         ],
         [
-            _view(pictures, (v, k), (pictures.right[k], 2), shading, pad)
+            _view(pictures, (v, int(k)), (pictures.right[k], 2), shading, pad)
             for k in np.flatnonzero(pictures.lit[v])
         ],
     ]
