@@ -1,6 +1,9 @@
 """Raw images by wave optics, from a camera and a scene; linear images are formed by `operators`.
 
 - `imaging`: `simulate`
+- `exact`: parts of a scene that need no shots
+- `shots`: slices in light that interferes, field after field
+- `light`: what arrives on the sensor, and the raw image of it
 - `microscope_scene`: scenes before a light-field microscope
 - `spectrum`: `Spectrum`, light of several wavelengths, colour sensors
 - `coherence`: `Incoherent`, `Coherent`, `Snapshots`, `TiltedWaves`: how the scene's light interferes
