@@ -6,6 +6,7 @@ so ``50*mm`` is ``0.05``; files and the command line write ``"50 mm"``, which `p
 
 import math
 import re
+from decimal import Decimal
 
 from lumigraph.errors import FormatError
 
@@ -22,7 +23,7 @@ ms = 1e-3
 
 _EXAMPLE = {"length": "150 um", "angle": "2 deg", "time": "10 ms"}
 _UNITS: dict[str, tuple[str, float]] = {}
-"""Dimension and size by name: what is parsed is what Python's ``150 * um`` is, to the last bit."""
+"""Dimension and size by name."""
 
 
 def _name(dimension: str, size: float, names: str) -> None:
@@ -100,4 +101,4 @@ def parse(text: str | float, dimension: str = "length") -> float:
     known, size = _UNITS[unit]
     if known != dimension:
         raise FormatError(f"{text!r} is not a {dimension}. {hint}")
-    return number * size
+    return float(Decimal(match[1]) * Decimal(repr(size)))  # 200 * 1e-6 is not 2e-4

@@ -48,7 +48,9 @@ def test_what_is_not_a_length_is_refused(text, message):
         parse(text)
 
 
-def test_a_quantity_is_what_python_multiplies():
-    for number in (0.3, 5.2, 150, 200, 633):
-        assert parse(f"{number} um") == number * um
-        assert parse(f"{number} nm") == number * nm
+def test_a_quantity_is_the_number_nearest_to_what_is_written():
+    assert parse("200 um") == 2e-4  # 200 * 1e-6 is one bit less
+    for number in ("0.3", "5.2", "150", "633"):
+        assert parse(f"{number} um") == float(f"{number}e-6")
+        assert parse(f"{number} nm") == pytest.approx(float(number) * nm, rel=3e-16)
+    assert parse("1e-999999999 m") == 0.0

@@ -1,6 +1,5 @@
 """The designer's page in a browser: a slider changes what is drawn, computed and saved."""
 
-import re
 import threading
 import time
 from contextlib import contextmanager
@@ -56,7 +55,7 @@ def test_values_change_everything_and_wrong_ones_are_told(page, tmp_path):
         page.fill("[id='lenslets.pitch']", "200")
         page.press("[id='lenslets.pitch']", "Tab")
         settle(page)
-        assert re.search('pitch = "(200 um|200000 nm)"', page.text_content("#toml"))  # one float, either way
+        assert 'pitch = "200 um"' in page.text_content("#toml")
         assert "200 µm" in page.inner_text("#tables")
         assert page.get_attribute("#point", "src") != before[0]
         assert page.get_attribute("#drawing", "src") != before[1]
