@@ -59,7 +59,7 @@ def run() -> dict[str, dict[str, float]]:
     """Seconds by program."""
     scope = LightFieldMicroscope.from_catalogue("lfm-guv").replace(objective={"model": "scalar"})
     start = time.process_time()
-    operator = scope.operator(DEPTHS, 5, pixels=15, accuracy=0.03)
+    operator = scope.operator(DEPTHS, 5, pixels=15, accuracy=1e-2)
     raw = operator.forward(np.ones(operator.shape[1], np.float32)) + 1
     images = time.process_time() - start
     deconvolve(raw, operator, 1)

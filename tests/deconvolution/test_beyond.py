@@ -20,7 +20,7 @@ def crop():
         lenslets={"pitch": "100 um", "focal_length": "2 mm", "count": (9, 9)},
         sensor={"pixel_pitch": "12.5 um"},
     )  # fmt: skip
-    operator = scope.operator(DEPTHS, 3)
+    operator = scope.operator(DEPTHS, 3, accuracy=1e-2)
     wide, inside = beyond(operator)
     scene = np.zeros(wide.shape[1], np.float32)
     scene[0] = 1.0 + 0.5 * np.sin(np.arange(scene.shape[2]) / 4)

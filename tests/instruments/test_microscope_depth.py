@@ -19,7 +19,7 @@ def scope():
 
 def views_of(scope, dz):
     """Views of a plane at a depth, with waves of two to ten lenslets."""
-    operator = scope.operator((dz,), 3)
+    operator = scope.operator((dz,), 3, accuracy=1e-2)
     grid, rng = operator.object_grid, np.random.default_rng(2)
     ky, kx = rng.uniform(-0.5, 0.5, (2, 40, 1, 1)) * 2 * np.pi / (2 * scope.lenslet_size)
     waves = np.cos(ky * grid.y[:, None] + kx * grid.x + rng.uniform(0, 6, (40, 1, 1))).sum(0)

@@ -10,9 +10,9 @@ from lumigraph.elements.objective import Objective
 from lumigraph.errors import FormatError, GeometryError, SamplingError
 from lumigraph.operators import microscope_operator as module
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_kernels import octant, slice_kernel
+from lumigraph.operators.microscope_kernels import Demand, octant, slice_kernel
 from lumigraph.operators.microscope_operator import Layout, microscope_operator
-from lumigraph.operators.microscope_pixels import PixelPlacement
+from lumigraph.operators.microscope_pixels import FRAME, placement
 
 SCOPE = Objective(525e-9, 0.5)
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)
@@ -23,7 +23,7 @@ DEPTHS = (-8e-6, 0.0, 15e-6)
 
 @pytest.fixture(scope="module")
 def operator():
-    return microscope_operator([SCOPE], LENSLET, LAYOUT, DEPTHS)
+    return microscope_operator([SCOPE], LENSLET, LAYOUT, DEPTHS, accuracy=1e-2)
 
 
 def lattice_calibration(shape, pitch, rotation=0.0, origin=(30.0, 31.0)):
@@ -34,7 +34,7 @@ def lattice_calibration(shape, pitch, rotation=0.0, origin=(30.0, 31.0)):
 
 def test_a_points_image_is_that_of_one_direct_propagation():
     # Field, lenslet phases on the whole plane, Fresnel by a dense DFT along each axis: no cells, no symmetry.
-    kernel = slice_kernel([SCOPE], LENSLET, SAMPLING, 6e-6, 0.02)
+    kernel = slice_kernel([SCOPE], LENSLET, SAMPLING, 6e-6, Demand(1e-2, 9))
     p, n, T, M = LENSLET.pitch, 48, 9, LENSLET.magnification
     at = (np.arange(T * n) - (T * n - 1) / 2) * p / n
     for ky, kx in ((0, 1), (2, 0)):
@@ -92,7 +92,7 @@ def test_it_is_what_a_deconvolution_asks_for(operator):
     index = (1, 7, 4)
     one = np.zeros(operator.shape[1], np.float32)
     one[index] = 1
-    np.testing.assert_array_equal(operator.psf(index), operator.forward(one))
+    np.testing.assert_allclose(operator.psf(index), operator.forward(one), atol=1e-7)
     assert operator.psf(index).min() >= 0
 
 
@@ -123,7 +123,7 @@ def test_a_point_in_focus_lights_its_own_lenslet_and_grid_and_image_agree(operat
 def test_a_defocused_point_lights_lenslets_on_the_side_of_its_rays():
     # Farther than the focus: light spreads after its image, and lenslets to the right see it from the left,
     # which their micro-images, inverted, show to the right; nearer points the other way round.
-    operator = microscope_operator([SCOPE], LENSLET, Layout((7, 7), SAMPLING), (-20e-6, 20e-6))
+    operator = microscope_operator([SCOPE], LENSLET, Layout((7, 7), SAMPLING), (-20e-6, 20e-6), accuracy=2e-2)
     at = np.arange(8) - 3.5
     for k, side in ((0, -1), (1, 1)):
         image = operator.psf((k, 10, 10)).reshape(7, 8, 7, 8)
@@ -143,45 +143,47 @@ def test_two_wavelengths_are_averaged():
 
 def test_what_a_narrow_lenslet_blocks_is_lost():
     narrow = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 100e-6)
-    operator = microscope_operator([SCOPE], narrow, LAYOUT, (15e-6,))
+    operator = microscope_operator([SCOPE], narrow, LAYOUT, (15e-6,), accuracy=1e-2)
     light = operator.forward(np.ones(operator.shape[1])).reshape(5, 8, 6, 8).mean((1, 3))[2, 2]
     assert light == pytest.approx(0.8**2, abs=0.03)
 
 
 def test_pixels_on_the_samples_read_the_samples():
     calibration = lattice_calibration((40, 48), 8.0, origin=(3.5, 3.5))
-    placement, cells, middle = PixelPlacement.of(calibration, 8)
+    placed, cells, middle = placement(calibration, 8, 1)
     assert cells == (5, 6)
     assert middle == pytest.approx((19.5, 23.5))
-    plane = np.arange(40 * 48.0).reshape(40, 48)
-    np.testing.assert_allclose(placement.forward(plane), plane, rtol=1e-6, atol=1e-9)
+    frame = 8 * FRAME
+    plane = np.arange(56 * 64.0).reshape(56, 64)
+    np.testing.assert_allclose(placed.forward(plane), plane[frame:-frame, frame:-frame], rtol=1e-6, atol=1e-9)
 
 
 def test_turned_pixels_see_a_turned_picture(xp):
     # A smooth function of lattice coordinates, sampled by the cells, must be read at each pixel's own place.
     calibration = lattice_calibration((60, 64), 9.3, rotation=0.05)
-    placement, cells, _ = PixelPlacement.of(calibration, 16)
-    v, u = np.meshgrid(*(np.arange(n * 16) / 16 for n in cells), indexing="ij")
+    placed, cells, _ = placement(calibration, 16, 3)
+    v, u = np.meshgrid(*(np.arange(-16 * FRAME, (n + FRAME) * 16) / 16 for n in cells), indexing="ij")
     place = calibration.lattice.index(np.arange(60.0)[:, None], np.arange(64.0)[None, :])
     first = (place[0].min(), place[1].min())
     inverse = np.linalg.inv(calibration.lattice.matrix)
     y, x = np.meshgrid(np.arange(60.0), np.arange(64.0), indexing="ij")
     exact = np.stack([y - 30.0, x - 31.0], -1) @ inverse.T - np.array(first) + 0.5 - 0.5 / 16
     smooth = lambda a, b: 2 + np.sin(2.1 * a) * np.cos(1.7 * b)  # noqa: E731
+    # B-splines of samples average over two more of them: 1/3 of the second derivatives of 2.1² and 1.7².
     plane = xp.asarray(smooth(v, u))
-    found = np.asarray(placement.forward(plane))[6:-6, 6:-6]
-    np.testing.assert_allclose(found, smooth(exact[..., 0], exact[..., 1])[6:-6, 6:-6], atol=4e-3)
-    assert placement.matrix.data.min() >= 0
+    found = np.asarray(placed.forward(plane))[6:-6, 6:-6]
+    np.testing.assert_allclose(found, smooth(exact[..., 0], exact[..., 1])[6:-6, 6:-6], atol=6e-3)
+    assert placed.matrix.data.min() >= 0
     raw = xp.asarray(np.random.default_rng(1).random((60, 64)))
-    left = float(xp.sum(placement.forward(plane) * raw))
-    assert left == pytest.approx(float(xp.sum(plane * placement.adjoint(raw))), rel=1e-10)
+    left = float(xp.sum(placed.forward(plane) * raw))
+    assert left == pytest.approx(float(xp.sum(plane * placed.adjoint(raw))), rel=1e-10)
 
 
 def test_kernels_in_a_folder_are_mapped_and_found_again(tmp_path, operator, monkeypatch):
-    stored = microscope_operator([SCOPE], LENSLET, LAYOUT, DEPTHS, folder=tmp_path)
+    stored = microscope_operator([SCOPE], LENSLET, LAYOUT, DEPTHS, accuracy=1e-2, folder=tmp_path)
     assert all(isinstance(kernel.blocks, np.memmap) for kernel in stored.kernels)
     monkeypatch.setattr(module, "slice_kernel", None)  # a second run computes nothing
-    again = microscope_operator([SCOPE], LENSLET, LAYOUT, DEPTHS[::-1], folder=tmp_path)
+    again = microscope_operator([SCOPE], LENSLET, LAYOUT, DEPTHS[::-1], accuracy=1e-2, folder=tmp_path)
     volume = np.random.default_rng(2).random(operator.shape[1], np.float32)
     np.testing.assert_array_equal(stored.forward(volume), operator.forward(volume))
     assert again.forward(volume[::-1]) == pytest.approx(operator.forward(volume), rel=1e-5)
@@ -198,7 +200,7 @@ def test_products_in_small_groups_give_the_same(operator, monkeypatch, rng):
 
 def test_progress_is_told_slice_by_slice():
     told = []
-    microscope_operator([SCOPE], LENSLET, LAYOUT, (0.0, 1e-6), progress=told.append)
+    microscope_operator([SCOPE], LENSLET, LAYOUT, (0.0, 1e-6), accuracy=1e-2, progress=told.append)
     assert told == [0.5, 1.0]
 
 
@@ -208,7 +210,7 @@ def test_what_cannot_be_is_refused(operator, monkeypatch):
     with pytest.raises(GeometryError, match="depths must ascend or descend, and differ"):
         microscope_operator([SCOPE], LENSLET, LAYOUT, (0.0, 1e-6, 0.0))
     with pytest.raises(
-        SamplingError, match=r"image of a point at 1e\+06 µm, which lights 184759 lenslets .* nearer"
+        SamplingError, match=r"image of a point at 1e\+06 µm, which lights 184757 lenslets .* nearer"
     ):
         microscope_operator([SCOPE], LENSLET, LAYOUT, (1.0,))
     with pytest.raises(FormatError, match=r"folder /dev/null/x cannot be made"):
@@ -217,8 +219,8 @@ def test_what_cannot_be_is_refused(operator, monkeypatch):
         operator.psf((9, 9, 99))
     with pytest.raises(GeometryError, match="a depth is nan"):
         microscope_operator([SCOPE], LENSLET, LAYOUT, (float("nan"),))
-    with pytest.raises(GeometryError, match=r"dropped is 0\.7 but must be above 0 and below 0\.5"):
-        microscope_operator([SCOPE], LENSLET, LAYOUT, (0.0,), dropped=0.7)
+    with pytest.raises(GeometryError, match=r"accuracy is 0\.7 but must be from 1e-5 to 0\.1"):
+        microscope_operator([SCOPE], LENSLET, LAYOUT, (0.0,), accuracy=0.7)
     with pytest.raises(
         GeometryError, match=r"an object has shape \(2, 2\) but the operator takes \(3, 15, 18\)"
     ):
@@ -228,14 +230,14 @@ def test_what_cannot_be_is_refused(operator, monkeypatch):
     ):
         operator.adjoint(np.ones(4))
     many = Layout((5, 6), CellSampling(60, 8, 1 / 8))
-    monkeypatch.setattr("lumigraph.core.memory.available", lambda: 4 * 10**6)
+    monkeypatch.setattr("lumigraph.core.memory.available", lambda: 3 * 10**8)
     with pytest.raises(SamplingError, match=r"images of points at 1 depths needs .* or folder= to keep them"):
         microscope_operator([SCOPE], LENSLET, many, (0.0,))
 
 
 def test_what_is_left_out_is_the_same_in_every_direction(operator):
     # Mirrored and transposed points have mirrored and transposed images, to rounding.
-    square = microscope_operator([SCOPE], LENSLET, Layout((7, 7), SAMPLING), (12e-6,), dropped=0.03)
+    square = microscope_operator([SCOPE], LENSLET, Layout((7, 7), SAMPLING), (12e-6,), accuracy=0.03)
     image = square.psf((0, 14, 16))
     for mirrored, index in (
         (image[::-1], (6, 16)), (image[:, ::-1], (14, 4)), (image.T, (16, 14)), (image[::-1, ::-1].T, (4, 6)),

@@ -17,7 +17,7 @@ DEPTHS = (-25e-6, 0.0, 15e-6)
 
 def operators(sampling, cells):
     """By offsets and by frequency."""
-    one = microscope_operator([SCOPE], LENSLET, Layout(cells, sampling), DEPTHS)
+    one = microscope_operator([SCOPE], LENSLET, Layout(cells, sampling), DEPTHS, accuracy=2e-2)
     return (dataclasses.replace(one, by_frequency=way, _spectra={}) for way in (False, True))
 
 
@@ -64,13 +64,15 @@ def test_single_precision_stays_and_a_points_image_has_no_rounding(pair, xp, rng
 
 def test_the_way_is_chosen_by_time_memory_and_symmetry(monkeypatch):
     sampling, cells = CellSampling(3, 8, 1 / 8), (15, 15)
-    deep = microscope_operator([SCOPE], LENSLET, Layout(cells, sampling), (-30e-6, 30e-6))
+    deep = microscope_operator([SCOPE], LENSLET, Layout(cells, sampling), (-30e-6, 30e-6), accuracy=2e-2)
     assert deep.by_frequency
     assert deep.multiply_adds < dataclasses.replace(deep, by_frequency=False).multiply_adds / 5
-    flat = microscope_operator([SCOPE], LENSLET, Layout((3, 3), sampling), (0.0,))
+    flat = microscope_operator([SCOPE], LENSLET, Layout((3, 3), sampling), (0.0,), accuracy=2e-2)
     assert not flat.by_frequency
     coma = Objective(525e-9, 0.5, aberrations={8: 0.05})
-    assert not microscope_operator([coma], LENSLET, Layout((9, 9), sampling), (10e-6,)).by_frequency
+    assert not microscope_operator(
+        [coma], LENSLET, Layout((9, 9), sampling), (10e-6,), accuracy=2e-2
+    ).by_frequency
     assert _suits_frequencies(deep.kernels, cells)
     monkeypatch.setattr("lumigraph.core.memory.available", lambda: 14 * 10**5)
     assert not _suits_frequencies(deep.kernels, cells)

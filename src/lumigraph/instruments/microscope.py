@@ -28,15 +28,18 @@ from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.quantities import Displacement, Length, Positive, Wavelength
 from lumigraph.instruments.row import Row
 from lumigraph.operators.fourier_microscope import Mosaic, fourier_operator
+from lumigraph.operators.microscope_bench import DEGREE, samples_needed
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_kernels import DROPPED, TAILS
-from lumigraph.operators.microscope_operator import Layout, microscope_operator
-from lumigraph.operators.microscope_pixels import PixelPlacement, narrowed
+from lumigraph.operators.microscope_operator import Layout, microscope_operator, require_accuracy
+from lumigraph.operators.microscope_pixels import narrowed, placement
 from lumigraph.sensor import Sensor
 from lumigraph.simulation.microscope_scene import SAMPLES, point_image
 
-FINENESS = 1.7
-"""Samples of a lenslet's image over what its cut-off asks for, where pixels are interpolated from them."""
+MODELLED = 1e-2
+"""Accuracy of the model of a real camera: that of the light of 10 000 photons in a pixel."""
+
+PIXELS = 0.6
+"""Of the accuracy, what the interpolation of pixels may take."""
 
 
 class LightFieldMicroscope(Instrument):
@@ -271,7 +274,7 @@ class LightFieldMicroscope(Instrument):
         depths: Sequence[float] | None = None,
         samples_per_lenslet: int | None = None,
         *,
-        accuracy: float = TAILS * DROPPED,
+        accuracy: float = 1e-3,
         pixels: int | Calibration | None = None,
         folder: str | PathLike[str] | None = None,
         progress: Progress | None = None,
@@ -287,8 +290,8 @@ class LightFieldMicroscope(Instrument):
             s: object samples along a lenslet; an odd number has one on its axis. None for 5. A Fourier
             microscope samples the object as its pixels do.
         accuracy
-            Relative rms error by the light that is not followed: faint cells, far from a point's own. What
-            is kept is as bright as the whole. Half of it takes four times the memory.
+            Relative rms error of points' images. It sets how far light is followed, how finely it is sampled
+            and how many samples behind a lenslet pixels are interpolated from.
         pixels
             What the raw image's pixels are: None, those of this description; a `Calibration`, those of a real
             camera, wherever its lenslets stand; a whole number N, N × N for each lenslet, as `rectify` gives.
@@ -310,10 +313,10 @@ class LightFieldMicroscope(Instrument):
         samples = (
             5 if samples_per_lenslet is None else checks.whole("samples_per_lenslet", samples_per_lenslet)
         )
-        dropped = checks.positive("accuracy", accuracy, "1") / TAILS
+        layout = self._layout(samples, pixels, planes or (0.0,), accuracy)
         return microscope_operator(
-            self.objectives, self.lenslet, self._layout(samples, pixels), planes,
-            dropped=dropped, folder=folder, progress=progress,
+            self.objectives, self.lenslet, layout, planes,
+            accuracy=accuracy, folder=folder, progress=progress,
         )  # fmt: skip
 
     def operator_for(
@@ -323,9 +326,11 @@ class LightFieldMicroscope(Instrument):
         samples_per_lenslet: int | None = None,
         progress: Progress | None = None,
     ) -> Linear:
-        """The operator of a real camera's pixels; its object is a volume, of one plane without depths."""
+        """The operator of a real camera's pixels, as exact as photographs are; its object is a volume."""
         planes = depths or (0.0,)
-        return self.operator(planes, samples_per_lenslet, pixels=calibration, progress=progress)
+        return self.operator(
+            planes, samples_per_lenslet, accuracy=MODELLED, pixels=calibration, progress=progress
+        )
 
     def would_be(self, share: float) -> str:
         """A relay that explains a lattice so many times as large."""
@@ -347,10 +352,11 @@ class LightFieldMicroscope(Instrument):
         """Wavelength, objective, distances, lenslets, relay and pixels."""
         return microscope_design.parameters(self)
 
-    def point_image(self, y: float, x: float, dz: float = 0.0) -> np.ndarray:
+    def point_image(self, y: float, x: float, dz: float = 0.0, *, accuracy: float = 1e-3) -> np.ndarray:
         """Raw image (ny, nx) of a point anywhere [m] that is as bright as a sample of `object_grid` of 1.
 
-        A Fourier microscope spreads it over the four samples around it, as fine as its pixels.
+        `accuracy` is the relative rms error. A Fourier microscope spreads a point over the four samples
+        around it, as fine as its pixels.
 
         Examples
         --------
@@ -358,12 +364,20 @@ class LightFieldMicroscope(Instrument):
         >>> scope.point_image(10e-6, 0.0, 5e-6).shape == scope.sensor.shape
         True
         """
+        return self.imaged_point(y, x, dz, accuracy)[0]
+
+    def imaged_point(self, y: float, x: float, dz: float, accuracy: float) -> tuple[np.ndarray, float]:
+        """As `point_image`, with the estimated relative rms error."""
         y, x, dz = (checks.finite(name, at) for name, at in zip(("y", "x", "dz"), (y, x, dz), strict=True))
         if self.configuration == "fourier":
-            return fourier_operator(self.objectives, self._mosaic(), (dz,)).point_image(y, x)
-        return point_image(self.objectives, self.lenslet, self._layout(SAMPLES, None), (y, x, dz))
+            operator = fourier_operator(self.objectives, self._mosaic(), (dz,))
+            return operator.point_image(y, x), operator.error
+        layout = self._layout(SAMPLES, None, (dz,), accuracy)
+        return point_image(self.objectives, self.lenslet, layout, (y, x, dz), accuracy)
 
-    def _layout(self, samples: int, pixels: int | Calibration | None) -> Layout:
+    def _layout(
+        self, samples: int, pixels: int | Calibration | None, depths: Sequence[float], accuracy: float
+    ) -> Layout:
         if isinstance(pixels, int) and not isinstance(pixels, bool):
             if pixels < 2:
                 raise GeometryError(f"pixels is {pixels} but a lenslet needs at least 2 along each side.")
@@ -371,17 +385,20 @@ class LightFieldMicroscope(Instrument):
         calibration = self.calibration if pixels is None else pixels
         if not isinstance(calibration, Calibration):
             raise GeometryError(f"pixels is {pixels!r} but must be a whole number, a Calibration or None.")
-        pitch = calibration.lattice.pitch
-        cutoff = (
-            2 * self.lenslets.pitch**2 / (min(o.wavelength for o in self.objectives) * self.lenslet_distance)
-        )
-        N = max(2, math.ceil(FINENESS * cutoff), math.ceil(1.5 * pitch))
-        placement, cells, middle = PixelPlacement.of(calibration, N)
-        step = self.lenslet_size / pitch
+        sampling = self._sampling(samples, calibration.lattice.pitch, max(depths, key=abs), accuracy)
+        placed, cells, middle = placement(calibration, sampling.pixels, sampling.degree)
+        step = self.lenslet_size / calibration.lattice.pitch
         center = tuple((middle[k] - calibration.shape[k] // 2) * step for k in (0, 1))
-        return Layout(
-            cells, CellSampling(samples, N, narrowed(1 / pitch, N)), placement, (center[0], center[1])
-        )
+        return Layout(cells, sampling, placed, (center[0], center[1]))
+
+    def _sampling(self, samples: int, pitch: float, dz: float, accuracy: float) -> CellSampling:
+        """For pixels of which `pitch` make a lenslet's."""
+        if self.objective.model == "rays":
+            N = math.ceil(1.5 * pitch)
+            return CellSampling(samples, N, narrowed(1 / pitch, N), 1)
+        shortest = min(self.objectives, key=lambda one: one.wavelength)
+        N = samples_needed(shortest, self.lenslet, 1 / pitch, dz, PIXELS * require_accuracy(accuracy))
+        return CellSampling(samples, N, 1 / pitch, DEGREE)
 
     def _mosaic(self) -> Mosaic:
         assert self.fourier_lens is not None  # checked above

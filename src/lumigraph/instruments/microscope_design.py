@@ -22,7 +22,7 @@ def point_view(scope: "LightFieldMicroscope", dz: float) -> PointImage:
     small = scope.replace(
         lenslets={"count": count}, sensor={"shape": None}, objective={"model": "scalar"}, bandwidth=None
     )
-    seen = of_operator(small.operator((dz,), 1, pixels=N), scope.micro_image_pitch / N)
+    seen = of_operator(small.operator((dz,), 1, pixels=N, accuracy=1e-2), scope.micro_image_pitch / N)
     notes = (f"scalar model, one wavelength, {N} × {N} px per lenslet",)
     return replace(seen, lenslets=count, notes=notes)
 

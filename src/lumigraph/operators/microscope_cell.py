@@ -29,7 +29,7 @@ class Lenslet:
 
 @dataclass(frozen=True, slots=True)
 class CellSampling:
-    """Points and pixels of a lenslet's cell, symmetric about its centre.
+    """Points and samples of the image of a lenslet's cell, symmetric about its centre.
 
     Parameters
     ----------
@@ -38,12 +38,16 @@ class CellSampling:
     pixels
         N: samples of the image along each side.
     width
-        Of the square that each sample averages, over the lenslet's pitch.
+        Of a pixel, a square over which light is averaged, over the lenslet's pitch.
+    degree
+        0 where the samples are pixels; else that of the B-splines whose coefficients they are, from which
+        pixels anywhere are interpolated (`microscope_pixels`).
     """
 
     points: int
     pixels: int
     width: float
+    degree: int = 0
 
     @property
     def classes(self) -> int:

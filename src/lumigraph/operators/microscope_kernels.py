@@ -3,6 +3,9 @@
 A microscope is telecentric: moving a point by a lenslet's pitch over M moves its image by exactly one
 lenslet. So the points of one cell are enough; where objective and lenslets look the same after every flip and
 transposition, those of an eighth of the cell are.
+
+Cells far from a point's own receive little light, and much the same from all points of its cell: there the
+cell counts as one point, and its image as one of a few patterns, by direction (`Far`).
 """
 
 import math
@@ -12,24 +15,51 @@ from functools import lru_cache
 
 import numpy as np
 
-from lumigraph.core import arrays, memory
+from lumigraph.core import memory
 from lumigraph.core.threads import single_products
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import SamplingError
+from lumigraph.operators.microscope_bench import Bench, fineness, guard
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
+from lumigraph.operators.microscope_far import Far
 from lumigraph.operators.microscope_rays import ray_images
 
-MARGIN = 1.15
-"""Samples of a lenslet, over what its light asks for."""
+SECTORS = 16
+"""Directions of the patterns of far cells."""
 
-DROPPED = 0.01
-"""Part of the light in the faintest offsets between cells, which are left out."""
+SHARES = {"near": 0.5, "window": 0.25}
+"""Of the accuracy, that cells treated as far and those beyond the window may take."""
 
-TAILS = 1.5
-"""Relative rms error of an image over the part of the light that is left out.
+SPREAD = 8.0
+"""How much more of a far lenslet's light than one spot is spread out.
 
-Measured at NA 0.5, 20x, f/20 lenslets, sparse points: 1.3 for a hundredth in focus, 1.0 at 20 um out of it.
+Measured: 60x/1.2 and 20x/0.5, three depths, with it windows are 0 to 4 cells larger than what comes out near.
 """
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """How exactly images are wanted.
+
+    Parameters
+    ----------
+    accuracy
+        Relative rms.
+    limit
+        Cells to each side that are wanted at all.
+    """
+
+    accuracy: float
+    limit: int
+
+    @property
+    def margin(self) -> float:
+        """Samples of the light, over what its band without diffraction at lenslets asks for.
+
+        Measured at 20x/0.5 and 60x/1.2, three depths, against 10, relative rms: 5e-4 to 1e-2 with 2, 2e-4 to
+        6e-3 with 2.4, 7e-5 to 5e-4 with 3.2 (1.4e-3 on 16 pixels), 1e-5 to 7e-5 with 4.5.
+        """
+        return float(np.interp(-math.log10(self.accuracy), (1, 2, 3, 4, 5), (1.8, 2.4, 3.2, 4.5, 8)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,12 +76,29 @@ class SliceKernel:
         Of the cell.
     symmetric
         Whether only the points of an eighth of the cell are stored (`octant`).
+    far
+        What the other cells receive; None for nothing.
+    error
+        Estimated relative rms of a point's image.
+    passed
+        Part of an even plane's light that the lenslets let through.
     """
 
     offsets: np.ndarray
     blocks: np.ndarray
     sampling: CellSampling
     symmetric: bool
+    far: Far | None = None
+    error: float = 0.0
+    passed: float = 1.0
+
+    def white(self) -> np.ndarray:
+        """Image (N²,) of an even plane of 1 that goes on beyond all lenslets."""
+        near = self.matrix().sum(0, dtype=np.float64)
+        if self.far is None:
+            return near
+        far = self.far.weights.sum(0, dtype=np.float64) @ self.far.images
+        return near + far * max(self.passed * len(near) - near.sum(), 0) / far.sum()
 
     def matrix(self) -> np.ndarray:
         """(n s², N²) float32: the images of all points, offset by offset."""
@@ -101,10 +148,35 @@ def _expansion(s: int) -> list[tuple[int, tuple[bool, bool, bool], int]]:
     return found
 
 
-def reach_of(objective: Objective, lenslet: Lenslet, dz: float, dropped: float) -> int:
-    """Cells to each side of a point's own that hold all of its light but `dropped`."""
-    radius = objective.radius_of(1 - dropped, dz) * lenslet.magnification
-    return max(1, math.ceil(radius / lenslet.pitch))
+def reach_of(objective: Objective, lenslet: Lenslet, dz: float, demand: Demand) -> int:
+    """Cells to each side of a point's own that hold its image but for a share of the accuracy, rms.
+
+    Beyond what rays light, the part of a point's light that is farther than R falls as 1/R. A lenslet there
+    makes a small spot of it, where one that the whole aperture lights spreads its own over all directions.
+    """
+    size, rays = lenslet.pitch / lenslet.magnification, _ray_radius(objective, dz)
+    if objective.model == "rays":
+        return max(1, math.ceil(rays / size))
+    nearest = objective.wavelength / objective.numerical_aperture
+    slope = objective.numerical_aperture / lenslet.magnification * lenslet.distance / lenslet.pitch
+    resolved = lenslet.pitch**2 / (objective.wavelength * lenslet.distance)
+    lit = max(math.pi * (rays / size) ** 2, 1.0)
+    spots = max((2 * slope * resolved) ** 2 / lit, 1.0)
+    wanted = SHARES["window"] * demand.accuracy
+    # Part of the light beyond R: λ/(π² NA (R - r)); of a cell at R: its slope over a ring of cells.
+    for reach in range(max(1, math.ceil(rays / size)), demand.limit):
+        at = np.arange(reach + 0.5, 8 * reach + 9)
+        away = np.maximum(at * size - rays, nearest / 4)
+        cell = nearest * size / (math.pi**2 * away**2) / (2 * np.pi * at)
+        if np.square(cell).dot(2 * np.pi * at) * spots * lit < SPREAD * wanted**2:
+            return reach
+    return max(demand.limit, 1)
+
+
+def _ray_radius(objective: Objective, dz: float) -> float:
+    """Of what rays light, in object space [m]."""
+    spread = objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
+    return abs(dz) * spread + abs(objective.image_defocus) * objective.numerical_aperture
 
 
 @single_products()
@@ -113,7 +185,7 @@ def slice_kernel(
     lenslet: Lenslet,
     sampling: CellSampling,
     dz: float,
-    dropped: float = DROPPED,
+    demand: Demand = Demand(1e-2, 64),
 ) -> SliceKernel:
     """Images of a cell's points at depth dz, so that an even plane of intensity 1 gives an image of 1.
 
@@ -125,19 +197,93 @@ def slice_kernel(
         The rest of the microscope and how its cells are sampled.
     dz
         Depth from the focused plane [m].
-    dropped
-        Part of the light that the faintest cells may hold, and the window in which images are computed may
-        miss; what is kept is scaled up to all of it.
+    demand
+        How exactly, and how far.
     """
-    symmetric, s, N = all(one.is_round for one in objectives), sampling.points, sampling.pixels
+    symmetric, s = all(one.is_round for one in objectives), sampling.points
     points = octant(s) if symmetric else [(ky, kx) for ky in range(s) for kx in range(s)]
-    cells, passed = _images(objectives, lenslet, sampling, points, (dz, dropped))
+    cells, lost = _images(objectives, lenslet, sampling, points, (dz, demand))
     T = math.isqrt(cells.shape[1])
-    kept = _bright(cells, points, (s, T), dropped, symmetric)
-    cells = np.ascontiguousarray(cells[:, kept])
-    cells *= (N * N / s**2 * passed / cells.sum((1, 2), dtype=np.float64)).astype(np.float32)[:, None, None]
-    offsets = np.stack(np.divmod(kept, T), 1) - T // 2
-    return SliceKernel(offsets, cells, sampling, symmetric)
+    offsets = np.stack(np.divmod(np.arange(T * T), T), 1) - T // 2
+    counts = np.bincount([row for *_, row in _expansion(s)]) if symmetric else np.ones(len(points))
+    average = np.tensordot(counts / s**2, cells, 1)
+    average = _symmetrised(average, T) if symmetric else average
+    if objectives[0].model == "rays":
+        kept = average.sum(1) > 0
+        return SliceKernel(
+            offsets[kept], np.ascontiguousarray(cells[:, kept]), sampling, symmetric, None, lost
+        )
+    patterns, weights = _patterns(average, offsets)
+    guessed = (weights * average.sum(1)[:, None]) @ patterns
+    off = np.stack([np.square(own - guessed).sum(1, dtype=np.float64) for own in cells])
+    off /= np.square(cells).sum((1, 2), dtype=np.float64)[:, None]
+    kept, cut = _near(counts @ off / s**2, T, SHARES["near"] * demand.accuracy, symmetric)
+    passed = float(lenslet.width / lenslet.pitch) ** 2 * (math.pi / 4 if lenslet.is_round else 1)
+    beyond = max(passed * sampling.pixels**2 / s**2 - float(average.sum(dtype=np.float64)), 0.0)
+    places, light = _far(average.sum(1) * ~kept, beyond, (objectives[0], lenslet, dz), demand)
+    return SliceKernel(
+        offsets[kept], np.ascontiguousarray(cells[:, kept]), sampling, symmetric,
+        Far(places, light[:, None] * _sectors(places), patterns), math.hypot(lost, cut), passed,
+    )  # fmt: skip
+
+
+def _symmetrised(average: np.ndarray, T: int) -> np.ndarray:
+    """Mean over flips and transposition of cells (T², N²)."""
+    N = math.isqrt(average.shape[1])
+    whole = average.reshape(T, T, N, N)
+    whole = (whole + whole.transpose(1, 0, 3, 2)) / 2
+    whole = (whole + whole[::-1, :, ::-1]) / 2
+    return ((whole + whole[:, ::-1, :, ::-1]) / 2).reshape(average.shape)
+
+
+def _sectors(offsets: np.ndarray) -> np.ndarray:
+    """What part (n, SECTORS) of each offset belongs to each direction: linear between two."""
+    at = np.arctan2(offsets[:, 0], offsets[:, 1])[:, None] * SECTORS / (2 * np.pi) - np.arange(SECTORS)
+    return np.maximum(1 - np.abs((at + SECTORS / 2) % SECTORS - SECTORS / 2), 0).astype(np.float32)
+
+
+def _patterns(average: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Patterns (SECTORS, N²) of light 1 in the outer cells of a window, and weights (n, SECTORS)."""
+    weights = _sectors(offsets)
+    distance = np.hypot(*offsets.T)
+    outer = distance > 0.6 * offsets.max()
+    found = weights[outer].T @ average[outer]
+    return found / np.maximum(found.sum(1, keepdims=True), np.finfo(np.float32).tiny), weights
+
+
+def _near(off: np.ndarray, T: int, wanted: float, symmetric: bool) -> tuple[np.ndarray, float]:
+    """Cells (T²,) that are not far, the same after every flip and transposition, and the rms of the rest."""
+    if symmetric:
+        off = _symmetrised(off.reshape(T * T, 1), T)[:, 0]
+        off = np.round(off / off.max(), 12) * off.max()
+    order = np.argsort(off)
+    faint = np.cumsum(off[order]) <= wanted**2
+    threshold = off[order][faint].max(initial=-1.0)
+    kept = off > threshold
+    return kept, math.sqrt(off[~kept].sum())
+
+
+def _far(
+    inside: np.ndarray, beyond: float, told: tuple[Objective, Lenslet, float], demand: Demand
+) -> tuple[np.ndarray, np.ndarray]:
+    """Offsets (n, 2) of far cells and their light, given that of those in the window and all beyond it."""
+    (objective, lenslet, dz), T = told, math.isqrt(len(inside))
+    size, rays = lenslet.pitch / lenslet.magnification, _ray_radius(objective, dz)
+
+    def falling(distance: np.ndarray) -> np.ndarray:
+        r = np.maximum(distance * size, 1e-3 * size)
+        return (1 / np.maximum(r - rays, size / 2) ** 2 + 1 / (r + rays) ** 2) / r
+
+    farthest = max(demand.limit, T // 2)
+    at = np.arange(-farthest, farthest + 1)
+    offsets = np.stack(np.meshgrid(at, at, indexing="ij"), -1).reshape(-1, 2)
+    outside = np.abs(offsets).max(1) > T // 2
+    light = falling(np.hypot(*offsets.T)) * outside
+    rings = np.arange(farthest + 1, 64 * (farthest + 1))
+    whole = light.sum() + (8 * rings * falling(1.12 * rings)).sum()
+    light *= beyond / whole
+    light[~outside] = inside
+    return offsets[light > 0], light[light > 0].astype(np.float32)
 
 
 def point_cells(
@@ -145,9 +291,9 @@ def point_cells(
     lenslet: Lenslet,
     sampling: CellSampling,
     point: tuple[float, float],
-    told: tuple[float, float],
-) -> np.ndarray:
-    """Image (T, T, N, N), in T × T cells around its own, of one point that need not be a sample.
+    told: tuple[float, Demand],
+) -> tuple[np.ndarray, float]:
+    """Image (T, T, N, N) in T × T cells of one point, which need not be a sample, and its rms error.
 
     Parameters
     ----------
@@ -156,12 +302,11 @@ def point_cells(
     point
         Place in its cell (ky, kx), in samples from 0 to s - 1.
     told
-        Depth [m], and the part of the light that the window may miss.
+        Depth [m], and how exactly.
     """
-    cells, passed = _images(objectives, lenslet, sampling, [point], told)
+    cells, lost = _images(objectives, lenslet, sampling, [point], told)
     T, N = math.isqrt(cells.shape[1]), sampling.pixels
-    scale = N * N / sampling.classes * float(passed[0]) / float(cells.sum(dtype=np.float64))
-    return cells.reshape(T, T, N, N) * np.float32(scale)
+    return cells.reshape(T, T, N, N), lost
 
 
 def _images(
@@ -169,26 +314,27 @@ def _images(
     lenslet: Lenslet,
     sampling: CellSampling,
     points: Sequence[tuple[float, float]],
-    told: tuple[float, float],
-) -> tuple[np.ndarray, np.ndarray]:
-    """Images (points, cells, N²) at (dz, dropped), and the part of their light that passes (points,)."""
+    told: tuple[float, Demand],
+) -> tuple[np.ndarray, float]:
+    """Images (points, cells, N²) at (dz, demand), and the relative rms that their samples do not hold."""
+    (dz, demand), N = told, sampling.pixels
     if objectives[0].model == "rays":  # which have no wavelength
-        return ray_images(objectives[0], lenslet, sampling, points, told[0])
-    (dz, dropped), N = told, sampling.pixels
-    reach = max(reach_of(one, lenslet, dz, dropped) for one in objectives)
-    T = 2 * reach + 1
+        cells, passed = ray_images(objectives[0], lenslet, sampling, points, dz)
+        cells *= (N * N / sampling.classes * passed / cells.sum((1, 2), dtype=np.float64))[:, None, None]
+        return cells, 0.0
+    reach = max(reach_of(one, lenslet, dz, demand) for one in objectives)
+    T, lost = 2 * reach + 1, 0.0
     cells = np.zeros((len(points), T * T, N * N), np.float32)
-    passed = np.zeros(len(points))
     for objective in objectives:
-        bench = _Bench(objective, lenslet, sampling, reach)
+        bench = Bench(objective, lenslet, sampling, reach, demand.margin)
         for row, point in enumerate(points):
-            image = bench.image(point, dz)
+            image = bench.image(point, dz) / len(objectives)
             cells[row] += image.reshape(T, N, T, N).transpose(0, 2, 1, 3).reshape(T * T, N * N)
-            passed[row] += bench.open / len(objectives)
-    return cells, passed
+            lost = max(lost, bench.lost)
+    return cells, lost
 
 
-def require_window(objective: Objective, lenslet: Lenslet, sampling: CellSampling, dz: float) -> None:
+def require_window(objective: Objective, lenslet: Lenslet, dz: float, demand: Demand) -> None:
     """Refuse a depth at which the window of a point's image does not fit in memory.
 
     Raises
@@ -196,9 +342,10 @@ def require_window(objective: Objective, lenslet: Lenslet, sampling: CellSamplin
     SamplingError
         The depth, and how many lenslets its light is wide there.
     """
-    spread = abs(dz) * objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
-    cells = 2 * math.ceil(spread * lenslet.magnification / lenslet.pitch) + 5
-    side = cells * _fineness(objective, lenslet, sampling) * sampling.pixels
+    lit = math.ceil(_ray_radius(objective, dz) * lenslet.magnification / lenslet.pitch)
+    reach = max(reach_of(objective, lenslet, dz, demand), lit)
+    cells = 2 * (reach + guard(objective, lenslet)) + 1
+    side = cells * fineness(objective, lenslet, demand.margin)
     what = f"the image of a point at {dz * 1e6:.4g} µm, which lights {cells} lenslets across,"
     memory.require(
         (16.0 * objective.modes + 64) * side**2,
@@ -208,102 +355,9 @@ def require_window(objective: Objective, lenslet: Lenslet, sampling: CellSamplin
     )
 
 
-def _fineness(objective: Objective, lenslet: Lenslet, sampling: CellSampling) -> int:
-    """Samples of the light along an image sample."""
-    steepest = objective.numerical_aperture / lenslet.magnification
-    steepest += lenslet.pitch / (2 * abs(lenslet.focal_length))
-    return math.ceil(lenslet.pitch * 2 * MARGIN * steepest / objective.wavelength / sampling.pixels)
-
-
 def kernel_bytes(
-    objective: Objective, lenslet: Lenslet, sampling: CellSampling, dz: float, dropped: float = DROPPED
+    objective: Objective, lenslet: Lenslet, sampling: CellSampling, dz: float, demand: Demand
 ) -> float:
     """Upper bound of what the kernel of a depth takes in memory, expanded to all points [bytes]."""
-    cells = 2 * reach_of(objective, lenslet, dz, dropped) + 1
+    cells = 2 * reach_of(objective, lenslet, dz, demand) + 1
     return 4.0 * cells**2 * sampling.classes * sampling.pixels**2
-
-
-def _bright(
-    cells: np.ndarray,
-    points: list[tuple[int, int]],
-    sides: tuple[int, int],
-    dropped: float,
-    symmetric: bool,
-) -> np.ndarray:
-    """Offsets that hold all of the light but `dropped`, the same after every flip and transposition."""
-    s, T = sides
-    light = cells.sum(2, dtype=np.float64)
-    count = np.ones(len(points)) if not symmetric else np.bincount([row for *_, row in _expansion(s)])
-    total = (light * count[:, None]).sum(0).reshape(T, T)
-    if symmetric:
-        total = total + total.T
-        total = total + total[::-1]
-        total = total + total[:, ::-1]
-        total = np.round(total / total.max(), 12)
-    order = np.argsort(total, axis=None)
-    faint = np.cumsum(total.ravel()[order]) <= dropped * total.sum()
-    threshold = total.ravel()[order][faint].max(initial=-1.0)
-    return np.flatnonzero(total.ravel() > threshold)
-
-
-class _Bench:
-    """The lenslets around a point's own, and the way from there to the pixels."""
-
-    def __init__(self, objective: Objective, lenslet: Lenslet, sampling: CellSampling, reach: int) -> None:
-        self.objective, self.lenslet, self.sampling = objective, lenslet, sampling
-        wave, p = objective.wavelength, lenslet.pitch
-        self.over = _fineness(objective, lenslet, sampling)
-        self.fine = self.over * sampling.pixels
-        self.cells = 2 * reach + 3  # a lenslet more on each side, for what diffracts outward
-        self.step = p / self.fine
-        n = self.cells * self.fine
-        self.at = (np.arange(n) - (n - 1) / 2) * self.step
-        self.phase, self.mask = self._lenslets(wave)
-        f2 = np.fft.fftfreq(n, self.step) ** 2
-        self.transfer = np.exp(-1j * np.pi * wave * lenslet.distance * f2).astype(np.complex64)
-        self.open = 1.0
-
-    def _lenslets(self, wave: float) -> tuple[np.ndarray, np.ndarray]:
-        own = (np.arange(self.fine) - (self.fine - 1) / 2) * self.step
-        phase = np.exp(-1j * np.pi * own**2 / (wave * self.lenslet.focal_length)).astype(np.complex64)
-        half = self.lenslet.width / 2
-        inside = np.clip((half - np.abs(own)) / self.step + 0.5, 0, 1)
-        mask = np.outer(inside, inside)
-        if self.lenslet.is_round:
-            mask = np.clip((half - np.hypot(own[:, None], own)) / self.step + 0.5, 0, 1)
-        return np.tile(phase, self.cells), np.tile(mask, (self.cells, self.cells)).astype(np.float32)
-
-    def image(self, point: tuple[float, float], dz: float) -> np.ndarray:
-        """Intensity ((2 reach + 1) N, the same) of a point (ky, kx) of the middle cell [samples]."""
-        s, p, M = self.sampling.points, self.lenslet.pitch, self.lenslet.magnification
-        y, x = ((self.at - ((k - (s - 1) / 2) / s) * p) / M for k in point)
-        fields = self.objective.fields(y[:, None], x[None, :], dz).astype(np.complex64)
-        whole, passed, image = 0.0, 0.0, np.zeros((len(self.at),) * 2, np.float32)
-        for field in fields:
-            whole += float(np.square(np.abs(field)).sum(dtype=np.float64))
-            field = field * self.phase[:, None] * self.phase * self.mask
-            passed += float(np.square(np.abs(field)).sum(dtype=np.float64))
-            spectrum = arrays.fft2(field, overwrite=True)
-            spectrum *= self.transfer[:, None]
-            spectrum *= self.transfer
-            field = arrays.ifft2(spectrum, overwrite=True)
-            image += np.square(field.real) + np.square(field.imag)
-        self.open = passed / whole
-        return self._pixels(image)
-
-    def _pixels(self, image: np.ndarray) -> np.ndarray:
-        """Samples of the cells but for the outermost, each averaged over its square."""
-        n, N, edge = len(self.at), self.sampling.pixels, self.sampling.pixels
-        if abs(self.sampling.width * N - 1) < 1e-9:
-            shape = (n // self.over, self.over, n // self.over, self.over)
-            image = image.reshape(shape).mean((1, 3))
-        else:
-            f = np.fft.fftfreq(n)
-            # Half a fine sample: the middle of an even number of them lies between two.
-            shift = np.exp(-1j * np.pi * f) if self.over % 2 == 0 else np.ones(n)
-            spread = (np.sinc(f * self.sampling.width * self.fine) * shift).astype(np.complex64)
-            spectrum = arrays.fft2(image) * spread[:, None] * spread
-            image = arrays.ifft2(spectrum, overwrite=True).real
-            start = self.over // 2
-            image = np.maximum(image[start :: self.over, start :: self.over], 0)
-        return image[edge:-edge, edge:-edge]

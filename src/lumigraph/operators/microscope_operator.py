@@ -3,7 +3,8 @@
 With s × s points in each lenslet's cell and N × N samples of the image, a plane's raw image is the sum over
 the offsets between the points' cell and the image's of (cells × s²) · (s² × N²). All offsets of a depth are
 one product: the points of the neighbouring cells are gathered first. Where it takes less time, all of it goes
-through the lenslets' frequencies instead (`microscope_spectrum`), with the same result to rounding.
+through the lenslets' frequencies instead (`microscope_spectrum`), with the same result to rounding. What goes
+far is added by a few patterns (`microscope_far`).
 """
 
 import hashlib
@@ -22,21 +23,22 @@ from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear, Shape
+from lumigraph.core.matrix import Matrix
 from lumigraph.core.progress import Progress
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import FormatError, GeometryError, SamplingError
-from lumigraph.operators import microscope_spectrum
+from lumigraph.operators import microscope_pixels, microscope_spectrum
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
+from lumigraph.operators.microscope_far import Far, FarLight
 from lumigraph.operators.microscope_kernels import (
-    DROPPED,
-    TAILS,
+    Demand,
     SliceKernel,
     kernel_bytes,
     octant,
     require_window,
     slice_kernel,
 )
-from lumigraph.operators.microscope_pixels import PixelPlacement
+from lumigraph.operators.microscope_pixels import FRAME
 
 GATHERED = 2**27
 """Numbers that are gathered for one product."""
@@ -56,11 +58,11 @@ class MicroscopeOperator(Linear):
     kernels
         Of each depth.
     cells
-        Lenslets (rows, columns).
-    dropped
-        Part of each point's light that is left out.
+        Lenslets (rows, columns) whose light is followed, with the frame.
     placement
-        Where the pixels stand; None where they are the N × N samples of each cell.
+        From samples to pixels; None where they are the N × N samples of each cell.
+    frame
+        Lenslets around the object: pixels at the border see some of their light.
     by_frequency
         Whether `forward` and `adjoint` go through the lenslets' frequencies (`microscope_spectrum`), where
         rounding may leave -1e-6 of the highest value instead of 0; else by products over all offsets.
@@ -68,8 +70,8 @@ class MicroscopeOperator(Linear):
 
     kernels: tuple[SliceKernel, ...]
     cells: tuple[int, int]
-    dropped: float
-    placement: PixelPlacement | None = None
+    placement: Matrix | None = None
+    frame: int = 0
     by_frequency: bool = False
     _spectra: dict = field(default_factory=dict)
 
@@ -79,14 +81,20 @@ class MicroscopeOperator(Linear):
     def shape(self) -> tuple[Shape, Shape]:
         """Pixels (ny, nx) of the raw image, samples (y, x) or (z, y, x) of the object."""
         s, N = self.kernels[0].sampling.points, self.kernels[0].sampling.pixels
-        raw = (self.cells[0] * N, self.cells[1] * N) if self.placement is None else self.placement.shape
+        raw = (self.cells[0] * N, self.cells[1] * N) if self.placement is None else self.placement.raw_shape
         volume = () if self.depths is None else (len(self.kernels),)
-        return raw, (*volume, self.cells[0] * s, self.cells[1] * s)
+        rows, columns = self._seen
+        return raw, (*volume, rows * s, columns * s)
+
+    @property
+    def _seen(self) -> tuple[int, int]:
+        """Lenslets before which the object stands."""
+        return self.cells[0] - 2 * self.frame, self.cells[1] - 2 * self.frame
 
     @property
     def error(self) -> float:
-        """By the light that is left out: `TAILS` times as much."""
-        return TAILS * self.dropped
+        """Relative rms of points' images, of the worst depth."""
+        return max(kernel.error for kernel in self.kernels)
 
     @property
     def multiply_adds(self) -> int:
@@ -127,25 +135,44 @@ class MicroscopeOperator(Linear):
         margin, s = self.reach, self.kernels[0].sampling.points
         if "wide" not in self._spectra:
             self._spectra["wide"] = self._with_margin(margin)
-        rows, columns = (slice(margin * s, (margin + n) * s) for n in self.cells)
+        rows, columns = (slice(margin * s, (margin + n) * s) for n in self._seen)
         return self._spectra["wide"], (rows, columns)
 
     def _with_margin(self, margin: int) -> "MicroscopeOperator":
         sampling, grid = self.kernels[0].sampling, self.object_grid
         cells = (self.cells[0] + 2 * margin, self.cells[1] + 2 * margin)
         if grid is not None:
-            grid = Grid((cells[0] * sampling.points, cells[1] * sampling.points), grid.pitch, grid.center)
+            ny, nx = (n + 2 * margin * sampling.points for n in grid.shape)
+            grid = Grid((ny, nx), grid.pitch, grid.center)
         ny, nx = self.shape[0]
-        placement = self.placement or PixelPlacement.every((ny, nx))
+        placement = self.placement or microscope_pixels.every((ny, nx))
         return replace(
-            self, cells=cells, object_grid=grid, placement=placement.widened(margin * sampling.pixels),
+            self, cells=cells, object_grid=grid,
+            placement=microscope_pixels.widened(placement, margin * sampling.pixels),
             by_frequency=_suits_frequencies(self.kernels, cells), _spectra={},
         )  # fmt: skip
 
     def _forward(self, intensity: Array) -> Array:
-        volume = intensity if self.depths is not None else intensity[None, ...]
+        volume = self._framed(intensity if self.depths is not None else intensity[None, ...])
         plane = self._light(volume) if self.by_frequency else self._by_offsets(volume)
-        return plane if self.placement is None else self.placement.forward(plane)
+        if (far := self._far(volume)) is not None:
+            N = self.kernels[0].sampling.pixels
+            plane = plane + _plane(far.forward(volume, self.kernels[0].sampling.points), N)
+        return plane if self.placement is None else self.placement._forward(plane)
+
+    def _framed(self, volume: Array) -> Array:
+        s = self.kernels[0].sampling.points
+        edge, shape = self.frame * s, (self.cells[0] * s, self.cells[1] * s)
+        return arrays.framed(volume, (edge, edge), shape) if edge else volume
+
+    def _far(self, like: Array) -> FarLight | None:
+        key = "far", arrays.placement(like)
+        fars = [kernel.far for kernel in self.kernels if kernel.far is not None]
+        if len(fars) < len(self.kernels):
+            return None
+        if key not in self._spectra:
+            self._spectra[key] = FarLight.of(fars, self.cells, like)
+        return self._spectra[key]
 
     def _light(self, volume: Array) -> Array:
         tiling = microscope_spectrum.tiling(self.kernels, self.cells)
@@ -177,17 +204,26 @@ class MicroscopeOperator(Linear):
 
     def _volume(self, raw: Array) -> Array:
         xp = arrays.namespace(raw)
-        plane = raw if self.placement is None else self.placement.adjoint(raw)
-        N = self.kernels[0].sampling.pixels
+        plane = raw if self.placement is None else self.placement._adjoint(raw)
+        s, N = self.kernels[0].sampling.points, self.kernels[0].sampling.pixels
+        light = _class_first(plane, N)
         if self.by_frequency:
-            tiling, s = microscope_spectrum.tiling(self.kernels, self.cells), self.kernels[0].sampling.points
-            return microscope_spectrum.adjoint(self._matrix(raw), tiling, plane, s)
-        flat = xp.reshape(_class_first(plane, N), (N * N, -1))
-        return xp.stack([self._back(kernel, flat) for kernel in self.kernels])
+            tiling = microscope_spectrum.tiling(self.kernels, self.cells)
+            volume = microscope_spectrum.adjoint(self._matrix(raw), tiling, plane, s)
+        else:
+            flat = xp.reshape(light, (N * N, -1))
+            volume = xp.stack([self._back(kernel, flat) for kernel in self.kernels])
+        if (far := self._far(raw)) is not None:
+            volume = volume + far.adjoint(light, s)
+        rows, columns = (slice(self.frame * s, (n - self.frame) * s) for n in self.cells)
+        return volume[:, rows, columns]
 
     def _of_point(self, point: np.ndarray) -> np.ndarray:
-        plane = self._by_offsets(point.reshape(-1, *point.shape[-2:]))  # dark pixels stay 0
-        return plane if self.placement is None else self.placement.forward(plane)
+        volume, sampling = self._framed(point.reshape(-1, *point.shape[-2:])), self.kernels[0].sampling
+        plane = self._by_offsets(volume)  # dark pixels stay 0
+        if (far := self._far(volume)) is not None:
+            plane += np.maximum(_plane(far.forward(volume, sampling.points), sampling.pixels), 0)
+        return plane if self.placement is None else self.placement._forward(plane)
 
     def _back(self, kernel: SliceKernel, flat: Array) -> Array:
         xp, s, reach = arrays.namespace(flat), kernel.sampling.points, _reach(kernel)
@@ -210,20 +246,30 @@ class Layout:
 
     Parameters
     ----------
-    cells
-        Lenslets (rows, columns).
+    seen
+        Lenslets (rows, columns) before the object.
     sampling
         Of a cell.
     placement
-        Of real pixels; None for N × N samples per cell.
+        From samples, those of the frame too, to real pixels; None for N × N samples per cell.
     center
         Of the cells, in the object (y, x) [m].
     """
 
-    cells: tuple[int, int]
+    seen: tuple[int, int]
     sampling: CellSampling
-    placement: PixelPlacement | None = None
+    placement: Matrix | None = None
     center: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def frame(self) -> int:
+        """Lenslets around those that are seen, to each side: pixels at the border see some of their light."""
+        return 0 if self.placement is None else FRAME
+
+    @property
+    def cells(self) -> tuple[int, int]:
+        """Lenslets whose light is followed."""
+        return self.seen[0] + 2 * self.frame, self.seen[1] + 2 * self.frame
 
 
 def microscope_operator(
@@ -232,7 +278,7 @@ def microscope_operator(
     layout: Layout,
     depths: Sequence[float] | None = None,
     *,
-    dropped: float = DROPPED,
+    accuracy: float = 1e-3,
     folder: str | PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> MicroscopeOperator:
@@ -247,8 +293,8 @@ def microscope_operator(
     depths
         Of the slices from the focused plane [m], positive farther from the objective, for an object
         (z, y, x); None for the focused plane alone, an object (y, x).
-    dropped
-        Part of each point's light that may be left out; see `slice_kernel`.
+    accuracy
+        Relative rms of points' images.
     folder
         Keeps the kernels in files that are mapped into memory, and finds again those that are there: for
         volumes whose kernels do not fit in memory, and for the next run.
@@ -266,11 +312,10 @@ def microscope_operator(
     """
     planes = (0.0,) if depths is None else tuple(checks.finite("a depth", dz) for dz in depths)
     _check_order(planes)
-    if not 0 < checks.finite("dropped", dropped, "1") < 0.5:
-        raise GeometryError(f"dropped is {dropped:g} but must be above 0 and below 0.5.")
+    demand = Demand(require_accuracy(accuracy), math.ceil(1.5 * max(layout.cells)))
     for one in objectives:
-        require_window(one, lenslet, layout.sampling, max(planes, key=abs))
-    sizes = [kernel_bytes(objectives[0], lenslet, layout.sampling, dz, dropped) for dz in planes]
+        require_window(one, lenslet, max(planes, key=abs), demand)
+    sizes = [kernel_bytes(objectives[0], lenslet, layout.sampling, dz, demand) for dz in planes]
     stored = 1 if folder is None else 0
     needed = max(sizes) * 2 + stored * sum(sizes) * (0.25 if objectives[0].is_round else 1)
     remedy = "Use fewer slices or samples, or folder= to keep them on disk."
@@ -284,13 +329,21 @@ def microscope_operator(
         memory.require_disk(sum(sizes) * share, folder, "the images of points", SamplingError)
     kernels = []
     for done, dz in enumerate(planes):
-        kernels.append(_kept(objectives, lenslet, layout.sampling, dz, dropped, folder))
+        kernels.append(_kept(objectives, lenslet, layout.sampling, dz, demand, folder))
         if progress is not None:
             progress((done + 1) / len(planes))
     return MicroscopeOperator(
-        tuple(kernels), layout.cells, dropped, layout.placement, _suits_frequencies(kernels, layout.cells),
+        tuple(kernels), layout.cells, layout.placement, layout.frame,
+        _suits_frequencies(kernels, layout.cells),
         object_grid=_object_grid(lenslet, layout), depths=None if depths is None else planes,
     )  # fmt: skip
+
+
+def require_accuracy(accuracy: float) -> float:
+    """A relative rms that can be asked for, or an error."""
+    if not 1e-5 <= checks.finite("accuracy", accuracy, "1") <= 0.1:
+        raise GeometryError(f"accuracy is {accuracy:g} but must be from 1e-5 to 0.1.")
+    return accuracy
 
 
 def _check_order(depths: tuple[float, ...]) -> None:
@@ -312,7 +365,7 @@ def _suits_frequencies(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -
 
 def _object_grid(lenslet: Lenslet, layout: Layout) -> Grid:
     s = layout.sampling.points
-    shape = (layout.cells[0] * s, layout.cells[1] * s)
+    shape = (layout.seen[0] * s, layout.seen[1] * s)
     pitch = lenslet.pitch / lenslet.magnification / s
     # Cells are centred as a whole: with an even number of samples the middle lies between two.
     center = [c + (0.0 if n % 2 else pitch / 2) for c, n in zip(layout.center, shape, strict=True)]
@@ -324,22 +377,31 @@ def _kept(
     lenslet: Lenslet,
     sampling: CellSampling,
     dz: float,
-    dropped: float,
+    demand: Demand,
     folder: str | PathLike[str] | None,
 ) -> SliceKernel:
     """The kernel of a depth, mapped from its file if a folder is given."""
     if folder is None:
-        return slice_kernel(objectives, lenslet, sampling, dz, dropped)
-    told = repr((tuple(objectives), lenslet, sampling, dz, dropped))
+        return slice_kernel(objectives, lenslet, sampling, dz, demand)
+    told = repr((tuple(objectives), lenslet, sampling, dz, demand))
     key = f"slice-{hashlib.sha256(told.encode()).hexdigest()[:20]}"
 
     def built() -> dict[str, np.ndarray]:
-        kernel = slice_kernel(objectives, lenslet, sampling, dz, dropped)
-        return {"offsets": kernel.offsets, "blocks": kernel.blocks}
+        kernel = slice_kernel(objectives, lenslet, sampling, dz, demand)
+        held = {"offsets": kernel.offsets, "blocks": kernel.blocks}
+        if kernel.far is not None:
+            held |= {f"far_{name}": getattr(kernel.far, name) for name in ("offsets", "weights", "images")}
+        return held | {"told": np.array([kernel.error, kernel.passed])}
 
     found = store.kept(key, built, Path(folder))
     symmetric = all(one.is_round for one in objectives)
-    return SliceKernel(found["offsets"], found["blocks"], sampling, symmetric)
+    far = (
+        Far(found["far_offsets"], found["far_weights"], found["far_images"])
+        if "far_images" in found
+        else None
+    )
+    error, passed = (float(value) for value in found["told"])
+    return SliceKernel(found["offsets"], found["blocks"], sampling, symmetric, far, error, passed)
 
 
 def _products(

@@ -16,14 +16,20 @@ from lumigraph.core.raw import RawImage
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError
 from lumigraph.operators.microscope_cell import Lenslet
-from lumigraph.operators.microscope_kernels import DROPPED, point_cells, require_window
+from lumigraph.operators.microscope_kernels import Demand, point_cells, require_window
 from lumigraph.operators.microscope_operator import Layout, MicroscopeOperator
 from lumigraph.scene import Diffuser, Points, Scene, Slice
 from lumigraph.sensor import Sensor
+from lumigraph.simulation import error
 from lumigraph.simulation.coherence import Incoherent
 
 SAMPLES = 5
 """Samples along a lenslet of a scene's slice, at least: those of the microscope's ``object_grid``."""
+
+_SOURCE = "cells treated as far, what samples behind a lenslet do not hold, samples of slices"
+
+COARSER = 1.5
+"""Pitch of the samples that tell the error of an operator's own, over theirs."""
 
 
 @runtime_checkable
@@ -45,12 +51,18 @@ class Microscope(Protocol):
         """Pixels."""
         ...
 
-    def operator(self, depths: Sequence[float] | None = None, samples_per_lenslet: int | None = None) -> Any:
+    def operator(
+        self,
+        depths: Sequence[float] | None = None,
+        samples_per_lenslet: int | None = None,
+        *,
+        accuracy: float,
+    ) -> Any:
         """How it sees slices."""
         ...
 
-    def point_image(self, y: float, x: float, dz: float) -> np.ndarray:
-        """Raw image of a point."""
+    def imaged_point(self, y: float, x: float, dz: float, accuracy: float) -> tuple[np.ndarray, float]:
+        """Raw image of a point, and its estimated relative rms error."""
         ...
 
 
@@ -71,39 +83,77 @@ def microscope_image(
         )
     if not scene.parts:
         raise GeometryError("the scene is empty. Add targets, points or a diffuser.")
-    pixels = np.zeros(scope.sensor.shape)
+    pixels, reached = np.zeros(scope.sensor.shape), []
     for done, part in enumerate(scene.parts):
-        pixels += _image(scope, part)
+        image, rms = _image(scope, part, coherence.accuracy)
+        pixels += image
+        reached.append((error.norm(image), error.Reached(rms, _SOURCE)))
         if progress is not None:
             progress((done + 1) / len(scene.parts))
     known = {
         "simulated": repr(coherence), "shots": len(scene.parts), "wavelength": scope.objectives[0].wavelength
     }  # fmt: skip
+    if (whole := error.together(reached)) is not None:
+        known["error"] = {"rms": whole.rms, "source": whole.source}
+    error.warn_if_missed(coherence.accuracy, whole)
     return RawImage(np.maximum(pixels, 0).astype(np.float32), scope.sensor.pixel_pitch, metadata=known)
 
 
-def _image(scope: Microscope, part: Slice | Points | Diffuser) -> np.ndarray:
+def _image(scope: Microscope, part: Slice | Points | Diffuser, accuracy: float) -> tuple[np.ndarray, float]:
+    """Raw image of a part, and its estimated relative rms error."""
     if isinstance(part, Slice):
-        return _slice_image(scope, part)
+        return _slice_image(scope, part, accuracy)
     if isinstance(part, Points):
-        rows = zip(part.positions, part.intensities, strict=True)
-        images = (float(light) * scope.point_image(*map(float, place)) for place, light in rows)
-        return sum(images, np.zeros(scope.sensor.shape))
-    return part.intensity * _white(scope.operator((0.0,), SAMPLES))
+        return _points_image(scope, part, accuracy)
+    operator = scope.operator((0.0,), SAMPLES, accuracy=accuracy)
+    return part.intensity * _white(operator), operator.error
 
 
-def _slice_image(scope: Microscope, part: Slice) -> np.ndarray:
-    """By an operator as fine as the slice, or as the objective resolves."""
+def _points_image(scope: Microscope, part: Points, accuracy: float) -> tuple[np.ndarray, float]:
+    """The sum of points' images, whose errors are independent."""
+    whole, squares = np.zeros(scope.sensor.shape), 0.0
+    for light, place in zip(part.intensities, part.positions, strict=True):
+        image, rms = scope.imaged_point(*map(float, place), accuracy=accuracy)
+        whole += float(light) * image
+        squares += (float(light) * rms * error.norm(image)) ** 2
+    return whole, math.sqrt(squares) / (error.norm(whole) or 1.0)
+
+
+def _slice_image(scope: Microscope, part: Slice, accuracy: float) -> tuple[np.ndarray, float]:
+    """By an operator as fine as the slice; where that does not do, as the objective resolves."""
     if part.intensity.ndim != 2:
         raise GeometryError(
             f"a slice has shape {part.intensity.shape} but one wavelength needs grey (y, x). "
             "Give spectrum=Spectrum.rgb() for a coloured scene."
         )
     finest = min(one.wavelength / (4 * one.numerical_aperture) for one in scope.objectives)
-    samples = math.ceil(scope.lenslet_size / max(finest, *part.grid.pitch) - 1e-6)
-    operator = scope.operator((part.dz,), max(SAMPLES, samples))
-    plane = averaged(arrays.to_numpy(part.intensity), part.grid, operator.object_grid)
-    return operator.forward(plane[None].astype(np.float32))
+    steps, image, rms = (max(finest, *part.grid.pitch), finest), np.zeros(scope.sensor.shape), 0.0
+    for samples in dict.fromkeys(max(SAMPLES, math.ceil(scope.lenslet_size / p - 1e-6)) for p in steps):
+        operator = scope.operator((part.dz,), samples, accuracy=accuracy)
+        image = operator.forward(_plane(part, operator.object_grid))
+        rms = math.hypot(operator.error, _sampling_error(operator, part, image))
+        if rms <= accuracy:
+            break
+    return image, rms
+
+
+def _plane(part: Slice, grid: Grid) -> np.ndarray:
+    return averaged(arrays.to_numpy(part.intensity), part.grid, grid)[None].astype(np.float32)
+
+
+def _sampling_error(operator: Any, part: Slice, image: np.ndarray) -> float:
+    """Relative rms by the pitch of the operator's samples, from that of samples `COARSER` times as far apart.
+
+    It falls as the square of their pitch. A slice on the operator's own samples is what it is.
+    """
+    grid = operator.object_grid
+    if part.grid == grid:
+        return 0.0
+    shape = (math.ceil(grid.shape[0] / COARSER), math.ceil(grid.shape[1] / COARSER))
+    coarse = Grid(shape, (grid.pitch[0] * COARSER, grid.pitch[1] * COARSER), grid.center)
+    there = Slice(_plane(part, coarse)[0], coarse, part.dz)
+    difference = operator.forward(_plane(there, grid)) - image
+    return error.norm(difference) / (COARSER**2 - 1) / (error.norm(image) or 1.0)
 
 
 def averaged(picture: np.ndarray, grid: Grid, wanted: Grid) -> np.ndarray:
@@ -128,8 +178,7 @@ def _white(operator: Any) -> np.ndarray:
     if not isinstance(operator, MicroscopeOperator):
         return operator.forward(np.ones(operator.shape[1], np.float32))
     N = operator.kernels[0].sampling.pixels
-    cell = operator.kernels[0].matrix().sum(0, dtype=np.float64).reshape(N, N)
-    plane = np.tile(cell, operator.cells)
+    plane = np.tile(operator.kernels[0].white().reshape(N, N), operator.cells)
     return plane if operator.placement is None else operator.placement.forward(plane)
 
 
@@ -138,9 +187,9 @@ def point_image(
     lenslet: Lenslet,
     layout: Layout,
     position: tuple[float, float, float],
-    dropped: float = DROPPED,
-) -> np.ndarray:
-    """Raw image (ny, nx) of a point at (y, x, dz) [m] that sends as much light as a sample of the layout.
+    accuracy: float = 1e-3,
+) -> tuple[np.ndarray, float]:
+    """Raw image (ny, nx) of a point that sends as much light as a sample of the layout, and its rms error.
 
     Parameters
     ----------
@@ -149,12 +198,10 @@ def point_image(
     lenslet, layout
         The array and the pixels.
     position
-        Anywhere; its image is cut off at the lenslets' border.
-    dropped
-        Part of the light that the window may miss.
+        (y, x, dz) [m], anywhere; its image is cut off at the lenslets' border.
+    accuracy
+        Relative rms; that of the image, which is returned, is an estimate.
     """
-    for one in objectives:
-        require_window(one, lenslet, layout.sampling, position[2])
     s, N, size = layout.sampling.points, layout.sampling.pixels, lenslet.pitch / lenslet.magnification
     place = [
         (at - middle) / size + (n - 1) / 2
@@ -162,7 +209,11 @@ def point_image(
     ]
     own = [math.floor(cell + 0.5) for cell in place]
     within = ((place[0] - own[0]) * s + (s - 1) / 2, (place[1] - own[1]) * s + (s - 1) / 2)
-    cells = point_cells(objectives, lenslet, layout.sampling, within, (position[2], dropped))
+    farthest = max(max(k, n - 1 - k) for k, n in zip(own, layout.cells, strict=True))
+    demand = Demand(accuracy, farthest + 1)  # what falls beside the sensor needs no window
+    for one in objectives:
+        require_window(one, lenslet, position[2], demand)
+    cells, error = point_cells(objectives, lenslet, layout.sampling, within, (position[2], demand))
     plane = np.zeros((layout.cells[0], N, layout.cells[1], N))
     reach = len(cells) // 2
     rows, columns = (
@@ -173,4 +224,4 @@ def point_image(
     lit = cells[first[0] :, first[1] :][: rows.stop - rows.start, : columns.stop - columns.start]
     plane[rows, :, columns] = lit.transpose(0, 2, 1, 3)
     image = plane.reshape(layout.cells[0] * N, layout.cells[1] * N)
-    return image if layout.placement is None else layout.placement.forward(image)
+    return (image if layout.placement is None else layout.placement.forward(image)), error

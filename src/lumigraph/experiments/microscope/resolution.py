@@ -60,7 +60,8 @@ def bead(
     """
     depths = tuple(dz + (k - PLANES // 2) * STEP for k in range(PLANES))
     operators = [
-        one.operator(depths, SAMPLES, pixels=PIXELS) for one in {id(bench): bench, id(model): model}.values()
+        one.operator(depths, SAMPLES, pixels=PIXELS, accuracy=1e-2)
+        for one in {id(bench): bench, id(model): model}.values()
     ]
     truth = np.zeros(operators[0].shape[1], np.float32)
     middle = tuple(n // 2 for n in truth.shape)
@@ -118,7 +119,7 @@ def _vesicle(
     """A shell about the focused plane."""
     samples = 3 if context.quick else 5
     depths = tuple(np.arange(-22, 22.1, 4 if context.quick else 2) * um)
-    operator = bench.operator(depths, samples, pixels=PIXELS)
+    operator = bench.operator(depths, samples, pixels=PIXELS, accuracy=1e-2)
     grid = operator.object_grid
     assert grid is not None
     radius = np.sqrt(np.asarray(depths)[:, None, None] ** 2 + grid.y[:, None] ** 2 + grid.x**2)

@@ -37,7 +37,7 @@ def run(context: Context) -> Outcome:
     for done, dz in enumerate(depths):
         context.progress(done / len(depths), f"target at {dz / um:g} µm")
         found = context.cached(f"usaf-{done}", lambda dz=dz: _found(bench, dz, (groups, samples), rng))
-        grid = bench.operator((dz,), samples, pixels=PIXELS).object_grid
+        grid = bench.operator((dz,), samples, pixels=PIXELS, accuracy=1e-2).object_grid
         assert grid is not None
         contrasts = {f: contrast(found, grid, corner, w) for f, corner, w in elements(groups)}
         finest.append(finest_resolved(contrasts, RESOLVED))
@@ -61,7 +61,7 @@ def _found(
     bench: LightFieldMicroscope, dz: float, chart: tuple[tuple[int, int], int], rng: np.random.Generator
 ) -> np.ndarray:
     groups, samples = chart
-    operator = bench.operator((dz,), samples, pixels=PIXELS)
+    operator = bench.operator((dz,), samples, pixels=PIXELS, accuracy=1e-2)
     assert operator.object_grid is not None
     (chart_slice,) = targets.usaf1951(operator.object_grid, groups).parts
     assert isinstance(chart_slice, Slice)
