@@ -291,7 +291,7 @@ class LightFieldMicroscope(Instrument):
             microscope samples the object as its pixels do.
         accuracy
             Relative rms error of points' images. It sets how far light is followed, how finely it is sampled
-            and how many samples behind a lenslet pixels are interpolated from.
+            and how many samples behind a lenslet pixels are interpolated from. A Fourier microscope has none.
         pixels
             What the raw image's pixels are: None, those of this description; a `Calibration`, those of a real
             camera, wherever its lenslets stand; a whole number N, N × N for each lenslet, as `rectify` gives.

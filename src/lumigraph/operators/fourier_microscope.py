@@ -101,6 +101,11 @@ class FourierMicroscopeOperator(Linear):
         """Of the points' images and their spectra [bytes]."""
         return self.images.nbytes + 8.0 * math.prod(self.images.shape[:2]) * math.prod(self._size)
 
+    @property
+    def error(self) -> float:
+        """Not known: NaN."""
+        return math.nan
+
     def _forward(self, intensity: Array) -> Array:
         volume = intensity if self.depths is not None else intensity[None, ...]
         xp, spectra = arrays.namespace(volume), self._of(volume)

@@ -93,7 +93,8 @@ def microscope_image(
     known = {
         "simulated": repr(coherence), "shots": len(scene.parts), "wavelength": scope.objectives[0].wavelength
     }  # fmt: skip
-    if (whole := error.together(reached)) is not None:
+    whole = error.together(reached)
+    if whole is not None and math.isfinite(whole.rms):  # of Fourier microscopes it is not known
         known["error"] = {"rms": whole.rms, "source": whole.source}
     error.warn_if_missed(coherence.accuracy, whole)
     return RawImage(np.maximum(pixels, 0).astype(np.float32), scope.sensor.pixel_pitch, metadata=known)
