@@ -208,7 +208,12 @@ OPTIONS = {
     "depth behind the lens": ((*SIMULATE, "--depth", "-300 mm"), ["-300 mm"]),
     "depths without scenes": ((*SIMULATE, "--depth", "1 mm", "--depth", "2 mm"), ["2 --depth for 1 --scene"]),
     "one coordinate": ((*SIMULATE, "--point", "1 mm"), ["--point", "1 mm"]),
-    "zero snapshots": ((*SIMULATE, "--count", "0"), ["--count is 0"]),
+    "zero snapshots": ((*SIMULATE, "--coherence", "snapshots", "--count", "0"), ["--count is 0"]),
+    "accuracy out of range": ((*SIMULATE, "--accuracy", "0.5"), ["accuracy is 0.5", "0.01"]),
+    "accuracy of coherent light": (
+        (*SIMULATE, "--coherence", "coherent", "--accuracy", "0.01"),
+        ["--accuracy"],
+    ),
     "negative seed": ((*SIMULATE, "--seed", "-1"), ["--seed is -1"]),
     "na of another light": ((*SIMULATE, "--na", "0.1"), ["--na", "tilted"]),
     "na too large": ((*SIMULATE, "--coherence", "tilted", "--na", "3"), ["na is 3"]),

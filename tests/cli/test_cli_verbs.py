@@ -35,6 +35,7 @@ VERBS = (
         "depth",
         "deconvolve",
         "measure",
+        "board",
         "view",
         "samples",
     ),
@@ -116,6 +117,7 @@ def test_simulate_adds_noise_that_the_seed_repeats(lumigraph, bench):
     [
         (("--coherence", "coherent"), "Coherent()"),
         ((), "Incoherent(accuracy=0.001)"),
+        (("--accuracy", "1e-4"), "Incoherent(accuracy=0.0001)"),
         (("--coherence", "snapshots"), "Snapshots(count=100, coherence_index=None, rng=7)"),
         (("--coherence", "tilted", "--na", "0.01", "--count", "5"), "TiltedWaves(count=5, na=0.01)"),
     ],
@@ -326,7 +328,8 @@ def test_warnings_are_one_line_each(lumigraph, bench, monkeypatch):
 
 
 def test_ctrl_c_ends_with_130_and_one_line(bench):
-    words = ["simulate", "thesis-plenoptic-1", "--scene", "photo", "--count", "100000", "-o", "raw.tiff"]
+    words = ["simulate", "thesis-plenoptic-1", "--scene", "photo", "--coherence", "snapshots"]
+    words += ["--count", "100000", "-o", "raw.tiff"]
     program = [*PROGRAM[:2], PROGRAM[2].replace("sys.exit", "print(flush=True); sys.exit")]
     pipe = subprocess.PIPE
     process = subprocess.Popen([*program, *words], stdout=pipe, stderr=pipe, text=True, cwd=bench)

@@ -201,7 +201,7 @@ def test_what_a_microscope_would_see_can_be_simulated_and_deconvolved(lumigraph,
     (tmp_path / "scope.toml").write_text(SCOPE)
     found = lumigraph(
         "simulate", "scope.toml", "--point", "4 um, -6 um, 10 um", "--scene", "siemens_star",
-        "--depth", "-5 um", "-o", "raw.tiff",
+        "--depth", "-5 um", "--accuracy", 1e-2, "-o", "raw.tiff",
     )  # fmt: skip
     assert found.code == 0, found.err
     found = lumigraph(

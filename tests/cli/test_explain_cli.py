@@ -70,7 +70,7 @@ def test_each_cause_is_named_with_its_size(name, lumigraph, tmp_path, intended):
     if name == "shifted":  # the raw image is turned by 180 degrees, and micro-images lie a little farther out
         spread = 1 + intended.lenslet_distance / intended.separation
         right = [-value * spread * 1e6 for value in SHIFT]
-        assert numbers(text, r"shifted by \((\S+), (\S+)\) um") == pytest.approx(right, abs=0.5)
+        assert numbers(text, r"shifted by \((\S+), (\S+)\) µm") == pytest.approx(right, abs=0.5)
     if name == "tilted":
         assert numbers(text, r"tilted by \((\S+), (\S+)\) deg") == pytest.approx([0, TILT], abs=0.2)
     if name == "far":
@@ -82,7 +82,7 @@ def test_each_cause_is_named_with_its_size(name, lumigraph, tmp_path, intended):
         assert numbers(text, rf"{verb} the main lens from (\S+) to (\S+) mm") == pytest.approx(
             right, rel=0.03
         )
-        assert numbers(text, rf"{word} (\S+) um") == pytest.approx([abs(factor - 1) * pitch * 1e6], rel=0.2)
+        assert numbers(text, rf"{word} (\S+) µm") == pytest.approx([abs(factor - 1) * pitch * 1e6], rel=0.2)
 
 
 def numbers(text, pattern):

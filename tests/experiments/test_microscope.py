@@ -32,8 +32,8 @@ def test_contrast_is_one_on_the_target_itself_and_falls_where_it_is_soft():
     assert usaf.contrast(picture[::-1], grid, *usaf.elements((7, 8))[0][1:]) < 0.5
     frequencies = [f for f, _, _ in usaf.elements((7, 8))]
     assert frequencies[0] == pytest.approx(128e3)
-    assert usaf.finest_resolved({64.0: 0.9, 72.0: 0.3, 81.0: 0.1, 91.0: 0.8}) == 72.0
-    assert usaf.finest_resolved({64.0: 0.1}) == 0.0
+    assert usaf.finest_resolved({64.0: 0.9, 72.0: 0.3, 81.0: 0.1, 91.0: 0.8}, usaf.RESOLVED) == 72.0
+    assert usaf.finest_resolved({64.0: 0.1}, usaf.RESOLVED) == 0.0
 
 
 @pytest.mark.long

@@ -115,12 +115,12 @@ class Diagnosis:
         texts = {
             "rotation": f"the lenslets are turned by {math.degrees(self.rotation):+.3f} deg: turn them back",
             "offset": f"the lenslets are shifted by ({self.offset[0] * um:+.1f}, {self.offset[1] * um:+.1f}) "
-            "um (y, x): move them back",
+            "µm (y, x): move them back",
             "distance": f"the sensor stands {self.lenslet_distance * mm:.3f} mm behind the lenslets, "
             f"{moved * mm:+.3f} mm from where it was meant",
             "tilt": f"the lenslets are tilted by ({math.degrees(self.tilt[0]):+.2f}, "
             f"{math.degrees(self.tilt[1]):+.2f}) deg: the pitch changes by "
-            f"({self.pitch_gradient[0] * um:+.2f}, {self.pitch_gradient[1] * um:+.2f}) um over the picture",
+            f"({self.pitch_gradient[0] * um:+.2f}, {self.pitch_gradient[1] * um:+.2f}) µm over the picture",
             "gap": f"gaps of {self.gap * um:.1f} µm between micro-images: open the main lens from "
             f"{self.diameter * mm:.2f} to {self.matching_diameter * mm:.2f} mm",
             "overlap": f"micro-images overlap by {-self.gap * um:.1f} µm: close the main lens from "

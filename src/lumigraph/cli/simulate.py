@@ -37,6 +37,9 @@ class Light:
     coherence
         incoherent: like every lit scene; coherent: one plane wave; snapshots: random phases, many
         times; tilted: plane waves from many directions.
+    accuracy
+        Relative rms error of incoherent light that is asked for, 0.01 to 0.00001; 0.001 if left out. The raw
+        image says what was reached, and a warning where that is more.
     count
         Snapshots (100 if left out) or tilted waves (64) to add up: more of them, less speckle.
     na
@@ -49,6 +52,7 @@ class Light:
     """
 
     coherence: Literal["incoherent", "coherent", "snapshots", "tilted"] = "incoherent"
+    accuracy: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
     count: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
     na: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
     wavelength: list[str] | None = None
@@ -73,6 +77,8 @@ class Light:
             raise FormatError(
                 f"--count has no meaning with --coherence {self.coherence}. Leave it out, or use snapshots."
             )
+        if self.accuracy is not None and self.coherence != "incoherent":
+            raise FormatError(f"--accuracy has no meaning with --coherence {self.coherence}. Leave it out.")
         if self.coherence == "coherent":
             return simulation.Coherent()
         if self.na is not None and self.coherence != "tilted":
@@ -80,7 +86,7 @@ class Light:
                 f"--na has no meaning with --coherence {self.coherence}. Use --coherence tilted."
             )
         if self.coherence == "incoherent":
-            return simulation.Incoherent()
+            return simulation.Incoherent() if self.accuracy is None else simulation.Incoherent(self.accuracy)
         count = _COUNTS[self.coherence] if self.count is None else self.count
         if count < 1:
             raise FormatError(f"--count is {count} but must be at least 1.")

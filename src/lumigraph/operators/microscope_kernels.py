@@ -79,7 +79,7 @@ class SliceKernel:
     far
         What the other cells receive; None for nothing.
     error
-        Estimated relative rms of a point's image.
+        Estimated relative rms of a point's image; NaN where it is not known.
     passed
         Part of an even plane's light that the lenslets let through.
     """
@@ -89,7 +89,7 @@ class SliceKernel:
     sampling: CellSampling
     symmetric: bool
     far: Far | None = None
-    error: float = 0.0
+    error: float = math.nan
     passed: float = 1.0
 
     def white(self) -> np.ndarray:

@@ -133,7 +133,7 @@ def _slice_image(scope: Microscope, part: Slice, accuracy: float) -> tuple[np.nd
         operator = scope.operator((part.dz,), samples, accuracy=accuracy)
         image = operator.forward(_plane(part, operator.object_grid))
         rms = math.hypot(operator.error, _sampling_error(operator, part, image))
-        if rms <= accuracy:
+        if not rms > accuracy:  # nor where it is not known
             break
     return image, rms
 
