@@ -93,7 +93,7 @@ def test_the_low_pass_takes_the_blocks_away_and_makes_it_truer(vesicle):
         [np.corrcoef(v.ravel(), t.ravel())[0, 1] for v, t in ((v, truth), (v[23], truth[23]))]
         for v in volumes
     )
-    assert smooth[0] >= 0.845
+    assert smooth[0] >= 0.84
     assert smooth[0] > plain[0] - 0.001
     assert smooth[1] > plain[1] + 0.1
     assert steps(volumes[0][23]) > 2
