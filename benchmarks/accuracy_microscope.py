@@ -109,7 +109,8 @@ def points(
         sensor=SimpleNamespace(grid=type(grid)(grid.shape, pitch)),
     )  # fmt: skip
     relay = references.Relay(camera, fineness)
-    farthest = 1.2 * math.hypot(*array.extent) / scope.magnification  # type: ignore[misc]
+    assert array.extent is not None  # the catalogue's arrays are finite
+    farthest = 1.2 * math.hypot(*array.extent) / scope.magnification
     light, share = Dipoles(scope, dz, farthest, fineness), (part.pitch / 5) ** 2
     return [
         share * sum(relay.pixels(np.abs(f) ** 2) for f in relay.fields(list(light.fields(point))))

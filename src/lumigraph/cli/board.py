@@ -1,5 +1,6 @@
 """`lumigraph board`."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -126,7 +127,7 @@ def _headline(found: "Measured") -> tuple[str, ...]:
 def _figures(found: "Measured") -> Iterable[Figure]:
     rows = [["picture", "distance", "tilt", "off", "expected"]]
     for pose in found.poses:
-        tilt = (pose.turn[1] ** 2 + pose.turn[2] ** 2) ** 0.5 * 57.2958
+        tilt = math.degrees(math.hypot(*pose.turn[1:]))
         rows.append([
             str(pose.frame), f"{pose.shift[0] * 1e3:.2f} mm", f"{tilt:.1f}°",
             f"{pose.residual_px:.3f} px", f"{pose.expected_px:.3f} px",

@@ -82,8 +82,9 @@ class Labels:
                 f"the coordinate {name!r} has steps of {steps.min():.6g} to {steps.max():.6g} m but must "
                 "ascend evenly. Interpolate, or select with a slice."
             )
-        exact = known is not None and abs(known - mean) <= 1e-9 * mean
-        return places.tolist(), float(known) if exact else mean  # type: ignore[arg-type]
+        if known is not None and abs(known - mean) <= 1e-9 * mean:
+            return places.tolist(), float(known)
+        return places.tolist(), mean
 
 
 def to_xarray(data: np.ndarray, labels: Labels) -> Any:

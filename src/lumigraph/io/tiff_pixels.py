@@ -133,7 +133,7 @@ def _quiet() -> Iterator[None]:
             yield
             return
         try:
-            with open(os.devnull, "wb") as nowhere:  # noqa: PTH123
+            with open(os.devnull, "wb") as nowhere:  # noqa: PTH123 - a device, no file
                 os.dup2(nowhere.fileno(), 2)
             yield
         finally:

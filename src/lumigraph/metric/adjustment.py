@@ -166,7 +166,7 @@ def adjust(
     problem, kept, misfit = first, np.ones(len(corners), bool), first.misfit(unknowns)
     for number in range(_ROUNDS):
         loss = "linear" if number else "soft_l1"  # until wild corners are known
-        jacobian: Any = problem.jacobian
+        jacobian: Any = problem.jacobian  # SciPy's types know names of methods only
         found = least_squares(problem.residual, unknowns, jacobian, x_scale="jac", loss=loss, max_nfev=200)
         if found.status <= 0:
             raise CalibrationError(

@@ -43,6 +43,10 @@ def of_quadrature(path: str, accuracy: float) -> Reached:
     return Reached(accuracy * coarse ** (1 - towards) * fine**towards, f"{path} at accuracy {accuracy:g}")
 
 
+SINGLE_LENS = Reached(1e-4, "convolution with a point's image")
+"""Of a camera without lenslets."""
+
+
 def together(parts: Sequence[tuple[float, Reached]]) -> Reached | None:
     """Of a sum of images of the given norms, whose errors are independent."""
     if not parts:

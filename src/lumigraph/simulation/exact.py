@@ -12,15 +12,13 @@ from lumigraph.simulation.camera import Camera
 
 Part = Slice | Points | Diffuser
 
-_SINGLE_LENS = error.Reached(1e-4, "convolution with a point's image")
-
 
 def image_of(
     camera: Camera, part: Part, accuracy: float, progress: Progress
 ) -> tuple[np.ndarray, error.Reached]:
     """Raw image of a part in incoherent light, and how far off it is."""
     if camera.lattice is None:
-        return _without_lenslets(camera, part), _SINGLE_LENS
+        return _without_lenslets(camera, part), error.SINGLE_LENS
     if isinstance(part, Points):
         return points.points_image(camera, part, accuracy), error.of_quadrature("points", accuracy)
     if isinstance(part, Diffuser):

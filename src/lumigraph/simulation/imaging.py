@@ -97,7 +97,7 @@ def _imaged(
     scene: Scene,
     coherence: Coherence | Incoherent,
     progress: Progress | None,
-    map: Callable[..., Iterable[Any]],  # noqa: A002
+    map: Callable[..., Iterable[Any]],  # noqa: A002 - as `simulate` names it
 ) -> RawImage:
     light = Light(np.zeros(camera.image_grid.shape), np.zeros(camera.sensor.shape))
     slices, count, accuracy = [], 0, 1e-3
@@ -133,7 +133,7 @@ def _coloured(
     coherence: Coherence | Incoherent,
     spectrum: Spectrum,
     progress: Progress | None,
-    map: Callable[..., Iterable[Any]],  # noqa: A002
+    map: Callable[..., Iterable[Any]],  # noqa: A002 - as `simulate` names it
 ) -> RawImage:
     count = len(spectrum.wavelengths)
 

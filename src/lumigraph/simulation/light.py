@@ -14,7 +14,6 @@ from lumigraph.simulation.coherence import Coherence, Incoherent
 
 # Seen on a few cameras, 1e-2 to 3e-2; not estimated from the image.
 _PROPAGATED = error.Reached(0.03, "propagation on grids twice as fine as the rules ask")
-_SINGLE_LENS = error.Reached(1e-4, "convolution with a point's image")
 
 
 @dataclass(slots=True)
@@ -57,7 +56,7 @@ def read_out(camera: Camera, light: Light, coherence: Coherence | Incoherent) ->
     reached = list(light.reached)
     if light.intensity.any():
         seen = integrate(light.intensity, camera.image_grid, camera.sensor)
-        reached.append((error.norm(seen), _SINGLE_LENS if camera.lattice is None else _PROPAGATED))
+        reached.append((error.norm(seen), error.SINGLE_LENS if camera.lattice is None else _PROPAGATED))
         pixels = pixels + seen
     halves = {k: integrate(image, camera.image_grid, camera.sensor) for k, image in light.halves.items()}
     for half in halves.values():
