@@ -60,7 +60,7 @@ torch: $(READY)  ## optional: PyTorch, so that the array tests run on it too
 	@$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/python -m pip install --quiet --disable-pip-version-check "torch==2.13.0"
 
 lock: $(READY)  ## compile requirements.lock again (needs uv)
-	uv pip compile --universal --python-version 3.11 --generate-hashes --extra dev --extra video --no-emit-index-url --no-emit-find-links \
+	uv pip compile --universal --python-version 3.11 --generate-hashes --extra dev --extra video --extra board --no-emit-index-url --no-emit-find-links \
 		--custom-compile-command "make lock" -o requirements.lock pyproject.toml
 	uv pip compile --universal --python-version 3.11 --generate-hashes --extra docs --constraint requirements.lock --no-emit-index-url --no-emit-find-links \
 		--custom-compile-command "make lock" -o docs/requirements.lock pyproject.toml

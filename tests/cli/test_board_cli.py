@@ -32,7 +32,7 @@ def test_a_table_of_corners_gives_a_camera_with_intervals(table, capsys) -> None
     ("words", "said"),
     [
         (KNOWN, "give --board"),
-        (["--board", "7 x 5, 10 mm"], "give --focal-length, --pixel-pitch and --shape"),
+        (["--board", "7 x 5, 10 mm"], "give --focal-length, --pixel-pitch, --shape"),
         (["--board", "seven", *KNOWN], "must be written as '9 x 5 corners, 10 mm'"),
     ],
 )

@@ -1,20 +1,23 @@
 """`lumigraph board`."""
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from lumigraph.cli.console import progress
 from lumigraph.cli.files import check_output
 from lumigraph.cli.options import Output, length
+from lumigraph.cli.origin import NO_ORIGIN, Origin
 from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.core.result import Figure, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
+    from lumigraph.core.prepared import PreparedImage
     from lumigraph.metric import Board, Corners, Measured, Nominal
 
 
@@ -26,13 +29,13 @@ class Known:
     Parameters
     ----------
     focal_length
-        Of the main lens, such as '50 mm'.
+        Of the main lens, such as '50 mm'; that of --camera if left out.
     focal_length_error
         How well it is known, such as '1 mm'; 2 % if left out.
     pixel_pitch
-        Of the sensor, such as '5.5 um'.
+        Of the sensor, such as '5.5 um'; what the raw images or --camera say if left out.
     shape
-        Rows and columns of the raw images.
+        Rows and columns of the raw images, for a table of corners.
     """
 
     focal_length: str | None = None
@@ -40,80 +43,125 @@ class Known:
     pixel_pitch: str | None = None
     shape: tuple[int, int] | None = None
 
-    def nominal(self, given: "Nominal | None") -> "Nominal":
-        """Of the options, which come before what a folder says."""
-        from dataclasses import replace
-
+    def nominal(self, given: dict[str, Any]) -> "Nominal":
+        """Of the options, which come before what files say."""
         from lumigraph.metric import Nominal
 
         f, pitch = length("--focal-length", self.focal_length), length("--pixel-pitch", self.pixel_pitch)
-        if given is None and None in (f, pitch, self.shape):
-            raise FormatError("give --focal-length, --pixel-pitch and --shape of the camera.")
         known = {"focal_length": f, "pixel_pitch": pitch, "shape": self.shape}
-        known = {name: value for name, value in known.items() if value is not None}
-        nominal = Nominal(**known) if given is None else replace(given, **known)
+        known = given | {name: value for name, value in known.items() if value is not None}
+        lacking = [
+            f"--{name.replace('_', '-')}"
+            for name in ("focal_length", "pixel_pitch", "shape")
+            if name not in known
+        ]
+        if lacking:
+            raise FormatError(f"give {', '.join(lacking)} of the camera.")
+        nominal = Nominal(**known)
         error = length("--focal-length-error", self.focal_length_error)
         return nominal if error is None else replace(nominal, focal_length_error=error / nominal.focal_length)
 
 
 def board(
-    corners: Path,
+    sources: Annotated[tuple[Path, ...], Parameter(negative="")],
     /,
     *,
     board: Annotated[str | None, Parameter(name="--board")] = None,
+    origin: Origin = NO_ORIGIN,
     known: Known = Known(),
+    table: Path | None = None,
     output: Output | None = None,
     common: Reported = REPORTED,
 ) -> Result:
-    """Measure a plenoptic camera by a board of known size: its lengths, with their uncertainty.
+    """Measure a plenoptic camera 2.0 by a chessboard of known size: its lengths, with their uncertainty.
 
-    CORNERS says where lenslets show the board's corners on three or more pictures: a table (.csv) with the
-    columns frame, corner, y, x, center_y, center_x, kind; or a folder of COMPOTE's (bap.csv, centers.csv,
-    camera.json, scene.json), which also says what the board and the camera are.
+    SOURCES are raw images of the board, three or more, in which the corners are found (this needs OpenCV:
+    pip install 'lumigraph[board]'); or one table (.csv) of where lenslets show them, with the columns frame,
+    corner, y, x, center_y, center_x, kind; or one folder of COMPOTE's (bap.csv, centers.csv, camera.json,
+    scene.json), which also says what the board and the camera are.
+
+    Example: `lumigraph board raw1.png raw2.png raw3.png --white white.png --board "9 x 5 corners, 10 mm"
+    --focal-length "50 mm" --pixel-pitch "5.5 um" -o camera.json`
 
     Example: `lumigraph board corners.csv --board "9 x 5 corners, 10 mm" --focal-length "50 mm" --pixel-pitch
     "5.5 um" --shape 3068 4080 -o camera.json`
 
     Parameters
     ----------
-    corners
-        Table or folder.
+    sources
+        Raw images, or one table or folder.
     board
-        Corners across and down and their spacing, such as '9 x 5 corners, 10 mm'.
+        Inner corners across and down and their spacing, such as '9 x 5 corners, 10 mm'.
+    table
+        Where to write the corners that were found on raw images (.csv).
     output
         File for the camera (.json), which lumigraph.metric.load reads.
     """
     common.check()
-    if output is not None:
-        check_output(output, (".json",))
+    for path, endings in ((output, (".json",)), (table, (".csv",))):
+        if path is not None:
+            check_output(path, endings)
     from lumigraph import metric
 
-    seen, target, given = _read(corners)
-    if board is not None:
-        target = metric.Board.from_text(board)
-    if target is None:
-        raise FormatError("give --board, such as '9 x 5 corners, 10 mm'.")
+    target = None if board is None else metric.Board.from_text(board)
+    seen, target, given = _read(sources, target, origin)
     found = metric.board(seen, target, known.nominal(given))
+    written = [path for path in (output, table) if path is not None]
     if output is not None:
         metric.save(found, output)
+    if table is not None:
+        metric.save_corners(seen, table)
     return Result(
         "Board",
-        f"A camera measured by {len(seen)} corners of {corners.name}.",
+        f"A camera measured by {len(seen)} places of corners on {len(seen.frames)} pictures.",
         found,
         _headline(found),
         found.quantities(),
         lambda: _figures(found),
         found.notes,
-        () if output is None else (output,),
+        tuple(written),
     )
 
 
-def _read(path: Path) -> "tuple[Corners, Board | None, Nominal | None]":
+def _read(
+    sources: tuple[Path, ...], board: "Board | None", origin: Origin
+) -> "tuple[Corners, Board, dict[str, Any]]":
+    """Corners, their board, and what the files say of the camera."""
     from lumigraph import metric
 
-    if path.is_dir():
-        return metric.load_compote(path)
-    return metric.load_corners(path), None, None
+    first, alone = sources[0], len(sources) == 1
+    if alone and first.is_dir():
+        seen, told, known = metric.load_compote(first)
+        given = {name: getattr(known, name) for name in ("focal_length", "pixel_pitch", "shape")}
+        return seen, board or told, given
+    if board is None:
+        raise FormatError("give --board, such as '9 x 5 corners, 10 mm'.")
+    if alone and first.suffix.lower() == ".csv":
+        return metric.load_corners(first), board, {}
+    return _found(sources, board, origin)
+
+
+def _found(
+    sources: tuple[Path, ...], board: "Board", origin: Origin
+) -> "tuple[Corners, Board, dict[str, Any]]":
+    """Of raw images."""
+    from lumigraph import metric
+    from lumigraph.instruments import FocusedPlenopticCamera
+
+    ready = list(_prepared(sources, origin))
+    camera = origin.described("render")
+    with progress("board") as tell:
+        seen = metric.find_corners(ready, board, progress=tell)
+    told = {"shape": ready[0].shape, "pixel_pitch": ready[0].pixel_pitch}
+    if isinstance(camera, FocusedPlenopticCamera):
+        told |= {"focal_length": camera.main_lens.focal_length, "pixel_pitch": camera.sensor.pixel_pitch}
+    return seen, board, {name: value for name, value in told.items() if value is not None}
+
+
+def _prepared(sources: tuple[Path, ...], origin: Origin) -> "Iterator[PreparedImage]":
+    """Raw images ready to use."""
+    for path in sources:
+        yield origin.prepared(origin.read(path), use="render")
 
 
 def _headline(found: "Measured") -> tuple[str, ...]:

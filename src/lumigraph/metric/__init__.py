@@ -1,6 +1,7 @@
 """Cameras with lengths: calibrated from boards of known size, and distances of what they see.
 
 - `Board`: the known object; `Corners`: where its corners show on raw images.
+- `find_corners`: the same from raw images of a chessboard (`chessboard`).
 - `MetricCamera`: main lens, lenslets, sensor, as a geometry of rays (`geometry`).
 - `board`: the camera from corners, by bundle adjustment (`adjustment`) from a coarse search (`start`),
   with the noise of corners that are seen many times (`noise`). `Measured` holds it, its errors, the poses.
@@ -15,6 +16,7 @@ from lumigraph.metric.calibration import Measured, Pose, board
 from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.metric.files import load, load_compote, load_corners, save, save_corners
+from lumigraph.metric.finding import find_corners
 from lumigraph.metric.triangulation import Triangulated, triangulate
 
 __all__ = [
@@ -26,6 +28,7 @@ __all__ = [
     "Pose",
     "Triangulated",
     "board",
+    "find_corners",
     "load",
     "load_compote",
     "load_corners",

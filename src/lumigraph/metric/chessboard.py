@@ -1,0 +1,35 @@
+"""Chessboards on pictures, by OpenCV."""
+
+import numpy as np
+
+from lumigraph.errors import LumigraphError
+from lumigraph.metric.corners import Board
+
+
+def find(picture: np.ndarray, board: Board) -> np.ndarray | None:
+    """Inner corners (n, 2) as (y, x) [samples], row by row with rows downwards of columns to the right.
+
+    The first is at either end of a board that looks the same turned by 180°. None where the picture does
+    not show them all.
+    """
+    try:
+        import cv2
+    except ImportError as error:
+        raise LumigraphError(
+            "finding the board needs OpenCV. Install it with: pip install 'lumigraph[board]'."
+        ) from error
+    down, across = board.shape
+    flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
+    found, corners = cv2.findChessboardCornersSB(_eight_bits(picture), (across, down), flags=flags)
+    if not found:
+        return None
+    places = corners.reshape(down, across, 2)[..., ::-1].astype(np.float64)
+    (ay, ax), (by, bx) = places[0, -1] - places[0, 0], places[-1, 0] - places[0, 0]
+    # A mirrored order would be a board seen from behind.
+    return (places if ax * by - ay * bx > 0 else places[:, ::-1]).reshape(-1, 2)
+
+
+def _eight_bits(picture: np.ndarray) -> np.ndarray:
+    low, high = np.quantile(picture, (0.005, 0.995))
+    scaled = (picture - low) / (max(high - low, np.finfo(np.float32).tiny)) * 255
+    return np.clip(np.rint(scaled), 0, 255).astype(np.uint8)

@@ -1,0 +1,264 @@
+"""Corners of a chessboard in the micro-images of raw images of a plenoptic 2.0 camera."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from scipy.ndimage import map_coordinates, spline_filter
+
+from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.progress import Progress, silent
+from lumigraph.core.raw import RawImage
+from lumigraph.depth import correlation
+from lumigraph.errors import CalibrationError
+from lumigraph.metric import chessboard
+from lumigraph.metric.corners import Board, Corners
+from lumigraph.preparation import of_raw
+from lumigraph.rendering import render
+from lumigraph.rendering.interpolate import as_float
+from lumigraph.rendering.patches import Layout, Patches
+
+_LEAST_SEEN = 3
+"""Lenslets that must show a corner."""
+
+_WINDOW = 0.35
+"""Half the window about a corner, over the way to the nearest other one: no window holds two."""
+
+_NARROW = 0.1
+"""The same over the pitch: wide windows fit into few micro-images."""
+
+_RADII = (2, 6)  # px: of windows
+_ROUNDS = 3  # corners found, places of the next round told by those found
+_STEPS = 12  # of one search
+_STRAY = 2.5  # px: from where a corner is expected
+_ODD = 0.15
+"""Part of a window's contrast that changes when it is turned by 180°: a corner has none but noise."""
+
+_STILL = 0.02  # px: of the last step
+
+_OFF = 3.0  # times the median distance from the corner's own line
+
+
+def find_corners(
+    raws: Sequence[RawImage | Array],
+    board: Board,
+    calibration: Calibration | None = None,
+    *,
+    progress: Progress = silent,
+) -> Corners:
+    """Where lenslets show the corners of a chessboard, on raw images of a plenoptic 2.0 camera.
+
+    A picture is rendered of each raw image, sharp all over (`lumigraph.depth.correlation`), and the board
+    found on it by OpenCV. That says where each lenslet should show each corner; there it is looked for in
+    the micro-image itself, as the saddle of the brightness, which no even blur moves. All places of one
+    corner must lie on its line, place = centre - k (X - centre): others are left out.
+
+    Parameters
+    ----------
+    raws
+        Pictures (y, x[, c]) of the whole board, best by `lumigraph.prepare` with a white image: without one
+        the edges of micro-images pull corners outwards. They are numbered from 0.
+    board
+        Inner corners of a chessboard with a white margin.
+    calibration
+        Of raw images that were not prepared.
+    progress
+        Called as ``progress(fraction)``.
+
+    Raises
+    ------
+    CalibrationError
+        No pictures, one without the whole board, or squares too small to be told apart behind a lenslet.
+    LumigraphError
+        OpenCV is not installed.
+
+    References
+    ----------
+    The board: A. Duda and U. Frese, "Accurate detection and localization of checkerboard corners for
+    calibration", BMVC 2018. Corners in micro-images: M. Labussiere et al., IJCV 130 (2022); here by saddles.
+    """
+    found = []
+    for frame, raw in enumerate(raws):
+        found.append(_on_picture(raw, calibration, board, frame))
+        progress((frame + 1) / len(raws))
+    if not found:
+        raise CalibrationError("there are no raw images. Give three or more of the board.")
+    return Corners(*(np.concatenate(column) for column in zip(*found, strict=True)))
+
+
+@of_raw
+def _on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: int) -> tuple[np.ndarray, ...]:
+    """Columns of `Corners` of one raw image."""
+    image = to_numpy(as_float(raw.data))
+    raw = replace(raw, data=image.mean(2) if image.ndim == 3 else image)
+    lines = _Lines.of(raw, calibration, board, frame)
+    search = _Search.of(raw.data, lines.window(calibration.lattice.pitch, board, frame))
+    lines, sights = search.found(lines, calibration)
+    for _ in range(_ROUNDS - 1):
+        lines, sights = search.found(lines, calibration)
+    if not len(sights):
+        raise CalibrationError(
+            f"picture {frame} shows the board, but no corner behind {_LEAST_SEEN} lenslets or more. Move the "
+            "board to where the micro-images are sharp."
+        )
+    kinds = calibration.lattice.kind(*sights.index.T)
+    return np.full(len(sights), frame), sights.corner, sights.center + sights.way, sights.center, kinds
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sights:
+    """n pairs of corner and lenslet: way from the micro-image's centre to the corner (n, 2) [px]."""
+
+    corner: np.ndarray
+    index: np.ndarray
+    flat: np.ndarray
+    center: np.ndarray
+    way: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.corner)
+
+    def __getitem__(self, chosen: np.ndarray) -> "_Sights":
+        return _Sights(*(getattr(self, f.name)[chosen] for f in fields(self)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Lines:
+    """Each corner's place in the lattice (k, 2) [px], and how far its image moves against a lenslet (k,)."""
+
+    places: np.ndarray
+    ratio: np.ndarray
+
+    @classmethod
+    def of(cls, raw: RawImage, calibration: Calibration, board: Board, frame: int) -> "_Lines":
+        """From the board on the rendered picture."""
+        sizes = correlation(raw, calibration).values
+        patches = Patches.of(sizes, calibration)
+        layout = Layout.of(calibration, patches, None)
+        seen = chessboard.find(render(raw, calibration, sizes, blend=True), board)
+        if seen is None:
+            down, across = board.shape
+            raise CalibrationError(
+                f"picture {frame} does not show a whole chessboard of {across} x {down} inner corners with a "
+                "white margin. Leave the picture out, or give the board's own numbers."
+            )
+        places = np.stack([layout.y[0], layout.x[0]]) + layout.step * seen
+        indices = np.linalg.solve(
+            calibration.lattice.matrix, (places - np.asarray(calibration.lattice.origin)).T
+        )
+        return cls(places, patches.between(*indices) / calibration.lattice.pitch * np.ones(len(places)))
+
+    def window(self, pitch: float, board: Board, frame: int) -> int:
+        """Radius of the window about a corner behind a lenslet [px]."""
+        lattice = (self.places * np.abs(self.ratio)[:, None]).reshape(*board.shape, 2)
+        nearest = min(float(np.hypot(*np.moveaxis(np.diff(lattice, axis=k), -1, 0)).min()) for k in (0, 1))
+        least, most = _RADII
+        if nearest * _WINDOW < least:
+            raise CalibrationError(
+                f"on picture {frame} the squares are {nearest:.3g} px wide behind a lenslet, but "
+                f"{least / _WINDOW:.3g} px are needed. Use a board with larger squares, or bring it nearer."
+            )
+        return max(least, min(most, int(nearest * _WINDOW), round(pitch * _NARROW)))
+
+    def sights(self, calibration: Calibration, margin: int) -> _Sights:
+        """Lenslets that should show each corner with `margin` [px] around it."""
+        (rows, columns), pitch = calibration.shape, calibration.lattice.pitch
+        index = calibration.indices_within((0, rows - 1), (0, columns - 1))
+        flat = calibration.lattice.position(index)
+        way = -self.ratio[:, None, None] * (self.places[:, None] - flat)
+        lit = (calibration.fill or 1.0) * pitch / 2 - margin - 1
+        corner, lenslet = np.nonzero(np.hypot(way[..., 0], way[..., 1]) <= lit)
+        chosen = index[lenslet]
+        return _Sights(corner, chosen, flat[lenslet], calibration.position(chosen), way[corner, lenslet])
+
+    def fitted(self, sights: _Sights) -> tuple["_Lines", _Sights]:
+        """The lines that fit the sights of each corner, and the sights on them."""
+        places, ratio, kept = self.places.copy(), self.ratio.copy(), np.zeros(len(sights), bool)
+        for corner in np.unique(sights.corner):
+            mine = np.flatnonzero(sights.corner == corner)
+            place, slope, fit = _line(sights.flat[mine], sights.way[mine])
+            if fit.sum() >= _LEAST_SEEN:
+                places[corner], ratio[corner], kept[mine] = place, slope, fit
+        return replace(self, places=places, ratio=ratio), sights[kept]
+
+
+def _line(flat: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+    """X and k of way = -k (X - flat), and which ways lie on it."""
+    fit = np.ones(len(way), bool)
+    place, slope = np.zeros(2), 0.0
+    for _ in range(4):
+        if fit.sum() < _LEAST_SEEN:
+            return place, slope, np.zeros(len(way), bool)
+        middle, mean = flat[fit].mean(0), way[fit].mean(0)
+        across, moved = flat[fit] - middle, way[fit] - mean
+        slope = float((across * moved).sum() / (across**2).sum())
+        place = middle - mean / slope
+        off = np.hypot(*(way + slope * (place - flat)).T)
+        fit = off <= max(0.3, _OFF * float(np.median(off[fit])))
+    return place, slope, fit
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Search:
+    """A raw image in which saddles of the brightness are looked for, in windows of a radius [px]."""
+
+    splines: np.ndarray
+    radius: int
+
+    @classmethod
+    def of(cls, image: np.ndarray, radius: int) -> "_Search":
+        return cls(spline_filter(image.astype(np.float64), 3), radius)
+
+    def found(self, lines: _Lines, calibration: Calibration) -> tuple[_Lines, _Sights]:
+        """Corners where lines expect them, and the lines that they are on."""
+        return lines.fitted(self.settled(lines.sights(calibration, self.radius)))
+
+    def settled(self, sights: _Sights) -> _Sights:
+        """The sights of saddles near the expected places, moved there."""
+        y, x = _disc(self.radius)
+        solve, at = _quadratic(y, x, self.radius / 2), sights.way
+
+        def step(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            return _towards_saddle(self._windows(sights.center + at, y, x) @ solve)
+
+        for _ in range(_STEPS):
+            at = at + step(at)[0]
+        move, saddle = step(at)
+        near = np.hypot(*(at - sights.way).T) < _STRAY
+        kept = saddle & near & (np.hypot(*move.T) < _STILL)
+        kept[kept] = _odd(self._windows((sights.center + at)[kept], y, x)) < _ODD
+        return replace(sights, way=at)[kept]
+
+    def _windows(self, at: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        places = np.stack([at[:, :1] + y, at[:, 1:] + x])
+        return map_coordinates(self.splines, places, order=3, mode="nearest", prefilter=False)
+
+
+def _disc(radius: int) -> np.ndarray:
+    """Ways (2, k) from the middle of a round window to its pixels."""
+    ways = np.mgrid[-radius : radius + 1, -radius : radius + 1].reshape(2, -1).astype(np.float64)
+    return ways[:, np.hypot(*ways) <= radius + 0.5]
+
+
+def _odd(values: np.ndarray) -> np.ndarray:
+    """Part of the contrast of windows (n, k) that turns its sign when they are turned by 180°."""
+    values = values - values.mean(1, keepdims=True)
+    return ((values - values[:, ::-1]) ** 2).sum(1) / np.maximum(4 * (values**2).sum(1), 1e-30)
+
+
+def _quadratic(y: np.ndarray, x: np.ndarray, width: float) -> np.ndarray:
+    """From values (n, k) to the terms (n, 6) of the quadratic 1, y, x, y²/2, yx, x²/2 that fits them best."""
+    weight = np.exp(-(y**2 + x**2) / (4 * width**2))  # its square is a Gaussian of `width`
+    terms = np.stack([np.ones_like(y), y, x, y * y / 2, y * x, x * x / 2], 1)
+    return (np.linalg.pinv(terms * weight[:, None]) * weight).T
+
+
+def _towards_saddle(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Step (n, 2) [px], at most 1, to where the gradient is 0, and which quadratics are saddles."""
+    _, gy, gx, yy, yx, xx = terms.T
+    determinant = yy * xx - yx**2
+    saddle = determinant < 0
+    safe = np.where(saddle, determinant, -np.inf)
+    step = np.stack([(yx * gx - xx * gy) / safe, (yx * gy - yy * gx) / safe], 1)
+    return np.clip(step, -1.0, 1.0), saddle

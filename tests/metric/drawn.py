@@ -1,0 +1,94 @@
+"""Raw images of a chessboard, drawn by rays through a known camera."""
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.lattice import Lattice
+from lumigraph.metric import Board, MetricCamera, geometry
+
+BOARD = Board((4, 5), 2.8e-3)
+SHAPE, PITCH, PIXEL = (420, 500), 24.3, 5.5e-6
+LIT = 0.94
+
+
+def camera(side: float, kinds: int = 1) -> MetricCamera:
+    """Keplerian (side 1) or Galilean (-1), of m = 0.3 for what is 0.45 m away."""
+    image, b = 50e-3 * 0.45 / 0.4, 0.45e-3
+    separation = image + side * b / 0.3
+    gains = (1.0, 1.006, 0.994)[:kinds]
+    axis = (SHAPE[0] / 2 + 3, SHAPE[1] / 2 - 4)
+    return MetricCamera(
+        50e-3, separation, b, 0.9 * separation, PIXEL, axis, (4e-4, -6e-4), (0.05, 0.0, 0.0), gains=gains
+    )
+
+
+def calibration(kinds: int = 1) -> Calibration:
+    """Of its hexagonal array, turned a little."""
+    none = np.zeros((0, 2))
+    lattice = Lattice.hex(PITCH, 0.004, (12.3, 13.1), kinds=kinds)
+    return Calibration(lattice, SHAPE, none.astype(int), none, 0.0, pixel_pitch=PIXEL, fill=LIT)
+
+
+def pose(turn: tuple[float, float, float], distance: float = 0.45, board: Board = BOARD) -> np.ndarray:
+    """Of a board whose middle is on the axis."""
+    middle = np.array([0.0, *((n - 1) / 2 * board.spacing for n in board.shape)])
+    turned = geometry.moved(middle, np.array([*turn, 0.0, 0.0, 0.0]))
+    return np.concatenate([turn, np.array([distance, 0.0, 0.0]) - turned])
+
+
+def raw(seen_by: MetricCamera, where: np.ndarray, kinds: int = 1, blur: float = 0.7) -> np.ndarray:
+    """Raw image (y, x) of an evenly lit board, with 1 % of noise."""
+    place, center, kind = _pixels(kinds)
+    at, scale = _on_board(seen_by, where, place, center, kind)
+    lit = _lit(place, center)
+    noise = np.random.default_rng(0).normal(0, 0.01, SHAPE)
+    return (gaussian_filter((lit * _squares(at, scale)).reshape(SHAPE), blur) + noise).astype(np.float32)
+
+
+def white(kinds: int = 1, blur: float = 0.7) -> np.ndarray:
+    """White image (y, x)."""
+    place, center, _ = _pixels(kinds)
+    return gaussian_filter(_lit(place, center).reshape(SHAPE), blur).astype(np.float32)
+
+
+def _pixels(kinds: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places of all pixels, centres of their micro-images, kinds of their lenslets."""
+    known, place = calibration(kinds), np.stack([each.ravel() for each in np.indices(SHAPE)], 1)
+    index = np.stack(known.index(*place.T), -1)
+    return place, known.position(index), known.lattice.kind(*index.T)
+
+
+def _lit(place: np.ndarray, center: np.ndarray) -> np.ndarray:
+    """Light of each pixel, softer at the edge than a pixel."""
+    return np.clip(LIT * PITCH / 2 - np.hypot(*(place - center).T) + 0.5, 0, 1)
+
+
+def _on_board(
+    seen_by: MetricCamera, where: np.ndarray, pixel: np.ndarray, center: np.ndarray, kind: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points of the board (n, 2) [m] that pixels see, by Newton's method, and metres a pixel (n,)."""
+    at = np.full((len(pixel), 2), 8e-3)
+    for _ in range(5):
+        here, down, across = (
+            _seen(seen_by, where, at + step, center, kind) for step in ((0, 0), (1e-6, 0), (0, 1e-6))
+        )
+        slope = np.stack([down - here, across - here], -1) / 1e-6
+        at = at - np.clip(np.linalg.solve(slope, (here - pixel)[..., None])[..., 0], -0.02, 0.02)
+    return at, 1 / np.sqrt(np.abs(np.linalg.det(slope)))
+
+
+def _seen(
+    seen_by: MetricCamera, where: np.ndarray, at: np.ndarray, center: np.ndarray, kind: np.ndarray
+) -> np.ndarray:
+    points = np.concatenate([np.zeros((len(at), 1)), at], 1)
+    return seen_by.project(geometry.moved(points, where), center, kind)
+
+
+def _squares(at: np.ndarray, soft: np.ndarray) -> np.ndarray:
+    """Brightness (n,) of the board, its edges as soft as a pixel."""
+    cells = at / BOARD.spacing
+    edges = np.abs(np.mod(cells + 0.5, 2) - 1) - 0.5
+    sharp = np.clip(2 * edges * (BOARD.spacing / soft)[:, None], -1, 1).prod(1)
+    outside = (cells < -1).any(1) | (cells > np.array(BOARD.shape)).any(1)
+    return np.where(outside, 0.9, 0.5 + 0.4 * sharp)
