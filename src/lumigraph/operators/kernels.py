@@ -16,10 +16,11 @@ from lumigraph.core.cache import ByteCache
 from lumigraph.core.progress import Progress
 from lumigraph.errors import SamplingError
 from lumigraph.operators.blocks import Part, build
-from lumigraph.operators.glare import Glare, glare
+from lumigraph.operators.glare import Glare, aside, glare
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.sizes import build_bytes, build_operations
 from lumigraph.operators.streamed import Streamed, stream_bytes, streamed
+from lumigraph.operators.white import endless
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,20 +32,20 @@ class Matrix:
     parts
         The periodic one, then those at the array's border.
     glare
-        The rest: faint, and far from the diagonal.
+        The rest, faint and far from the diagonal: what the main lens sends there, and the lenslets.
     margin
         Cells (y, x) beyond the rings around the array whose points reach into them.
     """
 
     parts: tuple[Part, ...]
-    glare: Glare
+    glare: tuple[Glare, Glare]
     margin: tuple[int, int]
 
     @property
     def nbytes(self) -> int:
         """Memory that it takes [bytes]."""
         shared = {part.right.ctypes.data: part.factor.nbytes + part.right.nbytes for part in self.parts}
-        return sum(shared.values()) + self.glare.spectra.nbytes + self.glare.pictures.nbytes
+        return sum(shared.values()) + sum(g.spectra.nbytes + g.pictures.nbytes for g in self.glare)
 
 
 _MATRICES = ByteCache()
@@ -117,7 +118,8 @@ def _require(optics: Optics) -> None:
 def _build(optics: Optics, progress: Progress | None = None) -> dict[str, np.ndarray]:
     """The matrix as a few arrays: the factors of all parts side by side."""
     found, per = build(optics, progress), optics.cells
-    rest = glare(found.means, per)
+    even, sent = endless(optics)
+    rest = glare(found.means, per, even - sent)
     left = np.empty((found.ranks, math.prod(per.points)), np.float32)
     right = np.empty((found.ranks, math.prod(per.samples)), np.float32)
     places, offsets, mine, last = [], [], slice(0, 0), None
@@ -137,6 +139,7 @@ def _build(optics: Optics, progress: Progress | None = None) -> dict[str, np.nda
         "right": right,
         "spectra": rest.spectra,
         "pictures": rest.pictures,
+        "aside": np.array([sent, optics.axes[0].neighbourhood]),
     }
 
 
@@ -149,4 +152,5 @@ def _unpacked(arrays: dict[str, np.ndarray], optics: Optics) -> Matrix:
         left, right = arrays["left"][:, ranks], arrays["right"][ranks]
         parts.append(Part(range(*ranges[:3]), range(*ranges[3:]), tuple(offsets), left, right))
         first += count
-    return Matrix(tuple(parts), Glare(arrays["spectra"], arrays["pictures"], optics.cells, margin), margin)
+    rest = Glare(arrays["spectra"], arrays["pictures"], optics.cells, margin)
+    return Matrix(tuple(parts), (rest, aside(optics.cells, margin, *arrays["aside"].tolist())), margin)

@@ -12,7 +12,7 @@ from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.cell_response import SLACK, Axis
 from lumigraph.operators.cells import Cells, Fineness
 
-VERSION = 8
+VERSION = 9
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 

@@ -33,14 +33,14 @@ from lumigraph.core.linear import Linear, Shape
 from lumigraph.core.progress import Progress
 from lumigraph.core.progress import part as part_of
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators.blocks import Offset, Part
+from lumigraph.operators.beyond import Beyond, beyond
+from lumigraph.operators.blocks import Part
 from lumigraph.operators.camera import HasOptics
-from lumigraph.operators.cells import HALF_WIDTH, Cells
+from lumigraph.operators.cells import Cells
 from lumigraph.operators.kernels import Matrix, matrix
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.resampling import averaged, represented
 from lumigraph.operators.streamed import Streamed
-from lumigraph.operators.turning import Crop, Turn, turn_margin
+from lumigraph.operators.tiles import as_plane, by_cell, readout, spread
 
 PIECE = 600
 """Cells of the image that are computed at a time."""
@@ -56,10 +56,13 @@ class Plane:
         From the points of the object's cells to the image's.
     spread
         From the object's samples to those points.
+    beyond
+        Light from farther away, where the object reaches there.
     """
 
     matrix: Matrix | Streamed
     spread: Linear
+    beyond: Beyond | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -100,19 +103,23 @@ class PeriodicOperator(Linear):
         like = {"dtype": intensity.dtype, "device": intensity.device}
         image = xp.zeros((rows, columns, math.prod(self.cells.samples)), **like)
         for k, plane in enumerate(self.planes):
-            points = _by_cell(
+            points = by_cell(
                 plane.spread.forward(layers[k, ...]), self.cells, self.cells.points, plane.matrix.margin[0]
             )
             for part in _pieces(plane.matrix.parts):
                 mine = (_slice(part.rows), _slice(part.columns), slice(None))
                 for group in _groups(part, plane.matrix.margin):
                     image[mine] += group.seen(points) @ arrays.like(group.right, image)
-            image += plane.matrix.glare.forward(xp.sum(points, axis=2))
-        return self.readout.forward(_as_plane(image, self.cells, self.cells.samples))
+            light = xp.sum(points, axis=2)
+            for glare in plane.matrix.glare:
+                image += glare.forward(light)
+            if plane.beyond is not None:
+                image += plane.beyond.forward(layers[k, ...])
+        return self.readout.forward(as_plane(image, self.cells, self.cells.samples))
 
     def _adjoint(self, raw: Array) -> Array:
         xp = arrays.namespace(raw)
-        image = _by_cell(self.readout.adjoint(raw), self.cells, self.cells.samples)
+        image = by_cell(self.readout.adjoint(raw), self.cells, self.cells.samples)
         layers = [self._returned(plane, image) for plane in self.planes]
         return layers[0] if self.depths is None else xp.stack(layers, axis=0)
 
@@ -125,8 +132,10 @@ class PeriodicOperator(Linear):
             mine = image[_slice(part.rows), _slice(part.columns), :]
             for group in _groups(part, margin):
                 group.return_to(points, mine @ xp.matrix_transpose(arrays.like(group.right, image)))
-        points += xp.expand_dims(plane.matrix.glare.adjoint(image), axis=2)
-        return plane.spread.adjoint(_as_plane(points, self.cells, self.cells.points, margin[0]))
+        for glare in plane.matrix.glare:
+            points += xp.expand_dims(glare.adjoint(image), axis=2)
+        layer = plane.spread.adjoint(as_plane(points, self.cells, self.cells.points, margin[0]))
+        return layer if plane.beyond is None else layer + plane.beyond.adjoint(image)
 
     @property
     def memory_bytes(self) -> float:
@@ -278,82 +287,7 @@ def periodic_operator(
 
 
 def _plane(optics: Optics, matrix: Matrix | Streamed, grid: Grid) -> Plane:
-    """The spread of an object's samples onto the points of the cells, turned with the array."""
-    cells, camera = optics.cells, optics.camera
+    """The spread of an object's samples onto the points of the cells, and what lies beyond these."""
+    cells = optics.cells
     ring = (cells.ring[0] + matrix.margin[0], cells.ring[1] + matrix.margin[1])
-    scale = -optics.distance / camera.separation
-    if not optics.rotation:
-        return Plane(matrix, represented(grid, cells.grid(cells.points, scale, ring), HALF_WIDTH))
-    wide = _widened(cells.grid(cells.points, 1.0, ring), optics)
-    turn = Turn(cells.grid(cells.points, 1.0, wide), optics.rotation)
-    spread = represented(grid, cells.grid(cells.points, scale, wide), HALF_WIDTH)
-    return Plane(matrix, _cropped(turn.grid, wide, ring, cells.points) @ turn @ spread)
-
-
-def readout(optics: Optics) -> Linear:
-    """Means over the pixels of the image's samples, turned back."""
-    cells, pixels = optics.cells, optics.camera.sensor.grid
-    if not optics.rotation:
-        return averaged(cells.grid(cells.samples, optics.image_scale, cells.ring), pixels)
-    wide = _widened(cells.grid(cells.samples, 1.0, cells.ring), optics)
-    turn = Turn(cells.grid(cells.samples, 1.0, wide), -optics.rotation)
-    mean = averaged(cells.grid(cells.samples, optics.image_scale, wide), pixels)
-    return mean @ turn @ _cropped(turn.grid, wide, cells.ring, cells.samples).T
-
-
-def _cropped(plane: Grid, wide: Offset, ring: Offset, per_cell: Offset) -> Crop:
-    """From cells in a wide ring to those in a narrower one."""
-    y, x = ((w - r) * n for w, r, n in zip(wide, ring, per_cell, strict=True))
-    return Crop(plane.shape, (y, x))
-
-
-def _widened(grid: Grid, optics: Optics) -> tuple[int, int]:
-    """Cells around the array that hold the grid's plane when it is turned."""
-    size, cells = grid.size, optics.cells
-    extra = turn_margin((size[0], size[1]), optics.rotation)
-    wide = []
-    for k in (0, 1):
-        ring = (grid.size[k] / cells.size[k] - cells.count[k]) / 2
-        wide.append(math.ceil(ring + extra[k] / cells.size[k]))
-    return wide[0], wide[1]
-
-
-def _by_cell(plane: Array, cells: Cells, per_cell: tuple[int, int], margin: int = 0) -> Array:
-    """(rows ky, columns kx) to (rows, columns, ky kx); there are `margin` more rows beyond the image's."""
-    step = cells.step(per_cell)
-    if not step:
-        tiles = arrays.tiled(plane, per_cell)
-        return arrays.namespace(plane).reshape(tiles, (*tiles.shape[:2], math.prod(per_cell)))
-    xp, (rows, columns) = arrays.namespace(plane), _inside(plane.shape, per_cell)
-    found = xp.zeros((rows, columns, math.prod(per_cell)), dtype=plane.dtype, device=arrays.device(plane))
-    lines = xp.reshape(plane, (rows, per_cell[0], plane.shape[1]))
-    for mine, across in _staggered(cells, columns * per_cell[1], step, margin):
-        tiles = xp.reshape(lines[mine, :, across], (-1, per_cell[0], columns, per_cell[1]))
-        tiles = xp.permute_dims(tiles, (0, 2, 1, 3))
-        found[mine, :, :] = xp.reshape(tiles, (*tiles.shape[:2], math.prod(per_cell)))
-    return found
-
-
-def _as_plane(image: Array, cells: Cells, per_cell: tuple[int, int], margin: int = 0) -> Array:
-    """(rows, columns, ky kx) to (rows ky, columns kx): the transpose of `_by_cell`."""
-    xp, (rows, columns, _), step = arrays.namespace(image), image.shape, cells.step(per_cell)
-    if not step:
-        return arrays.untiled(xp.reshape(image, (rows, columns, *per_cell)))
-    width = columns * per_cell[1]
-    lines = xp.zeros((rows, per_cell[0], width + step), dtype=image.dtype, device=arrays.device(image))
-    for mine, across in _staggered(cells, width, step, margin):
-        tiles = xp.reshape(image[mine, :, :], (-1, columns, *per_cell))
-        lines[mine, :, across] = xp.reshape(xp.permute_dims(tiles, (0, 2, 1, 3)), (-1, per_cell[0], width))
-    return xp.reshape(lines, (rows * per_cell[0], width + step))
-
-
-def _inside(shape: Sequence[int], per_cell: tuple[int, int]) -> tuple[int, int]:
-    """Whole cells in a plane of so many samples."""
-    return shape[0] // per_cell[0], shape[1] // per_cell[1]
-
-
-def _staggered(cells: Cells, width: int, step: int, margin: int) -> Iterator[tuple[slice, slice]]:
-    """Rows of a parity, and the samples of a line that lie in their cells."""
-    for parity in cells.parities:
-        across = slice(parity * step, parity * step + width)
-        yield slice((cells.ring[0] + margin + parity) % 2, None, 2), across
+    return Plane(matrix, spread(optics, grid, cells.points, ring), beyond(optics, grid, matrix.glare[0]))

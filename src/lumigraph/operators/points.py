@@ -10,9 +10,9 @@ import numpy as np
 from lumigraph.operators.camera import HasOptics
 from lumigraph.operators.cells import FINEST
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.periodic import readout
 from lumigraph.operators.point_light import PointLight, point_light
 from lumigraph.operators.relay import Relay, relay
+from lumigraph.operators.tiles import readout
 from lumigraph.scene import Points
 
 LEFT_OUT = 0.3

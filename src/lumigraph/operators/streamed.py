@@ -46,7 +46,7 @@ class Streamed:
     """
 
     builder: Builder
-    glare: Glare
+    glare: tuple[Glare, ...]
     margin: Offset
     progress: Progress | None
 
@@ -101,7 +101,7 @@ def streamed(optics: Optics, progress: Progress | None = None) -> Streamed:
     """Of one depth."""
     builder = Builder(optics, lambda _: None, WORKERS)
     means = builder.means_at_the_end()
-    return Streamed(builder, glare([means], optics.cells), optics.reach, progress)
+    return Streamed(builder, (glare([means], optics.cells),), optics.reach, progress)
 
 
 def uses(builder: Builder) -> dict[State, list[Use]]:

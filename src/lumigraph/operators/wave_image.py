@@ -160,6 +160,11 @@ class WaveImage:
         return max(0.0, 1 - float(np.mean(np.abs(total) ** 2, dtype=np.float64)) / self.through)
 
     @property
+    def farthest(self) -> float:
+        """Where half of the light has faded out [m]."""
+        return self.sides[0].axis.neighbourhood * (1 - FADING / 2)
+
+    @property
     def samples(self) -> int:
         """Of the wave's image, all in all."""
         return math.prod(side.length for side in self.sides)

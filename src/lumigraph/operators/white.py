@@ -11,7 +11,7 @@ cells around; its faint fringes are left out.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import fft
@@ -21,8 +21,9 @@ from scipy.special import j1
 from lumigraph.core import arrays
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import HasOptics
+from lumigraph.operators.glare import fallen
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.periodic import readout
+from lumigraph.operators.tiles import readout
 from lumigraph.operators.wave_image import WaveImage
 
 ASIDE = 0.16
@@ -54,6 +55,28 @@ def white_image(camera: HasOptics, accuracy: float) -> tuple[np.ndarray, float]:
     image = image.reshape([n * k for n, k in zip(cells.image, cells.samples, strict=True)])
     raw = readout(optics).forward(image.astype(np.float32) / optics.image_scale**2)
     return raw, FRINGES * _aside(optics, pitches) * float(far.max())
+
+
+def endless(optics: Optics) -> tuple[np.ndarray, float]:
+    """Image (kinds, samples) in a cell of each kind, of light of 1 on lenslets that go on for ever.
+
+    And how much of it comes from farther than the operator follows light from lenslets.
+    """
+    lattice, cells = optics.array.lattice, optics.cells
+    rows, columns = 1 + cells.staggered, lattice.kinds if cells.staggered else 1
+    period = replace(
+        cells, size=(rows * cells.size[0], columns * cells.size[1]), count=(1, 1), ring=(0, 0),
+        samples=(rows * cells.samples[0], columns * cells.samples[1]), staggered=False, kinds=1,
+    )  # fmt: skip
+    followed = optics.axes[0].neighbourhood
+    optics = replace(optics, array=replace(optics.array, extent=None), cells=period)
+    wave = WaveImage.of(optics, _pitches(optics))
+    aside = wave.aside() * wave.through / optics.image_scale**2
+    image = _averaged(np.abs(wave.amplitude()) ** 2, optics)[0, :, 0] / optics.image_scale**2 + aside
+    tiles = image[: cells.samples[0]].reshape(cells.samples[0], columns, cells.samples[1])
+    first = [cells.columns(cells.ring[1], cells.ring[1] + columns, 0, k)[0] for k in range(cells.kinds)]
+    pictures = np.array([tiles[:, k - cells.ring[1]].ravel() for k in first])
+    return pictures, aside * wave.farthest / followed
 
 
 def _pitches(optics: Optics) -> float:
@@ -92,8 +115,7 @@ def _far(wave: WaveImage) -> np.ndarray:
         return np.ones(cells.image)
     y, x = (np.arange(1 - n, n) * size for n, size in zip(cells.image, cells.size, strict=True))
     distance = np.hypot(y[:, None], x)
-    law = np.where(distance > reach, reach / (2 * np.pi * np.maximum(distance, reach) ** 3), 0.0)
-    law *= math.prod(cells.size)
+    law = fallen(distance, reach) * math.prod(cells.size)
     there = np.pad(np.ones(cells.count), [(r, r) for r in cells.ring])
     return fftconvolve(there, law, mode="same")
 
