@@ -146,14 +146,14 @@ def _found(
 ) -> "tuple[Corners, Board, dict[str, Any]]":
     """Of raw images."""
     from lumigraph import metric
-    from lumigraph.instruments import FocusedPlenopticCamera
+    from lumigraph.instruments.capabilities import WithMainLens
 
     ready = list(_prepared(sources, origin))
     camera = origin.described("render")
     with progress("board") as tell:
         seen = metric.find_corners(ready, board, progress=tell)
     told = {"shape": ready[0].shape, "pixel_pitch": ready[0].pixel_pitch}
-    if isinstance(camera, FocusedPlenopticCamera):
+    if isinstance(camera, WithMainLens):
         told |= {"focal_length": camera.main_lens.focal_length, "pixel_pitch": camera.sensor.pixel_pitch}
     return seen, board, {name: value for name, value in told.items() if value is not None}
 
