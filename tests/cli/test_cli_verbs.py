@@ -150,7 +150,18 @@ def test_simulate_tells_the_estimated_error(lumigraph, bench, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "scene", ["white", "usaf1951", "siemens_star", "gratings", "slanted_edge", "edge", "pinhole", "photo"]
+    "scene",
+    [
+        "white",
+        "usaf1951",
+        "siemens_star",
+        "gratings",
+        "slanted_edge",
+        "edge",
+        "pinhole",
+        "chessboard",
+        "photo",
+    ],
 )
 def test_every_named_scene_fits_the_camera(lumigraph, bench, monkeypatch, scene):
     monkeypatch.setattr("lumigraph.simulation.simulate", lambda *_, **__: io.open(bench / "raw.tiff"))

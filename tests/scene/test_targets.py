@@ -178,3 +178,24 @@ def test_white_is_a_diffuser():
 def test_a_pinhole_outside_the_grid_is_refused():
     with pytest.raises(GeometryError, match=r"the pinhole at \(0\.001, 0\) m lies outside the grid"):
         targets.pinhole(Grid.square(10, 1 * UM), position=(1e-3, 0))
+
+
+def test_a_chessboard_has_its_corners_where_they_are_told():
+    grid, angle = Grid.square(400, 1e-4), 0.3
+    board = targets.chessboard(grid, (3, 4), 5e-3, angle=angle, position=(1e-3, -2e-3)).parts[0].intensity
+    turned = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    for row in range(3):
+        for column in range(4):
+            y, x = turned @ (np.array([row - 1, column - 1.5]) * 5e-3) + (1e-3, -2e-3)
+            corner = np.array([y, x]) / 1e-4 + 200
+            steps = turned @ np.array([[1, 1, -1, -1], [1, -1, 1, -1]]) * 12
+            around = [board[tuple(np.rint(corner + step).astype(int))] for step in steps.T]
+            light = float((row + column) % 2 == 1)
+            assert around == [light, 1 - light, 1 - light, light]
+    assert board[0].min() == 1.0
+
+
+def test_a_chessboard_fills_its_grid_but_for_a_margin():
+    board = targets.chessboard(Grid.square(440, 1e-4)).parts[0].intensity
+    dark = np.flatnonzero((board < 0.6).any(0))
+    assert (dark[0], dark[-1]) == (40, 400)

@@ -22,7 +22,17 @@ if TYPE_CHECKING:
     from lumigraph.instruments import Instrument
     from lumigraph.scene import Scene
 
-SCENES = ("white", "usaf1951", "siemens_star", "gratings", "slanted_edge", "edge", "pinhole", "photo")
+SCENES = (
+    "white",
+    "usaf1951",
+    "siemens_star",
+    "gratings",
+    "slanted_edge",
+    "edge",
+    "pinhole",
+    "chessboard",
+    "photo",
+)
 _FINEST_GROUP = 12
 _COUNTS = {"snapshots": 100, "tilted": 64}
 
@@ -103,8 +113,8 @@ class Stage:
     Parameters
     ----------
     scene
-        white, usaf1951, siemens_star, gratings, slanted_edge, edge, pinhole, photo, or a picture file;
-        may be given several times.
+        white, usaf1951, siemens_star, gratings, slanted_edge, edge, pinhole, chessboard, photo, or a picture
+        file; may be given several times.
     depth
         Of each scene from the focused plane, such as '10 mm' (farther) or '-10 mm' (nearer).
     point

@@ -1,7 +1,7 @@
 """What stands in front of the camera, in object space.
 
 - `volumes`: `Scene` and its parts: `Slice`, `Points`, `Diffuser`
-- `targets`: functions that draw test charts as scenes: pinhole, edge, USAF-1951, gratings, star, photo
+- `targets`: test charts as scenes: pinhole, edge, USAF-1951, gratings, star, chessboard, photo
 - `sources`: waves: `plane_wave`, `point_source`, `gaussian_beam`
 """
 

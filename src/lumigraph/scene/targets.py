@@ -264,6 +264,57 @@ def siemens_star(
     return Scene([Slice(coverage.supersampled(grid, bright), grid)])
 
 
+def chessboard(
+    grid: Grid,
+    corners: tuple[int, int] = (5, 8),
+    spacing: float | None = None,
+    *,
+    angle: float = 0.0,
+    position: Pair = (0.0, 0.0),
+) -> Scene:
+    """A board of squares on white paper, such as `lumigraph.metric.find_corners` looks for.
+
+    Parameters
+    ----------
+    grid
+        Samples of the focused plane.
+    corners
+        Inner corners down and across: one less than squares.
+    spacing
+        Width of a square [m]; None for a board that fills the grid but for a margin of a square.
+    angle
+        By which the board is turned, from +x towards +y [rad].
+    position
+        Of the middle of the board (y, x) [m].
+
+    Raises
+    ------
+    GeometryError
+        No corners, or a spacing that is not above 0.
+
+    Examples
+    --------
+    >>> board = chessboard(Grid.square(120, 1e-4), (3, 5), 1.5e-3).parts[0].intensity
+    >>> float(board.min()), float(board.max()), float(board[60, 60]), float(board[62, 62])
+    (0.0, 1.0, 0.5, 1.0)
+    """
+    _check_grid(grid)
+    counts, center = checks.shape("corners", corners), checks.pair("position", position)
+    if spacing is None:
+        spacing = min(size / (n + 3) for size, n in zip(grid.size, counts, strict=True))
+    spacing = checks.positive("spacing", spacing)
+    sin, cos = math.sin(checks.finite("angle", angle, "rad")), math.cos(angle)
+
+    def bright(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        y, x = y - center[0], x - center[1]
+        row = np.floor((cos * y - sin * x) / spacing + (counts[0] + 1) / 2)
+        column = np.floor((cos * x + sin * y) / spacing + (counts[1] + 1) / 2)
+        outside = (row < 0) | (row > counts[0]) | (column < 0) | (column > counts[1])
+        return outside | ((row + column) % 2 == 1)
+
+    return Scene([Slice(coverage.supersampled(grid, bright), grid)])
+
+
 def photo(grid: Grid, image: np.ndarray | None = None) -> Scene:
     """A photograph, as large as fits in the grid, resampled to its samples.
 
