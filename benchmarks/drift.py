@@ -1,41 +1,57 @@
 """Raw images and calibrations that fit each other, and that do not: what the drift check says of them.
 
-Raw images are drawn by rays and boxes: each micro-image shows the scene around its own place, magnified,
-behind a stop with soft edges; then the pixels blur and add noise. Scenes are points, beads and stars before a
-dark ground, gratings of every pitch, charts, textures, dark ones and a white one. Each is judged with the
-right calibration, and with ones whose pitch is 1 % off or that are turned by 0.5 deg. A wrong pair should be
-found where the scene lights most of the picture and there are gaps. Real raw images (LUMIGRAPH_DATA), too.
+Scenes are points, beads and stars before a dark ground, gratings of every pitch, charts, textures, dark ones
+and a white one. Their raw images are drawn by rays and boxes (each micro-image shows the scene around its own
+place, magnified, behind a stop with soft edges), or simulated by wave optics for cameras of several kinds;
+then pixels add noise. Each is judged with the right calibration, and with ones whose pitch is 1 % off or that
+are turned by 0.5 deg. A wrong pair should be found where the scene lights most of the picture and there are
+gaps. Real raw images (LUMIGRAPH_DATA), too. Results are kept in a file of JSON lines, so that a run goes on
+where it was stopped.
 
-    python -m benchmarks.drift [first:last]
+    python -m benchmarks.drift [drawn | simulated | real] [first:last] [-o results.jsonl]
 """
 
+import argparse
+import json
 import os
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
 
 import lumigraph as lg
 from lumigraph.core.calibration import Calibration
-from lumigraph.preparation.drift import Drift, drift, verdict
+from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera
+from lumigraph.preparation.drift import drift, verdict
 
 DATA = Path(os.environ.get("LUMIGRAPH_DATA") or Path(__file__).parents[2] / "shared" / "data")
 REAL = {
     "guv": ("lfm_guv/Lightfield_GUVExperim1.tif", "lfm_guv/Radiometry_GUVExperim1.tif"),
+    "guv, white": ("lfm_guv/Radiometry_GUVExperim1.tif",) * 2,
+    "guv, alone": ("lfm_guv/Lightfield_GUVExperim1.tif",) * 2,
+    "guv by rays": (
+        "lfm_guv_simulated/LightField_GUVSimul1.tif",
+        "lfm_guv_simulated/Radiometry_GUVSimul1.tif",
+    ),
     "letters": ("letters_plenoptic1/letters_ULF_M1.png", "letters_plenoptic1/letters_ULF_M1_white.png"),
+    "letters, white": ("letters_plenoptic1/letters_ULF_M1_white.png",) * 2,
+    "letters, alone": ("letters_plenoptic1/letters_ULF_M1.png",) * 2,
     "brain": ("lfm_mouse_brain/LF_img_train_0.tif",) * 2,
     "worm": ("lfm_worm/20131219WORM2_small_full_neg_X1_N15_cropped_uncompressed.tif",) * 2,
+    "raytrix": ("raytrix_r42_multifocus/sc2_klein.png",) * 2,
 }
+_NO_GAPS = ("worm", "guv by rays", "raytrix")
 NONE = np.zeros((0, 2))
 
-Scene = Callable[[np.ndarray, np.ndarray], np.ndarray]
+Seen = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-def _spots(rng: np.random.Generator, count: int, size: float, shape: tuple[int, int]) -> Scene:
+def _spots(rng: np.random.Generator, count: int, size: float, shape: tuple[int, int]) -> Seen:
     """Blobs of all brightnesses before a dark ground."""
     places, light = rng.uniform(0, 1, (count, 2)) * shape, rng.uniform(0, 1, count) ** 3 + 0.05
 
@@ -49,7 +65,7 @@ def _spots(rng: np.random.Generator, count: int, size: float, shape: tuple[int, 
     return scene
 
 
-def _grating(rng: np.random.Generator, pitch: float) -> Scene:
+def _grating(rng: np.random.Generator, pitch: float) -> Seen:
     """Bars of a pitch between a third of the lattice's and eight of it, often near a simple part of it."""
     period = pitch * (rng.choice([0.5, 1, 1.5, 2, 3]) * rng.uniform(0.96, 1.04) if rng.random() < 0.5
                       else np.exp(rng.uniform(np.log(0.33), np.log(8))))  # fmt: skip
@@ -63,7 +79,7 @@ def _grating(rng: np.random.Generator, pitch: float) -> Scene:
     return scene
 
 
-def _chart(rng: np.random.Generator, pitch: float) -> Scene:
+def _chart(rng: np.random.Generator, pitch: float) -> Seen:
     """Squares of a board, black ones not quite black."""
     period, angle, black = pitch * rng.uniform(0.6, 6), rng.uniform(0, 0.5), rng.uniform(0.02, 0.3)
 
@@ -74,7 +90,7 @@ def _chart(rng: np.random.Generator, pitch: float) -> Scene:
     return scene
 
 
-def _texture(rng: np.random.Generator, shape: tuple[int, int]) -> Scene:
+def _texture(rng: np.random.Generator, shape: tuple[int, int]) -> Seen:
     """A surface whose details of all sizes have alike contrast."""
     n = 256
     wave = np.hypot(np.fft.fftfreq(n)[:, None], np.fft.fftfreq(n))
@@ -104,42 +120,105 @@ class Pair:
     tells: bool
 
 
+def _seen(kind: str, rng: np.random.Generator, pitch: float, shape: tuple[int, int]) -> Seen:
+    """What stands before the camera, by places in units of `pitch` for each lenslet."""
+    match kind:
+        case "points":
+            return _spots(rng, int(rng.integers(1, 8)), pitch * rng.uniform(0.1, 1), shape)
+        case "beads":
+            return _spots(rng, 30, pitch * rng.uniform(0.3, 2), shape)
+        case "stars":
+            return _spots(rng, 250, pitch * rng.uniform(0.05, 0.3), shape)
+        case "grating":
+            return _grating(rng, pitch)
+        case "chart":
+            return _chart(rng, pitch)
+        case "white":
+            return lambda y, x: np.ones(y.shape)
+        case _:
+            return _texture(rng, shape)
+
+
+def _exposed(light: np.ndarray, kind: str, rng: np.random.Generator) -> np.ndarray:
+    """A raw image of light that is 1 where it is bright."""
+    full = 30 if kind == "dark" else float(rng.choice([200, 2000, 20000]))
+    return rng.poisson(np.maximum(light, 0) * full) + rng.normal(20, 2, light.shape)
+
+
 def drawn(number: int) -> Pair:
-    """The raw image of a number."""
+    """The raw image of a number, by rays and boxes."""
     rng = np.random.default_rng(number)
     kind = KINDS[number % len(KINDS)]
     pitch, layout = float(np.exp(rng.uniform(np.log(8), np.log(32)))), ("square", "hex")[number // 8 % 2]
-    shape = tuple(int(pitch * rng.uniform(24, 44)) for _ in range(2))
+    shape = int(pitch * rng.uniform(24, 44)), int(pitch * rng.uniform(24, 44))
     lattice = getattr(lg.Lattice, layout)(pitch, rng.uniform(-0.03, 0.03), tuple(rng.uniform(0, pitch, 2)))
     y, x = np.arange(shape[0], dtype=float)[:, None], np.arange(shape[1], dtype=float)[None]
     dy, dx = lattice.offset(y, x)
     # What a micro-image shows: its own place in focus (0), a little around it, or a whole patch (camera 2.0).
     zoom = float(rng.choice([0, rng.uniform(-0.6, 0.6), rng.uniform(-4, 4)]))
     at = y - dy + zoom * dy, x - dx + zoom * dx
-    scenes: dict[str, Callable[[], Scene]] = {
-        "points": lambda: _spots(rng, int(rng.integers(1, 8)), pitch * rng.uniform(0.1, 1), shape),
-        "beads": lambda: _spots(rng, 30, pitch * rng.uniform(0.3, 2), shape),
-        "stars": lambda: _spots(rng, 250, pitch * rng.uniform(0.05, 0.3), shape),
-        "grating": lambda: _grating(rng, pitch),
-        "chart": lambda: _chart(rng, pitch),
-        "texture": lambda: _texture(rng, shape),
-        "dark": lambda: _texture(rng, shape),
-        "white": lambda: lambda y, x: np.ones(y.shape),
-    }
     fill = float(rng.uniform(0.75, 0.95))
-    raw = scenes[kind]()(*at) * np.clip(fill * pitch / 2 - np.hypot(dy, dx) + 0.5, 0, 1)
+    raw = _seen(kind, rng, pitch, shape)(*at) * np.clip(fill * pitch / 2 - np.hypot(dy, dx) + 0.5, 0, 1)
     raw = ndimage.gaussian_filter(raw, rng.uniform(0.3, 0.9))
-    full = 30 if kind == "dark" else float(rng.choice([200, 2000, 20000]))
-    raw = rng.poisson(np.maximum(raw, 0) * full) + rng.normal(20, 2, shape)
-    right = Calibration(lattice, (shape[0], shape[1]), NONE.astype(int), NONE, 0.0)
+    raw = _exposed(raw, kind, rng)
+    right = Calibration(lattice, shape, NONE.astype(int), NONE, 0.0)
     return Pair(f"{number} {kind}, {layout}, {pitch:.1f} px, zoom {zoom:.2f}", raw, right, kind in LIT)
 
 
-def real() -> Iterable[Pair]:
-    """Those of the data that are there; two have no white image and are calibrated alone."""
-    for name, (raw, white) in REAL.items():
-        if (DATA / raw).exists():
-            yield Pair(name, lg.open(DATA / raw).data, lg.calibrate(lg.open(DATA / white)), name != "worm")
+Simulated = PlenopticCamera | FocusedPlenopticCamera
+CAMERAS: dict[str, tuple[type[PlenopticCamera] | type[FocusedPlenopticCamera], dict[str, Any]]] = {
+    "1.0": (PlenopticCamera, {"main_lens": {"focal_length": 120e-3}, "object_distance": 240e-3,
+        "lenslets": {"focal_length": 10e-3, "pitch": 150e-6, "count": (24, 24)}}),
+    "1.0, hex": (PlenopticCamera, {"main_lens": {"focal_length": 80e-3}, "object_distance": 200e-3,
+        "lenslets": {"focal_length": 10e-3, "pitch": 150e-6, "count": (24, 21), "layout": "hex",
+                     "shape": "round"}}),
+    "2.0": (FocusedPlenopticCamera, {"main_lens": {"focal_length": 60e-3}, "object_distance": 120e-3,
+        "lenslets": {"focal_length": 5.2e-3, "pitch": 150e-6, "count": (24, 24), "magnification": 0.3}}),
+    "2.0, Galilean": (FocusedPlenopticCamera, {"main_lens": {"focal_length": 50e-3}, "object_distance": 0.2,
+        "lenslets": {"focal_length": 9e-3, "pitch": 150e-6, "count": (24, 24), "magnification": -0.3}}),
+    "2.0, three kinds": (FocusedPlenopticCamera, {"main_lens": {"focal_length": 60e-3},
+        "object_distance": 120e-3,
+        "lenslets": {"focal_length": (6e-3, 6.3e-3, 5.7e-3), "pitch": 150e-6, "count": (20, 18),
+                     "layout": "hex", "shape": "round", "magnification": 0.5}}),
+}  # fmt: skip
+
+
+@cache
+def _camera(name: str, pixels: int) -> Simulated:
+    """With so many pixels across a lenslet."""
+    kind, given = CAMERAS[name]
+    sensor = {"pixel_pitch": given["lenslets"]["pitch"] / pixels}
+    return kind(**{**given, "wavelength": 550e-9, "sensor": sensor})
+
+
+def simulated(number: int) -> Pair:
+    """The raw image of a number, by wave optics."""
+    rng = np.random.default_rng([number, 1])
+    name = list(CAMERAS)[number // len(KINDS) % len(CAMERAS)]
+    kind, camera = KINDS[number % len(KINDS)], _camera(name, (11, 14)[number // len(KINDS) % 2])
+    grid, right = camera.object_grid, camera.calibration
+    assert right is not None
+    across = min(grid.shape) / min(right.shape) * right.lattice.pitch  # samples for each lenslet
+    near = float(rng.choice([-0.06, 0, 0.06])) * camera.object_distance
+    if kind == "points":
+        at = rng.uniform(-0.45, 0.45, (int(rng.integers(1, 8)), 2)) * grid.size
+        scene = lg.targets.points([(*each, near) for each in at])
+    elif kind == "white":
+        scene = lg.targets.white()
+    else:
+        y, x = (np.broadcast_to(k, grid.shape) for k in np.ogrid[: grid.shape[0], : grid.shape[1]])
+        scene = lg.Scene([lg.Slice(_seen(kind, rng, across, grid.shape)(y, x), grid, near)])
+    light = np.asarray(lg.simulate(camera, scene, coherence=lg.Incoherent(accuracy=1e-2)).data)
+    raw = _exposed(light / np.percentile(light, 99 if kind in LIT else 100), kind, rng)
+    told = f"simulated {number} {kind}, {name}, {right.lattice.pitch:.1f} px, {1e3 * near:+.1f} mm"
+    return Pair(told, raw, right, kind in LIT)
+
+
+def real(number: int) -> Pair:
+    """A pair of the data; some have no white image and are calibrated alone."""
+    name = list(REAL)[number]
+    raw, white = (DATA / one for one in REAL[name])
+    return Pair(name, lg.open(raw).data, lg.calibrate(lg.open(white)), name not in _NO_GAPS)
 
 
 def wrong(right: Calibration) -> dict[str, Calibration]:
@@ -156,28 +235,53 @@ def wrong(right: Calibration) -> dict[str, Calibration]:
     return found
 
 
+SOURCES: dict[str, tuple[Callable[[int], Pair], int]] = {
+    "drawn": (drawn, 400),
+    "simulated": (simulated, 120),
+    "real": (real, len(REAL)),
+}
+"""Pairs by number, and how many are looked at unless told."""
+
+
 @dataclass(frozen=True)
 class Row:
     """What was said of one pair: "fits", "nothing", "shifted", "warned" or "refused"."""
 
+    source: str
+    number: int
     name: str
     pair: str
     tells: bool
     said: str
-    found: Drift | None
+    report: str
 
 
-def judged(pair: Pair) -> list[Row]:
-    rows = []
+def judged(source: str, number: int) -> list[Row]:
+    pair, rows = SOURCES[source][0](number), []
     for name, calibration in {"right": pair.right, **wrong(pair.right)}.items():
         found = drift(pair.raw, calibration)
-        rows.append(Row(pair.name, name, pair.tells, "nothing" if found is None else verdict(found), found))
+        said, report = ("nothing", "") if found is None else (verdict(found), found.report())
+        rows.append(Row(source, number, pair.name, name, pair.tells, said, report))
     return rows
 
 
-def run(numbers: Iterable[int] = range(64), *, also_real: bool = True) -> list[Row]:
-    rows = [row for number in numbers for row in judged(drawn(number))]
-    return rows + [row for pair in (real() if also_real else ()) for row in judged(pair)]
+def run(source: str, numbers: Iterable[int], kept: Path | None = None) -> list[Row]:
+    """Rows of pairs; those in the file `kept` are not done again."""
+    rows = [] if kept is None or not kept.exists() else read(kept)
+    done = {(row.source, row.number) for row in rows}
+    for number in numbers:
+        if (source, number) in done:
+            continue
+        rows += (found := judged(source, number))
+        if kept is not None:
+            with kept.open("a") as file:
+                file.writelines(json.dumps(asdict(row)) + "\n" for row in found)
+    return rows
+
+
+def read(kept: Path) -> list[Row]:
+    """Rows of a file of results."""
+    return [Row(**json.loads(line)) for line in kept.read_text().splitlines()]
 
 
 def is_bad(row: Row) -> bool:
@@ -188,14 +292,25 @@ def is_bad(row: Row) -> bool:
 
 def show(rows: Sequence[Row]) -> None:
     """Counts for right and wrong pairs, and every pair of which something else should have been said."""
-    for pair in ("right", "pitch", "turned"):
-        for tells, name in ((True, "lit, with gaps"), (False, "others")):
-            counts = Counter(row.said for row in rows if (row.pair, row.tells) == (pair, tells))
-            print(f"{pair:7} {name:15}", *(f"{counts[word]:4} {word}" for word in SAID))
+    for source in sorted({row.source for row in rows}):
+        for pair in ("right", "pitch", "turned"):
+            for tells, name in ((True, "lit, with gaps"), (False, "others")):
+                key = (source, pair, tells)
+                counts = Counter(row.said for row in rows if (row.source, row.pair, row.tells) == key)
+                print(f"{source:9} {pair:6} {name:15}", *(f"{counts[word]:4} {word}" for word in SAID))
     for row in filter(is_bad, rows):
-        print(row.pair, row.said, row.name, row.found)
+        print(row.pair, row.said, row.name, row.report)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("source", nargs="?", choices=SOURCES, default="drawn")
+    parser.add_argument("numbers", nargs="?")
+    parser.add_argument("-o", "--output", type=Path)
+    given = parser.parse_args()
+    first, last = (int(k) for k in (given.numbers or f"0:{SOURCES[given.source][1]}").split(":"))
+    show(run(given.source, range(first, last), given.output))
 
 
 if __name__ == "__main__":
-    first, last = (int(k) for k in (sys.argv[1] if len(sys.argv) > 1 else "0:64").split(":"))
-    show(run(range(first, last)))
+    main()

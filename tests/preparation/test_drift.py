@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.drift import drawn, is_bad, judged
+from benchmarks.drift import is_bad, judged
 from scipy import ndimage
 
 import calibration_drawing
@@ -143,6 +143,14 @@ def test_a_large_colour_picture_takes_a_third_of_a_second(rng):
     assert time.process_time() - start < 0.5
 
 
+def test_the_lattice_seen_is_the_expected_one_turned_and_stretched(rng):
+    lattice = LATTICES["hex"]
+    expected = off(lattice, 1.03, 0.02)
+    seen = drift(raw_image(lattice, (400, 440), rng), expected).seen(expected.lattice)
+    np.testing.assert_allclose(seen.matrix, lattice.matrix, atol=0.02)
+    assert (seen.layout, seen.origin) == ("hex", expected.lattice.origin)
+
+
 REAL = {
     "letters": ("letters_plenoptic1", "letters_ULF_M1_white.png", "letters_ULF_M1.png"),
     "vesicle": ("lfm_guv", "Radiometry_GUVExperim1.tif", "Lightfield_GUVExperim1.tif"),
@@ -170,9 +178,31 @@ def test_real_cameras_fit_their_calibration_and_drift_is_seen(name):
         assert seen.slip > 0.2
 
 
+def test_lines_that_a_specimen_pulls_at_contradict_no_calibration():
+    """Rectified to 17 px: its lines scatter by a fifth of a pitch, and made a lattice of 16.95 px."""
+    raw = np.asarray(io.open(real("lfm_worm", REAL["worm"][1])).data, np.float32)
+    picture = ndimage.zoom(raw, 17 / 15, order=1, grid_mode=True, mode="nearest")
+    found = drift(picture, off(Lattice.square(17.0, 0, (8.5, 8.5)), shape=picture.shape))
+    assert found.slip > 0.1, "which was warned of"
+    assert found.error > found.slip / 3
+    check_drift(picture, off(Lattice.square(17.0, 0, (8.5, 8.5)), shape=picture.shape))  # warns of nothing
+
+
+def test_a_slip_is_told_with_its_error(rng):
+    lattice = LATTICES["square"]
+    raw = raw_image(lattice, (400, 440), rng)
+    slips = [drift(raw + 0.1 * rng.standard_normal(raw.shape), off(lattice)) for _ in range(4)]
+    assert all(0 < found.slip < 4 * found.error < 0.1 for found in slips)
+
+
 @pytest.mark.parametrize("number", [0, 3, 4, 13])  # points, a grating, a chart, a texture
 def test_drawn_pairs_are_right_or_wrong_as_they_were_drawn(number):
     """A few of the pairs of `python -m benchmarks.drift`."""
-    rows = judged(drawn(number))
+    rows = judged("drawn", number)
     assert not [row for row in rows if is_bad(row)]
     assert [row.said for row in rows] == (["nothing"] * 3 if number == 0 else ["fits", "warned", "warned"])
+
+
+@pytest.mark.parametrize("number", [0, 3])  # points, a grating
+def test_simulated_pairs_are_right_or_wrong_as_they_were_made(number):
+    assert not [row for row in judged("simulated", number) if is_bad(row)]

@@ -17,7 +17,26 @@ _LINE = 8.0  # of a single line over that median
 _SHARPEST, _HIGHEST = 0.14, 4.0  # 1/px, and orders, of the lines that gaps have after smoothing
 
 
-def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> tuple[np.ndarray, float] | None:
+class Followed(NamedTuple):
+    """What a feature repeats on.
+
+    Parameters
+    ----------
+    basis
+        Lattice vectors (y, x) of i and j in columns [px].
+    evidence
+        Of its lines over their surroundings.
+    errors
+        Standard errors (2, 2) of the waves of i and j along y and x [1/px], by how far the lines scatter
+        about those of one lattice; NaN of two lines alone.
+    """
+
+    basis: np.ndarray
+    evidence: float
+    errors: np.ndarray
+
+
+def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> Followed | None:
     """The lattice near another one that a feature (y, x) repeats on, by the lines of its spectrum.
 
     Parameters
@@ -31,15 +50,16 @@ def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> tuple[np.n
 
     Returns
     -------
-    tuple or None
-        Basis, and its lines over their surroundings; None where they do not stand out.
+    Followed or None
+        None where its lines do not stand out.
     """
     pitch = math.sqrt(abs(float(np.linalg.det(basis))))
     lines = _Lines.of(feature)
     found = _nearest(lines, np.linalg.inv(basis), is_hex, min(feature.shape) / pitch)
     if found is None or found.evidence < _EVIDENCE:
         return None
-    return np.linalg.inv(_refined(lines, found, pitch)), found.evidence
+    waves, errors = _refined(lines, found, pitch)
+    return Followed(np.linalg.inv(waves), found.evidence, errors)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +134,13 @@ def _nearest(lines: _Lines, waves: np.ndarray, is_hex: bool, lenslets: float) ->
     return _Found(tried[:2, best[0], best[1]], float(score[best]) / around, around)
 
 
-def _refined(lines: _Lines, found: _Found, pitch: float) -> np.ndarray:
-    """Waves of i and j (2, 2) by least squares over ever more harmonics, each at its own maximum."""
+def _refined(lines: _Lines, found: _Found, pitch: float) -> tuple[np.ndarray, np.ndarray]:
+    """Waves of i and j (2, 2) by least squares over ever more harmonics, each at its own maximum.
+
+    Their standard errors (2, 2), too.
+    """
     highest, waves = float(np.clip(_SHARPEST * pitch, 1.0, _HIGHEST)), found.waves
+    errors = np.full((2, 2), np.nan)
     reach = np.arange(-5, 6)
     orders = np.stack(np.meshgrid(reach, reach, indexing="ij"), -1).reshape(-1, 2)
     orders = orders[61:]  # half a plane: the rest mirrors it
@@ -130,5 +154,14 @@ def _refined(lines: _Lines, found: _Found, pitch: float) -> np.ndarray:
         better = np.linalg.lstsq(orders[used] * weights, places * weights, rcond=None)[0]
         if np.linalg.matrix_rank(orders[used] * (weights > 0)) < 2:
             break
-        waves = better
-    return waves
+        waves, errors = better, _errors(places, orders[used], better, weights)
+    return waves, errors
+
+
+def _errors(places: np.ndarray, orders: np.ndarray, waves: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Standard errors (2, 2) of waves that weighted places (k, 2) of harmonics were fitted by."""
+    left = int((weights > 0).sum()) - 2
+    if left < 1:
+        return np.full((2, 2), np.nan)
+    variance = np.square((places - orders @ waves) * weights).sum(0) / left
+    return np.sqrt(np.outer(np.diag(np.linalg.inv((orders * weights).T @ (orders * weights))), variance))

@@ -98,7 +98,7 @@ def _by_lines(flat: np.ndarray, fitted: Fitted) -> Fitted:
     found = light_followed(flat, lattice.matrix, lattice.layout == "hex")
     if found is None:
         return fitted
-    column, row = found[0].T
+    column, row = found.basis.T
     return fitted._replace(lattice=replace(lattice, basis=(_vector(row), _vector(column))))
 
 

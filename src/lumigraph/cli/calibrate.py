@@ -66,7 +66,7 @@ class Bench:
         from lumigraph.preparation import implied
 
         camera = None if self.camera is None else load_camera(self.camera)
-        return () if camera is None or camera.calibration is None else (implied(found, camera)[0],)
+        return () if camera is None or camera.calibration is None else (implied(found.lattice, camera)[0],)
 
 
 def calibrate(

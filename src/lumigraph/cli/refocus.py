@@ -167,7 +167,7 @@ def refocus(
     focus.check(camera)
     _check_output(output, focus.count)
     with progress("refocus") as shown:
-        source = light_field(views, origin)
+        source, notes = _light_field(views, origin)
         alphas = focus.chosen(camera, source)
         images = quality.pictures(source, alphas, shown)
     shape = images[0].shape[:2]
@@ -178,7 +178,7 @@ def refocus(
     return Result(
         "Refocus", "Pictures focused afresh; α' above 1 is farther.", images,
         tuple(f"alpha {alpha:g}: {shape[0]} x {shape[1]} px" for alpha in alphas), values,
-        lambda: _figures(images, alphas), written=tuple(_write(images, alphas, output)),
+        lambda: _figures(images, alphas), notes, tuple(_write(images, alphas, output)),
     )  # fmt: skip
 
 
@@ -188,15 +188,16 @@ def _figures(images: list[Any], alphas: list[float]) -> "Iterator[Figure]":
         yield Figure(image, f"α' = {alpha:g}", options={"white": white, "zoom": enlarged(image)})
 
 
-def light_field(path: Path, origin: Origin) -> "LightField":
-    """The views in a file, or those of the raw image in it."""
+def _light_field(path: Path, origin: Origin) -> "tuple[LightField, tuple[str, ...]]":
+    """The views in a file, or those of the raw image in it, and what was done to it."""
     from lumigraph import preparation
     from lumigraph.core.lightfield import LightField
 
     found = origin.views(path)
     if isinstance(found, LightField):
-        return found
-    return preparation.decode(origin.prepared(found, use="decode"))
+        return found, ()
+    ready = origin.prepared(found, use="decode")
+    return preparation.decode(ready), ready.notes
 
 
 def _check_output(output: Path, count: int) -> None:

@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Protocol
 
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.lattice import Lattice
 from lumigraph.errors import CalibrationError
 
 _PITCH, _TURN = 0.005, math.radians(0.3)
@@ -24,15 +25,17 @@ class Described(Protocol):
         ...
 
 
-def implied(found: Calibration, camera: Described) -> tuple[str, bool]:
+def implied(seen: Lattice, camera: Described, *, used: bool = True) -> tuple[str, bool]:
     """One line on what a picture's lattice says about the camera, and whether the two agree.
 
     Parameters
     ----------
-    found
-        Measured on a picture.
+    seen
+        Measured on a picture [px].
     camera
         Whose file says where its micro-images should stand.
+    used
+        Whether it is the picture's lattice that is used, not the camera's.
 
     Returns
     -------
@@ -41,16 +44,20 @@ def implied(found: Calibration, camera: Described) -> tuple[str, bool]:
     """
     if camera.calibration is None:
         raise CalibrationError("the camera has no lenslets whose micro-images could be compared.")
-    told, seen = camera.calibration.lattice, found.lattice
+    told = camera.calibration.lattice
     share, turn = seen.pitch / told.pitch, _between(seen.rotation, told.rotation, seen.layout)
     alike = seen.layout == told.layout and (seen.kinds == told.kinds or seen.kinds == 1)
     agree = alike and abs(share - 1) <= _PITCH and abs(turn) <= _TURN
     line = (
         f"the picture has a pitch of {seen.pitch:.3f} px, turned by {math.degrees(turn):+.2f} deg "
-        f"({_lenslets(found)}); by the camera file it has {told.pitch:.3f} px "
-        f"({_lenslets(camera.calibration)}): "
+        f"({_lenslets(seen)}); by the camera file it has {told.pitch:.3f} px "
+        f"({_lenslets(told)}): "
     )
-    verdict = "they agree" if agree else f"{camera.would_be(share)}. The picture's lattice is used"
+    verdict = (
+        "they agree"
+        if agree
+        else (f"{camera.would_be(share)}. The {'picture' if used else 'camera'}'s lattice is used")
+    )
     return line + verdict, agree
 
 
@@ -60,6 +67,5 @@ def _between(seen: float, told: float, layout: str) -> float:
     return (seen - told + period / 2) % period - period / 2
 
 
-def _lenslets(calibration: Calibration) -> str:
-    kinds = f", {calibration.lattice.kinds} kinds" if calibration.lattice.kinds > 1 else ""
-    return f"{calibration.lattice.layout}{kinds}"
+def _lenslets(lattice: Lattice) -> str:
+    return f"{lattice.layout}, {lattice.kinds} kinds" if lattice.kinds > 1 else lattice.layout

@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -11,7 +11,9 @@ from lumigraph.calibration import followed
 from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.gaps import logarithm, valleys
+from lumigraph.core.lattice import Lattice
 from lumigraph.errors import CalibrationError, SamplingWarning
+from lumigraph.preparation.agreement import Described
 
 _SIZE = 1024  # px of the middle of the picture that is looked at
 _FEWEST = 8.0  # lenslets across it
@@ -20,6 +22,7 @@ _CLEAR, _SLIGHT = (
     18.5,
     0.1,
 )  # evidence from which a slip of few pitches is told; self-made lattices reach 0.08
+_SIGMAS = 3.0  # of its standard error from which a slip is told; a specimen pulls at the lines of gaps
 _BLOCKS, _EVERYWHERE = (
     8,
     0.45,
@@ -46,6 +49,9 @@ class Drift:
         Of the mean micro-image from where the calibration has it (y, x) [px]; None where it is not seen.
     evidence
         Lines of the lattice in the spectrum of the raw image's gaps over their surroundings.
+    error
+        Standard error of the slip [pitches], by how far the lines scatter about those of one lattice; 0
+        where there are too few to tell.
     """
 
     pitch: float
@@ -55,6 +61,20 @@ class Drift:
     slip: float
     shift: tuple[float, float] | None
     evidence: float
+    error: float = 0.0
+
+    @property
+    def share(self) -> float:
+        """The pitch seen over the expected one."""
+        return self.pitch / self.expected_pitch
+
+    def seen(self, expected: Lattice) -> Lattice:
+        """The expected lattice with the pitch and the rotation that are seen."""
+        turn = self.rotation - self.expected_rotation
+        cos, sin = math.cos(turn), math.sin(turn)
+        basis = np.array([[cos, sin], [-sin, cos]]) @ expected.matrix * self.share
+        (yi, yj), (xi, xj) = basis.tolist()
+        return replace(expected, basis=((yj, xj), (yi, xi)))
 
     def told(self) -> str:
         """How well the lattices agree, in one line."""
@@ -88,8 +108,7 @@ def drift(data: Array, calibration: Calibration) -> Drift | None:
     found = followed(gaps, basis, calibration.lattice.layout == "hex")
     if found is None:
         return None
-    seen_basis, evidence = found
-    seen = np.linalg.inv(seen_basis)
+    seen_basis, seen = found.basis, np.linalg.inv(found.basis)
     if _share(gaps, seen) < _EVERYWHERE:  # spots of a few points repeat, too, by what depth they are at
         return None
     half = np.array([(y, x) for y in (-0.5, 0.5) for x in (-0.5, 0.5)]) * calibration.shape
@@ -97,12 +116,15 @@ def drift(data: Array, calibration: Calibration) -> Drift | None:
         float(np.hypot(*seen_basis).mean()), float(np.hypot(*basis).mean()),
         math.atan2(*seen_basis[:, 1]), math.atan2(*basis[:, 1]),
         float(np.abs(half @ (seen - waves).T).max()),
-        _shift(picture, seen, basis, np.array(calibration.lattice.origin) - corner), evidence,
+        _shift(picture, seen, basis, np.array(calibration.lattice.origin) - corner), found.evidence,
+        _between_lines(found.errors, calibration.shape),
     )  # fmt: skip
 
 
-def check_drift(data: Array, calibration: Calibration) -> Drift | None:
+def check_drift(data: Array, calibration: Calibration, camera: Described | None = None) -> Drift | None:
     """Refuse a raw image (y, x[, c]) that carries another lattice than the calibration's.
+
+    Where that is a camera's own, by its file, what of the file would explain the raw image is told, too.
 
     Returns
     -------
@@ -122,30 +144,32 @@ def check_drift(data: Array, calibration: Calibration) -> Drift | None:
     """
     found = drift(data, calibration)
     if found is not None:
-        _tell(found)
+        _tell(found, "" if camera is None else f" This would be {camera.would_be(found.share)}.")
     return found
 
 
 def verdict(found: Drift) -> str:
     """What a drift means for a calibration: "refused", "warned", "shifted" or "fits"."""
-    if found.slip >= _CERTAIN:
+    sure = found.slip >= _SIGMAS * found.error
+    if sure and found.slip >= _CERTAIN:
         return "refused"
-    if found.slip >= (_SLIGHT if found.evidence >= _CLEAR else _LIKELY):
+    if sure and found.slip >= (_SLIGHT if found.evidence >= _CLEAR else _LIKELY):
         return "warned"
     if found.shift is not None and max(map(abs, found.shift)) > _SHIFTED * found.pitch:
         return "shifted"
     return "fits"
 
 
-def _tell(found: Drift) -> None:
+def _tell(found: Drift, implied: str) -> None:
     said = verdict(found)
     if said == "refused":
         raise CalibrationError(
-            f"{found.report()}. Calibrate on a white image taken with the settings of the raw image."
+            f"{found.report()}.{implied} Calibrate on a white image taken with the settings of the raw image."
         )
     if said == "warned":
         warnings.warn(
-            f"{found.report()}. A white image taken with the settings of the raw image would fit better.",
+            f"{found.report()}.{implied} "
+            "A white image taken with the settings of the raw image would fit better.",
             SamplingWarning,
             stacklevel=4,
         )
@@ -203,6 +227,12 @@ def _share(gaps: np.ndarray, waves: np.ndarray) -> float:
         sizes = np.abs(blocks)
         shares.append(float(sizes.mean() ** 2 / np.square(sizes).mean()))
     return min(shares)
+
+
+def _between_lines(errors: np.ndarray, shape: tuple[int, int]) -> float:
+    """Standard error of the slip at the border of a picture, of those of the waves (2, 2) [1/px]."""
+    found = float(np.hypot(*(errors * shape / 2).T).max())
+    return 0.0 if math.isnan(found) else found
 
 
 def _shift(

@@ -121,13 +121,17 @@ def _placed(
         found = aligned(found, raw)
         if not found.by_maker:
             _warn(notes, f"the maker's lattice was {found.notes[-1]}")
-    judged = check_drift(raw.data, found)
+    described = None if told is None else camera
+    judged = check_drift(raw.data, found, described if found is told else None)
     notes += [] if judged is None else [judged.told()]
-    if camera is not None and told is not None and found is not told:
-        line, agree = implied(found, camera)
-        notes.append(line) if agree else _warn(notes, line)
-        found = _with_lengths(found, told)
-    return found, notes
+    if described is None or told is None:
+        return found, notes
+    if found is told:
+        seen = [] if judged is None else [judged.seen(found.lattice)]
+        return found, notes + [implied(one, described, used=False)[0] for one in seen]
+    line, agree = implied(found.lattice, described)
+    notes.append(line) if agree else _warn(notes, line)
+    return _with_lengths(found, told), notes
 
 
 def _warn(notes: list[str], line: str) -> None:
