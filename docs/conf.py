@@ -1,5 +1,6 @@
 """The site: `make docs` builds it into site/, strictly and without a network."""
 
+import shutil
 from importlib.metadata import version as _version
 from pathlib import Path
 from typing import Any
@@ -41,7 +42,7 @@ suppress_warnings = ["config.cache"]
 
 
 def _figures(block: Any, variables: dict[str, Any], gallery: dict[str, Any]) -> str:
-    """Save the figures that a block of an example has made; lumigraph's own open no window."""
+    """Save the figures and the films (paths that end in .gif) that a block of an example has made."""
     from sphinx_gallery.scrapers import figure_rst
 
     found, known = [], gallery.setdefault("_figures", set())
@@ -50,6 +51,11 @@ def _figures(block: Any, variables: dict[str, Any], gallery: dict[str, Any]) -> 
             known.add(id(thing))
             path = Path(next(variables["image_path_iterator"]))
             thing.savefig(path, dpi=110)
+            found.append(str(path))
+        elif isinstance(thing, Path) and thing.suffix == ".gif" and thing not in known:
+            known.add(thing)
+            path = Path(next(variables["image_path_iterator"])).with_suffix(".gif")
+            shutil.copy(thing, path)
             found.append(str(path))
     return figure_rst(found, gallery["src_dir"])
 

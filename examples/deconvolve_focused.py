@@ -24,7 +24,7 @@ def main():
 
     operator = periodic_operator(camera, camera.object_grid)
     method = RichardsonLucy(TotalVariation(0.003), accelerated=True)
-    found = lg.deconvolve(raw, operator, 40, method=method, exposure=Exposure.of(raw), progress=told)
+    found = lg.deconvolve(raw, operator, 40, method=method, exposure=Exposure.of(raw), progress=report)
 
     pictures = [
         (raw.data, "raw image"),
@@ -36,7 +36,7 @@ def main():
     lg.save(found, "deconvolved.tiff")
 
 
-def told(step):
+def report(step):
     if step.iteration % 20 == 0:
         print(f"iteration {step.iteration}: deviance {step.deviance:.3f}, {step.remaining:.1f} s to go")
 

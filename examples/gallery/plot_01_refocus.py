@@ -13,9 +13,8 @@ sample = lg.samples.scene()
 views, disparity = sample.views, np.asarray(sample.disparity.values)
 
 # %%
-# A thing that moves by d samples from view to view is sharp at the refocus factor
-# α' = 1 - d · (lenslet pitch) / (spacing of the views). The leaves move by 2 samples, the robot by
-# 0.3, the wall by -2.
+# A thing that moves by d samples from view to view is sharp at the refocus factor α' = 1 - d · (lenslet
+# pitch) / (spacing of the views). The leaves move by 2 samples, the robot by 0.3, the wall by -2.
 
 step = views.lenslets.pitch[1] / views.aperture.pitch[1]
 pictures = [

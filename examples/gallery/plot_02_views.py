@@ -2,8 +2,8 @@
 Parallax, and lines in epipolar-plane images
 ============================================
 
-Side by side, the views of a light field show parallax. One row of all of them, stacked, shows a line
-for every point: the steeper, the nearer.
+Side by side, the views of a light field show parallax. One row of all of them, stacked, shows a line for
+every point: the steeper, the nearer.
 """
 
 import numpy as np
@@ -20,3 +20,11 @@ figure = lg.plots.images(
     ],
     columns=3,
 )
+
+# %%
+# Play with it; the key E shows the lines through the pointer:
+#
+# .. code-block:: sh
+#
+#    lumigraph samples make -o samples
+#    lumigraph view samples/scene.zarr

@@ -23,3 +23,11 @@ figure = lg.plots.images(
 )
 wrong = 100 * np.mean(error > 0.3)
 print(f"median error {np.nanmedian(error):.3f} px, more than 0.3 px at {wrong:.1f} % of the places")
+
+# %%
+# Play with it:
+#
+# .. code-block:: sh
+#
+#    lumigraph samples make -o samples
+#    lumigraph depth samples/scene.zarr -o disparity.pfm --report page.html

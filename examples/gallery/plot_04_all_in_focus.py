@@ -19,3 +19,11 @@ figure = lg.plots.images(
     ],
     columns=2,
 )
+
+# %%
+# Play with it:
+#
+# .. code-block:: sh
+#
+#    lumigraph samples make -o samples
+#    lumigraph render samples/scene.zarr --all-in-focus --map alpha.tiff -o sharp.png

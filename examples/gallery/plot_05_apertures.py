@@ -18,3 +18,11 @@ apertures = [
 ]
 pictures = [(np.clip(lg.refocus(kept, 1 - 0.3 * step), 0, 1) ** (1 / 2.2), name) for kept, name in apertures]
 figure = lg.plots.images([(p[:100, 40:216], name) for p, name in pictures], columns=3)
+
+# %%
+# Play with it; the small aperture beside the picture opens, closes and moves:
+#
+# .. code-block:: sh
+#
+#    lumigraph samples make -o samples
+#    lumigraph view samples/scene.zarr

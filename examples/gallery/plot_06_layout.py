@@ -14,3 +14,10 @@ figure = lg.plots.layout(camera)
 # The numbers behind it:
 
 print("\n".join(f"{row.name:38} {row.text}" for row in camera.describe().rows[:14]))
+
+# %%
+# Play with it; every length is a slider:
+#
+# .. code-block:: sh
+#
+#    lumigraph design thesis-plenoptic-2-m050 --web

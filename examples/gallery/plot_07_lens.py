@@ -13,3 +13,10 @@ slit = lg.RectangularAperture((1 * mm, 0.1 * mm)).transmission(grid, 633 * nm)
 field = lg.Field(slit, grid, 633 * nm)
 train = lg.Train((lg.Propagate(316 * mm), lg.ThinLens(158 * mm, 5 * mm), lg.Propagate(316 * mm)))
 figure = lg.plots.planes(train.planes(field), names=("slit", "before the lens", "behind it", "image"))
+
+# %%
+# Play with this camera; every length is a slider:
+#
+# .. code-block:: sh
+#
+#    lumigraph design thesis-2f --web

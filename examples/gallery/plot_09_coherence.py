@@ -22,3 +22,12 @@ lights = (
     (lg.Incoherent(), "incoherent"),
 )
 figure = lg.plots.images([(lg.simulate(camera, star, light).data, name) for light, name in lights], columns=3)
+
+# %%
+# Play with both, side by side:
+#
+# .. code-block:: sh
+#
+#    lumigraph simulate thesis-2f --scene siemens_star --coherence coherent -o coherent.tiff
+#    lumigraph simulate thesis-2f --scene siemens_star -o incoherent.tiff
+#    lumigraph view coherent.tiff incoherent.tiff

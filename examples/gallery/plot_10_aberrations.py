@@ -28,3 +28,8 @@ for name, terms in (
     image = lg.propagate(light, focal_length, method="zoom", grid=target).intensity
     pictures.append(((image / image.max()) ** 0.4, name))
 figure = lg.plots.images(pictures, columns=3)
+
+# %%
+# Look at each closely:
+
+lg.view_inline(lg.Stack(np.stack([picture.astype(np.float32) for picture, _ in pictures])))

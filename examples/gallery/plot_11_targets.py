@@ -18,3 +18,11 @@ charts = {
     "photograph": lg.targets.photo(grid),
 }
 figure = lg.plots.images([(scene.parts[0].intensity, name) for name, scene in charts.items()], columns=3)
+
+# %%
+# Play with it:
+#
+# .. code-block:: sh
+#
+#    lumigraph simulate thesis-2f --scene usaf1951 -o chart.tiff
+#    lumigraph view chart.tiff

@@ -12,7 +12,7 @@ from lumigraph.deconvolution import RichardsonLucy, filters
 
 sample = lg.samples.volume()
 truth = np.asarray(sample.volume.data)
-operator = sample.camera.operator(sample.volume.depths, sample.samples_per_lenslet)
+operator = sample.camera.operator(sample.volume.depths, sample.samples_per_lenslet, accuracy=1e-2)
 widths = filters.widths_of(
     sample.camera.sampling_distances(sample.volume.depths), operator.object_grid.pitch[0]
 )
@@ -24,3 +24,8 @@ figure = lg.plots.images(
     columns=3,
 )
 print(f"correlation with the truth {np.corrcoef(found.ravel(), truth.ravel())[0, 1]:.2f}")
+
+# %%
+# The volume to move through:
+
+lg.view_inline(lg.Volume(found, operator.object_grid, sample.volume.depths))

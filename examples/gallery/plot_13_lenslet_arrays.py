@@ -20,3 +20,10 @@ for name, (lattice, focal_length) in arrays.items():
     light = array(lg.Field(1 + 0j * grid.y[:, None] * grid.x, grid, 550 * nm))
     pictures.append((lg.propagate(light, 5 * mm, pad=0.5).intensity.clip(0, 25) ** 0.5, name))
 figure = lg.plots.images(pictures, columns=3)
+
+# %%
+# Play with it:
+#
+# .. code-block:: sh
+#
+#    lumigraph design multi-focus-hex --web

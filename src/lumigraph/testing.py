@@ -56,7 +56,7 @@ def fields(draw: st.DrawFn, grid: Grid | None = None, *, single: bool = False) -
 
 @st.composite
 def light_fields(draw: st.DrawFn, *, colour: bool | None = None) -> LightField:
-    """Radiances from 0 to 1 of up to 5 × 5 views and 12 × 12 lenslets; grey or colour, or as told."""
+    """Radiances from 0 to 1 of up to 5 × 5 views and 12 × 12 lenslets; grey or colour, or as asked."""
     aperture, lenslets = draw(grids(max_side=5)), draw(grids(max_side=12))
     colour = draw(st.booleans()) if colour is None else colour
     shape = aperture.shape + lenslets.shape + ((3,) if colour else ())

@@ -1,5 +1,7 @@
 """Nouns among Python's own: NumPy, matplotlib, xarray and notebooks take them as they are."""
 
+import sys
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -128,3 +130,9 @@ def test_stacks_scenes_grids_and_tables_show_themselves_in_notebooks():
     }
     for text, thing in expected.items():
         assert text in thing._repr_html_()
+
+
+def test_without_xarray_one_line_names_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(lg.LumigraphError, match=r"pip install 'lumigraph\[xarray\]'"):
+        VIEWS.to_xarray()

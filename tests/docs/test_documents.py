@@ -114,21 +114,6 @@ def test_the_camera_file_of_readme_is_read(tmp_path):
     assert lg.load_camera(tmp_path / "camera.toml").patch == pytest.approx(39.82, abs=0.01)
 
 
-def test_the_commands_of_readme_are_understood(monkeypatch):
-    """Every verb and option exists; nothing is run."""
-    from lumigraph.cli.app import app
-
-    commands = [
-        line.split("#")[0].strip().removeprefix("lumigraph ")
-        for _, code in blocks("README.md", "sh")
-        for line in code.splitlines()
-        if line.startswith("lumigraph ")
-    ]
-    assert len(commands) > 5
-    for command in commands:
-        app.parse_args(command, print_error=False, exit_on_error=False)
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_lead_somewhere(page):
     for target, anchor in re.findall(r"\]\((?!https?:)([^)#\s]*)(#[^)\s]+)?\)", page.read_text()):

@@ -1,4 +1,5 @@
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -199,3 +200,9 @@ def test_a_chessboard_fills_its_grid_but_for_a_margin():
     board = targets.chessboard(Grid.square(440, 1e-4)).parts[0].intensity
     dark = np.flatnonzero((board < 0.6).any(0))
     assert (dark[0], dark[-1]) == (40, 400)
+
+
+def test_without_scikit_image_one_line_names_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "skimage.data", None)
+    with pytest.raises(LumigraphError, match=r"pip install 'lumigraph\[photo\]'"):
+        targets.photo(Grid((8, 8), 1e-6))

@@ -1,4 +1,4 @@
-"""What a one-dimensional profile of intensity tells: zeros, widths, contrast."""
+"""Measures of a one-dimensional profile of intensity: zeros, widths, contrast."""
 
 import numpy as np
 from scipy.interpolate import CubicSpline

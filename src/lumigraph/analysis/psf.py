@@ -1,4 +1,4 @@
-"""What a point image tells: where it is, and how much light is near."""
+"""Measures of a point image: where it is, and how much light is near."""
 
 import numpy as np
 

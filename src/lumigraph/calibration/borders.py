@@ -31,7 +31,7 @@ class Border(NamedTuple):
 def aligned(calibration: Calibration, raw: RawImage | Array) -> Calibration:
     """The calibration moved to where a raw image shows the borders of its micro-images.
 
-    A maker's file tells pitch and rotation well, but not where a picture was cropped. Neighbouring
+    A maker's file gives pitch and rotation well, but not where a picture was cropped. Neighbouring
     micro-images of a camera 2.0 show different places of the scene, so that edges gather on the borders
     between them whatever the scene is. The lattice is moved where the four quarters of the picture agree, by
     a quarter of a pitch at most, and a note says by how much; otherwise the calibration comes back as it is.
@@ -95,7 +95,7 @@ def edges(picture: np.ndarray) -> np.ndarray:
 
 
 def _place(cell: np.ndarray, lattice: Lattice) -> tuple[np.ndarray, float]:
-    """Way [px] to where the border of a lattice's cell goes best with a mean cell, and the correlation."""
+    """Offset [px] at which the border of a lattice's cell fits a mean cell best, and the correlation."""
     size = len(cell)
     at = np.arange(size) / size
     steps = np.stack(np.meshgrid(at, at, indexing="ij"), -1) @ lattice.matrix.T

@@ -132,7 +132,7 @@ def _check_request(layout: str | None, pitch: float | None, rotation: float | No
         raise CalibrationError(f"layout is {layout!r} but must be 'square' or 'hex', or left out.")
     if pitch is not None and checks.positive("pitch", pitch, "px", CalibrationError) < SMALLEST_PITCH:
         raise CalibrationError(
-            f"pitch is {pitch:g} px but micro-images below {SMALLEST_PITCH:g} px cannot be told apart. "
+            f"pitch is {pitch:g} px but micro-images below {SMALLEST_PITCH:g} px cannot be separated. "
             "Use a sensor with smaller pixels, or lenslets farther apart."
         )
     if rotation is not None:

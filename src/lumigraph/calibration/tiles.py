@@ -119,7 +119,7 @@ def _tried(original: np.ndarray, tile: Area, model: Calibration, how: How) -> Tr
 
 
 def _centres(picture: np.ndarray, model: Calibration, how: How) -> Tried:
-    """Centres on one tile (y, x), told as those of the middle were."""
+    """Centres on one tile (y, x), found as those of the middle were."""
     if how == "gaps":
         gaps = valleys(picture, 1.0)
         return traced(gaps.max() - gaps, model)

@@ -1,4 +1,4 @@
-"""Which lenslets do not send light as they should, told by light alone: `unlit`, `saturated`."""
+"""Which lenslets do not send light as they should, judged by their light alone: `unlit`, `saturated`."""
 
 import numpy as np
 from scipy import ndimage

@@ -37,7 +37,7 @@ _UNMEASURED = (
 
 
 How = Literal["light", "sharp", "gaps", "logarithm", "discs", "nothing"]
-"""What centres were told by: first harmonics of the light, the mean micro-image, the dark gaps, the logarithm
+"""How centres were found: first harmonics of the light, the mean micro-image, the dark gaps, the logarithm
 of the picture, overlapping discs; or nothing, where none was measured."""
 
 
@@ -191,7 +191,7 @@ def _raw_notes(fitted: Fitted, shape: tuple[int, ...]) -> tuple[str, ...]:
             f"raw image where {_SHARE:.0%} are needed. Take a white image with the same camera settings."
         )
     return (
-        "found by the gaps between micro-images of a raw image; a white image tells their centres better",
+        "found by the gaps between micro-images of a raw image; a white image shows their centres better",
     )
 
 

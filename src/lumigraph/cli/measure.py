@@ -70,7 +70,7 @@ class Dark:
     dark
         Pictures without light, two of each exposure time; the first two have the flats' own.
     exposure_time
-        Of each pair of darks, such as '10 ms': tells dark current from black level.
+        Of each pair of darks, such as '10 ms': separates dark current from black level.
     highest
         Largest number that the sensor reads; by the file's bit depth if left out.
     """

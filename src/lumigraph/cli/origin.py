@@ -30,7 +30,7 @@ class Origin:
     white
         White image, for a raw image: it is divided by it, and calibrated from it without --calibration.
     dark
-        Image with the lens covered: subtracted; tells which pixels are hot.
+        Image with the lens covered: subtracted; shows which pixels are hot.
     camera
         Camera file, or a name of the catalogue: gives the calibration if no other is given, and depths.
     page
@@ -104,7 +104,7 @@ class Origin:
     def prepared(
         self, raw: "RawImage", *, use: Use | None = None, devignette: bool | None = None
     ) -> "PreparedImage":
-        """The raw image, ready to use; refused where nothing tells where its micro-images stand.
+        """The raw image, ready to use; refused where its lattice is not known.
 
         Parameters
         ----------

@@ -235,7 +235,7 @@ def render(
 
 @dataclass(frozen=True)
 class _Made:
-    """What was rendered: pictures, what is told of them, and the map that was found or None."""
+    """What was rendered: pictures, what is reported of them, and the map that was found or None."""
 
     pictures: list[Any]
     text: str

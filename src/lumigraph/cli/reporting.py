@@ -48,7 +48,7 @@ _SMALL = 240
 
 
 def enlarged(image: Any) -> int | None:
-    """Times that a picture of few pixels is shown larger; None for one that needs it not."""
+    """Times that a picture of few pixels is shown larger; None where that is not needed."""
     times = _SMALL // max(image.shape[:2])
     return times if times > 1 else None
 

@@ -21,7 +21,7 @@ def check_port(port: int) -> None:
 
 
 def announce(address: str, common: Common, *, no_open: bool) -> None:
-    """Print a page's address on one line, and open a browser there unless told not to."""
+    """Print a page's address on one line, and open a browser there unless --no-open is given."""
     report(common, address, {"address": address})
     sys.stdout.flush()
     if not no_open:

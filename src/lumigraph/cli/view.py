@@ -27,7 +27,7 @@ class Shown(Origin):
     white
         White image: the raw image is divided by it, and calibrated from it without --calibration.
     dark
-        Image with the lens covered: subtracted; tells which pixels are hot.
+        Image with the lens covered: subtracted; shows which pixels are hot.
     camera
         Camera file, or a name of the catalogue, of the raw image.
     patch

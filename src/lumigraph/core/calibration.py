@@ -24,7 +24,7 @@ class Calibration:
 
     Micro-images stand at `position(indices)`: the points of `lattice`, moved by `warp` where the camera has
     one. Whoever needs a place on the picture asks `position`, `index`, `offset` or `centers_within`; the
-    lattice by itself tells pitches and directions.
+    lattice by itself holds pitches and directions.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Calibration:
     notes
         What to know before trusting the result, one sentence each.
     by_maker
-        Whether it is the file of a camera's maker, which tells pitch and rotation well, but not where a
+        Whether it is the file of a camera's maker, which gives pitch and rotation well, but not where a
         picture was cropped: `calibration.aligned` moves it.
     """
 

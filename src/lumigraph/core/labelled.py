@@ -1,12 +1,13 @@
 """Arrays with names along their axes, as xarray holds them."""
 
 from dataclasses import dataclass, field
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from lumigraph.core.grid import Grid
-from lumigraph.errors import GeometryError
+from lumigraph.errors import GeometryError, LumigraphError
 
 _EVEN = 1e-6
 """Steps that differ by this part of their mean count as equal."""
@@ -87,10 +88,27 @@ class Labels:
         return places.tolist(), mean
 
 
+def _library() -> ModuleType:
+    """The module xarray.
+
+    Raises
+    ------
+    LumigraphError
+        It is not installed.
+    """
+    try:
+        import xarray
+    except ImportError as error:
+        raise LumigraphError(
+            "arrays with named axes need the package xarray: pip install 'lumigraph[xarray]'. "
+            "Or use np.asarray."
+        ) from error
+    return xarray
+
+
 def to_xarray(data: np.ndarray, labels: Labels) -> Any:
     """An `xarray.DataArray` of an array and its labels."""
-    import xarray
-
+    xarray = _library()
     names = tuple(labels.axes) + ("c",) * (data.ndim - len(labels.axes))
     along = {n: c if isinstance(c, tuple) else ((n,), c) for n, c in labels.along.items()}
     attributes = {n: value for n, value in labels.attributes.items() if value is not None}
@@ -109,8 +127,7 @@ def _described(labels: Labels, name: str) -> dict[str, Any]:
 
 def from_xarray(array: Any, kind: str, axes: str) -> Labels:
     """The labels and values of a DataArray with the axes of a kind of noun."""
-    import xarray
-
+    xarray = _library()
     if not isinstance(array, xarray.DataArray):
         raise GeometryError(f"{kind}.from_xarray takes an xarray.DataArray, not a {type(array).__name__}.")
     names = tuple(str(name) for name in array.dims)

@@ -94,7 +94,7 @@ def deconvolve(
     method
         `RichardsonLucy` (default) with or without a prior, or `LeastSquares`.
     exposure
-        Background, vignetting, dead pixels, noise; None for what a `RawImage` tells of its noise.
+        Background, vignetting, dead pixels, noise; None for the noise that a `RawImage` records.
     progress
         Called with a `Step` after each iteration.
     checkpoint

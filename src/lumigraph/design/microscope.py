@@ -272,7 +272,7 @@ def sampling_distance(wavelength: float, aperture: tuple[float, float], lenslet:
     .. math:: \frac{d}{M} \text{ for } |dz| \le \frac{d}{2 M \tan\theta}, \text{ else }
               \max\left(\frac{0.47 \lambda M |dz|}{d},\ \frac{\lambda}{4\,\mathrm{NA}}\right)
 
-    Near the focused plane the light of a point is not wider than a lenslet: which lenslet is lit tells where
+    Near the focused plane the light of a point is not wider than a lenslet: which lenslet is lit shows where
     it is, one sample per lenslet. Beyond that, neighbouring lenslets see a point from sides that overlap, and
     what a lenslet resolves (`band_limit`) is the limit. Finer structure in a reconstruction is not measured.
 

@@ -34,7 +34,7 @@ from lumigraph.simulation import Spectrum
 
 @dataclass(frozen=True, slots=True)
 class Making:
-    """How an operator is made: how exactly, where it is kept, and who is told of its progress."""
+    """How an operator is made: how exactly, where it is kept, and who hears of its progress."""
 
     accuracy: float
     folder: str | PathLike[str] | None

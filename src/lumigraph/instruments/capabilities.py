@@ -1,4 +1,4 @@
-"""What only some kinds of instruments can do, told by their methods: ``isinstance(camera, Decoded)``."""
+"""What only some kinds of instruments can do, by their methods: ``isinstance(camera, Decoded)``."""
 
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
@@ -18,7 +18,7 @@ class Decoded(Protocol):
 
 @runtime_checkable
 class Correctable(Protocol):
-    """What a measure of depth makes of its views can be told by planes whose depth is known."""
+    """The bias of a measure of depth can be found on planes whose depth is known."""
 
     def plane_views(self, alpha: float) -> LightField:
         """Views of a textured plane at a refocus factor."""

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from lumigraph.instruments.microscope import LightFieldMicroscope
 
 DEPTHS = (5e-6, 10e-6, 25e-6, 50e-6, 100e-6)
-"""Depths for which the band limit is told [m]."""
+"""Depths for which the band limit is listed [m]."""
 
 
 def microscope(scope: "LightFieldMicroscope") -> Description:

@@ -29,7 +29,7 @@ from lumigraph.sensor import Sensor
 class Instrument(Part):
     """What a camera file describes; see its children.
 
-    What only some kinds can do is told by the protocols of `instruments.capabilities`. What raises
+    The protocols of `instruments.capabilities` say what only some kinds can do. What raises
     NotImplementedError here, every kind has in its own way.
     """
 

@@ -29,7 +29,9 @@ def readable(error: ValidationError, model: type[BaseModel]) -> LumigraphError:
         return GeometryError(f"{name}: {value!r} is not {problem.get('ctx', {}).get('expected')}.")
     if kind == "model_type":
         return FormatError(f"{name}: {value!r} is not a table of keys and values.")
-    return GeometryError(f"{name}: {value!r} will not do: {problem['msg'][:1].lower()}{problem['msg'][1:]}.")
+    return GeometryError(
+        f"{name}: {value!r} is not possible: {problem['msg'][:1].lower()}{problem['msg'][1:]}."
+    )
 
 
 def unknown_key(name: str, known: list[str]) -> str:

@@ -34,7 +34,7 @@ def load(
     path
         A PNG.
     views
-        Pixels of a block (v, u); guessed if left out, with a warning that tells the guess.
+        Pixels of a block (v, u); guessed if left out, with a warning that names the guess.
     max_pixels
         Larger pictures are refused.
 

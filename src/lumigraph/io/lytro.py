@@ -212,7 +212,7 @@ def _calibration(container: Container, frame: dict[str, Any], max_pixels: int) -
 
 
 def _bare(path: Path, max_pixels: int) -> RawImage:
-    """A frame without a container: its metadata stands beside it (`.txt`, `.json`), or its size tells."""
+    """A frame without a container: its metadata stands beside it (`.txt`, `.json`), or its size says."""
     size = path.stat().st_size
     beside = next((p for end in (".txt", ".TXT", ".json") if (p := path.with_suffix(end)).is_file()), None)
     known: dict[str, Any] = {}

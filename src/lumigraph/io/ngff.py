@@ -1,4 +1,4 @@
-"""OME-Zarr (NGFF 0.5): how a volume's axes, units and sizes are told to other programs.
+"""OME-Zarr (NGFF 0.5): how other programs learn a volume's axes, units and sizes.
 
 J. Moore et al., *OME-Zarr: a cloud-optimized bioimaging file format*, Histochem. Cell Biol. 160, 223 (2023);
 specification 0.5, section "multiscales". One level is written; of several the first, the finest, is read.

@@ -38,7 +38,7 @@ def load(
 ) -> RawImage | Stack | Volume:
     """The picture in a TIFF file (y, x) or (y, x, c), or its pages; transparency is left out.
 
-    Several pages of one size open as a `Stack`, or as a `Volume` where the file tells the size of a voxel
+    Several pages of one size open as a `Stack`, or as a `Volume` where the file gives the size of a voxel
     (OME-XML with PhysicalSizeX, Y and Z and neither channels nor times). Depths of a volume by another
     program count from its middle plane unless it gives positions.
 

@@ -3,7 +3,7 @@
 Read: the HCI 4D light field benchmark (`input_Cam000.png` ..., row by row from the top left; its
 `parameters.cfg` if there), the Stanford archive (`out_RR_CC_Y_X_.png`), and any names that end in two
 numbers, row and column (`view_03_05.png`). Written: `view_RR_CC.png` (`.tif` for floats) and `views.json`.
-Row 0, column 0 is the camera top left; `cameras` tells how that becomes (v, u).
+Row 0, column 0 is the camera top left; `cameras` says how that becomes (v, u).
 """
 
 import json
@@ -148,7 +148,7 @@ def _files(path: Path) -> tuple[Files, tuple[float, float]]:
     """Picture of each camera (row, column), and the spacing of the cameras (down, right)."""
     path = source.existing(path)
     if not path.is_dir():
-        raise FormatError(f"{path} is no folder of views, and has no extension that tells what it is.")
+        raise FormatError(f"{path} is no folder of views, and has no extension that says what it is.")
     names = sorted(child.name for child in path.iterdir())
     if len(names) > 10 * _MOST:
         raise FormatError(f"{path} holds {len(names)} files, too many for views. Check the path.")

@@ -285,7 +285,7 @@ class Builder:
         behind: dict[Limits, Lit] = {}
 
         def of(state: State) -> Apart | Few:
-            # Any cell of the kind: only the border, as it is told, makes a difference.
+            # Any cell of the kind: only the border makes a difference.
             response = self.lenslets.response(cells.middle(state.kind), (state.y, state.x))
             if response.core is not None:
                 return few(light, response, self.axes, self.optics.margin(reach), cells.staggered)

@@ -40,7 +40,7 @@ def placement(
     origin = calibration.lattice.origin
     place = np.stack(np.broadcast_arrays(y - origin[0], x - origin[1]), -1)
     place = place @ np.linalg.inv(calibration.lattice.matrix).T
-    # A lenslet of which the outermost pixels alone are seen tells nothing.
+    # A lenslet whose outermost pixels alone are seen says nothing.
     least = SLIVER / calibration.lattice.pitch
     first = np.floor(place.reshape(-1, 2).min(0) + 0.5 + least).astype(int)
     last = np.floor(place.reshape(-1, 2).max(0) + 0.5 - least).astype(int)

@@ -49,7 +49,7 @@ def layout(camera: Camera) -> Figure:
     drawn = camera.layout()
     if drawn is None:
         raise GeometryError(
-            f"there is no ray diagram of a {type(camera).__name__}. Its describe() tells its distances."
+            f"there is no ray diagram of a {type(camera).__name__}. Its describe() lists its distances."
         )
     if drawn.object_distance <= drawn.focal_length:
         raise GeometryError(

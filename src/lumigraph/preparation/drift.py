@@ -21,14 +21,14 @@ _CERTAIN, _LIKELY = 0.5, 0.2  # pitches between the lattices at the border of th
 _CLEAR, _SLIGHT = (
     18.5,
     0.1,
-)  # evidence from which a slip of few pitches is told; self-made lattices reach 0.08
-_SIGMAS = 3.0  # of its standard error from which a slip is told; a specimen pulls at the lines of gaps
+)  # evidence that shows a slip of few pitches; self-made lattices reach 0.08
+_SIGMAS = 3.0  # of its standard error from which a slip counts; a specimen pulls at the lines of gaps
 _BLOCKS, _EVERYWHERE = (
     8,
     0.45,
 )  # parts along each axis; real lattices have shares over 0.55, single points 0.36
 _DIM, _LIT = 0.05, 0.5  # of a bright lenslet's light; part of the lenslets that must have it
-_CONTRAST = 0.15  # of the mean micro-image from which its place is told
+_CONTRAST = 0.15  # of the mean micro-image from which its place is found
 _SHIFTED = 0.25  # of a pitch
 
 

@@ -35,7 +35,7 @@ class Given:
         raw
             As it was read.
         even
-            False where the white image only tells where the micro-images stand, and is not divided out.
+            False where the white image only gives the lattice and is not divided out.
         options
             As `prepare` takes them.
         """

@@ -52,7 +52,7 @@ def prepare(
     white
         Picture of an evenly lit surface with the same settings.
     dark
-        Picture with the lens covered: tells which pixels shine by themselves, too.
+        Picture with the lens covered: shows which pixels shine by themselves, too.
     camera
         Its description: gives lengths, and the lattice where nothing else does; one without lenslets is
         not looked at.

@@ -1,4 +1,4 @@
-"""Which pixels and lenslets of a raw image count, told by light: `pixel_reasons`, `verdicts`."""
+"""Which pixels and lenslets of a raw image count, judged by their light: `pixel_reasons`, `verdicts`."""
 
 import math
 
@@ -29,7 +29,7 @@ def pixel_reasons(
     raw
         As it was read.
     beside
-        Its white image tells what is dark, its dark image what is dead.
+        Its white image shows what is dark, its dark image what is dead.
     calibration
         Where the micro-images stand, if that is known.
     mask

@@ -2,7 +2,7 @@
 
 - `decode`: a plenoptic 1.0 raw image to a `LightField`, on its true micro-image lattice; `encode` back;
   `squared`: hexagonal lattices onto a square grid, and finer; `pixels`: hot pixels found and filled;
-  `kind_check`: tells a raw image of a camera 2.0
+  `kind_check`: recognises a raw image of a camera 2.0
 - `views`: single views, points of view, a smaller aperture, mosaics of views and of micro-images;
   `paths`: a point of view that moves
 - `refocus`: shear and sum, for one depth or a stack; `sharp`: one picture focused everywhere

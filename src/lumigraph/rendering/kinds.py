@@ -24,9 +24,9 @@ def match_kinds(
 ) -> tuple[float, ...]:
     """`focus` for `render` in the order of the kinds that the raw image shows.
 
-    A maker's file tells at which depths three kinds of lenslets are sharp, but not which of them stands first
+    A maker's file says at which depths three kinds of lenslets are sharp, but not which of them stands first
     in a picture that was cropped or turned. Where the patches are known, the kind that shows more detail than
-    its neighbours tells it: of all orders, the one whose blur, |patch - focus|, goes best with it is
+    its neighbours shows it: of all orders, the one whose blur, |patch - focus|, fits it best is
     returned, or the given one where the picture has too little detail.
 
     Parameters

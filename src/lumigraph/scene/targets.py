@@ -14,7 +14,7 @@ import numpy as np
 from lumigraph.core import checks, coverage, memory
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
-from lumigraph.errors import GeometryError, SamplingWarning
+from lumigraph.errors import GeometryError, LumigraphError, SamplingWarning
 from lumigraph.scene.volumes import Diffuser, Points, Scene, Slice
 
 Pair = tuple[float, float]
@@ -324,14 +324,14 @@ def photo(grid: Grid, image: np.ndarray | None = None) -> Scene:
         Samples of the focused plane.
     image
         (y, x) or (y, x, c): whole numbers (the type's highest becomes 1), or floats taken as intensities.
-        None takes scikit-image's photographer.
+        None takes scikit-image's photographer (``pip install 'lumigraph[photo]'``).
 
     Raises
     ------
     GeometryError
         An image of another shape.
     LumigraphError
-        Negative, NaN or infinite values.
+        Negative, NaN or infinite values, or no image and no scikit-image.
 
     Examples
     --------
@@ -339,12 +339,7 @@ def photo(grid: Grid, image: np.ndarray | None = None) -> Scene:
     (40, 40)
     """
     _check_grid(grid)
-    from skimage.transform import resize
-
-    if image is None:
-        from skimage.data import camera
-
-        image = camera()
+    image = _photographer() if image is None else image
     pixels = np.asarray(to_numpy(image))
     if pixels.ndim not in (2, 3) or min(pixels.shape) < 1:
         raise GeometryError(f"a photo has shape (y, x) or (y, x, c), not {pixels.shape}.")
@@ -353,8 +348,29 @@ def photo(grid: Grid, image: np.ndarray | None = None) -> Scene:
     checks.finite_array("the photo", values)
     size = min(grid.size[0] / pixels.shape[0], grid.size[1] / pixels.shape[1])
     shape = tuple(max(1, min(grid.shape[k], round(size * pixels.shape[k] / grid.pitch[k]))) for k in (0, 1))
-    resized = resize(values, (*shape, *pixels.shape[2:]), order=1, anti_aliasing=True)
+    resized = _resized(values, (shape[0], shape[1]))
     return Scene([Slice(resized, grid.resized((shape[0], shape[1])))])
+
+
+def _photographer() -> np.ndarray:
+    try:
+        from skimage.data import camera
+    except ImportError as error:
+        raise LumigraphError(
+            "the photographer comes with scikit-image: pip install 'lumigraph[photo]'. Or give an image."
+        ) from error
+    return camera()
+
+
+def _resized(picture: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Linear interpolation between samples, after a Gaussian that keeps finer detail from aliasing."""
+    from scipy.ndimage import gaussian_filter, zoom
+
+    factors = [new / old for new, old in zip(shape, picture.shape, strict=False)]
+    spread = [max(0.0, (1 / factor - 1) / 2) for factor in factors]
+    rest = picture.ndim - 2
+    smooth = gaussian_filter(picture, [*spread, *[0.0] * rest], mode="mirror")
+    return zoom(smooth, [*factors, *[1.0] * rest], order=1, mode="mirror", grid_mode=True)
 
 
 def points(positions: Sequence[Sequence[float]], intensities: Sequence[float] | None = None) -> Scene:

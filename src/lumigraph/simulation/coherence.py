@@ -62,7 +62,7 @@ class Coherence(Protocol):
         ...
 
     def half(self, number: int) -> int | None:
-        """Of two halves, alike in kind, the one of a shot (from 0): their difference tells the error."""
+        """Of two halves, alike in kind, the one of a shot (from 0): their difference shows the error."""
         ...
 
     def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
@@ -265,8 +265,8 @@ class TiltedWaves:
             return found * wavelength, weights
         if (limit := wavelength / (2 * max(plane.grid.pitch))) < self.na:
             raise SamplingError(
-                f"na is {self.na:g} but the scene's pitch of {max(plane.grid.pitch) * 1e6:.3g} µm tells "
-                f"directions apart up to {limit:.3g}. Use a pitch of "
+                f"na is {self.na:g} but the scene's pitch of {max(plane.grid.pitch) * 1e6:.3g} µm "
+                f"resolves directions up to {limit:.3g}. Use a pitch of "
                 f"{wavelength / (2 * self.na) * 1e6:.3g} µm or finer."
             )
         found, weights = directions.over_a_disc(share, frequencies, self.na / wavelength, self.count)

@@ -25,6 +25,7 @@ from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_map
 
 _CAMERA_FILE = 1 << 20  # bytes; camera files have some hundred
 _PATCHES = 25
+_PAINTED = 256  # samples across the picture that a camera is shown
 _PATCH_SPAN = 1.8  # 2.0 pictures from tiles so many times smaller to so many times larger
 _LABELS = {
     "alpha": ("Focus α′", ""),
@@ -53,7 +54,7 @@ class Origin(Given):
 
     @property
     def is_known(self) -> bool:
-        """Whether anything tells where micro-images stand."""
+        """Whether it is known where micro-images stand."""
         return any(one is not None for one in (self.camera, self.calibration, self.white))
 
 
@@ -187,14 +188,16 @@ def is_camera(path: Path) -> bool:
 
 
 def _simulated(path: Path, tell: Progress) -> Exhibit:
-    """What a camera sees of a photograph, by wave optics."""
+    """What a camera sees of the painted scene, as one flat picture, by wave optics."""
+    from lumigraph import samples
     from lumigraph.instruments import load_camera
     from lumigraph.scene import targets
     from lumigraph.simulation import simulate
 
     camera = load_camera(path)
+    picture = samples.scene((_PAINTED, _PAINTED), 3).views.view(1, 1).mean(axis=2)
     raw = simulate(
-        camera, targets.photo(camera.object_grid),
+        camera, targets.photo(camera.object_grid, picture),
         progress=within(tell, 0.0, 1.0, "simulating"),
     )  # fmt: skip
     return of_raw(path.name, raw, camera.calibration, camera.patch)

@@ -13,7 +13,7 @@ RATIOS = (0.003, 0.01, 0.03, 0.06, 0.1, coherence.INCOHERENCE, 0.2, 0.28)
 """C/N from the thesis' C = 5 to its C = 500, of N = 1765."""
 QUICK = (0.01, coherence.INCOHERENCE)
 COUNT = {True: 40, False: 48}
-"""Snapshots for each coherence index, quick and full; both kinds of error are told apart, see `Errors`."""
+"""Snapshots for each coherence index, quick and full; the two kinds of error are separate, see `Errors`."""
 ITERATIONS = 300
 """Snapshots of the thesis' figures 3.14 and 3.15."""
 

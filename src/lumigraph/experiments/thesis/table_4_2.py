@@ -107,7 +107,7 @@ def peak(curve: np.ndarray, alphas: np.ndarray) -> float:
 def _fine(context: Context, camera: PlenopticCamera) -> Callable[[float, tuple[float, float]], float]:
     """Refocus factor that an oversampled stack measures of a point at (depth, place).
 
-    A coarse stack tells where to look, so that the oversampled one can be short.
+    A coarse stack shows where to look, so that the oversampled one can be short.
     """
     directions, oversample, step = (6, 3, 0.04) if context.quick else (8, 4, 0.02)
     coarse = np.arange(0.4, 1.36, 0.05)
