@@ -370,7 +370,7 @@ def _resized(picture: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     spread = [max(0.0, (1 / factor - 1) / 2) for factor in factors]
     rest = picture.ndim - 2
     smooth = gaussian_filter(picture, [*spread, *[0.0] * rest], mode="mirror")
-    return zoom(smooth, [*factors, *[1.0] * rest], order=1, mode="mirror", grid_mode=True)
+    return np.asarray(zoom(smooth, [*factors, *[1.0] * rest], order=1, mode="mirror", grid_mode=True))
 
 
 def points(positions: Sequence[Sequence[float]], intensities: Sequence[float] | None = None) -> Scene:
