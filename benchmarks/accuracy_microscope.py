@@ -7,6 +7,7 @@ nodes of its own, for which nothing wraps round and no edge is missed.
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -135,36 +136,39 @@ MICROSCOPES = {
 }  # fmt: skip
 DEPTHS = (-9e-6, 0.0, 4e-6)
 SAMPLES = 3
+ANYWHERE = {"middle": [(0.1, -0.23), (0.45, 0.5)], "border": [(2.7, 1.2)], "outside": [(4.2, 0.3)]}
+"""Points, in lenslets as the object has them."""
+INDICES = {"middle": [(10, 10), (9, 11)], "border": [(18, 11)]}
+"""Samples of slices."""
 
 
-def rows_of(name: str, depths: Sequence[float], accuracies: Sequence[float]) -> list[dict[str, Any]]:
-    """Points anywhere, and samples of slices, of one microscope: rms over the accuracy asked for."""
-    scope, rows = MICROSCOPES[name](), []
-    size = scope.lenslet_size
-    anywhere = {"middle": [(0.1 * size, -0.23 * size), (0.45 * size, 0.5 * size)]}
-    anywhere |= {"border": [(2.7 * size, 1.2 * size)], "outside": [(4.2 * size, 0.3 * size)]}
-    for dz in depths:
-        grid = scope.operator((dz,), SAMPLES, accuracy=1e-2).object_grid
-        indices = {"middle": [(10, 10), (9, 11)], "border": [(18, 11)]}
-        samples = {k: [(float(grid.y[i]), float(grid.x[j])) for i, j in at] for k, at in indices.items()}
-        every = [p for at in (anywhere, samples) for place in at.values() for p in place]
-        truth = dict(zip(every, points(scope, dz, every), strict=True))
-        for accuracy in accuracies:
-            operator = scope.operator((dz,), SAMPLES, accuracy=accuracy)
-            scale = (SAMPLES / 5) ** 2  # of a sample's light to that of `object_grid`'s
-            paths = {
-                "points": {k: [scope.point_image(*p, dz, accuracy=accuracy) for p in at]
-                           for k, at in anywhere.items()},
-                "slices": {k: [operator.psf((0, *i)) * scale for i in at] for k, at in indices.items()},
-            }  # fmt: skip
-            for path, images in paths.items():
-                row = {"path": path, "camera": name, "dz [mm]": f"{dz * 1e3:g}", "asked": f"{accuracy:g}"}
-                for place in ("middle", "border", "outside"):
-                    at = (anywhere if path == "points" else samples).get(place, [])
-                    off = [_relative(i, truth[p]) for i, p in zip(images.get(place, []), at, strict=True)]
-                    row[place] = f"{max(off) / accuracy:.2f}" if off else ""
-                rows.append(row)
-    return rows
+def errors(name: str, path: str, dz: float, accuracy: float) -> dict[str, float]:
+    """Relative rms error of points anywhere or of samples of slices, the worst of each place."""
+    scope = MICROSCOPES[name]()
+    if path == "points":
+        places = {
+            k: [(y * scope.lenslet_size, x * scope.lenslet_size) for y, x in at] for k, at in ANYWHERE.items()
+        }
+        images = {p: scope.point_image(*p, dz, accuracy=accuracy) for at in places.values() for p in at}
+    else:
+        operator = scope.operator((dz,), SAMPLES, accuracy=accuracy)
+        grid, scale = (
+            operator.object_grid,
+            (SAMPLES / 5) ** 2,
+        )  # of a sample's light to that of `object_grid`'s
+        found = {
+            k: {(float(grid.y[i]), float(grid.x[j])): (0, i, j) for i, j in at} for k, at in INDICES.items()
+        }
+        places = {k: list(at) for k, at in found.items()}
+        images = {p: operator.psf(index) * scale for at in found.values() for p, index in at.items()}
+    every = [p for at in places.values() for p in at]
+    truth = dict(zip(every, _truth(name, dz, tuple(every)), strict=True))
+    return {k: max(_relative(images[p], truth[p]) for p in at) for k, at in places.items()}
+
+
+@cache
+def _truth(name: str, dz: float, at: tuple[Place, ...]) -> list[np.ndarray]:
+    return points(MICROSCOPES[name](), dz, at)
 
 
 def _relative(image: np.ndarray, reference: np.ndarray) -> float:

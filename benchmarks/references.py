@@ -165,7 +165,7 @@ class Lens:
         wavelength, L, half = camera.wavelength, camera.separation, camera.pupil_diameter / 2
         (lens,) = camera.lens_train().elements
         power = 1 / self.distance + 1 / L - 1 / lens.focal_length
-        farthest = farthest or 4 * max(camera.lenslets.reach)
+        farthest = farthest or 7 * max(camera.lenslets.reach)
         unit, weight = np.polynomial.legendre.leggauss(fineness.pupil)
         rho, weight = half * (unit + 1) / 2, half / 2 * weight
         pupil = np.exp(1j * np.pi * power * rho**2 / wavelength) * 2 * np.pi * rho * weight
@@ -191,6 +191,15 @@ def points(camera: Any, dz: float, at: Sequence[Point], fineness: Fineness = FIN
     """Raw image (ny, nx) of each point, for 1 of light on the lenslets."""
     relay, lens = Relay(camera, fineness), Lens(camera, dz, fineness)
     return [relay.pixels(np.abs(f) ** 2) for f in relay.fields([lens.light(point) for point in at])]
+
+
+def focused(camera: Any, dz: float, at: Sequence[Point], fineness: Fineness = FINE) -> list[np.ndarray]:
+    """Raw image (ny, nx) of each point before a camera without lenslets, for 1 of light on the sensor."""
+    grid, (nodes, shares) = camera.sensor.grid, np.polynomial.legendre.leggauss(fineness.pixel)
+    y, x = ((-c[:, None] + nodes * p / 2).ravel() for c, p in zip((grid.y, grid.x), grid.pitch, strict=True))
+    lens, (ny, nx), q = Lens(camera, dz, fineness, 2 * max(grid.size)), grid.shape, fineness.pixel
+    light = (np.abs(lens.light(point)(y, x)) ** 2 for point in at)
+    return [np.einsum("yixj,i,j->yx", one.reshape(ny, q, nx, q), shares / 2, shares / 2) for one in light]
 
 
 def coherent(

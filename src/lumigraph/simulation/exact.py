@@ -1,10 +1,11 @@
-"""Parts of a scene whose images need no shots: points, evenly lit stops, and slices in incoherent light."""
+"""Parts of a scene whose images need no shots: points, evenly lit stops, slices in light of one kind."""
 
 import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.progress import Progress
 from lumigraph.operators import points, single_lens, white
+from lumigraph.operators.coherent import coherent_image
 from lumigraph.operators.periodic import periodic_operator
 from lumigraph.scene import Diffuser, Points, Slice
 from lumigraph.simulation import error
@@ -14,9 +15,13 @@ Part = Slice | Points | Diffuser
 
 
 def image_of(
-    camera: Camera, part: Part, accuracy: float, progress: Progress
+    camera: Camera, part: Part, accuracy: float, progress: Progress, *, coherent: bool = False
 ) -> tuple[np.ndarray, error.Reached]:
-    """Raw image of a part in incoherent light, and how far off it is."""
+    """Raw image of a part in incoherent light, or of a slice in coherent light, and how far off it is."""
+    if coherent and isinstance(part, Slice):
+        amplitude = np.sqrt(arrays.to_numpy(part.intensity))
+        image = coherent_image(camera, amplitude, part.grid, part.dz, accuracy)
+        return image, error.of_quadrature("coherent", accuracy)
     if camera.lattice is None:
         return _without_lenslets(camera, part), error.SINGLE_LENS
     if isinstance(part, Points):

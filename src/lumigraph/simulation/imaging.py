@@ -13,6 +13,7 @@ from lumigraph.core.progress import part as share
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.operators.coherent import is_followed
 from lumigraph.scene import Points, Scene, Slice
 from lumigraph.simulation import error
 from lumigraph.simulation.camera import Camera, Imaging
@@ -102,8 +103,11 @@ def _imaged(
     light = Light(np.zeros(camera.image_grid.shape), np.zeros(camera.sensor.shape))
     slices, count, accuracy = [], 0, 1e-3
     fields: Iterable[Shot] = ()
+    coherent = isinstance(coherence, Coherent) and is_followed(camera)
     if isinstance(coherence, Incoherent):
         accuracy = coherence.accuracy
+    elif coherent:
+        scene = Scene(part.trimmed() if isinstance(part, Slice) else part for part in scene.parts)
     elif slices := [part.trimmed() for part in scene.parts if isinstance(part, Slice)]:
         fields = shots(camera, slices, coherence)
         count = number_of_shots(slices, coherence)
@@ -111,7 +115,8 @@ def _imaged(
     total = len(exact) + count
     try:
         for part in exact:
-            image, reached = image_of(camera, part, accuracy, share(progress, light.done, total))
+            report = share(progress, light.done, total)
+            image, reached = image_of(camera, part, accuracy, report, coherent=coherent)
             light.pixels += image
             light.reached.append((error.norm(image), reached))
             light.count(progress, total)
