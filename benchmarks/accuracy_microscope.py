@@ -21,7 +21,7 @@ from lumigraph.elements import LensletArray
 
 Place = tuple[float, float]
 
-FINE = references.Fineness(lenslet=160, pixel=6, pupil=400, spline=32)
+FINE = references.Fineness(lenslet=240, pixel=6, pupil=400, spline=32)
 BEYOND = 2
 """Lenslets that the reference has beyond those that the sensor sees, to each side: arrays go on there."""
 

@@ -76,7 +76,9 @@ def _on_sensor(camera: CameraOptics, amplitude: np.ndarray, grid: Grid, distance
     """Of a camera without lenslets."""
     pixels, pitch = camera.sensor.grid, _cells.airy(camera) / (2 * OVERSAMPLING)
     ny, nx = (math.ceil(size / pitch) + 2 * HALF_WIDTH + 2 for size in pixels.size)
-    plane = Grid((ny, nx), pitch, (-pixels.center[0], -pixels.center[1]))  # pixels are turned by 180°
+    plane = Grid(
+        (ny, nx), (pitch, pitch), (-pixels.center[0], -pixels.center[1])
+    )  # pixels are turned by 180°
     stop, image = _Stop(camera, distance, grid, _farthest(plane.y, plane.x)), np.zeros((ny, nx), np.float32)
     light, step = stop.light(amplitude), max(1, int(TOGETHER / nx))
     for first in range(0, ny, step):
