@@ -168,18 +168,12 @@ class Way:
 
     def method(self, camera: "Instrument", operator: "Linear") -> "RichardsonLucy":
         """`RichardsonLucy` with what was asked for."""
-        from lumigraph.deconvolution import LowPass, RichardsonLucy, TotalVariation, Wavelets
-        from lumigraph.deconvolution.filters import widths_of
-        from lumigraph.instruments.capabilities import WithObjective
+        from lumigraph.deconvolution import RichardsonLucy, TotalVariation, Wavelets
+        from lumigraph.instruments.smoothing import low_pass_of
 
         given: dict[str, Any] = {} if self.strength is None else {"strength": self.strength}
         prior = {"none": None, "tv": TotalVariation(**given), "wavelets": Wavelets(**given)}[self.prior]
-        smooth = None
-        if isinstance(camera, WithObjective) and not self.raw_lattice:
-            assert operator.depths is not None  # a camera's operators stand somewhere
-            assert operator.object_grid is not None
-            distances = camera.low_pass_distances(operator.depths)
-            smooth = LowPass(widths_of(distances, operator.object_grid.pitch[0]))
+        smooth = None if self.raw_lattice else low_pass_of(camera, operator)
         return RichardsonLucy(prior, smooth, accelerated=self.accelerated)
 
 

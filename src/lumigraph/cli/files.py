@@ -31,6 +31,20 @@ def check_output(path: Path, endings: Sequence[str]) -> None:
         check_target(path, endings)
 
 
+def check_page(path: Path) -> None:
+    """Refuse a folder into which a page could not be written in the end.
+
+    Raises
+    ------
+    FormatError
+        The folder above does not exist, or it holds other things, or an input.
+    """
+    from lumigraph.viewer import check_folder
+
+    _check_inputs(path)
+    check_folder(path)
+
+
 def check_inside(paths: Iterable[Path]) -> None:
     """Refuse files inside an output folder that would take the place of an input.
 

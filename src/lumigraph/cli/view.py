@@ -49,23 +49,42 @@ class Page:
     no_open
         Do not open a browser.
     export
-        Write the page into this file (.html) instead, which works from disk and can be sent to others.
+        Write the page instead: into one file (.html), which works from disk and can be sent to others, or
+        into a folder for any web server, in tiles, so that things of many gigabytes open at once.
     quality
-        Of the exported views, 1 to 99; 100 keeps every number, in a file several times as large.
+        Of the exported views, 1 to 99; 100 keeps every number, in files several times as large.
+    serve_folder
+        FILE is a folder that --export wrote: serve its files.
     """
 
     port: Port = 0
     no_open: Annotated[bool, Parameter(negative="")] = False
     export: Path | None = None
     quality: Annotated[int, Parameter(allow_leading_hyphen=True)] = 90
+    serve_folder: Annotated[bool, Parameter(negative="")] = False
+
+    @property
+    def is_file(self) -> bool:
+        """Whether the page is written into one file."""
+        return self.export is not None and self.export.suffix.lower() in (".html", ".htm")
 
     def check(self) -> None:
         """Refuse what is wrong before anything is read."""
         check_port(self.port)
         if not 1 <= self.quality <= 100:
             raise FormatError(f"--quality is {self.quality} but must be from 1 to 100.")
-        if self.export is not None:
+        if self.export is None:
+            return
+        if self.serve_folder:
+            raise FormatError("--export writes a page and --serve-folder shows one. Leave one of them out.")
+        if self.is_file:
             files.check_output(self.export, (".html", ".htm"))
+            return
+        if self.export.suffix:
+            raise FormatError(
+                f"--export is {self.export}: the wrong extension. Give a file (.html), or a folder (no extension)."
+            )
+        files.check_page(self.export)
 
 
 def view(
@@ -87,6 +106,8 @@ def view(
 
     Example: `lumigraph view views.zarr --export page.html`
 
+    Example: `lumigraph view large.zarr --export page`, then `lumigraph view page --serve-folder`
+
     Parameters
     ----------
     file
@@ -97,21 +118,41 @@ def view(
     from lumigraph import viewer
 
     page.check()
+    if page.serve_folder:
+        if beside is not None:
+            raise FormatError("--serve-folder serves one folder. Leave the second file out.")
+        _serve(viewer.serve_folder(file), page, common)
+        return None
     exhibits = [_opened(path, origin) for path in (file, beside) if path is not None]
-    if page.export is not None:
-        with progress("export") as shown:
-            written = viewer.export(exhibits, page.export, quality=page.quality, progress=shown)
-        sizes = {name.split("/")[1]: size for name, size in written.arrays.items()}
-        parts = ", ".join(f"{name} {_megabytes(size)}" for name, size in sizes.items())
-        text = f"{_megabytes(written.size)} ({parts})"
-        values = (Quantity("bytes", written.size), Quantity("arrays", written.arrays))
-        return Result("View", "", exhibits, (text,), values, written=(written.path,))
+    if page.export is None:
+        _serve(viewer.site(exhibits), page, common)
+        return None
+    return _exported(exhibits, page, page.export)
+
+
+def _serve(site: Any, page: Page, common: Common) -> None:
+    from lumigraph import viewer
+
     viewer.serve(
-        viewer.site(exhibits),
-        port=page.port,
-        ready=lambda address: announce(address, common, no_open=page.no_open),
-    )
-    return None
+        site, port=page.port, ready=lambda address: announce(address, common, no_open=page.no_open)
+    )  # fmt: skip
+
+
+def _exported(exhibits: list[Any], page: Page, path: Path) -> Result:
+    from lumigraph import viewer
+
+    with progress("export") as shown:
+        if page.is_file:
+            written = viewer.export(exhibits, path, quality=page.quality, progress=shown)
+            sizes = {name.split("/")[1]: size for name, size in written.arrays.items()}
+            about = ", ".join(f"{name} {_megabytes(size)}" for name, size in sizes.items())
+            values = Quantity("bytes", written.size), Quantity("arrays", written.arrays)
+        else:
+            written = viewer.export_folder(exhibits, path, quality=page.quality, progress=shown)
+            about = f"{written.files} files, for any web server"
+            values = Quantity("bytes", written.size), Quantity("files", written.files)
+    text = f"{_megabytes(written.size)} ({about})"
+    return Result("View", "", exhibits, (text,), values, written=(written.path,))
 
 
 def _opened(path: Path, origin: Shown) -> Any:

@@ -1,11 +1,11 @@
-"""What the nouns share: NumPy reads them, they draw themselves, and xarray carries them with named axes."""
+"""What the nouns share: NumPy reads them, they draw themselves, xarray and napari get named axes."""
 
 from abc import abstractmethod
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self
 
 import numpy as np
 
-from lumigraph.core import labelled
+from lumigraph.core import labelled, layers
 from lumigraph.core.arrays import A, as_numpy
 from lumigraph.core.drawing import draw
 from lumigraph.core.labelled import Labels
@@ -41,6 +41,20 @@ class Noun(Generic[A]):
     def to_xarray(self) -> Any:
         """An `xarray.DataArray` with named axes, coordinates in metres, and attributes."""
         return labelled.to_xarray(as_numpy(getattr(self, self.pixels)), self._labels())
+
+    def to_napari(self, name: str = "") -> layers.LayerData:
+        """A layer of napari, (data, options, "image"), with scale in micrometres, units and names of axes.
+
+        napari is not needed for it. ``viewer.add_image(data, **options)`` shows it; its metadata hold this
+        object as "lumigraph".
+
+        Parameters
+        ----------
+        name
+            Of the layer; that of the type if left out.
+        """
+        array = as_numpy(getattr(self, self.pixels))
+        return layers.image(array, self._labels(), self, name or type(self).__name__)
 
     @classmethod
     def from_xarray(cls, array: Any) -> Self:

@@ -5,6 +5,7 @@
   `kind_check`: recognises a raw image of a camera 2.0
 - `views`: single views, points of view, a smaller aperture, mosaics of views and of micro-images;
   `paths`: a point of view that moves
+- `focus_range`: refocus factors worth looking at
 - `refocus`: shear and sum, for one depth or a stack; `sharp`: one picture focused everywhere
 - `fourier_slice`: the same by a slice through the four-dimensional spectrum
 - `focused`: plenoptic 2.0: turned patches tiled without seams, of one size or one for each lenslet;
@@ -15,6 +16,7 @@
 
 from lumigraph.rendering.decode import decode
 from lumigraph.rendering.encode import encode
+from lumigraph.rendering.focus_range import focus_range, focus_span
 from lumigraph.rendering.focused import render, render_stack, rendered_grid
 from lumigraph.rendering.fourier_slice import refocus_fourier
 from lumigraph.rendering.kinds import match_kinds
@@ -38,6 +40,8 @@ __all__ = [
     "all_in_focus",
     "decode",
     "encode",
+    "focus_range",
+    "focus_span",
     "hot_pixels",
     "lenslet_indices",
     "lenslet_mosaic",

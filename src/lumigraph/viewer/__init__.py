@@ -7,7 +7,9 @@
 - `parts`: an exhibit as a description (JSON) and arrays that are sent when they are asked for
 - `encoding`: arrays as bytes: as they are, losslessly smaller, or as pictures
 - `page`: the page's files, as a table to serve
+- `packing`: how arrays are kept in a page that is written
 - `single_file`: the same page as one file that works from disk
+- `pyramid`, `folder`: the same page as a folder for any web server, with pictures in several steps, in tiles
 - `designer`, `designer_parameters`, `designer_curves`, `designer_point`: a camera as sliders
 - `inline`: the page inside a notebook
 - `static/`: HTML, CSS, JavaScript modules and shaders, as they are
@@ -15,6 +17,7 @@
 
 from lumigraph.viewer.designer import designer_site
 from lumigraph.viewer.exhibit import Exhibit
+from lumigraph.viewer.folder import check_folder, export_folder, serve_folder
 from lumigraph.viewer.inline import view_inline
 from lumigraph.viewer.opening import Origin, open_exhibit
 from lumigraph.viewer.page import site
@@ -26,10 +29,13 @@ __all__ = [
     "Origin",
     "Resource",
     "Site",
+    "check_folder",
     "designer_site",
     "export",
+    "export_folder",
     "open_exhibit",
     "serve",
+    "serve_folder",
     "site",
     "view_inline",
 ]

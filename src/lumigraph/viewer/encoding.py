@@ -18,6 +18,42 @@ _TOP = 65535
 _LOSSLESS = 6  # zlib level
 
 
+@dataclass(frozen=True, slots=True)
+class Coding:
+    """How values become whole numbers: ``(value - offset) / scale``, of the type `kind`."""
+
+    kind: np.dtype
+    scale: float = 1.0
+    offset: float = 0.0
+
+    @classmethod
+    def of(cls, data: np.ndarray) -> "Coding":
+        """8 or 16 bits stay as they are; other values fill 16 bits from the least to the largest."""
+        if data.dtype == np.bool_:
+            return cls(np.dtype(np.uint8))
+        if data.dtype.kind in "iu" and data.size and data.min() >= 0 and data.max() <= _TOP:
+            return cls(np.dtype(np.uint8 if data.dtype.itemsize <= 1 else "<u2"))
+        if data.dtype.kind not in "iuf":
+            raise FormatError(f"the viewer shows real numbers, not {data.dtype}. Give the intensity.")
+        low, high = _range(data)
+        low = 0.0 if 0 <= low < high / 2 else low
+        return cls(np.dtype("<u2"), (high - low) / _TOP or 1.0, low)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the numbers are the values."""
+        return (self.scale, self.offset) == (1.0, 0.0)
+
+    def numbers(self, piece: np.ndarray) -> np.ndarray:
+        """Whole numbers of some values; those that are not finite become the least, +inf the largest."""
+        if self.is_exact:
+            return piece.astype(self.kind, copy=False)
+        found = np.nan_to_num(
+            (piece.astype(np.float64) - self.offset) / self.scale, posinf=_TOP, neginf=0
+        )  # fmt: skip
+        return np.rint(np.clip(found, 0, _TOP)).astype(self.kind)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Coded:
     """Whole numbers of 8 or 16 bits that stand for values: ``offset + scale * number``."""
@@ -33,21 +69,13 @@ class Coded:
         Values that are not finite become the least.
         """
         data = to_numpy(array)
-        if data.dtype == np.bool_:
-            return cls(data.astype(np.uint8))
-        if data.dtype.kind in "iu" and data.size and data.min() >= 0 and data.max() <= _TOP:
-            kept = data.dtype.itemsize <= 1
-            return cls(data.astype(np.uint8 if kept else np.dtype("<u2"), copy=False))
-        if data.dtype.kind not in "iuf":
-            raise FormatError(f"the viewer shows real numbers, not {data.dtype}. Give the intensity.")
-        low, high = _range(data)
-        low = 0.0 if 0 <= low < high / 2 else low
-        scale = (high - low) / _TOP or 1.0
-        numbers = np.empty(data.shape, "<u2")
+        coding = Coding.of(data)
+        if coding.is_exact:
+            return cls(coding.numbers(data))
+        numbers = np.empty(data.shape, coding.kind)
         for k in range(len(data)):  # piece by piece: a light field in float64 would double the memory
-            piece = np.nan_to_num((data[k].astype(np.float64) - low) / scale, posinf=_TOP, neginf=0)
-            numbers[k] = np.rint(np.clip(piece, 0, _TOP))
-        return cls(numbers, scale, low)
+            numbers[k] = coding.numbers(data[k])
+        return cls(numbers, coding.scale, coding.offset)
 
     @property
     def bits(self) -> int:
@@ -122,5 +150,9 @@ def white_level(array: Array, bit_depth: int | None = None) -> float:
 
 
 def _range(data: np.ndarray) -> tuple[float, float]:
-    finite = data[np.isfinite(data)] if data.dtype.kind == "f" and not np.isfinite(data).all() else data
-    return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    """The least and the largest finite value, piece by piece."""
+    finite = (piece[np.isfinite(piece)] for piece in data)
+    ends = [(piece.min(), piece.max()) for piece in finite if piece.size]
+    if not ends:
+        return 0.0, 1.0
+    return float(min(low for low, _ in ends)), float(max(high for _, high in ends))

@@ -15,10 +15,11 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.errors import LumigraphError
+from lumigraph.rendering import focus_range, focus_span
 
 _FEWEST_PIXELS = 200
 _MOST_DETAIL = 8
-_WIDEST, _COMFORTABLE, _NEAREST = 0.8, 0.5, 0.02  # spans of refocus factors about 1, and the least factor
+_WIDEST, _COMFORTABLE = 0.8, 0.5  # spans of refocus factors about 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +107,7 @@ def comfortable(views: LightField) -> tuple[LightField, bool]:
     cameras for one pixel would fall below 0, which no lens can do. Counting pixels as smaller keeps every
     picture and brings the factors of all of them near 1.
     """
-    span = _span(views)
+    span = focus_span(views)
     if span <= _WIDEST:
         return views, False
     times, grid = span / _COMFORTABLE, views.lenslets
@@ -115,27 +116,6 @@ def comfortable(views: LightField) -> tuple[LightField, bool]:
         (grid.center[0] / times, grid.center[1] / times),
     )  # fmt: skip
     return LightField(views.data, views.aperture, smaller, views.separation, views.valid), True
-
-
-def focus_range(views: LightField) -> tuple[float, float]:
-    """Refocus factors (first, last) worth looking at: the outermost view moves by up to 14 lenslets.
-
-    In small pictures a tenth of the picture is enough, 3 lenslets at least.
-    """
-    span = _span(views)
-    return max(1 - span, _NEAREST), 1 + span
-
-
-def _span(views: LightField) -> float:
-    """Refocus factors worth looking at lie this far from 1."""
-    reach = max(
-        max(abs(aperture)) / pitch
-        for aperture, pitch in zip(
-            (views.aperture.y, views.aperture.x), views.lenslets.pitch, strict=True
-        )
-    )  # fmt: skip
-    most = min(14.0, max(3.0, 0.1 * min(views.lenslets.shape)))
-    return most / reach if reach > 0 else _COMFORTABLE
 
 
 def detail(views: LightField) -> int:

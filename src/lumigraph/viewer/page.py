@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
+from pathlib import PurePath
 from typing import Any
 
 from lumigraph.viewer.encoding import Coded
@@ -14,12 +15,19 @@ from lumigraph.viewer.server import Content, Resource, Site
 
 MODULES = (
     "colours.js", "tone.js", "source.js", "state.js", "aperture.js", "focusing.js", "shaders.js", "device.js",
-    "canvas.js", "refocus.js", "overlay.js", "epi.js", "models.js", "pane.js", "histogram.js", "controls.js",
-    "play.js", "keys.js", "main.js",
+    "canvas.js", "refocus.js", "overlay.js", "epi.js", "finer.js", "models.js", "pane.js",
+    "histogram.js", "controls.js", "play.js", "keys.js", "main.js",
 )  # fmt: skip
 """In the order of their imports: a module comes after those it uses."""
 
-_TYPES = {"js": "text/javascript; charset=utf-8", "css": "text/css; charset=utf-8"}
+MEDIA = {
+    ".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+}  # fmt: skip
+"""Media types of the page's files by their endings."""
+
+Pack = Callable[[str, Parts, Coded], bytes]
+"""How an array travels: function of its name, what it belongs to, and its numbers."""
 
 
 @cache
@@ -30,15 +38,18 @@ def static(name: str) -> str:
 
 def site(exhibits: Sequence[Exhibit]) -> Site:
     """The viewer's page and one or two exhibits' arrays, as a table to serve."""
-    resources = {"": Resource("text/html; charset=utf-8", static("index.html").encode())}
+    return site_of([Parts.of(exhibit) for exhibit in exhibits])
+
+
+def site_of(parts: Sequence[Parts], pack: Pack = lambda name, part, coded: coded.as_bytes()) -> Site:
+    """As `site`, of exhibits that are described already."""
+    resources = {"": Resource(MEDIA[".html"], static("index.html").encode())}
     for name in (*MODULES, "style.css"):
-        kind = _TYPES[name.rsplit(".", 1)[1]]
-        resources[f"app/{name}"] = Resource(kind, static(name).encode())
-    parts = [Parts.of(exhibit) for exhibit in exhibits]
+        resources[f"app/{name}"] = Resource(MEDIA[PurePath(name).suffix], static(name).encode())
     resources["data/about"] = Resource("application/json", json.dumps(about(parts)).encode())
     for number, part in enumerate(parts):
         for name, coded in part.arrays.items():
-            _add(resources, f"data/{number}/{name}", part, coded)
+            _add(resources, (f"data/{number}/{name}", name), part, coded, pack)
     return Site(resources)
 
 
@@ -47,18 +58,23 @@ def about(parts: Sequence[Parts]) -> dict[str, Any]:
     return {"version": version("lumigraph"), "exhibits": [part.about for part in parts]}
 
 
-def _add(resources: dict[str, Resource], path: str, part: Parts, coded: Callable[[], Coded]) -> None:
-    kind = "application/octet-stream"
-    if path.endswith("/views"):
-        numbers = coded()
-        flat = Coded(
-            numbers.numbers.reshape(-1, *numbers.numbers.shape[2:]), numbers.scale, numbers.offset
-        )  # fmt: skip
+def pictures(views: Coded) -> Coded:
+    """A light field's numbers (v, u, t, s[, c]) as pictures (n, t, s[, c])."""
+    return Coded(views.numbers.reshape(-1, *views.numbers.shape[2:]), views.scale, views.offset)
+
+
+def _add(
+    resources: dict[str, Resource], at: tuple[str, str], part: Parts, coded: Callable[[], Coded], pack: Pack
+) -> None:
+    (path, name), kind = at, "application/octet-stream"
+    if name == "views":
+        flat = pictures(coded())
         for k, (first, count) in enumerate(part.about["views"]["chunks"]):
-            resources[f"{path}/{k}"] = Resource(kind, _sliced(flat, first, count), keep=False)
+            some = slice(first, first + count)
+            resources[f"{path}/{k}"] = Resource(kind, _sliced(flat, some, part, pack), keep=False)
     else:
-        resources[path] = Resource(kind, lambda: coded().as_bytes())
+        resources[path] = Resource(kind, lambda: pack(name, part, coded()))
 
 
-def _sliced(flat: Coded, first: int, count: int) -> Callable[[], Content]:
-    return lambda: flat.as_bytes(slice(first, first + count))
+def _sliced(flat: Coded, some: slice, part: Parts, pack: Pack) -> Callable[[], Content]:
+    return lambda: pack("views", part, Coded(flat.numbers[some], flat.scale, flat.offset))

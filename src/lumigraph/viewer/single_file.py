@@ -11,17 +11,13 @@ from pathlib import Path
 from lumigraph.core.progress import Progress, Stage
 from lumigraph.errors import LumigraphError
 from lumigraph.io.target import check_target, write_bytes
-from lumigraph.viewer.encoding import Coded
 from lumigraph.viewer.exhibit import Exhibit
-from lumigraph.viewer.page import MODULES, about, static
+from lumigraph.viewer.packing import check_quality, packed
+from lumigraph.viewer.page import MODULES, about, pictures, static
 from lumigraph.viewer.parts import Parts
 
 LARGEST = 400 << 20
 """Bytes: browsers hold a page's text in strings of little more than 512 MiB."""
-
-LOSSLESS = 100
-
-_EXACT_16 = 64 << 20  # bytes of 16-bit views that still go into a page without loss
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +72,7 @@ def exported(
     exhibits: Sequence[Exhibit], quality: int, progress: Progress | None = None
 ) -> tuple[str, dict[str, int]]:
     """The page as text, and the bytes of each array in it; as `export`, which writes it."""
-    if not 1 <= quality <= LOSSLESS:
-        raise LumigraphError(f"quality is {quality} but must be from 1 to 100.")
+    check_quality(quality)
     parts = [Parts.of(exhibit) for exhibit in exhibits]
     names = [(number, name) for number, part in enumerate(parts) for name in part.arrays]
     blobs: dict[str, str] = {}
@@ -85,7 +80,8 @@ def exported(
     for k, (number, name) in enumerate(names):
         if progress is not None:
             progress(Stage(k / len(names), name))
-        content = _blob(name, parts[number].arrays[name](), parts[number], quality)
+        coded = parts[number].arrays[name]()
+        content = packed(name, pictures(coded) if name == "views" else coded, parts[number], quality)
         sizes[f"{number}/{name}"] = len(content)
         if sum(sizes.values()) * 4 / 3 > LARGEST:
             raise LumigraphError(
@@ -132,28 +128,6 @@ def _enclosed(text: str) -> str:
     names = ", ".join(re.findall(start, text, flags=re.MULTILINE))
     body = re.sub(start, "", text, flags=re.MULTILINE)
     return f"const {{ {names} }} = (() => {{\n{body}return {{ {names} }};\n}})();"
-
-
-def _blob(name: str, coded: Coded, part: Parts, quality: int) -> bytes:
-    if name not in ("views", "stack") or (name == "stack" and "fallback" not in part.about["stack"]):
-        return coded.deflated()
-    numbers = coded.numbers.reshape(-1, *coded.numbers.shape[2:]) if name == "views" else coded.numbers
-    flat = Coded(numbers, coded.scale, coded.offset)
-    small = coded.bits == 16 and numbers.nbytes <= _EXACT_16 and name == "views"
-    if quality == LOSSLESS or small:
-        return flat.deflated()
-    return _eight_bits(flat, part.about[name]["white"]).pictures(quality)
-
-
-def _eight_bits(coded: Coded, white: float) -> Coded:
-    """Numbers of 8 bits, 0 to white; those that have 8 bits stay as they are."""
-    import numpy as np
-
-    if coded.bits == 8:
-        return coded
-    pictures = [np.clip(coded.offset + coded.scale * p.astype(np.float32), 0, white) for p in coded.numbers]
-    numbers = np.stack([np.rint(p / white * 255).astype(np.uint8) for p in pictures])
-    return Coded(numbers, white / 255, 0.0)
 
 
 def _inert(name: str, kind: str, text: str) -> str:

@@ -15,17 +15,25 @@ export class CanvasDevice {
 
   fits() { return true; }
 
-  forget() {}
+  forget(image) { if (image) this.buffers.delete(image.numbers); }
 
-  show(image, { origin, scale, smooth, ground }, tone) {
+  show(image, { origin, scale, smooth, ground, clip }, tone) {
     const buffer = this.buffer(image, tone);
     const { context, canvas } = this, byte = (x) => Math.round(255 * x);
-    context.fillStyle = `rgb(${(ground ?? [0, 0, 0]).map(byte).join(" ")})`;
-    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.save();
+    if (clip) {
+      context.beginPath();
+      context.rect(clip[0], clip[1], clip[2] - clip[0], clip[3] - clip[1]);
+      context.clip();
+    } else {
+      context.fillStyle = `rgb(${(ground ?? [0, 0, 0]).map(byte).join(" ")})`;
+      context.fillRect(0, 0, canvas.width, canvas.height);
+    }
     context.imageSmoothingEnabled = smooth || scale[0] < 1;
     context.imageSmoothingQuality = "low";
     const [left, top] = origin.map((o, k) => o - scale[k] / 2);
     context.drawImage(buffer, left, top, image.nx * scale[0], image.ny * scale[1]);
+    context.restore();
   }
 
   /** The image's colours in a canvas of its own size; those of a focal stack are kept. */

@@ -128,7 +128,7 @@ export class Controls {
     Object.assign(input, { min: low, max: high, value: state.focus });
     by("focus-label").textContent = model.views ? (model.views.relative ? "Disparity" : "Focus α′") : stack?.label ?? "Focus";
     if (model.views) {
-      const shift = viewShifts(model.views, state.focus, 1).step, plane = model.views.metric ? ` · image at ${lengthText(model.views.separation / state.focus)}` : "";
+      const shift = model.factor * viewShifts(model.views, state.focus, 1).step, plane = model.views.metric ? ` · image at ${lengthText(model.views.separation / state.focus)}` : "";
       const factor = model.views.relative ? "" : `${state.focus.toFixed(4)} · `;
       tell("focus-out", `${factor}${shift >= 0 ? "+" : "−"}${Math.abs(shift).toFixed(2)} px per view${plane}`);
     } else tell("focus-out", `${Number((this.app.main.image?.position ?? state.focus).toPrecision(5))} ${stack?.unit ?? ""}`);

@@ -138,10 +138,11 @@ class Device {
   }
 
   /** Shows an image: {nx, ny, channels, bits, numbers} or {nx, ny, channels, texture (floats)}. */
-  show(image, { origin, scale, smooth, ground }, tone, target = null) {
+  show(image, { origin, scale, smooth, ground, clip }, tone, target = null) {
     const whole = !image.texture, weights = channelWeights(tone.channel);
     const texture = this.textureOf(image), map = this.map(tone.map);
     const size = target ? [image.nx, image.ny] : [this.canvas.width, this.canvas.height];
+    if (clip) this.clipTo(clip, size[1]);
     this.draw(this.program(whole ? "show-whole" : "show", SHOW(whole)), size, target, (at, gl) => {
       this.bind(0, whole ? gl.TEXTURE_2D_ARRAY : gl.TEXTURE_2D, texture, at.source);
       this.bind(1, gl.TEXTURE_2D, map, at.colours);
@@ -158,6 +159,14 @@ class Device {
       gl.uniform1f(at.lift, tone.lift);
       gl.uniform1f(at.power, tone.power);
     });
+    this.gl.disable(this.gl.SCISSOR_TEST);
+  }
+
+  /** What is drawn next changes a part of the canvas only: [left, top, right, bottom] from its upper left corner. */
+  clipTo(clip, height) {
+    const { gl } = this, [left, top, right, bottom] = clip.map(Math.round);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(left, height - bottom, Math.max(0, right - left), Math.max(0, bottom - top));
   }
 
   /** Bytes r, g, b, a of an image in its own size, as it is shown. */

@@ -101,6 +101,7 @@ class App {
     else if (missing.some((name) => name === "depth" || name === "confidence")) text = "Measuring depth …";
     else if (missing.includes("stack")) text = "Preparing the focal stack …";
     else if (missing.length) text = "Loading …";
+    else if (Object.values(model.finer).some(({ loading }) => loading)) text = "Loading what is finer …";
     else if (model.views && !model.refocuser) text = "Without WebGL 2: focal stack";
     else text = this.main.kept()?.every((n) => n === 1) && this.state.mode === "picture" ? "One view" : "";
     if (status.textContent !== text) status.textContent = text;
@@ -182,7 +183,7 @@ function wire(app) {
   const on = (id, act) => document.getElementById(id).addEventListener("click", act);
   on("save", actions.s); on("fit", actions[0]); on("help", actions["?"]); on("full", actions.f); on("link", () => copyLink(app));
   on("reset", () => { app.state = { ...app.base, mode: app.state.mode, renderer: app.state.renderer }; app.touched(); });
-  on("pixel", () => zoom(1 / ((app.main.scale[0] / app.main.image.detail) / app.main.ratio)));
+  on("pixel", () => zoom(1 / ((app.main.scale[0] / app.main.image.detail / app.main.model.factor) / app.main.ratio)));
   app.player = new Player(app);
   listenToKeys(app, actions);
 }

@@ -1,17 +1,25 @@
 // One exhibit: its arrays as they come, and the image that the settings ask for.
 
 import { middleView, viewWeights } from "./aperture.js";
+import { Finer, PlaneWindow, used, ViewsWindow } from "./finer.js";
 import { sharpestAlpha, subject } from "./focusing.js";
 import { Refocuser } from "./refocus.js";
 import { loadArray } from "./source.js";
 import { cachedMap } from "./tone.js";
 
+const PATIENCE = 1500; // ms that a finer picture may take at rest
 const SLOW = 45; // ms for one refocused picture, above which a focal stack is shown while the focus moves
 
 export class Model {
   constructor(number, about, changed) {
-    Object.assign(this, { number, about, changed, arrays: {}, wanted: new Set(), errors: {}, slow: false, complete: false });
+    Object.assign(this, { number, about, changed, arrays: {}, finer: {}, wanted: new Set(), errors: {}, slow: false, complete: false });
     this.views = about.views ? { ...about.views } : null;
+    for (const what of ["views", "volume"]) if (about[what]?.finer) this.finer[what] = new Finer(`${number}/${what}-tiles`, about[what].finer, bytesOf(about, what), changed);
+  }
+
+  /** Samples of the file for one of the pictures that the page has from the start. */
+  get factor() {
+    return (this.finer.views ?? this.finer.volume)?.coarsest ?? 1;
   }
 
   get modes() {
@@ -86,6 +94,37 @@ export class Model {
       if (this.took > 4 * SLOW) break;
     }
     this.slow = this.took > SLOW;
+  }
+
+  /**
+   * What is finer where somebody looks: {image, origin, factor, low, high}, or null. `seen` is {low, high, scale}: the part of
+   * the picture on the screen, and pixels for one of its samples. At rest the next tiles are asked for.
+   */
+  fine(state, device, seen, settled) {
+    const shown = { picture: this.fineViews, volume: this.finePlane }[state.mode]?.call(this, state, device, seen, settled);
+    const finer = this.finer[state.mode === "picture" ? "views" : state.mode];
+    if (finer?.error) this.errors.tiles = finer.error;
+    return shown ?? null;
+  }
+
+  fineViews(state, device, seen, settled) {
+    const { views, finer: { views: finer } } = this;
+    if (!finer || !this.complete || !this.refocuser || state.renderer === "stack") return null;
+    const weights = viewWeights(views, state), { rect, pictures, margin } = used(views, weights, state.focus);
+    const [nv, nu, nt, ns] = views.shape;
+    const most = (PATIENCE / Math.max(this.took, 1)) * nv * nu * nt * ns * views.detail, plan = finer.plan(seen, pictures, { margin, most, extra: 16 * (rect[1] - rect[0] + 2) });
+    if (settled && plan) finer.want({ ...plan, rect }, (found) => new ViewsWindow(device, views, { ...found, rect }, finer.coarsest));
+    const { window } = finer;
+    if (!plan || !window || !pictures.every((index) => window.kept.has(index)) || (!settled && (this.slow || window.took > SLOW))) return null;
+    return { ...finer.place(window, margin), image: window.picture(state.focus, weights) };
+  }
+
+  finePlane(state, device, seen, settled) {
+    const { finer: { volume: finer }, about: { volume } } = this, array = this.arrays.volume;
+    if (!finer || !array || state.projection !== "plane") return null;
+    const k = Math.min(volume.depths.length - 1, state.plane ?? Math.floor(volume.depths.length / 2)), plan = finer.plan(seen, [k]);
+    if (settled && plan) finer.want(plan, (found) => new PlaneWindow(device, found, array.shape[3] ?? 1, volume.white));
+    return plan && finer.window?.kept.has(k) ? { ...finer.place(finer.window), image: finer.window.image } : null;
   }
 
   /** What to show: {nx, ny, channels, numbers or texture, ... , base: [ny, nx], detail, aspect}; null if not yet. */
@@ -188,6 +227,10 @@ export class Model {
     if (y < -0.5 || x < -0.5 || y >= ny - 0.5 || x >= nx - 0.5) return null;
     return { value: depth.offset + depth.scale * depth.numbers[k], confidence: confidence.numbers[k] / 255 };
   }
+}
+
+function bytesOf(about, what) {
+  return what === "views" ? (about.views.channels * about.views.bits) / 8 + (about.views.masked ? 1 : 0) : 6;
 }
 
 export function depthMap(state) {

@@ -62,12 +62,25 @@ export class Pane {
     if (!this.device.fits(image)) return this.app.tell(`${image.nx} × ${image.ny} pixels are too many for this graphics processor.`, true);
     const view = { ...this.layout(image), smooth: state.smooth && !image.sharp && this.scale[0] / image.detail < 24, ground: this.app.ground };
     this.tone = image.plain ? { gain: 1 / 255, lift: 0, power: 1, map: "grey", channel: "colour" } : toneOf(state, image);
-    this.deviceFor(image, settled).show(image, view, this.tone);
+    const device = this.deviceFor(image, settled);
+    device.show(image, view, this.tone);
+    if (device === this.device) this.drawFine(state, view, settled);
     if (this.image && this.heavy === undefined) this.weigh(image, view);
     this.image = image;
     this.over(state, image);
-    if ((this.heavy || (this.model.slow && !image.exact)) && !settled) setTimeout(() => this.app.schedule(), SETTLED + 20);
+    if ((this.heavy || (this.model.slow && !image.exact) || this.model.factor > 1) && !settled) setTimeout(() => this.app.schedule(), SETTLED + 20);
     return true;
+  }
+
+  /** Over the picture, what is finer of it, in the part where that is exact. */
+  drawFine(state, view, settled) {
+    const { origin: [left, top], scale: [across, down], canvas: { width, height }, base: [ny, nx] } = this;
+    const place = ([y, x]) => [left + x * across, top + y * down];
+    const low = [Math.max(0, -top / down), Math.max(0, -left / across)], high = [Math.min(ny - 1, (height - top) / down), Math.min(nx - 1, (width - left) / across)];
+    this.finest = this.model.fine(state, this.device, { low, high, scale: across }, settled);
+    if (!this.finest) return;
+    const { image, origin, factor } = this.finest, clip = [...place(this.finest.low), ...place(this.finest.high)];
+    this.device.show(image, { ...view, origin: place(origin), scale: [across * factor, down * factor], clip }, toneOf(state, image));
   }
 
   /** Where WebGL is software, the browser's own canvas shows the planes of a stack twice as fast. */
@@ -124,7 +137,7 @@ export class Pane {
   /** Position and value under the pointer. */
   tellPlace(image) {
     if (!this.hover) { if (this.readout.textContent) this.readout.textContent = ""; return; }
-    const [y, x] = this.hover, parts = [`y ${y.toFixed(1)}  x ${x.toFixed(1)} px`];
+    const [y, x] = this.hover, { factor } = this.model, parts = [`y ${(factor * y).toFixed(1)}  x ${(factor * x).toFixed(1)} px`];
     const row = Math.round(y * image.detail), column = Math.round(x * image.detail);
     if (row < 0 || column < 0 || row >= image.ny || column >= image.nx) { this.readout.textContent = ""; return; }
     if (this.app.state.mode === "depth") {
@@ -245,8 +258,18 @@ export class Pane {
 
   /** The picture in its own size, as bytes. */
   pixels() {
+    if (this.finest) return this.finePixels(this.finest);
     const image = this.model.image(this.app.state, this.device, true);
     return image && { width: image.nx, height: image.ny, data: this.device.pixels(image, this.tone ?? toneOf(this.app.state, image)), aspect: image.aspect, unit: image.unit && image.unit / image.detail };
+  }
+
+  /** What is finer than the picture in its own size, cut to where it is exact. */
+  finePixels({ image, origin, factor, low, high }) {
+    const { aspect, unit } = this.image, start = low.map((l, k) => Math.max(0, Math.ceil((l - origin[k]) / factor)));
+    const [height, width] = high.map((h, k) => Math.min(k ? image.nx : image.ny, Math.floor((h - origin[k]) / factor) + 1) - start[k]);
+    const whole = new ImageData(this.device.pixels(image, toneOf(this.app.state, image)), image.nx, image.ny), sheet = new OffscreenCanvas(image.nx, image.ny).getContext("2d");
+    sheet.putImageData(whole, 0, 0);
+    return { width, height, data: sheet.getImageData(start[1], start[0], width, height).data, aspect, unit: unit && unit * factor };
   }
 
   /** How many views are kept (v, u). */

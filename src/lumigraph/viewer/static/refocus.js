@@ -32,6 +32,16 @@ export class Refocuser {
     }
   }
 
+  /** Adds a part of one view: its rows and columns from a corner. */
+  addPart(index, [y, x], [ny, nx], numbers, array) {
+    const { tiles: [across, down] } = this, [, , nt, ns] = this.views.shape, tile = index % (across * down);
+    this.device.fill(array, [(tile % across) * ns + x, Math.floor(tile / across) * nt + y, Math.floor(index / (across * down))], [nx, ny], numbers);
+  }
+
+  release() {
+    for (const texture of [this.array.texture, this.mask.texture, this.rows, this.target]) if (texture) this.device.gl.deleteTexture(texture);
+  }
+
   /** The picture focused on alpha: {nx, ny, channels, texture}. */
   picture(alpha, weights, detail) {
     const { device, views } = this, [nv, nu, nt, ns] = views.shape;

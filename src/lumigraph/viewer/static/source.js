@@ -15,8 +15,8 @@ export async function loadAbout() {
   return text === null ? (await fetched("about")).json() : JSON.parse(text);
 }
 
-async function fetched(name) {
-  const answer = await fetch(`data/${name}`);
+async function fetched(name, signal) {
+  const answer = await fetch(`data/${name}`, { signal });
   if (answer.ok) return answer;
   let why = `${answer.status}`;
   try { why = (await answer.json()).error ?? why; } catch { /* not JSON: the number has to do */ }
@@ -24,9 +24,9 @@ async function fetched(name) {
 }
 
 /** An array by name: {shape, numbers, scale, offset}; values are offset + scale * number. */
-export async function loadArray(name) {
+export async function loadArray(name, signal) {
   const text = inlineText(name);
-  return decodeBlob(text === null ? await (await fetched(name)).arrayBuffer() : bytesOf(text).buffer);
+  return decodeBlob(text === null ? await (await fetched(name, signal)).arrayBuffer() : bytesOf(text).buffer);
 }
 
 function bytesOf(text) {

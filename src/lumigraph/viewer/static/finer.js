@@ -1,0 +1,191 @@
+// What is finer than the pictures that the page has: tiles of what is seen, fetched when somebody looks there.
+
+import { viewShifts } from "./aperture.js";
+import { Refocuser } from "./refocus.js";
+import { loadArray } from "./source.js";
+
+const BUDGET = 192 << 20; // bytes of graphics memory for the pictures of one window
+const AT_ONCE = 8; // requests
+
+/** Tiles of pictures in steps of 1, 2, 4, ... samples; places are in samples of the coarsest. */
+export class Finer {
+  constructor(path, { shape: [, ny, nx], coarsest, tile, pack }, bytes, changed) {
+    Object.assign(this, { path, size: [ny, nx], coarsest, tile, pack, bytes, changed, window: null });
+  }
+
+  /** The finest window of these pictures (ascending indices) around what is seen that memory, and `most` samples, allow; null where the coarsest does. */
+  plan({ low, high, scale }, pictures, { margin = [0, 0], extra = 0, most = Infinity } = {}) {
+    let step = this.coarsest;
+    while (step > 1 && this.coarsest / step < scale) step /= 2;
+    for (; step < this.coarsest; step *= 2) {
+      const tiles = low.map((_, k) => {
+        const last = Math.ceil(Math.ceil(this.size[k] / step) / this.tile) - 1, tileOf = (place) => Math.floor((place * this.coarsest) / step / this.tile);
+        return [Math.max(0, tileOf(low[k] - margin[k])), Math.min(last, tileOf(high[k] + margin[k]))];
+      });
+      if (tiles.some(([first, last]) => first > last)) return null;
+      const sides = tiles.map(([first, last], k) => Math.min((last + 1) * this.tile, Math.ceil(this.size[k] / step)) - first * this.tile);
+      const area = sides[0] * sides[1];
+      if (area * (pictures.length * this.bytes + extra) <= BUDGET && area * pictures.length <= most) return { step, tiles, sides, pictures };
+    }
+    return null;
+  }
+
+  /** Whether a window shows all that a plan asks for. */
+  covers(plan, window = this.window) {
+    return Boolean(window) && window.step <= plan.step && plan.pictures.every((index) => window.kept.has(index)) && plan.tiles.every(([first, last], k) => {
+      const [low, high] = window.span(this.tile, k), side = this.tile * plan.step;
+      return low <= first * side && high >= Math.min((last + 1) * side, this.size[k]);
+    });
+  }
+
+  /** Loads what a plan asks for, first in coarser steps; `begin` makes the window that takes the tiles. */
+  want(plan, begin) {
+    if (this.covers(plan) || (this.loading && this.covers(plan, this.loading))) return;
+    const now = this.window && plan.pictures.every((index) => this.window.kept.has(index)) ? this.window.step : this.coarsest;
+    const step = Math.max(plan.step, now / 4), times = step / plan.step;
+    const sides = plan.sides.map((side) => Math.ceil(side / times)), tiles = plan.tiles.map(([first, last]) => [Math.floor(first / times), Math.floor(last / times)]);
+    const grown = tiles.map(([first, last], k) => Math.min((last + 1) * this.tile, Math.ceil(this.size[k] / step)) - first * this.tile);
+    this.stop?.abort();
+    this.stop = new AbortController();
+    this.load(times > 1 ? { ...plan, step, tiles, sides: grown } : { ...plan, sides }, begin, this.stop.signal);
+  }
+
+  async load(plan, begin, signal) {
+    const window = (this.loading = Object.assign(begin(plan), { step: plan.step, tiles: plan.tiles, sides: plan.sides, kept: new Set(plan.pictures), span }));
+    try {
+      await this.fill(window, plan, signal);
+      if (signal.aborted) throw new DOMException("left", "AbortError");
+      this.window?.release();
+      this.window = window;
+      this.error = "";
+    } catch (error) {
+      window.release();
+      if (!signal.aborted) this.error = error.message;
+    }
+    if (this.loading === window) this.loading = null;
+    if (!this.error) this.changed();
+  }
+
+  /** Fetches the files of a window, some at a time, the middle first. */
+  async fill(window, { step, tiles: [[top, bottom], [left, right]] }, signal) {
+    const packs = [...new Set([...window.kept].map((index) => Math.floor(index / this.pack)))], files = [];
+    for (let j = top; j <= bottom; j++) for (let i = left; i <= right; i++) for (const pack of packs) files.push([j, i, pack]);
+    const one = async () => {
+      for (let file = files.shift(); file && !signal.aborted; file = files.shift()) await this.file(window, step, file, signal);
+    };
+    await Promise.all(Array.from({ length: AT_ONCE }, one));
+  }
+
+  async file(window, step, [j, i, pack], signal) {
+    const corner = [j - window.tiles[0][0], i - window.tiles[1][0]].map((k) => k * this.tile);
+    for (const masks of window.masked ? [false, true] : [false]) {
+      const { shape: [count, ny, nx], numbers, bits, scale, offset } = await loadArray(`${this.path}/${masks ? "valid-" : ""}${step}/${j}-${i}/${pack}`, signal);
+      if (signal.aborted) return;
+      const size = numbers.length / count;
+      if (!masks) window.coded?.({ bits, scale, offset });
+      for (let k = 0; k < count; k++) {
+        const index = pack * this.pack + k;
+        if (window.kept.has(index)) window.add(index, corner, [ny, nx], numbers.subarray(k * size, (k + 1) * size), masks);
+      }
+    }
+  }
+
+  /** Where the window stands and what of it is exact, in samples of the coarsest: {origin, factor, low, high}. */
+  place({ step, tiles, sides }, margin = [0, 0]) {
+    const factor = step / this.coarsest, start = tiles.map(([first]) => first * this.tile * factor), end = start.map((s, k) => s + (sides[k] - 1) * factor);
+    const whole = this.size.map((n, k) => end[k] / factor >= Math.ceil(n / step) - 1.5);
+    return {
+      origin: start, factor,
+      low: start.map((s, k) => (s > 0 ? s + margin[k] : -factor / 2)), high: end.map((e, k) => (whole[k] ? e + factor / 2 : e - margin[k])),
+    };
+  }
+}
+
+/** First and last sample of the whole picture along an axis. */
+function span(tile, k) {
+  const start = this.tiles[k][0] * tile;
+  return [start * this.step, (start + this.sides[k]) * this.step];
+}
+
+/** Views of a window, refocused by the graphics processor. */
+export class ViewsWindow {
+  constructor(device, views, { sides, step, pictures, rect }, coarsest) {
+    const [v0, v1, u0, u1] = rect, shape = [v1 - v0 + 1, u1 - u0 + 1], { aperture, lenslets } = views;
+    const middle = (k) => [v0, u0][k] + Math.floor(shape[k] / 2) - Math.floor(views.shape[k] / 2);
+    Object.assign(this, { rect, pictures, masked: views.masked, kind: views });
+    this.views = {
+      ...views, shape: [...shape, ...sides], factor: step / coarsest,
+      aperture: { ...aperture, center: aperture.center.map((c, k) => c + middle(k) * aperture.pitch[k]) },
+      lenslets: { ...lenslets, pitch: lenslets.pitch.map((p) => (p * step) / coarsest) },
+    };
+    this.device = device;
+  }
+
+  coded(coding) {
+    if (this.refocuser) return;
+    Object.assign(this.views, coding);
+    this.refocuser = new Refocuser(this.device, this.views);
+  }
+
+  add(index, corner, size, numbers, masks) {
+    const [v0, , u0] = this.rect, nu = this.kind.shape[1], at = (Math.floor(index / nu) - v0) * this.views.shape[1] + (index % nu) - u0;
+    this.refocuser.addPart(at, corner, size, numbers, masks ? this.refocuser.mask : this.refocuser.array);
+  }
+
+  /** The picture focused on alpha with the weights of all views; drawn afresh only where they differ. */
+  picture(alpha, weights) {
+    const [v0, v1, u0, u1] = this.rect, nu = this.kind.shape[1], own = new Float32Array((v1 - v0 + 1) * (u1 - u0 + 1));
+    for (let v = v0, k = 0; v <= v1; v++) for (let u = u0; u <= u1; u++, k++) own[k] = weights[v * nu + u];
+    const key = `${alpha}/${own.join()}`;
+    if (key !== this.key) {
+      this.key = key;
+      const start = performance.now();
+      this.drawn = this.refocuser.picture(alpha, own, 1);
+      this.device.finish();
+      this.took = performance.now() - start;
+    }
+    return { white: this.kind.white, scale: this.views.scale, offset: this.views.offset, bits: this.views.bits, ...this.drawn };
+  }
+
+  release() {
+    this.refocuser?.release();
+  }
+}
+
+/** One plane of a window, as numbers. */
+export class PlaneWindow {
+  constructor(device, { sides }, channels, white) {
+    Object.assign(this, { device, sides, channels, white });
+  }
+
+  coded(coding) {
+    const [ny, nx] = this.sides;
+    this.image ??= { nx, ny, channels: this.channels, white: this.white, ...coding, numbers: new (coding.bits === 8 ? Uint8Array : Uint16Array)(ny * nx * this.channels) };
+  }
+
+  add(_, [top, left], [ny, nx], numbers) {
+    const across = this.sides[1] * this.channels, row = nx * this.channels;
+    for (let y = 0; y < ny; y++) this.image.numbers.set(numbers.subarray(y * row, (y + 1) * row), (top + y) * across + left * this.channels);
+  }
+
+  release() {
+    this.device.forget(this.image);
+  }
+}
+
+/** Views that count, the rectangle of the aperture that they fill, and how far they move at a focus [samples of the coarsest]. */
+export function used(views, weights, alpha) {
+  const [nv, nu] = views.shape, rect = [nv, -1, nu, -1];
+  weights.forEach((weight, k) => {
+    if (weight <= 0) return;
+    const v = Math.floor(k / nu), u = k % nu;
+    rect[0] = Math.min(rect[0], v); rect[1] = Math.max(rect[1], v); rect[2] = Math.min(rect[2], u); rect[3] = Math.max(rect[3], u);
+  });
+  const pictures = [];
+  for (let v = rect[0]; v <= rect[1]; v++) for (let u = rect[2]; u <= rect[3]; u++) pictures.push(v * nu + u);
+  const margin = [0, 1].map((axis) => {
+    const { first, step } = viewShifts(views, alpha, axis);
+    return Math.max(...rect.slice(2 * axis, 2 * axis + 2).map((k) => Math.abs(first + k * step))) + 2;
+  });
+  return { rect, pictures, margin };
+}
