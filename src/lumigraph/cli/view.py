@@ -82,7 +82,7 @@ class Page:
             return
         if self.export.suffix:
             raise FormatError(
-                f"--export is {self.export}: the wrong extension. Give a file (.html), or a folder (no extension)."
+                f"--export is {self.export}: the wrong extension. Give a file (.html), or a folder (none)."
             )
         files.check_page(self.export)
 
