@@ -39,3 +39,22 @@ def test_a_table_of_corners_gives_a_camera_with_intervals(table, capsys) -> None
 def test_what_is_missing_is_named(table, capsys, words, said) -> None:
     assert main(["board", str(table), *words]) == 1
     assert said in capsys.readouterr().err
+
+
+def test_a_plan_says_which_pictures_to_take(capsys) -> None:
+    words = [
+        "board",
+        "plan",
+        "--camera",
+        "multi-focus-hex",
+        "--board",
+        "5 x 4 corners, 0.5 mm",
+        "--pictures",
+        "3",
+    ]
+    assert main(words) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0].split()[:2] == ["picture", "distance"]
+    assert len(printed) == 4
+    assert main([*words[:2], *words[4:]]) == 1
+    assert "a plan needs --camera" in capsys.readouterr().err

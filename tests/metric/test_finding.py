@@ -5,11 +5,14 @@ import json
 import numpy as np
 import pytest
 
+import lumigraph as lg
 from lumigraph import io, metric
 from lumigraph.cli import main
+from lumigraph.core.grid import Grid
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.preparation import prepare
+from lumigraph.scene import targets
 from metric import drawn
 
 pytest.importorskip("cv2", reason="OpenCV finds the board")
@@ -40,6 +43,33 @@ def test_a_picture_without_the_board_is_named() -> None:
     dull = np.random.default_rng(0).normal(0.5, 0.01, drawn.SHAPE).astype(np.float32)
     with pytest.raises(CalibrationError, match="picture 0 does not show a whole chessboard of 5 x 4"):
         metric.find_corners([dull], drawn.BOARD, drawn.calibration())
+
+
+@pytest.mark.long  # simulates a board by wave optics
+@pytest.mark.parametrize(("magnified", "dz"), [(0.3, 0.0), (-0.3, 8e-3)])
+def test_corners_are_where_wave_optics_puts_them(magnified, dz) -> None:
+    camera = lg.FocusedPlenopticCamera(
+        wavelength="550 nm", object_distance="450 mm", main_lens={"focal_length": "50 mm"},
+        lenslets={"pitch": "100 um", "focal_length": "1.2 mm", "count": (17, 17), "magnification": magnified},
+        sensor={"pixel_pitch": "4 um"},
+    )  # fmt: skip
+    board, angle, middle = metric.Board((3, 4), 2e-3), 0.05, np.array([0.4e-3, -0.3e-3])
+    drawing = targets.chessboard(
+        Grid.square(480, 16e-3 / 480), board.shape, 2e-3, angle=angle, position=middle
+    )
+    raw, white = (
+        lg.simulate(camera, scene, lg.Incoherent(1e-2)) for scene in (drawing.at(dz), targets.white())
+    )
+    found = metric.find_corners([lg.prepare(raw, camera.calibration, white=white)], board)
+    turned = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    flat = (board.points()[:, 1:] - (2e-3, 3e-3)) @ turned.T + middle
+    points = np.column_stack([np.full(12, camera.object_distance + dz), flat])
+    ideal = metric.MetricCamera.of(camera)
+    ways = [
+        found.place - ideal.project(each[found.corner], found.center, found.kind)
+        for each in (points, points[::-1])
+    ]
+    assert min(float(np.sqrt((way**2).mean())) for way in ways) < 0.1
 
 
 @pytest.mark.long  # draws and searches five raw images

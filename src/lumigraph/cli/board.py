@@ -70,6 +70,7 @@ def board(
     origin: Origin = NO_ORIGIN,
     known: Known = Known(),
     table: Path | None = None,
+    pictures: Annotated[int, Parameter(allow_leading_hyphen=True)] = 8,
     output: Output | None = None,
     common: Reported = REPORTED,
 ) -> Result:
@@ -78,7 +79,10 @@ def board(
     SOURCES are raw images of the board, three or more, in which the corners are found (this needs OpenCV:
     pip install 'lumigraph[board]'); or one table (.csv) of where lenslets show them, with the columns frame,
     corner, y, x, center_y, center_x, kind; or one folder of COMPOTE's (bap.csv, centers.csv, camera.json,
-    scene.json), which also says what the board and the camera are.
+    scene.json), which also says what the board and the camera are. Or the word plan: which pictures of the
+    board to take with --camera, and how well they will tell its lengths.
+
+    Example: `lumigraph board plan --camera camera.toml --board "9 x 5 corners, 10 mm"`
 
     Example: `lumigraph board raw1.png raw2.png raw3.png --white white.png --board "9 x 5 corners, 10 mm"
     --focal-length "50 mm" --pixel-pitch "5.5 um" -o camera.json`
@@ -89,11 +93,13 @@ def board(
     Parameters
     ----------
     sources
-        Raw images, or one table or folder.
+        Raw images, or one table or folder, or plan.
     board
         Inner corners across and down and their spacing, such as '9 x 5 corners, 10 mm'.
     table
         Where to write the corners that were found on raw images (.csv).
+    pictures
+        To plan.
     output
         File for the camera (.json), which lumigraph.metric.load reads.
     """
@@ -104,6 +110,8 @@ def board(
     from lumigraph import metric
 
     target = None if board is None else metric.Board.from_text(board)
+    if sources == (Path("plan"),):
+        return _planned(origin, target, known, pictures)
     seen, target, given = _read(sources, target, origin)
     found = metric.board(seen, target, known.nominal(given))
     written = [path for path in (output, table) if path is not None]
@@ -162,6 +170,27 @@ def _prepared(sources: tuple[Path, ...], origin: Origin) -> "Iterator[PreparedIm
     """Raw images ready to use."""
     for path in sources:
         yield origin.prepared(origin.read(path), use="render")
+
+
+def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int) -> Result:
+    """Pictures to take."""
+    from lumigraph import metric
+    from lumigraph.instruments import LensletCamera
+
+    camera = origin.described("render")
+    if board is None or not isinstance(camera, LensletCamera):
+        raise FormatError("a plan needs --camera, a file of a plenoptic camera 2.0, and --board.")
+    ideal = metric.MetricCamera.of(camera)
+    told = {name: getattr(ideal, name) for name in ("focal_length", "pixel_pitch")}
+    nominal = known.nominal(told | {"shape": camera.sensor.shape})
+    found = metric.plan(ideal, camera.calibration, board, nominal, pictures=pictures)
+    table = found.table()
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in table]
+    return Result(
+        "Plan", f"{pictures} pictures of a board to take, the most telling first.", found, tuple(lines),
+        found.quantities(), lambda: iter((Figure(table, section="Pictures"),)),
+    )  # fmt: skip
 
 
 def _headline(found: "Measured") -> tuple[str, ...]:

@@ -5,6 +5,7 @@
 - `MetricCamera`: main lens, lenslets, sensor, as a geometry of rays (`geometry`).
 - `board`: the camera from corners, by bundle adjustment (`adjustment`) from a coarse search (`start`),
   with the noise of corners that are seen many times (`noise`). `Measured` holds it, its errors, the poses.
+- `plan`: how to take pictures of the board, and how well they will tell the camera.
 - `triangulate`: positions of points from their micro-images.
 
 T. Georgiev and A. Lumsdaine, "Focused plenoptic camera and rendering", J. Electron. Imaging 19 (2010),
@@ -17,6 +18,7 @@ from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.metric.files import load, load_compote, load_corners, save, save_corners
 from lumigraph.metric.finding import find_corners
+from lumigraph.metric.planning import Plan, plan
 from lumigraph.metric.triangulation import Triangulated, triangulate
 
 __all__ = [
@@ -25,6 +27,7 @@ __all__ = [
     "Measured",
     "MetricCamera",
     "Nominal",
+    "Plan",
     "Pose",
     "Triangulated",
     "board",
@@ -32,6 +35,7 @@ __all__ = [
     "load",
     "load_compote",
     "load_corners",
+    "plan",
     "save",
     "save_corners",
     "triangulate",

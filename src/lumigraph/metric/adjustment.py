@@ -83,14 +83,8 @@ class Problem:
 
     @property
     def free(self) -> np.ndarray:
-        """Numbers of the camera (all) by unknowns: the gains keep their mean."""
-        kinds, plain = len(self.camera.gains), len(geometry.NAMES)
-        f, _, b, *_ = self.camera.numbers
-        scale = [0.1 * f, 0.1 * f, 0.1 * b, 0.1, 100, 100, 1e-2, 1e-2, 0.1, 1, 10, 1e-2, 1e-2]
-        free = np.zeros((plain + kinds, plain + kinds - 1))
-        free[:plain, :plain] = np.diag(scale)
-        free[plain:-1, plain:], free[-1, plain:] = 0.1 * np.eye(kinds - 1), -0.1
-        return free
+        """See `freedom`."""
+        return freedom(self.camera)
 
     def split(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of the camera, and poses (frames, 6)."""
@@ -134,6 +128,17 @@ class Problem:
 
     def _white(self, values: np.ndarray) -> np.ndarray:
         return self.noise.whitened(values, self.sight, self.corners.kind)
+
+
+def freedom(camera: MetricCamera) -> np.ndarray:
+    """Numbers of the camera (all) by unknowns, scaled: the gains keep their mean."""
+    kinds, plain = len(camera.gains), len(geometry.NAMES)
+    f, _, b, *_ = camera.numbers
+    scale = [0.1 * f, 0.1 * f, 0.1 * b, 0.1, 100, 100, 1e-2, 1e-2, 0.1, 1, 10, 1e-2, 1e-2]
+    free = np.zeros((plain + kinds, plain + kinds - 1))
+    free[:plain, :plain] = np.diag(scale)
+    free[plain:-1, plain:], free[-1, plain:] = 0.1 * np.eye(kinds - 1), -0.1
+    return free
 
 
 def adjust(

@@ -7,6 +7,7 @@ import numpy as np
 from lumigraph.core import checks
 from lumigraph.core.checks import Pair
 from lumigraph.errors import CalibrationError
+from lumigraph.instruments import LensletCamera
 from lumigraph.metric import geometry
 
 
@@ -59,6 +60,14 @@ class MetricCamera:
         for name in ("axis", "tilt", "radial", "tangential", "gains"):
             for value in getattr(self, name):
                 checks.finite(name, value, "1")
+
+    @classmethod
+    def of(cls, camera: LensletCamera) -> "MetricCamera":
+        """The ideal one that a camera file describes: a thin lens, nothing tilted or distorted."""
+        y, x = ((n // 2) for n in camera.sensor.shape)
+        L, pitch, gains = camera.separation, camera.sensor.pixel_pitch, (1.0,) * camera.lattice.kinds
+        f, b = camera.main_lens.focal_length, camera.lenslet_distance
+        return cls(f, L, b, L, pitch, (float(y), float(x)), gains=gains)
 
     @property
     def numbers(self) -> np.ndarray:

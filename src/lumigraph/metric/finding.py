@@ -19,7 +19,7 @@ from lumigraph.rendering import render
 from lumigraph.rendering.interpolate import as_float
 from lumigraph.rendering.patches import Layout, Patches
 
-_LEAST_SEEN = 3
+LEAST_SEEN = 3
 """Lenslets that must show a corner."""
 
 _WINDOW = 0.35
@@ -29,6 +29,10 @@ _NARROW = 0.1
 """The same over the pitch: wide windows fit into few micro-images."""
 
 _RADII = (2, 6)  # px: of windows
+
+LEAST_SQUARE = _RADII[0] / _WINDOW
+"""Of a board behind a lenslet [px]."""
+
 _ROUNDS = 3  # corners found, places of the next round told by those found
 _STEPS = 12  # of one search
 _STRAY = 2.5  # px: from where a corner is expected
@@ -99,11 +103,16 @@ def _on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: in
         lines, sights = search.found(lines, calibration)
     if not len(sights):
         raise CalibrationError(
-            f"picture {frame} shows the board, but no corner behind {_LEAST_SEEN} lenslets or more. Move the "
+            f"picture {frame} shows the board, but no corner behind {LEAST_SEEN} lenslets or more. Move the "
             "board to where the micro-images are sharp."
         )
     kinds = calibration.lattice.kind(*sights.index.T)
     return np.full(len(sights), frame), sights.corner, sights.center + sights.way, sights.center, kinds
+
+
+def lit_radius(calibration: Calibration, margin: float = _RADII[0]) -> float:
+    """How far from a micro-image's centre a corner may be, with `margin` of light around it [px]."""
+    return (calibration.fill or 1.0) * calibration.lattice.pitch / 2 - margin - 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,21 +163,20 @@ class _Lines:
         lattice = (self.places * np.abs(self.ratio)[:, None]).reshape(*board.shape, 2)
         nearest = min(float(np.hypot(*np.moveaxis(np.diff(lattice, axis=k), -1, 0)).min()) for k in (0, 1))
         least, most = _RADII
-        if nearest * _WINDOW < least:
+        if nearest < LEAST_SQUARE:
             raise CalibrationError(
                 f"on picture {frame} the squares are {nearest:.3g} px wide behind a lenslet, but "
-                f"{least / _WINDOW:.3g} px are needed. Use a board with larger squares, or bring it nearer."
+                f"{LEAST_SQUARE:.2g} px are needed. Use a board with larger squares, or bring it nearer."
             )
         return max(least, min(most, int(nearest * _WINDOW), round(pitch * _NARROW)))
 
     def sights(self, calibration: Calibration, margin: int) -> _Sights:
         """Lenslets that should show each corner with `margin` [px] around it."""
-        (rows, columns), pitch = calibration.shape, calibration.lattice.pitch
+        rows, columns = calibration.shape
         index = calibration.indices_within((0, rows - 1), (0, columns - 1))
         flat = calibration.lattice.position(index)
         way = -self.ratio[:, None, None] * (self.places[:, None] - flat)
-        lit = (calibration.fill or 1.0) * pitch / 2 - margin - 1
-        corner, lenslet = np.nonzero(np.hypot(way[..., 0], way[..., 1]) <= lit)
+        corner, lenslet = np.nonzero(np.hypot(*np.moveaxis(way, -1, 0)) <= lit_radius(calibration, margin))
         chosen = index[lenslet]
         return _Sights(corner, chosen, flat[lenslet], calibration.position(chosen), way[corner, lenslet])
 
@@ -178,7 +186,7 @@ class _Lines:
         for corner in np.unique(sights.corner):
             mine = np.flatnonzero(sights.corner == corner)
             place, slope, fit = _line(sights.flat[mine], sights.way[mine])
-            if fit.sum() >= _LEAST_SEEN:
+            if fit.sum() >= LEAST_SEEN:
                 places[corner], ratio[corner], kept[mine] = place, slope, fit
         return replace(self, places=places, ratio=ratio), sights[kept]
 
@@ -188,14 +196,14 @@ def _line(flat: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, float, np.ndar
     fit = np.ones(len(way), bool)
     place, slope = np.zeros(2), 0.0
     for _ in range(4):
-        if fit.sum() < _LEAST_SEEN:
+        if fit.sum() < LEAST_SEEN:
             return place, slope, np.zeros(len(way), bool)
         middle, mean = flat[fit].mean(0), way[fit].mean(0)
         across, moved = flat[fit] - middle, way[fit] - mean
         slope = float((across * moved).sum() / (across**2).sum())
         place = middle - mean / slope
         off = np.hypot(*(way + slope * (place - flat)).T)
-        fit = off <= max(0.3, _OFF * float(np.median(off[fit])))
+        fit = off <= max(0.1, _OFF * float(np.median(off[fit])))
     return place, slope, fit
 
 

@@ -1,0 +1,232 @@
+"""How to take pictures of a board: poses that tell the camera's lengths best, and how well."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from lumigraph.core import checks
+from lumigraph.core.brief import brief
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.result import Quantity
+from lumigraph.errors import CalibrationError
+from lumigraph.metric import geometry
+from lumigraph.metric.adjustment import Problem, freedom
+from lumigraph.metric.calibration import LEAST_FRAMES
+from lumigraph.metric.camera import MetricCamera, Nominal
+from lumigraph.metric.corners import Board, Corners
+from lumigraph.metric.finding import LEAST_SEEN, LEAST_SQUARE, lit_radius
+from lumigraph.metric.noise import Noise
+
+Turn = tuple[float, float, float]
+
+_TILTS = (0.0, 0.35, -0.35, 0.7, -0.7)  # rad: beyond, the squares are too narrow
+_RATIOS = (0.08, 0.6)  # how far a corner moves against a lenslet, as `depth.correlation` looks for it
+_DISTANCES = 6
+_FARTHEST = 200.0  # focal lengths
+
+_SURE = (0.1, 0.3)
+"""Of L and b: how well they are known without any picture, over themselves."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One picture to take.
+
+    Parameters
+    ----------
+    distance
+        Of the board's middle, on the axis, from the main lens [m].
+    turn
+        Rotation vector (z, y, x) [rad], as that of `Pose`: y turns the board about its vertical, x about
+        its horizontal middle line.
+    places
+        Of corners behind lenslets that it gives.
+    errors
+        Standard deviations (f, L, b) [m] with this picture and those before it.
+    """
+
+    distance: float
+    turn: Turn
+    places: int
+    errors: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """Pictures of a board, the most telling first.
+
+    Parameters
+    ----------
+    camera, board
+        Of what, by what.
+    steps
+        The pictures.
+    """
+
+    camera: MetricCamera
+    board: Board
+    steps: tuple[Step, ...]
+
+    __repr__ = brief
+
+    def quantities(self) -> tuple[Quantity, ...]:
+        """f, L and b with the 95 % intervals that all pictures together will give, and the pictures."""
+        names, numbers = ("focal_length", "separation", "lenslet_distance"), self.camera.numbers.tolist()
+        spread = [1.96 * error for error in self.steps[-1].errors]
+        lengths = zip(names, numbers, spread, strict=False)
+        return (
+            *(Quantity(name, value, "m", (value - off, value + off)) for name, value, off in lengths),
+            Quantity("distances", tuple(step.distance for step in self.steps), "m"),
+            Quantity("turns", tuple(step.turn for step in self.steps), "rad"),
+        )
+
+    def table(self) -> list[list[str]]:
+        """The pictures as rows of text, their header first."""
+        rows = [["picture", "distance", "tilt (vertical)", "tilt (horizontal)", "places", "f", "L", "b"]]
+        for number, step in enumerate(self.steps, 1):
+            tilts = [f"{math.degrees(angle):+.0f}°" for angle in step.turn[1:]]
+            errors = [f"± {1.96 * error * 1e3:.3g} mm" for error in step.errors]
+            rows.append([str(number), f"{step.distance * 1e3:.4g} mm", *tilts, str(step.places), *errors])
+        return rows
+
+
+def plan(
+    camera: MetricCamera,
+    calibration: Calibration,
+    board: Board,
+    nominal: Nominal,
+    *,
+    pictures: int = 8,
+    noise_px: float = 0.1,
+    shared_px: float = 0.05,
+) -> Plan:
+    """Poses of a board, one after the other those that tell f, L and b best together.
+
+    Boards stand on the axis where three lenslets or more show each corner, straight or tilted. What a
+    picture tells of the camera is known before it is taken: its Fisher information, less what its own pose
+    takes. Each picture is the one that makes the sum of the relative variances of f, L and b least.
+
+    Parameters
+    ----------
+    camera
+        As its data sheet says, such as ``MetricCamera.of(camera_file)``.
+    calibration
+        Where its micro-images stand.
+    board
+        To be used.
+    nominal
+        How well the data sheet is known. L is taken as known to 10 %, b to 30 %.
+    pictures
+        How many; 3 at least.
+    noise_px, shared_px
+        Of one place, and of what all places of a corner share (see `Noise`) [px].
+
+    Raises
+    ------
+    CalibrationError
+        Fewer than three pictures, or no distance at which the board can be used.
+    """
+    checks.whole("pictures", pictures, LEAST_FRAMES, CalibrationError)
+    own = checks.positive("noise_px", noise_px, "px"), checks.positive("shared_px", shared_px, "px")
+    noise = Noise(np.full(len(camera.gains), own[0]), own[1])
+    places = product(_distances(camera), product((0.0,), _TILTS, _TILTS))
+    shots = [_shot(camera, calibration, board, noise, *place) for place in places]
+    useful = [shot for shot in shots if shot is not None]
+    if not useful:
+        raise CalibrationError(
+            f"there is no place where the whole board of {board.shape[1]} x {board.shape[0]} corners, "
+            f"{board.spacing * 1e3:.3g} mm, is in the picture and {LEAST_SEEN} lenslets show each corner, in "
+            f"squares {LEAST_SQUARE:.2g} px wide or wider. Try squares of another size."
+        )
+    return Plan(camera, board, tuple(_chosen(useful, camera, nominal, pictures)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shot:
+    """A picture and its information of the camera's unknowns, whatever its pose."""
+
+    distance: float
+    turn: Turn
+    places: int
+    told: np.ndarray
+
+
+def _distances(camera: MetricCamera) -> list[float]:
+    """At which micro-images can be compared, from near to far, evenly in the image."""
+    f, low = camera.focal_length, 1.02 * camera.focal_length
+    every = 1 / np.linspace(1 / low, 1 / (_FARTHEST * f), 400)
+    image = f * every / (every - f)
+    ratio = np.abs(camera.lenslet_distance / (camera.separation - image))
+    usable = every[(ratio >= _RATIOS[0]) & (ratio <= _RATIOS[1])]
+    if not len(usable):
+        raise CalibrationError(
+            f"nothing in front of the camera is shown {_RATIOS[0]:g} to {_RATIOS[1]:g} times as large as its "
+            f"image by a lenslet: L is {camera.separation * 1e3:.4g} mm, b "
+            f"{camera.lenslet_distance * 1e3:.4g} mm."
+        )
+    return usable[np.linspace(0, len(usable) - 1, min(_DISTANCES, len(usable))).astype(int)].tolist()
+
+
+def _shot(
+    camera: MetricCamera, calibration: Calibration, board: Board, noise: Noise, distance: float, turn: Turn
+) -> _Shot | None:
+    """A board at a distance; None where not all of its corners can be used."""
+    middle = np.array([0.0, *((n - 1) / 2 * board.spacing for n in board.shape)])
+    still = np.array([*turn, 0.0, 0.0, 0.0])
+    pose = np.concatenate([turn, np.array([distance, 0.0, 0.0]) - geometry.moved(middle, still)])
+    seen = _seen(camera, calibration, board, pose)
+    if seen is None:
+        return None
+    frame, sights = np.zeros(len(seen), int), seen.sights()
+    problem = Problem(seen, board, frame, camera, [], noise, sights)
+    own = problem.free.shape[1]
+    slopes = problem.jacobian(np.concatenate([np.zeros(own), pose]))
+    of_camera, of_pose = slopes[:, :own], slopes[:, own:]
+    across = of_pose.T @ of_camera
+    told = of_camera.T @ of_camera - across.T @ np.linalg.solve(of_pose.T @ of_pose, across)
+    return _Shot(distance, turn, len(seen), told)
+
+
+def _seen(camera: MetricCamera, calibration: Calibration, board: Board, pose: np.ndarray) -> Corners | None:
+    """Places of all corners behind lenslets; None where one cannot be found."""
+    (rows, columns), points = calibration.shape, geometry.moved(board.points(), pose)
+    if points[:, 0].min() <= 1.02 * camera.focal_length:
+        return None
+    index = calibration.indices_within((0, rows - 1), (0, columns - 1))
+    center, kinds = calibration.position(index), calibration.lattice.kind(*index.T)
+    corner, lenslet = (each.ravel() for each in np.indices((len(points), len(center))))
+    place = camera.project(points[corner], center[lenslet], kinds[lenslet])
+    shown = np.hypot(*(place - center[lenslet]).T) <= lit_radius(calibration)
+    if np.bincount(corner[shown], minlength=len(points)).min() < LEAST_SEEN:
+        return None
+    if _square(camera, board, points) < LEAST_SQUARE:
+        return None
+    corner, lenslet, place = corner[shown], lenslet[shown], place[shown]
+    return Corners(np.zeros(len(corner), int), corner, place, center[lenslet], kinds[lenslet])
+
+
+def _square(camera: MetricCamera, board: Board, points: np.ndarray) -> float:
+    """Least way between neighbouring corners behind a lenslet [px]."""
+    axis, shape = np.array([camera.axis]), (*board.shape, 2)
+    shown = camera.project(points, np.repeat(axis, len(points), 0)).reshape(shape)
+    return min(float(np.hypot(*np.moveaxis(np.diff(shown, axis=k), -1, 0)).min()) for k in (0, 1))
+
+
+def _chosen(shots: list[_Shot], camera: MetricCamera, nominal: Nominal, pictures: int) -> Iterator[Step]:
+    free, lengths = freedom(camera), camera.numbers[:3]
+    beforehand = [(k, error) for k, _, error in nominal.priors(len(camera.gains))]
+    beforehand += [(k + 1, share * lengths[k + 1]) for k, share in enumerate(_SURE)]
+    known = np.array([free[k] / error for k, error in beforehand])
+    told = known.T @ known
+
+    def errors(told: np.ndarray) -> np.ndarray:
+        return np.sqrt(np.diag(free @ np.linalg.inv(told) @ free.T)[:3])
+
+    for _ in range(pictures):
+        shot = min(shots, key=lambda shot: float(np.sum((errors(told + shot.told) / lengths) ** 2)))
+        told = told + shot.told
+        f, L, b = errors(told).tolist()
+        yield Step(shot.distance, shot.turn, shot.places, (f, L, b))
