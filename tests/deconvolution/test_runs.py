@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import lumigraph as lg
 from deconvolution.models import Matrix, blurred, disc
@@ -43,6 +44,19 @@ def killed_after(iterations):
             raise KeyboardInterrupt
 
     return progress
+
+
+def test_products_of_an_iteration_take_one_thread_each(raw):
+    """Threads that wait for one another between small products tripled the work on a busy machine."""
+    inside = []
+    with threadpool_limits(2, "blas"):
+        lg.deconvolve(raw, OPERATOR, 2, progress=lambda _: inside.append(_threads()))
+        assert _threads() == {2}
+    assert inside == [{1}, {1}]
+
+
+def _threads():
+    return {part["num_threads"] for part in threadpool_info() if part["user_api"] == "blas"}
 
 
 @pytest.mark.parametrize("name", METHODS)

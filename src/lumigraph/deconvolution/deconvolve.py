@@ -13,6 +13,7 @@ from lumigraph.core import arrays, checks, memory
 from lumigraph.core.arrays import Array
 from lumigraph.core.linear import Linear
 from lumigraph.core.raw import RawImage
+from lumigraph.core.threads import single_products
 from lumigraph.core.volume import Volume
 from lumigraph.deconvolution.beyond import Inside, beyond, continued, cut, least_seen
 from lumigraph.deconvolution.checkpoint import Checkpoint, fingerprint
@@ -151,18 +152,20 @@ def deconvolve_series(
     wide, inside = beyond(operator)
     scale: Scale | None = None
     for raw in frames:
-        if scale is None:
-            exposure = _known(raw, exposure)
-            data = values(raw, operator, exposure)
-            _require(wide, data)
-            scale = Scale.of(wide, exposure, data, least_seen(operator))
-        assert exposure is not None
-        problem = Problem.of(raw, exposure, scale)
-        run = _Run(problem, method, limits, progress, (operator, inside))
-        if checkpoint is not None:
-            run.checkpoint = Checkpoint.of(checkpoint)
-            run.key = fingerprint(values(raw, operator, exposure), exposure, method)
-        yield _finished(run, raw)
+        with single_products():  # threads of small products spin: three times the work on a busy machine
+            if scale is None:
+                exposure = _known(raw, exposure)
+                data = values(raw, operator, exposure)
+                _require(wide, data)
+                scale = Scale.of(wide, exposure, data, least_seen(operator))
+            assert exposure is not None
+            problem = Problem.of(raw, exposure, scale)
+            run = _Run(problem, method, limits, progress, (operator, inside))
+            if checkpoint is not None:
+                run.checkpoint = Checkpoint.of(checkpoint)
+                run.key = fingerprint(values(raw, operator, exposure), exposure, method)
+            found = _finished(run, raw)
+        yield found
 
 
 @dataclass(slots=True)
