@@ -48,8 +48,9 @@ fuzz: $(READY)  ## 100,000 damaged files for every reader, each in a process of 
 	$(BIN)/python tests/fuzz/run.py --count 100000
 
 audit: $(READY)  ## known holes in the locked dependencies; fails where no advisory service answers
-	@test -x .venv/audit/bin/pip-audit || { $(PYTHON) -m venv .venv/audit && .venv/audit/bin/pip install --quiet --disable-pip-version-check pip-audit; }
-	.venv/audit/bin/pip-audit --strict --disable-pip --require-hashes -r requirements.lock
+	@test -x .venv/audit/bin/pip-audit || { $(PYTHON) -m venv .venv/audit && .venv/audit/bin/pip install -qq --disable-pip-version-check pip-audit; }
+	@.venv/audit/bin/pip-audit --strict --disable-pip --require-hashes -r requirements.lock || \
+		{ echo "audit: holes are listed above; if none are, the advisory service of PyPI did not answer"; exit 1; }
 
 docs: $(READY)  ## the site, with its gallery: site/index.html; strict, without a network once its tools are there
 	@$(BIN)/python -c "import furo, myst_parser, sphinx_gallery" 2>/dev/null || \

@@ -10,13 +10,15 @@ stays quick. Nothing inside the package imports this module.
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
 from lumigraph.core import drawing
 
 __version__ = "0.1.0"
 
+TYPE_CHECKING = False  # `typing` takes ten times as long as all of this
 if TYPE_CHECKING:
+    from typing import Any
+
     from lumigraph import analysis, depth, design, metric, plots, samples, units
     from lumigraph.calibration import calibrate, devignette
     from lumigraph.core.calibration import Calibration
@@ -217,7 +219,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name not in _HOME:
         raise AttributeError(f"module 'lumigraph' has no attribute {name!r}")
     home = _HOME[name]

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -113,6 +114,14 @@ def test_an_interruption_while_the_program_starts_is_quiet():
         _, err = process.communicate(timeout=60)
         assert "Traceback" not in err
         assert process.returncode in (0, 130, -signal.SIGINT)
+
+
+def test_nothing_slow_is_imported_before_an_interruption_is_quiet():
+    place = Path(lg.__path__[0]).parent
+    code = f"import sys; sys.path.append({str(place)!r}); import lumigraph.cli; print(*sys.modules)"
+    words = [sys.executable, "-I", "-S", "-c", code]  # without `site`, which may import anything
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert not {"typing", "collections", "enum", "re", "signal", "contextlib"} & set(done.stdout.split())
 
 
 def test_an_exact_pitch_is_kept_by_calibrate(lumigraph, tmp_path):

@@ -66,6 +66,36 @@ def test_a_noun_comes_back_from_xarray(noun):
         np.testing.assert_array_equal(again.confidence, noun.confidence)
 
 
+def test_the_expected_error_of_a_depth_map_comes_back_from_xarray():
+    error = np.float32([[0.1, 0.2], [0.3, np.nan]])
+    depth = lg.DepthMap(np.ones((2, 2)), np.ones((2, 2)), "disparity", error)
+    np.testing.assert_array_equal(lg.DepthMap.from_xarray(depth.to_xarray()).error, error)
+
+
+@pytest.mark.parametrize("wrong", [None, "abc", [1, 2], 10**400, np.zeros(3), {}, 1j, np.nan])
+def test_xarray_with_what_is_no_number_is_refused_in_one_line(wrong):
+    """They ended in TypeError, ValueError or OverflowError."""
+    array = VIEWS.to_xarray()
+    array.attrs["separation"] = wrong
+    with pytest.raises(lg.GeometryError, match="attribute 'separation' is"):
+        lg.LightField.from_xarray(array)
+    array = VIEWS.to_xarray()
+    array.coords["t"].attrs["pitch"] = wrong
+    with pytest.raises(lg.GeometryError, match="'pitch' of the coordinate 't' is"):
+        lg.LightField.from_xarray(array)
+
+
+def test_xarray_with_coordinates_of_text_or_without_samples_is_refused():
+    array = VIEWS.to_xarray()
+    with pytest.raises(lg.GeometryError, match="coordinate 't' of the DataArray must hold finite numbers"):
+        lg.LightField.from_xarray(array.assign_coords(t=[f"{k}" for k in range(array.sizes["t"])]))
+    with pytest.raises(lg.GeometryError, match="coordinate 'v' of the DataArray must hold finite numbers"):
+        lg.LightField.from_xarray(array.isel(v=slice(0, 0)))
+    stack = lg.Stack(DATA[0], (1.0, 2.0, 3.0)[: len(DATA[0])], "alpha").to_xarray()
+    with pytest.raises(lg.GeometryError, match="has no coordinate 'n'"):
+        lg.Stack.from_xarray(stack.drop_vars("n"))
+
+
 def test_a_selection_in_xarray_keeps_its_place():
     part = lg.LightField.from_xarray(VIEWS.to_xarray().isel(s=slice(1, None), v=slice(0, 1)))
     np.testing.assert_allclose(part.lenslets.x, VIEWS.lenslets.x[1:], rtol=0, atol=1e-15)

@@ -12,34 +12,43 @@
 Modules of verbs import what is slow inside their functions, so that `--help` answers at once.
 """
 
-import os
-import signal
-import threading
-from collections.abc import Sequence
-from contextlib import suppress
+TYPE_CHECKING = False  # nothing is imported here: Python prints a traceback for Ctrl-C until `main` runs
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 __all__ = ["main"]
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: "Sequence[str] | None" = None) -> int:
     """Run the command line and return its exit code, see `app.main`; Ctrl-C while it starts is quiet, too."""
-    _fill_closed()
-    handler = signal.getsignal(signal.SIGINT)
-    ours = handler is signal.default_int_handler and threading.current_thread() is threading.main_thread()
     try:
-        if ours:  # the system's own way ends without a traceback, which imports would print
+        import signal
+
+        # The system's own way ends without a traceback, which imports would print.
+        ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler and _is_main_thread()
+        if ours:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
+        _fill_closed()
         from lumigraph.cli import app
 
         if ours:
-            signal.signal(signal.SIGINT, handler)
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         return app.main(arguments)
     except KeyboardInterrupt:
         return 130
 
 
+def _is_main_thread() -> bool:
+    import threading
+
+    return threading.current_thread() is threading.main_thread()
+
+
 def _fill_closed() -> None:
     """Open what the shell has closed (`2>&-`): else a file would be number 2, into which libraries print."""
+    import os
+    from contextlib import suppress
+
     with suppress(OSError):
         while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
             pass

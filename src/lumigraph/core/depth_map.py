@@ -148,13 +148,15 @@ class DepthMap(Noun[A]):
 
     def _labels(self) -> Labels:
         along = {"confidence": (("y", "x"), to_numpy(self.confidence))}
-        about = {"quantity": self.quantity}
-        return Labels("yx", self.quantity, self.unit, along, {"confidence": "1"}, attributes=about)
+        if self.error is not None:
+            along["error"] = (("y", "x"), to_numpy(self.error))
+        units = {"confidence": "1", "error": self.unit}
+        return Labels("yx", self.quantity, self.unit, along, units, attributes={"quantity": self.quantity})
 
     @classmethod
     def _of_labels(cls, labels: Labels) -> Self:
         trust = labels.along.get("confidence", np.ones(labels.data.shape))
-        return cls(labels.data, trust, labels.attribute("quantity"))
+        return cls(labels.data, trust, labels.attribute("quantity"), labels.along.get("error"))
 
     def check(self, *quantities: str) -> None:
         """Refuse a map of another quantity.

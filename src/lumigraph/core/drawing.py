@@ -1,18 +1,20 @@
 """Where nouns find what draws them: core knows no drawing library, `lumigraph` itself says who does."""
 
-from collections.abc import Callable
-from typing import Any
+TYPE_CHECKING = False  # `typing` is slow to import, and `import lumigraph` imports this
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
 
-_home: Callable[[], Any] | None = None
+_home: "Callable[[], Any] | None" = None
 
 
-def done_by(home: Callable[[], Any]) -> None:
+def done_by(home: "Callable[[], Any]") -> None:
     """Take the functions that draw from what `home` gives; it is called when the first thing is drawn."""
     global _home
     _home = home
 
 
-def draw(name: str, *things: Any, **options: Any) -> Any:
+def draw(name: str, *things: "Any", **options: "Any") -> "Any":
     """The figure that the function `name` of the drawing module makes of things."""
     if _home is None:
         raise RuntimeError("nothing draws yet. Import lumigraph.")

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, LumigraphError
 
@@ -61,11 +62,18 @@ class Labels:
             raise GeometryError(f"the DataArray has no attribute {name!r}. Give it: array.attrs[{name!r}].")
         return self.attributes[name]
 
+    def number(self, name: str) -> float:
+        """A finite number among the attributes that has to be there."""
+        return checks.finite(f"the DataArray's attribute {name!r}", self.attribute(name), "1")
+
     def coordinate(self, name: str) -> np.ndarray:
         """A coordinate that has to be there, in metres."""
         if name not in self.along:
             raise GeometryError(f"the DataArray has no coordinate {name!r}. Give it, in metres.")
-        return np.asarray(self.along[name], np.float64)
+        places = np.asarray(self.along[name])
+        if places.dtype.kind not in "iuf" or not places.size or not np.isfinite(places).all():
+            raise GeometryError(f"the coordinate {name!r} of the DataArray must hold finite numbers.")
+        return places.astype(np.float64)
 
     def _even(self, name: str) -> tuple[list[float], float]:
         places = self.coordinate(name)
@@ -137,7 +145,11 @@ def from_xarray(array: Any, kind: str, axes: str) -> Labels:
             "for colour. Transpose or rename them."
         )
     along = {str(name): np.asarray(values) for name, values in array.coords.items()}
-    pitches = {str(n): float(c.attrs["pitch"]) for n, c in array.coords.items() if "pitch" in c.attrs}
+    pitches = {
+        str(n): checks.finite(f"the attribute 'pitch' of the coordinate {n!r}", c.attrs["pitch"])
+        for n, c in array.coords.items()
+        if "pitch" in c.attrs
+    }
     units = {str(n): str(c.attrs.get("units", "")) for n, c in array.coords.items()}
     attributes = {str(name): value for name, value in array.attrs.items()}
     return Labels(axes, along=along, units=units, pitches=pitches, attributes=attributes, data=array.values)

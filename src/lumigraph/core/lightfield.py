@@ -99,4 +99,4 @@ class LightField(Noun[A]):
     @classmethod
     def _of_labels(cls, labels: Labels) -> Self:
         grids = labels.grid("vu"), labels.grid("ts")
-        return cls(labels.data, *grids, float(labels.attribute("separation")), labels.along.get("valid"))
+        return cls(labels.data, *grids, labels.number("separation"), labels.along.get("valid"))

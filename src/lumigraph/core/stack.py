@@ -127,6 +127,6 @@ class Stack(Noun[A]):
     @classmethod
     def _of_labels(cls, labels: Labels) -> Self:
         about = labels.attributes
-        positions = tuple(labels.along["n"].tolist()) if about.get("positioned") else ()
+        positions = tuple(labels.coordinate("n").tolist()) if np.any(about.get("positioned")) else ()
         known = about.get("pixel_pitch"), about.get("bit_depth"), about.get("metadata", {})
         return cls(labels.data, positions, about.get("quantity", "page"), *known)

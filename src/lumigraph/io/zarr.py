@@ -3,10 +3,9 @@
 Volumes are OME-Zarr (NGFF 0.5), which microscopy programs open; those by other programs are read too.
 """
 
-import time
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import closing, contextmanager
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ import zarr
 from zarr.abc.buffer import Buffer
 from zarr.codecs import ZstdCodec
 from zarr.errors import ZarrUserWarning
-from zarr.storage import LocalStore, ZipStore
+from zarr.storage import LocalStore, WrapperStore, ZipStore
 
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.lightfield import LightField
@@ -26,7 +25,6 @@ from lumigraph.errors import FormatError
 from lumigraph.io import header, ngff, source, target, zarr_chunks
 
 _SIDE = 1024  # pixels of a chunk along each axis of a raw image
-_PATIENCE = 10.0  # s
 _SIDES = (16, 256, 256)  # voxels of a chunk of a volume
 Names = tuple[str, ...]
 
@@ -106,15 +104,17 @@ def _write(path: Path, arrays: list[tuple[Any, ...]], attributes: dict[str, Any]
     for _, data, *_ in arrays:
         if data.dtype.kind not in "iufbc":
             raise FormatError(f"a Zarr store cannot hold {data.dtype} here. Save numbers.")
-    with target.replacing(path) as temporary, _writing(temporary, path.suffix == ".zip") as store:
+    zipped = path.suffix == ".zip"
+    with target.replacing(path) as temporary, _writing(temporary, zipped) as store:
         group = zarr.create_group(store, zarr_format=3, attributes=attributes)
         for array in arrays:
-            _add(group, array)
-        if isinstance(store, LocalStore):  # a ZIP would keep the group's description twice
+            if store.failure is None:
+                _add(group, array)
+        if not zipped and store.failure is None:  # a ZIP would keep the group's description twice
             _consolidate(store)
 
 
-def _consolidate(store: LocalStore) -> None:
+def _consolidate(store: "_Writer") -> None:
     """Describe all arrays in the group's own file, so that programs open the store by one request."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Consolidated metadata", ZarrUserWarning)
@@ -182,34 +182,34 @@ def _reading(path: Path) -> Iterator[zarr.Group]:
         store.close()
 
 
-class _Folder(LocalStore):
-    """A folder whose other chunks are not written after one has failed: they would make it again."""
+class _Writer(WrapperStore[LocalStore | ZipStore]):
+    """A store whose failures zarr does not see: it would leave its other chunks' tasks to complain later."""
 
-    stopped, busy = False, 0
+    failure: OSError | None = None
 
     async def set(self, key: str, value: Buffer) -> None:
         """Write one file."""
-        if self.stopped:
-            raise OSError("another chunk was not written")
-        self.busy += 1
-        try:
-            await super().set(key, value)
-        finally:
-            self.busy -= 1
+        await self._remember(super().set, key, value)
 
-    def stop(self) -> None:
-        """Refuse what comes, and wait for what is being written."""
-        self.stopped, end = True, time.monotonic() + _PATIENCE
-        while self.busy and time.monotonic() < end:
-            time.sleep(0.005)
+    async def set_if_not_exists(self, key: str, value: Buffer) -> None:
+        """Write one file if there is none."""
+        await self._remember(super().set_if_not_exists, key, value)
+
+    async def _remember(self, write: Callable[[str, Buffer], Awaitable[None]], *what: Any) -> None:
+        """Write, or remember why that failed; after that nothing is written."""
+        if self.failure is None:
+            try:
+                await write(*what)
+            except OSError as error:
+                self.failure = error
 
 
 @contextmanager
-def _writing(path: Path, zipped: bool) -> Iterator[LocalStore | ZipStore]:
-    store = ZipStore(path, mode="w") if zipped else _Folder(path)
+def _writing(path: Path, zipped: bool) -> Iterator[_Writer]:
+    store = _Writer(ZipStore(path, mode="w") if zipped else LocalStore(path))
     try:
-        yield store
+        with closing(store):
+            yield store
     finally:
-        if isinstance(store, _Folder):
-            store.stop()
-        store.close()
+        if store.failure is not None:  # what went wrong later followed from it
+            raise store.failure
