@@ -44,6 +44,11 @@ from fuzz.structure import Link, Pipe, structural
 SECONDS, MEMORY, BATCH, STRUCTURAL = 20, 1 << 30, 250, 0.3
 WATCHED, GUIDED = 8, 0.4  # one child of so many is watched; share of mutants made of those that it found
 MOST_SEEDS, LARGEST_SEED = 300, 100_000  # of new seeds: their number, and the bytes of one
+METRIC = {
+    "corners.csv": lg.metric.load_corners,
+    "compote": lg.metric.load_compote,
+    "measured.json": lambda path: [*(found := lg.metric.load(path)).quantities(), *found.tied()],
+}
 PACKAGE = str(Path(lg.__file__).parent)
 Tree = dict[str, bytes]
 
@@ -123,6 +128,9 @@ def read(tree: Tree, folder: Path) -> None:
         path = folder / first.split("/")[0]
     elif first.startswith("folder"):
         path = folder / "folder"
+    if (load := METRIC.get(path.name)) is not None:
+        load(path)
+        return
     if path.name == "camera.toml":
         lg.load_camera(path).describe()
         return

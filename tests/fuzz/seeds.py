@@ -8,6 +8,7 @@ import hashlib
 import io as streams
 import json
 import struct
+import sys
 import tempfile
 import zipfile
 import zlib
@@ -33,6 +34,10 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
+from lumigraph.metric.noise import Noise
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from fuzz.texts import ASCII_PLY, COMPOTE, PLENOPTOMOS, RAYTRIX
 
 Tree = dict[str, bytes]
 MAGIC = b"\r\n\x1a\n"
@@ -234,8 +239,26 @@ def seeds() -> dict[str, tuple[list[Tree], Callable[[Tree], Tree] | None]]:
         "xml": ([{"a.xml": RAYTRIX}], None),
         "ini": ([{"a.ini": PLENOPTOMOS}], None),
         "views": ([folder, hci], None),
+        "metric": (_metric(rng), None),
         "eslf": ([{"a_eslf.png": saved(np.tile(grey[:6, :6], (5, 7)), "a.png")["a.png"]}], mend_png),
     }
+
+
+def _metric(rng: np.random.Generator) -> list[Tree]:
+    """A table of corners, a folder of COMPOTE's, and a measured camera."""
+    corners = lg.metric.Corners(
+        np.repeat([0, 1], 4), np.arange(8) % 5, rng.random((8, 2)), rng.random((8, 2)), np.arange(8) % 3
+    )
+    pose = lg.metric.Pose(0, np.zeros(3), np.ones(3), np.eye(6), 0.1, 0.1)
+    camera = lg.metric.MetricCamera(0.05, 0.06, 1e-3, 0.06, 5e-6, (10.0, 12.0))
+    noise, board = Noise(np.ones(1), 0.1), lg.metric.Board((3, 4), 0.01)
+    measured = lg.metric.Measured(camera, np.eye(14), noise, board, (pose,), 0.1, 1, ("a note",))
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        lg.metric.save_corners(corners, folder / "corners.csv")
+        lg.metric.save(measured, folder / "measured.json")
+        found = read_tree(folder)
+    return [*({name: content} for name, content in found.items()), COMPOTE]
 
 
 def _sealed() -> Tree:
@@ -367,45 +390,3 @@ def _mended_lytro(content: bytes) -> bytes:
             result = result.replace(old, new)
         at += 96 + length + -length % 16
     return result
-
-
-ASCII_PLY = b"""ply
-format ascii 1.0
-element vertex 2
-property double x
-property double y
-property double z
-property uchar red
-property uchar green
-property uchar blue
-end_header
-0.5 1 2 255 0 9
-3 4 5 1 2 3
-"""
-
-RAYTRIX = b"""<RayCalibData version="1.0">
-<offset units="pix"><x>1.5</x><y>-2.25</y></offset><diameter units="pix">9.5</diameter>
-<rotation units="rad">0.01</rotation>
-<lens_base_x units="lens"><x>1.0</x><y>0.0</y></lens_base_x>
-<lens_base_y units="lens"><x>0.5</x><y>-0.8660254</y></lens_base_y>
-<lens_type id="0"><offset units="lens"><x>0.0</x><y>0.0</y></offset>
-<depth_range><min>1.0</min><max>3.0</max></depth_range></lens_type>
-<lens_type id="1"><offset units="lens"><x>1.0</x><y>0.0</y></offset>
-<depth_range><min>2.8</min><max>4.0</max></depth_range></lens_type>
-<lens_type id="2"><offset units="lens"><x>-1.0</x><y>0.0</y></offset>
-<depth_range><min>3.8</min><max>100.0</max></depth_range></lens_type>
-</RayCalibData>
-"""
-
-PLENOPTOMOS = b"""[micro_lenses_array]
-z=400.0
-[micro_lens]
-physical_size_s=300e-3
-f2=18.6
-[sensor]
-pixel_size_x=6.45e-3
-pixel_size_y=6.45e-3
-size_x=138
-size_y=103
-z=418.6
-"""

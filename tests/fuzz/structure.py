@@ -62,7 +62,7 @@ def structural(tree: Tree, rng: Rng) -> Tree:
         return {**tree, name: _archive(content, rng)}
     if name.endswith((".json", ".txt")):
         return {**tree, name: _json(content, rng)}
-    if name.endswith((".toml", ".ini", ".cfg", ".xml")) or content.startswith(b"ply"):
+    if name.endswith((".toml", ".ini", ".cfg", ".xml", ".csv")) or content.startswith(b"ply"):
         return {**tree, name: _lines(content, rng)}
     return {**tree, name: _embedded(content, rng)}
 

@@ -6,9 +6,11 @@ import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.core.checks import Pair
-from lumigraph.errors import CalibrationError
+from lumigraph.errors import CalibrationError, GeometryError
 from lumigraph.instruments import LensletCamera
 from lumigraph.metric import geometry
+
+_COUNTS = {"axis": (2,), "tilt": (2,), "radial": (3,), "tangential": (2,), "gains": (1, 2, 3)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +42,7 @@ class MetricCamera:
     Raises
     ------
     GeometryError
-        A length that is not above 0, or a number that is not finite.
+        A length that is not above 0, or a number that is not finite, too few or too many.
     """
 
     focal_length: float
@@ -57,7 +59,11 @@ class MetricCamera:
     def __post_init__(self) -> None:
         for name in ("focal_length", "separation", "lenslet_distance", "exit_pupil", "pixel_pitch"):
             checks.positive(name, getattr(self, name))
-        for name in ("axis", "tilt", "radial", "tangential", "gains"):
+        for name, counts in _COUNTS.items():
+            values = np.asarray(getattr(self, name))
+            if values.ndim != 1 or len(values) not in counts:
+                wanted = " or ".join(map(str, counts))
+                raise GeometryError(f"{name} has shape {values.shape} but must be {wanted} numbers.")
             for value in getattr(self, name):
                 checks.finite(name, value, "1")
 

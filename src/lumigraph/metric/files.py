@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from lumigraph.core import checks
 from lumigraph.errors import FormatError, LumigraphError
 from lumigraph.io import source
 from lumigraph.metric.calibration import Measured, Pose
@@ -22,6 +23,8 @@ COLUMNS = ("frame", "corner", "y", "x", "center_y", "center_x", "kind")
 """Of a table of corners: lengths in pixels."""
 
 KIND = "lumigraph metric camera"
+
+_COMPOTE = ("bap.csv", "centers.csv", "camera.json", "scene.json")
 
 _LARGEST = 256 << 20
 
@@ -40,8 +43,9 @@ def load_corners(path: str | os.PathLike[str]) -> Corners:
     found = _table(file, COLUMNS[:-1])
     with _checked(file):
         place, center = (_pair(found, y, x) for y, x in (("y", "x"), ("center_y", "center_x")))
-        kind = found.get("kind", np.zeros(len(place)))
-        return Corners(_whole("frame", found), _whole("corner", found), place, center, kind.astype(int))
+        found.setdefault("kind", np.zeros(len(place)))
+        frame, corner, kind = (_whole(name, found) for name in ("frame", "corner", "kind"))
+        return Corners(frame, corner, place, center, kind)
 
 
 def save_corners(corners: Corners, path: str | os.PathLike[str]) -> None:
@@ -62,9 +66,10 @@ def load_compote(folder: str | os.PathLike[str]) -> tuple[Corners, Board, Nomina
         A file or a key that is missing, or holds something else.
     """
     place = source.existing(folder)
-    corners = _table(source.regular_file(place / "bap.csv"), ("k", "l", "u", "v", "cluster", "frame"))
-    centers = _table(source.regular_file(place / "centers.csv"), ("k", "l", "u", "v"))
-    camera, scene = (_json(source.regular_file(place / name)) for name in ("camera.json", "scene.json"))
+    files = [source.regular_file(source.unlinked(place / name)) for name in _COMPOTE]
+    corners = _table(files[0], ("k", "l", "u", "v", "cluster", "frame"))
+    centers = _table(files[1], ("k", "l", "u", "v"))
+    camera, scene = (_json(file) for file in files[2:])
     with _checked(place):
         sensor, grid = camera["sensor"], scene["checkerboards"][0]
         nominal = Nominal(
@@ -142,28 +147,33 @@ def load(path: str | os.PathLike[str]) -> Measured:
             name: tuple(v) if isinstance(v, list) else v for name, v in found["camera"].items()
         }
         board = Board(tuple(found["board"]["shape"]), found["board"]["spacing"])
-        noise = Noise(np.asarray(found["noise"]["own"], float), float(found["noise"]["shared"]))
         camera = MetricCamera(**lists)
+        own, shared = _numbers(found["noise"], "own", len(camera.gains)), _number(found["noise"], "shared")
         numbers = len(camera.numbers)
         return Measured(
-            camera, _square(found["covariance"], numbers), noise, board,
-            tuple(_pose(one) for one in found["poses"]), float(found["residual_px"]),
+            camera, _numbers(found, "covariance", numbers, numbers), Noise(own, shared), board,
+            tuple(_pose(one) for one in found["poses"]), _number(found, "residual_px"),
             int(found["left_out"]), tuple(map(str, found["notes"])),
         )  # fmt: skip
 
 
 def _pose(found: dict[str, Any]) -> Pose:
-    turn, shift = (np.asarray(found[name], float).reshape(3) for name in ("turn", "shift"))
-    covariance = _square(found["covariance"], 6)
-    off, expected = float(found["residual_px"]), float(found["expected_px"])
+    turn, shift, covariance = (
+        _numbers(found, *what) for what in (("turn", 3), ("shift", 3), ("covariance", 6, 6))
+    )
+    off, expected = _number(found, "residual_px"), _number(found, "expected_px")
     return Pose(int(found["frame"]), turn, shift, covariance, off, expected)
 
 
-def _square(values: Any, size: int) -> np.ndarray:
-    matrix = np.asarray(values, float)
-    if matrix.shape != (size, size) or not np.isfinite(matrix).all():
-        raise FormatError(f"a covariance has shape {matrix.shape} but must be ({size}, {size}), finite.")
-    return matrix
+def _numbers(found: dict[str, Any], name: str, *shape: int) -> np.ndarray:
+    values = np.asarray(found[name], float)
+    if values.shape != shape or not np.isfinite(values).all():
+        raise FormatError(f"{name} has shape {values.shape} but must be {shape}, finite numbers.")
+    return values
+
+
+def _number(found: dict[str, Any], name: str) -> float:
+    return checks.finite(name, found[name], "px", FormatError)
 
 
 def _table(path: Path, needed: Sequence[str]) -> dict[str, np.ndarray]:
@@ -173,7 +183,7 @@ def _table(path: Path, needed: Sequence[str]) -> dict[str, np.ndarray]:
         names = [name.strip() for name in lines.readline(1000).split(",")]
         values = np.loadtxt(lines, delimiter=",", ndmin=2, dtype=np.float64)
     missing = [name for name in needed if name not in names]
-    if missing or values.shape[1] != len(names):
+    if missing or values.shape[1] != len(names) or len(set(names)) < len(names):
         raise FormatError(
             f"{path} has the columns {', '.join(names)[:100]} and {values.shape[1]} numbers a row but must "
             f"have {', '.join(needed)}."
@@ -216,5 +226,5 @@ def _checked(path: Path) -> Iterator[None]:
         yield
     except LumigraphError as error:
         raise FormatError(f"{path}: {error}") from None
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
         raise FormatError(f"{path}: {type(error).__name__} {error}, which no such file has.") from None
