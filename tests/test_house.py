@@ -37,6 +37,13 @@ def test_importing_lumigraph_imports_nothing_heavy():
     assert out.stdout.strip() == "set()"
 
 
+def test_cameras_wait_for_no_statistics():
+    """`scipy.signal` imports `scipy.stats`: a quarter of a second of each first image."""
+    code = "import sys, lumigraph.instruments; print({'scipy.stats', 'matplotlib'} & set(sys.modules))"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.strip() == "set()"
+
+
 def test_import_floors_hold():
     linter = Path(sys.executable).with_name("lint-imports")
     out = subprocess.run([linter, "--no-cache"], cwd=ROOT, capture_output=True, text=True, check=False)

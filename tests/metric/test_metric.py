@@ -125,6 +125,7 @@ def test_a_wild_corner_is_left_out_and_counted(seen: Corners, measured: lg.metri
         ({"corner": np.array([0.5])}, "must be \\(n,\\), integers"),
         ({"place": np.array([[np.nan, 0.0]])}, "place has 1 NaN"),
         ({"kind": np.array([3])}, "kinds 0 to 2"),
+        ({"center": np.array([[0.0, -1e150]])}, r"center reaches to 1e\+150 px but at most 1e\+06 px"),
     ],
 )
 def test_corners_that_cannot_be_are_refused(change: dict, match: str) -> None:

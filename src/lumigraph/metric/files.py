@@ -158,9 +158,8 @@ def load(path: str | os.PathLike[str]) -> Measured:
 
 
 def _pose(found: dict[str, Any]) -> Pose:
-    turn, shift, covariance = (
-        _numbers(found, *what) for what in (("turn", 3), ("shift", 3), ("covariance", 6, 6))
-    )
+    turn, shift = _numbers(found, "turn", 3), _numbers(found, "shift", 3)
+    covariance = _numbers(found, "covariance", 6, 6)
     off, expected = _number(found, "residual_px"), _number(found, "expected_px")
     return Pose(int(found["frame"]), turn, shift, covariance, off, expected)
 
