@@ -67,3 +67,12 @@ def test_a_link_in_a_folder_of_compotes_is_not_followed(files, name):
     (files / "compote" / name).symlink_to(files / "elsewhere")
     with pytest.raises(lg.FormatError, match="is a link, which is not followed"):
         lg.metric.load_compote(files / "compote")
+
+
+@pytest.mark.parametrize("wrong", ["1e308", "nan", "-1e7"])
+def test_centres_beyond_every_picture_are_refused_and_nothing_is_printed(files, wrong, capfd):
+    path = files / "compote" / "centers.csv"
+    path.write_text(path.read_text().replace("1,0,30,10", f"1,0,{wrong},10"))
+    with pytest.raises(lg.FormatError, match=r"centres beyond 1e\+06 px"):
+        lg.metric.load_compote(files / "compote")
+    assert capfd.readouterr() == ("", "")

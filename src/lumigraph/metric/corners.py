@@ -15,7 +15,8 @@ _BOARD = re.compile(r"\s*(\d{1,4})\s*[x×]\s*(\d{1,4})\s*(?:corners)?\s*,\s*(.+)
 LEAST = 3
 """Corners along either side of a board."""
 
-_FARTHEST = 1e6  # px
+FARTHEST = 1e6
+"""What no picture reaches to [px]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +120,8 @@ class Corners:
             checks.finite_array(name, values, CalibrationError)
             if values.shape != (len(self), 2):
                 raise CalibrationError(f"{name} has shape {values.shape} but must be ({len(self)}, 2).")
-            if values.size and (most := float(np.abs(values).max())) > _FARTHEST:
-                raise CalibrationError(f"{name} reaches to {most:.3g} px but at most {_FARTHEST:g} px.")
+            if values.size and (most := float(np.abs(values).max())) > FARTHEST:
+                raise CalibrationError(f"{name} reaches to {most:.3g} px but at most {FARTHEST:g} px.")
             object.__setattr__(self, name, values)
         if not len(self) or {len(self.corner), len(self.kind)} != {len(self)}:
             sizes = ", ".join(f"{f.name} {len(getattr(self, f.name))}" for f in fields(self))
