@@ -13,7 +13,10 @@ import lumigraph as lg
 from lumigraph.units import mm, nm, um
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(ROOT.glob("docs/**/*.md"))]
+PAGES = [
+    *(ROOT / f"{name}.md" for name in ("README", "CHANGELOG", "CONTRIBUTING")),
+    *sorted(ROOT.glob("docs/**/*.md")),
+]
 ERRATA = (ROOT / "docs/thesis-errata.md").read_text()
 
 
@@ -112,6 +115,12 @@ def test_the_camera_file_of_readme_is_read(tmp_path):
     (block,) = blocks("README.md", "toml")
     (tmp_path / "camera.toml").write_text(block[1])
     assert lg.load_camera(tmp_path / "camera.toml").patch == pytest.approx(39.82, abs=0.01)
+
+
+def test_every_public_name_has_a_page():
+    listed = set(re.findall(r"^   (\w+)$", (ROOT / "docs/api.md").read_text(), re.M))
+    assert set(lg.__all__) <= listed
+    assert set(lg.metric.__all__) <= listed
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

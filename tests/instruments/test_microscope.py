@@ -154,11 +154,6 @@ def test_depths_that_are_no_numbers_are_refused(scope, depths):
         scope.operator(depths, 3)
 
 
-def test_there_is_no_ray_diagram_of_a_microscope(scope):
-    with pytest.raises(GeometryError, match="no ray diagram of a LightFieldMicroscope"):
-        lg.plots.layout(scope)
-
-
 def test_beads_come_back_where_they_were(scope, rng):
     depths = (-12e-6, 0.0, 12e-6)
     operator = scope.operator(depths, 3, pixels=10, accuracy=1e-2)

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from matplotlib.patches import Ellipse
 
 from lumigraph.design.layout import Layout
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import load_camera
 from lumigraph.plots.layout import layout
+from lumigraph.plots.microscope_layout import planes, traced
 
 NAMES = [
     "thesis-plenoptic-1",
@@ -19,6 +21,10 @@ FAR = {"object_distance": "2 m"}
 
 
 def camera_of(name):
+    if name == "2.0":
+        return load_camera("lfm-worm").replace(
+            configuration="2.0", lenslet_offset="6 mm", sensor_distance="3 mm"
+        )
     return load_camera("galilean").replace(**FAR) if name == "far" else load_camera(name)
 
 
@@ -26,7 +32,10 @@ def texts(figure):
     return [text for axes in figure.axes for text in axes.texts if text.get_text()]
 
 
-@pytest.mark.parametrize("name", [*NAMES, "thesis-2f", "far"])
+SCOPES = ["lfm-guv", "lfm-worm", "lfm-fourier", "2.0"]
+
+
+@pytest.mark.parametrize("name", [*NAMES, *SCOPES, "thesis-2f", "far"])
 def test_no_label_covers_another(name):
     figure = layout(camera_of(name))
     figure.draw_without_rendering()
@@ -46,11 +55,14 @@ def test_no_label_covers_another(name):
             ["z1 = 120 mm", "L = 135.6 mm", "a = 15.6 mm", "b = 7.8 mm", "D = 2.308 mm"],
         ),
         ("galilean", ["a = -10.5 mm", "b = 2.625 mm", "virtual main-lens image"]),
+        ("lfm-guv", ["objective\n60x / 1.2", "b = 2.5 mm", "native image\nand lenslets", "sensor"]),
+        ("lfm-fourier", ["objective\n20x / 0.5", "tube lens\nf = 200 mm", "Fourier lens\nf = 75 mm"]),
+        ("2.0", ["native image", "a = 6 mm", "b = 3 mm"]),
         ("thesis-2f", ["z1 = 316 mm", "z2 = 316 mm", "D = 5 mm", "sensor"]),
     ],
 )
 def test_distances_are_labelled(name, expected):
-    found = [text.get_text() for text in texts(layout(load_camera(name)))]
+    found = [text.get_text() for text in texts(layout(camera_of(name)))]
     assert set(expected) <= set(found)
 
 
@@ -87,3 +99,32 @@ def test_a_camera_without_an_image_is_refused():
         GeometryError, match=r"the object at 50 mm is inside the focal length of 60 mm.* Move it"
     ):
         layout(Near())
+
+
+@pytest.mark.parametrize("name", SCOPES)
+def test_rays_of_a_microscope_meet_in_the_native_image_and_cross_in_the_pupil(name):
+    drawn = camera_of(name).layout()
+    stations = planes(drawn)
+    heights = np.array([[traced(stations, y, u) for u in (-0.5, 0.0, 0.5)] for y in (0.0, 0.3)])
+    names = [name for _, _, name in stations]
+    image = next(k for k, name in enumerate(names) if name.startswith("native image"))
+    assert heights[1, :, image] == pytest.approx([-2 * 0.3] * 3)
+    assert heights[0, :, names.index("pupil")] == pytest.approx(heights[1, :, names.index("pupil")])
+    if drawn.fourier_lens:  # the lenslets stand in the pupil's image
+        assert heights[0, :, -1] == pytest.approx(heights[1, :, -1])
+
+
+def test_micro_images_of_a_matched_microscope_touch():
+    scope = load_camera("lfm-guv")
+    (behind, lenslets) = scope.layout().behind, scope.layout().lenslets
+    width = behind.pupil_diameter * lenslets.distance / behind.separation
+    assert width == pytest.approx(scope.lenslets.pitch, rel=1e-3)
+
+
+def test_each_kind_of_lenslets_has_its_colour_and_the_stronger_one_is_thicker():
+    lower = layout(load_camera("multi-focus-hex")).axes[1]
+    lenses = [patch for patch in lower.patches if isinstance(patch, Ellipse)]
+    assert len({lens.get_facecolor() for lens in lenses}) == 3
+    focal = load_camera("multi-focus-hex").layout().lenslets
+    by_kind = {lens.get_width(): focal.focal_length(k - len(lenses) // 2) for k, lens in enumerate(lenses)}
+    assert [by_kind[width] for width in sorted(by_kind)] == sorted(by_kind.values(), reverse=True)

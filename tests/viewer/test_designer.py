@@ -128,5 +128,5 @@ def test_a_microscope_and_a_single_lens_have_designers_too():
     for name in ("lfm-guv-simulated", "lfm-fourier"):
         calls = viewer.designer_site(lg.load_camera(name), name).calls
         assert calls["design"]({"values": {"wavelength": 600.0}})["curves"]["curves"]
-        assert calls["layout"]({"values": {}}) == {"svg": ""}
+        assert "<svg" in calls["layout"]({"values": {}})["svg"]
     assert len(trade_offs(lg.load_camera("thesis-2f"))["curves"]) == 3

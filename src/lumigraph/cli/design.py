@@ -73,8 +73,6 @@ def design(
     if plot is not None:
         from lumigraph import plots
 
-        if described.layout() is None:
-            raise FormatError(f"a {described.noun} has no drawing of rays. Leave out --plot.")
         files.save_figure(plots.layout(described), plot)
     found = Result(
         "Design", f"{table.title[0].upper()}{table.title[1:]}, and all that follows in closed form.",
@@ -96,8 +94,7 @@ def _figures(camera: "Instrument", table: "Description") -> "Iterator[Figure]":
 
     if table.warnings:
         yield Figure("\n".join(table.warnings), section="Warnings")
-    if camera.layout() is not None:
-        yield Figure(plots.layout(camera), "Rays through the camera.", "Layout", {"wide": True})
+    yield Figure(plots.layout(camera), f"Rays through the {camera.noun}.", "Layout", {"wide": True})
     for title, rows in table.sections:
         cells = [(row.name, row.text, row.source) for row in rows]
         yield Figure([("quantity", "value", "equation"), *cells], section=title)

@@ -233,8 +233,7 @@ def _figures(raw: "RawImage", camera: "Instrument") -> "Iterator[Figure]":
     yield Figure(raw, "Upright, as a camera reads it out.", "Raw image", {"wide": True})
     rows, columns = (slice(max(0, n // 2 - 80), n // 2 + 80) for n in raw.shape)
     yield Figure(raw.data[rows, columns], "The middle, pixel by pixel.", "Raw image", {"zoom": 3})
-    if camera.layout() is not None:
-        yield Figure(plots.layout(camera), "Rays through the camera.", "Camera")
+    yield Figure(plots.layout(camera), f"Rays through the {camera.noun}.", "Camera")
     yield Figure(camera.to_toml(), section="Camera file")
 
 

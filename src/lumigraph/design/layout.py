@@ -65,3 +65,41 @@ class Layout:
     def length(self) -> float:
         """Main lens to sensor [m]."""
         return self.separation + (0.0 if self.lenslets is None else self.lenslets.distance)
+
+
+@dataclass(frozen=True, slots=True)
+class MicroscopeLayout:
+    """An objective with its tube lens, lenslets near their image or in the pupil's, a sensor.
+
+    Parameters
+    ----------
+    magnification
+        To the native image.
+    numerical_aperture
+        Of the objective.
+    lenslets
+        Pitch, focal length and distance to the sensor.
+    offset
+        Native image to lenslets, positive behind it [m].
+    tube_lens
+        Focal length [m]; None where it is not given.
+    fourier_lens
+        Focal length of the lens between native image and lenslets [m]; None where there is none.
+    """
+
+    magnification: float
+    numerical_aperture: float
+    lenslets: LensletLayout
+    offset: float = 0.0
+    tube_lens: float | None = None
+    fourier_lens: float | None = None
+
+    @property
+    def behind(self) -> Layout:
+        """Lenslets and sensor with the light that comes to them: from a pupil that is very far away."""
+        cone = 2 * self.numerical_aperture / self.magnification
+        return Layout(2 * _FAR, _FAR / 2, cone * _FAR, _FAR, _FAR + self.offset, 0.0, self.lenslets)
+
+
+_FAR = 1e3
+"""From the native image to a pupil whose rays count as parallel to the axis [m]."""

@@ -12,7 +12,7 @@ from lumigraph.core.drawing import draw
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress
-from lumigraph.design.layout import Layout
+from lumigraph.design.layout import Layout, MicroscopeLayout
 from lumigraph.errors import FormatError
 from lumigraph.instruments import files
 from lumigraph.instruments.description import Description
@@ -80,9 +80,9 @@ class Instrument(Part):
         """Piece of a micro-image that tiles the picture of the focused plane [px]; None if views do."""
         return None
 
-    def layout(self) -> Layout | None:
-        """What a ray diagram shows; None where there is none."""
-        return None
+    def layout(self) -> Layout | MicroscopeLayout:
+        """What a ray diagram shows."""
+        raise NotImplementedError
 
     def parameters(self) -> tuple[Parameter, ...]:
         """What can be changed of it by sliders, at its values."""

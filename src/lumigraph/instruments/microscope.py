@@ -16,6 +16,7 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress
 from lumigraph.design import microscope as closed_forms
+from lumigraph.design.layout import LensletLayout, MicroscopeLayout
 from lumigraph.elements.objective import Mismatch, Model, Objective
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import describe_microscope, microscope_design, trade_offs
@@ -130,6 +131,13 @@ class LightFieldMicroscope(Instrument):
     def lenslet_distance(self) -> float:
         """Lenslets to the plane that the sensor sees, b [m]."""
         return self.sensor_distance or self.lenslets.focal_length[0]
+
+    def layout(self) -> MicroscopeLayout:
+        """What a ray diagram shows."""
+        row = LensletLayout(self.lenslet_distance, self.lenslets.pitch, 0.0, self.lenslets.focal_length)
+        aperture, tube = self.objective.numerical_aperture, self.objective.tube_focal_length
+        offset = self.lenslet_offset or 0.0
+        return MicroscopeLayout(self.magnification, aperture, row, offset, tube, self.fourier_lens)
 
     @property
     def lenslet_size(self) -> float:

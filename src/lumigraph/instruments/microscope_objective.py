@@ -54,6 +54,11 @@ class MicroscopeObjective(Part):
         return self
 
     @property
+    def tube_focal_length(self) -> float | None:
+        """Of the tube lens, the maker's where none is given [m]; None where neither is."""
+        return self.tube_lens or (None if self.maker is None else closed_forms.tube_lens(self.maker))
+
+    @property
     def actual_magnification(self) -> float:
         """From the object to the native image: the engraved one, times the tube lens over the maker's."""
         if self.maker is None or self.tube_lens is None:

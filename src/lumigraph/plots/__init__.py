@@ -3,7 +3,7 @@
 - `pictures`: `show` an image, or any noun that holds one; nouns' `plot` comes here
 - `trains`: `planes` of a train of elements
 - `lattices`: `lattice`, a calibration over its white image
-- `layout`: rays through a camera
+- `layout`: rays through a camera; `microscope_layout`: through an objective
 - `curves`: `curves` over one axis, several `images` side by side
 - `volumes`: `projections` and `slices` of a volume
 - `axes`: axes with lengths in readable units, colour bars

@@ -9,11 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Rectangle
 
-from lumigraph.design.layout import Layout, LensletLayout
+from lumigraph.design.layout import Layout, LensletLayout, MicroscopeLayout
 from lumigraph.errors import GeometryError
+from lumigraph.plots import microscope_layout
 
 MM = 1e3
 AXIS_COLOUR, GLASS, DARK = "#8a8a8a", "#9ec9e2", "#333333"
+KINDS = (GLASS, "#b9d8a5", "#e2b6c9")
 BUNDLES = ("#c1272d", "#0071bc")
 FAN = ("#7a4fa3", "#c1272d", "#e08a00", "#2e8b57", "#0071bc")
 
@@ -21,8 +23,8 @@ FAN = ("#7a4fa3", "#c1272d", "#e08a00", "#2e8b57", "#0071bc")
 class Camera(Protocol):
     """What `layout` asks of an instrument."""
 
-    def layout(self) -> Layout | None:
-        """Its distances and sizes; None where there are no rays to draw."""
+    def layout(self) -> Layout | MicroscopeLayout:
+        """Its distances and sizes."""
         ...
 
 
@@ -30,27 +32,26 @@ def layout(camera: Camera) -> Figure:
     """Ray diagram of a camera: object, main lens with its stop, lenslets and sensor, distances labelled.
 
     The upper panel shows the whole camera, the lower one the lenslets and the sensor. Distances along the
-    axis are to scale within a panel, heights are enlarged.
+    axis are to scale within a panel, heights are enlarged; the upper panel of a microscope is not to scale.
+    Lenslets of several focal lengths have a colour for each, the stronger ones are thicker.
 
     Parameters
     ----------
     camera
-        Any camera of `lumigraph.instruments`.
+        Any camera or microscope of `lumigraph.instruments`.
 
     Raises
     ------
     GeometryError
-        The object is inside the focal length, so that there are no rays to draw, or a microscope.
+        The object is inside the focal length, so that there are no rays to draw.
 
     Examples
     --------
     ``lumigraph.plots.layout(camera).savefig("layout.png")``
     """
     drawn = camera.layout()
-    if drawn is None:
-        raise GeometryError(
-            f"there is no ray diagram of a {type(camera).__name__}. Its describe() lists its distances."
-        )
+    if isinstance(drawn, MicroscopeLayout):
+        return _microscope(drawn)
     if drawn.object_distance <= drawn.focal_length:
         raise GeometryError(
             f"the object at {drawn.object_distance * MM:.6g} mm is inside the focal length of "
@@ -64,6 +65,19 @@ def layout(camera: Camera) -> Figure:
     upper, lower = figure.subplots(2, 1, height_ratios=(1.0, 1.15))
     _whole(upper, drawn)
     _enlarged(lower, drawn, drawn.lenslets)
+    return figure
+
+
+def _microscope(drawn: MicroscopeLayout) -> Figure:
+    """Objective to sensor, and the lenslets of one that stands near the native image."""
+    if drawn.fourier_lens is not None:
+        figure = Figure(figsize=(9.0, 3.8), layout="constrained")
+        microscope_layout.whole(figure.subplots(), drawn)
+        return figure
+    figure = Figure(figsize=(9.0, 7.4), layout="constrained")
+    upper, lower = figure.subplots(2, 1, height_ratios=(1.0, 1.15))
+    microscope_layout.whole(upper, drawn)
+    _enlarged(lower, drawn.behind, drawn.lenslets, "native image")
     return figure
 
 
@@ -110,7 +124,7 @@ def _separation_name(drawn: Layout) -> str:
     return "F = z2" if math.isclose(drawn.separation, drawn.image_distance) else "L"
 
 
-def _enlarged(axes: Axes, drawn: Layout, lenslets: LensletLayout) -> None:
+def _enlarged(axes: Axes, drawn: Layout, lenslets: LensletLayout, image: str = "main-lens image") -> None:
     """Five lenslets, the main-lens image and the sensor: rays of one or three image points."""
     pitch, b, length = lenslets.pitch, lenslets.distance, drawn.separation
     relay = length - drawn.image_distance
@@ -120,22 +134,32 @@ def _enlarged(axes: Axes, drawn: Layout, lenslets: LensletLayout) -> None:
     _rays(axes, (drawn, lenslets), first, shown)
     for k in _numbers(shown):
         height, width = 0.97 * pitch * MM, 0.035 * (last - first) * MM
-        center = lenslets.center(k) * MM
-        axes.add_patch(Ellipse((0, center), width, height, color=GLASS, zorder=3, alpha=0.85))
+        center, kind = lenslets.center(k) * MM, k % len(lenslets.focal_lengths)
+        width *= _thickness(lenslets, kind)
+        axes.add_patch(Ellipse((0, center), width, height, color=KINDS[kind % 3], zorder=3, alpha=0.85))
     _plane(axes, b, top, DARK, lw=3.5)
     _micro_images(axes, (drawn, lenslets), shown, last - first)
     if abs(relay) > 1e-9 * length:
         axes.plot([-relay * MM] * 2, [-top * MM, top * MM], color=DARK, lw=1.2, ls=":")
-    name = "main-lens image" if relay >= 0 else "virtual main-lens image"
-    _names(axes, relay, b, top, name)
+    _names(axes, relay, b, top, image if relay >= 0 else f"virtual {image}")
     if abs(relay) > 1e-9 * length:
         level = -1.25 if relay > 0 else -1.55
         _dimension(axes, tuple(sorted((-relay, 0.0))), level * top, f"a = {_mm(relay)}")
     _dimension(axes, (0.0, b), -1.25 * top, f"b = {_mm(b)}")
-    told = "lenslet" if abs(relay) > 1e-9 * length else "place on the main lens"
-    caption = f"lenslets and sensor, enlarged; one colour for each {told}"
+    directions = "direction" if image == "native image" else "place on the main lens"
+    each = "lenslet" if abs(relay) > 1e-9 * length else directions
+    caption = f"lenslets and sensor, enlarged; one colour for each {each}"
+    if len(lenslets.focal_lengths) > 1:
+        caption += "; lenslets of f = " + ", ".join(_mm(f) for f in lenslets.focal_lengths) + " in turn"
     axes.text(0.01, 0.0, caption, transform=axes.transAxes, fontsize=9, color=DARK, va="bottom")
     _frame(axes, (first, last), (-2.0 * top, 1.5 * top))
+
+
+def _thickness(lenslets: LensletLayout, kind: int) -> float:
+    """Thickness of a kind over the mean; its difference of power is drawn six times as large."""
+    powers = [1 / abs(f) for f in lenslets.focal_lengths]
+    middle = sum(powers) / len(powers)
+    return min(max(1 + 6 * (powers[kind] / middle - 1), 0.5), 1.7)
 
 
 def _lenslets_shown(drawn: Layout, pitch: float) -> int:
@@ -216,7 +240,7 @@ def _names(axes: Axes, relay: float, b: float, top: float, image: str) -> None:
         _name(axes, 0, 1.12 * top, "lenslets", "center")
         _name(axes, b, 1.12 * top, "sensor, micro-images", "center")
     elif relay == 0:
-        _name(axes, 0, 1.12 * top, "lenslets at the main-lens image", "center")
+        _name(axes, 0, 1.12 * top, f"lenslets at the {image}", "center")
         _name(axes, b, 1.12 * top, "sensor, micro-images", "center")
     else:
         _name(axes, 0, 1.12 * top, "lenslets", "right")
