@@ -133,14 +133,14 @@ export class ViewsWindow {
   }
 
   /** The picture focused on alpha with the weights of all views; drawn afresh only where they differ. */
-  picture(alpha, weights) {
+  picture(alpha, weights, alone) {
     const [v0, v1, u0, u1] = this.rect, nu = this.kind.shape[1], own = new Float32Array((v1 - v0 + 1) * (u1 - u0 + 1));
     for (let v = v0, k = 0; v <= v1; v++) for (let u = u0; u <= u1; u++, k++) own[k] = weights[v * nu + u];
-    const key = `${alpha}/${own.join()}`;
+    const key = `${alpha}/${alone}/${own.join()}`;
     if (key !== this.key) {
       this.key = key;
       const start = performance.now();
-      this.drawn = this.refocuser.picture(alpha, own, 1);
+      this.drawn = this.refocuser.picture(alpha, own, 1, alone);
       this.device.finish();
       this.took = performance.now() - start;
     }

@@ -1,6 +1,6 @@
 // One exhibit: its arrays as they come, and the image that the settings ask for.
 
-import { middleView, viewWeights } from "./aperture.js";
+import { isAlone, middleView, viewWeights } from "./aperture.js";
 import { Finer, PlaneWindow, used, ViewsWindow } from "./finer.js";
 import { sharpestAlpha, subject } from "./focusing.js";
 import { Refocuser } from "./refocus.js";
@@ -116,7 +116,7 @@ export class Model {
     if (settled && plan) finer.want({ ...plan, rect }, (found) => new ViewsWindow(device, views, { ...found, rect }, finer.coarsest));
     const { window } = finer;
     if (!plan || !window || !pictures.every((index) => window.kept.has(index)) || (!settled && (this.slow || window.took > SLOW))) return null;
-    return { ...finer.place(window, margin), image: window.picture(state.focus, weights) };
+    return { ...finer.place(window, margin), image: window.picture(state.focus, weights, isAlone(views, state)) };
   }
 
   finePlane(state, device, seen, settled) {
@@ -142,7 +142,7 @@ export class Model {
     if (this.complete && this.refocuser && !forced && (settled || !this.slow || !whole || !this.arrays.stack)) {
       if (this.slow) this.need("stack");
       const weights = viewWeights(views, state), detail = state.detail ?? views.detail;
-      return this.seen({ ...this.refocuser.picture(state.focus, weights, detail), detail, exact: true });
+      return this.seen({ ...this.refocuser.picture(state.focus, weights, detail, isAlone(views, state)), detail, exact: true });
     }
     if (this.complete && (!this.refocuser || forced || this.slow) && whole) {
       const plane = this.plane(state.focus);

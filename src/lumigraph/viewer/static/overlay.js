@@ -10,8 +10,8 @@ export function clearOverlay(canvas, ratio) {
   return context;
 }
 
-/** Outlines of lenslets, coloured by kind, with their centres where they are large enough. */
-export function drawLattice(context, lattice, { toScreen, scale, width, height, bounds }) {
+/** Outlines of lenslets on the picture, coloured by kind, with their centres where they are large enough. */
+export function drawLattice(context, lattice, { toScreen, scale, width, height, bounds, picture: [ny, nx] }) {
   const [[y0, x0], [y1, x1]] = lattice.basis, [oy, ox] = lattice.origin, area = y1 * x0 - y0 * x1;
   const radius = (lattice.pitch * scale) / 2;
   if (radius < 2.5) return false;
@@ -26,7 +26,11 @@ export function drawLattice(context, lattice, { toScreen, scale, width, height, 
   else for (let i = i0; i <= i1; i++) for (let j = j0; j <= j1; j++) {
     add(toScreen(oy + i * y1 + j * y0, ox + i * x1 + j * x0), (((j - i) % lattice.kinds) + lattice.kinds) % lattice.kinds);
   }
+  const [left, top] = toScreen(-0.5, -0.5), [right, bottom] = toScreen(ny - 0.5, nx - 0.5);
+  context.save();
+  context.beginPath(); context.rect(left, top, right - left, bottom - top); context.clip();
   paths.forEach((path, kind) => { context.strokeStyle = KINDS[kind]; context.stroke(path); });
+  context.restore();
   return true;
 
   function add([x, y], kind) {

@@ -118,7 +118,7 @@ export class Pane {
     const context = clearOverlay(this.overlay, this.ratio), size = { width: this.overlay.width / this.ratio, height: this.overlay.height / this.ratio };
     if (state.mode === "raw" && lattice && state.lattice) {
       const [top, left] = this.toPicture(0, 0), [bottom, right] = this.toPicture(size.width, size.height);
-      drawLattice(context, lattice, { ...size, scale: this.scale[0] / this.ratio, toScreen: (y, x) => this.toScreen(y, x), bounds: { top, left, bottom, right } });
+      drawLattice(context, lattice, { ...size, scale: this.scale[0] / this.ratio, toScreen: (y, x) => this.toScreen(y, x), bounds: { top, left, bottom, right }, picture: image.base });
     }
     const place = this.hover ?? state.point ?? image.base.map((n) => (n - 1) / 2);
     if (this.root.classList.contains("epi") && this.model.complete) {

@@ -42,14 +42,13 @@ export class Refocuser {
     for (const texture of [this.array.texture, this.mask.texture, this.rows, this.target]) if (texture) this.device.gl.deleteTexture(texture);
   }
 
-  /** The picture focused on alpha: {nx, ny, channels, texture}. */
-  picture(alpha, weights, detail) {
+  /** The picture focused on alpha: {nx, ny, channels, texture}; `alone`: of one view, which has no black edge. */
+  picture(alpha, weights, detail, alone = false) {
     const { device, views } = this, [nv, nu, nt, ns] = views.shape;
     const nx = (ns - 1) * detail + 1, ny = (nt - 1) * detail + 1;
     this.prepare(nx, ny);
     const used = new Float32Array(nv);
     for (let v = 0; v < nv; v++) used[v] = weights.subarray(v * nu, (v + 1) * nu).some((w) => w > 0) ? 1 : 0;
-    const alone = weights.reduce((count, w) => count + (w > 0), 0) === 1 ? 1 : 0;
     const all = this.weights(weights, nu, nv), rows = this.weights(used, nv, 1);
     const across = viewShifts(views, alpha, 1), along = viewShifts(views, alpha, 0);
     const shear = device.program("shear-row", SHEAR_ROW);
@@ -58,7 +57,7 @@ export class Refocuser {
       device.bind(1, gl.TEXTURE_2D, all, at.weights);
       device.bind(2, gl.TEXTURE_2D_ARRAY, this.mask.texture, at.valid);
       gl.uniform1i(at.masked, views.masked ? 1 : 0);
-      gl.uniform1i(at.alone, alone);
+      gl.uniform1i(at.alone, alone ? 1 : 0);
       gl.uniform1i(at.row, v);
       gl.uniform1i(at.count, nu);
       gl.uniform2i(at.size, ns, nt);
@@ -71,7 +70,7 @@ export class Refocuser {
       device.bind(0, gl.TEXTURE_2D_ARRAY, this.rows, at.rows);
       device.bind(1, gl.TEXTURE_2D, rows, at.weights);
       gl.uniform1i(at.count, nv);
-      gl.uniform1i(at.alone, alone);
+      gl.uniform1i(at.alone, alone ? 1 : 0);
       gl.uniform1i(at.height, nt);
       gl.uniform1f(at.first, along.first);
       gl.uniform1f(at.step_, along.step);
