@@ -252,6 +252,22 @@ def test_stacks_focus_where_they_are_clicked(open_page, views):
         assert page.state("focus") == pytest.approx(FAR, abs=0.03)
 
 
+def test_a_quilt_has_the_views_from_left_to_right_from_the_bottom_up(open_page, views):
+    from PIL import Image
+
+    with served(of_views("two planes.zarr", views)) as address:
+        page = open_page(address)
+        page.set(focus=1.0, detail=1)
+        with page.page.expect_download() as download:
+            page.page.click("#quilt")
+        assert download.value.suggested_filename == "two planes_qs8x6a1.6.png"
+        found = np.array(Image.open(io.BytesIO(download.value.path().read_bytes())))[..., :3].astype(float)
+        assert found.shape == (6 * 40, 8 * 64, 3)
+        assert np.abs(found[-40:, :64] - shown(lg.view(views, 2, 0))).max() <= LEVELS
+        assert np.abs(found[:40, -64:] - shown(lg.view(views, 2, 4))).max() <= LEVELS
+        assert page.state("aperture") == 1
+
+
 def test_a_phone_has_no_sideways_scrolling(open_page, views):
     with served(of_views("two planes", views)) as address:
         page = open_page(address, viewport={"width": 390, "height": 844}, has_touch=True)

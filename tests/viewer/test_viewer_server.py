@@ -18,8 +18,8 @@ from urllib.parse import unquote
 import pytest
 
 from lumigraph.errors import LumigraphError
-from lumigraph.viewer import Resource, Site, safety, serve
-from lumigraph.viewer.server import application
+from lumigraph.viewer import Address, Resource, Site, address_of, safety, serve
+from lumigraph.viewer.server import LOOPBACK, _listener, application
 
 HOST = b"127.0.0.1:8000"
 SITE = Site(
@@ -277,6 +277,25 @@ def test_tokens_differ(monkeypatch):
     for _ in range(2):
         serve(SITE, ready=found.append)
     assert found[0].rsplit("/", 2)[1] != found[1].rsplit("/", 2)[1]
+
+
+def test_a_file_keeps_its_address_and_the_secret_is_the_user_s_alone(tmp_path, monkeypatch):
+    one, two = (address_of([Path(name)], tmp_path) for name in ("a.zarr", "b.zarr"))
+    assert address_of([Path("a.zarr")], tmp_path) == one
+    assert one.token != two.token
+    assert len(one.token) >= 32
+    assert 49152 <= one.port < 65536
+    key = tmp_path / "viewer.key"
+    assert key.stat().st_mode & 0o777 == 0o600
+    key.chmod(0o644)
+    assert address_of([Path("a.zarr")], tmp_path) is None  # others may have read it
+    found = []
+    monkeypatch.setattr("uvicorn.Server.run", lambda self, sockets: None)
+    with _listener(LOOPBACK, 0) as taken:
+        busy = taken.getsockname()[1]
+        serve(SITE, ready=found.append, address=Address("t" * 32, busy))
+    assert found[0].endswith("/" + "t" * 32 + "/")
+    assert f":{busy}/" not in found[0]
 
 
 def test_what_is_computed_is_computed_once_and_kept():

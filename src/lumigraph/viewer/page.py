@@ -16,7 +16,7 @@ from lumigraph.viewer.server import Content, Resource, Site
 MODULES = (
     "colours.js", "tone.js", "source.js", "state.js", "aperture.js", "focusing.js", "shaders.js", "device.js",
     "canvas.js", "refocus.js", "overlay.js", "epi.js", "finer.js", "models.js", "pane.js",
-    "histogram.js", "controls.js", "play.js", "keys.js", "main.js",
+    "quilt.js", "histogram.js", "controls.js", "play.js", "keys.js", "main.js",
 )  # fmt: skip
 """In the order of their imports: a module comes after those it uses."""
 

@@ -4,6 +4,7 @@ import { freedom, keptViews, middleView, viewShifts } from "./aperture.js";
 import { MAPS } from "./colours.js";
 import { Histogram } from "./histogram.js";
 import { depthMap } from "./models.js";
+import { canQuilt } from "./quilt.js";
 import { lengthText } from "./overlay.js";
 import { cachedMap } from "./tone.js";
 
@@ -103,6 +104,7 @@ export class Controls {
     by("modes").hidden = [...by("modes").children].filter((button) => !button.hidden).length < 2;
     for (const group of document.querySelectorAll("[data-modes]")) group.hidden = !group.dataset.modes.includes(state.mode);
     by("sway").hidden = false;
+    by("quilt").hidden = state.mode !== "picture" || !canQuilt(model);
     for (const part of document.querySelectorAll('[data-part="views"]')) part.hidden ||= !model.views;
     for (const part of document.querySelectorAll('[data-part="lattice"]')) part.hidden = !about.raw?.lattice;
     this.focus(model, state);
@@ -159,9 +161,11 @@ export class Controls {
     const range = model.depthRange(), map = cachedMap(depthMap(state));
     const colours = Array.from({ length: 17 }, (_, k) => { const i = 4 * Math.round((k * 255) / 16); return `rgb(${map[i]} ${map[i + 1]} ${map[i + 2]})`; });
     by("legend-bar").style.background = `linear-gradient(to right, ${colours.join(", ")})`;
-    by("legend-low").textContent = range ? range[0].toFixed(3) : "";
-    by("legend-high").textContent = range ? range[1].toFixed(3) : "";
-    by("legend-label").textContent = `${model.about.depth.label} ${model.about.depth.unit}`.trim();
+    const metric = model.views?.metric && model.about.depth.label.startsWith("Focus"), place = (x) => lengthText(model.views.separation / x);
+    const shown = (x) => (metric ? place(x) : x.toFixed(3));
+    by("legend-low").textContent = range ? shown(range[0]) : "";
+    by("legend-high").textContent = range ? shown(range[1]) : "";
+    by("legend-label").textContent = metric ? "image behind the main lens" : `${model.about.depth.label} ${model.about.depth.unit}`.trim();
   }
 
   facts(exhibits) {

@@ -6,6 +6,7 @@ import { Model } from "./models.js";
 import { drawScaleBar } from "./overlay.js";
 import { Pane } from "./pane.js";
 import { Player } from "./play.js";
+import { canQuilt, quilt } from "./quilt.js";
 import { isExported, loadAbout } from "./source.js";
 import { defaults, linkOf, parseLink } from "./state.js";
 
@@ -157,9 +158,19 @@ export function pictureCanvas(app) {
 
 async function savePicture(app) {
   await app.settled();
-  const blob = await new Promise((done) => pictureCanvas(app).toBlob(done, "image/png")), link = document.createElement("a");
+  await saveCanvas(app, pictureCanvas(app), fileName(app));
+}
+
+async function saveQuilt(app) {
+  if (!canQuilt(app.main.model)) { app.tell("A quilt needs views beside each other, and WebGL 2."); return; }
+  const { sheet, ending } = quilt(app.main, app.state);
+  await saveCanvas(app, sheet, `${app.main.model.about.name.replace(/\.[^.]*$/, "")}${ending}.png`);
+}
+
+async function saveCanvas(app, canvas, name) {
+  const blob = await new Promise((done) => canvas.toBlob(done, "image/png")), link = document.createElement("a");
   link.href = URL.createObjectURL(blob);
-  link.download = fileName(app);
+  link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
   app.tell(`Saved ${link.download}`);
@@ -181,6 +192,7 @@ function wire(app) {
   };
   const zoom = (factor) => { const box = app.main.stage.getBoundingClientRect(); app.main.zoomAt([box.width / 2, box.height / 2], factor); };
   const on = (id, act) => document.getElementById(id).addEventListener("click", act);
+  on("quilt", () => saveQuilt(app));
   on("save", actions.s); on("fit", actions[0]); on("help", actions["?"]); on("full", actions.f); on("link", () => copyLink(app));
   on("reset", () => { app.state = { ...app.base, mode: app.state.mode, renderer: app.state.renderer }; app.touched(); });
   on("pixel", () => zoom(1 / ((app.main.scale[0] / app.main.image.detail / app.main.model.factor) / app.main.ratio)));
