@@ -37,24 +37,20 @@ def test_pictures_are_those_of_the_library(open_page, views):
             assert np.abs(page.pixels() - shown(lg.refocus(small, 0.95))).max() <= LEVELS
         page.set(aperture=0.001, shape="square", focus=1.0, view=[1, 3])
         assert np.abs(page.pixels() - shown(lg.view(views, 1, 3))).max() <= LEVELS
-        page.set(view=[1.25, 2.6])
-        shares = [(1, 2, 0.3), (1, 3, 0.45), (2, 2, 0.1), (2, 3, 0.15)]
-        blended = sum(share * lg.view(views, v, u).astype(float) for v, u, share in shares)
-        assert np.abs(page.pixels() - shown(blended)).max() <= LEVELS
+        page.set(view=[1.25, 2.6])  # between views: the nearest, since a mean would show every edge twice
+        assert np.abs(page.pixels() - shown(lg.view(views, 1, 3))).max() <= LEVELS
 
 
-def test_between_views_what_is_in_focus_has_every_edge_once(open_page, views):
+def test_between_views_what_is_in_focus_stays_and_has_every_edge_once(open_page, views):
     with served(of_views("two planes", views)) as address:
         page = open_page(address)
-        near = (slice(4, -4), slice(4, 26))
-        found = {}
-        for focus in (NEAR, 1.0):
-            for view in ([1, 3], [1.5, 2.5]):
-                page.set(aperture=0.001, view=view, focus=focus, detail=1)
-                found[focus, view[0]] = page.pixels()[near]
-        apart = {focus: np.abs(found[focus, 1] - found[focus, 1.5]).max() for focus in (NEAR, 1.0)}
-        assert apart[NEAR] < 4  # what cubic interpolation by half a pixel leaves
-        assert apart[1.0] > 20
+        near, found = (slice(4, -4), slice(4, 26)), []
+        for view in ([1, 3], [1.45, 2.55], [1.55, 2.45], [2, 2]):
+            page.set(aperture=0.001, view=view, focus=NEAR, detail=1)
+            found.append(page.pixels()[near])
+        assert (
+            np.abs(np.diff(found, axis=0)).max() < 8
+        )  # cubic interpolation leaves 4; a mean at 1.0 more than 20
 
 
 def test_a_view_refocused_has_no_black_bar(open_page, views):

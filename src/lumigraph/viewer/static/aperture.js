@@ -28,11 +28,12 @@ export function middleView(views, fraction, view) {
 
 /**
  * Weights (v, u): those of the kept views, shared linearly between neighbours where the middle is between.
+ * One view alone is the nearest as it was recorded: a mean of two would show every edge twice that is not in focus.
  */
 export function viewWeights(views, { aperture, shape, view }) {
   const [nv, nu] = views.shape, kept = keptViews(views, aperture), middle = middleView(views, aperture, view);
   const weights = new Float32Array(nv * nu);
-  const start = middle.map((m, axis) => m - Math.floor(kept[axis] / 2));
+  const alone = kept.every((n) => n === 1), start = middle.map((m, axis) => (alone ? Math.round(m) : m - Math.floor(kept[axis] / 2)));
   const whole = start.map(Math.floor), rest = start.map((s, axis) => s - whole[axis]);
   for (let j = 0; j < kept[0]; j++) for (let i = 0; i < kept[1]; i++) {
     const y = (j - (kept[0] - 1) / 2) / (kept[0] / 2), x = (i - (kept[1] - 1) / 2) / (kept[1] / 2);
@@ -47,10 +48,7 @@ export function viewWeights(views, { aperture, shape, view }) {
   return weights;
 }
 
-/**
- * Whether one view is kept: then nothing else shows what lies beyond its edge. Between recorded views its neighbours are moved
- * along the disparity in focus and blended: what is in focus has every edge once.
- */
+/** Whether one view is kept: then nothing else shows what lies beyond its edge. */
 export function isAlone(views, { aperture }) {
   return keptViews(views, aperture).every((n) => n === 1);
 }

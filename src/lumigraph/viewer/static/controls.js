@@ -165,7 +165,7 @@ export class Controls {
     const shown = (x) => (metric ? place(x) : x.toFixed(3));
     by("legend-low").textContent = range ? shown(range[0]) : "";
     by("legend-high").textContent = range ? shown(range[1]) : "";
-    by("legend-label").textContent = metric ? "image behind the main lens" : `${model.about.depth.label} ${model.about.depth.unit}`.trim();
+    by("legend-label").textContent = metric ? "image distance" : `${model.about.depth.label} ${model.about.depth.unit}`.trim();
   }
 
   facts(exhibits) {
