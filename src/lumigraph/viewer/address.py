@@ -1,7 +1,6 @@
 """The same address for the same file, so that links copied from a page open it again the next time."""
 
 import base64
-import hashlib
 import hmac
 import os
 import secrets
@@ -46,7 +45,7 @@ def address_of(paths: Sequence[Path], folder: Path | None = None) -> Address | N
     if secret is None:
         return None
     names = b"\0".join(os.fsencode(path.absolute()) for path in paths)
-    digest = hmac.digest(secret, names, hashlib.sha256)
+    digest = hmac.digest(secret, names, "sha256")
     token = base64.urlsafe_b64encode(digest[:24]).decode()
     return Address(token, _FIRST_PORT + int.from_bytes(digest[24:28], "big") % _PORTS)
 
