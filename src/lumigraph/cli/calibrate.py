@@ -88,8 +88,8 @@ def calibrate(
     Parameters
     ----------
     white
-        Picture of an evenly lit surface, several of them to average, or a raw image where there is none
-        (TIFF, PNG, Zarr).
+        Picture of an evenly lit surface, several of them, or a stack, to average, or a raw image where there
+        is none (TIFF, PNG, Zarr).
     output
         Calibration file (.toml).
     layout
@@ -107,7 +107,7 @@ def calibrate(
     """
     from lumigraph import calibration as verbs
     from lumigraph import io
-    from lumigraph.preparation import read_raw
+    from lumigraph.preparation import read_pages
 
     common.check()
     files.check_output(output, (".toml",))
@@ -123,7 +123,7 @@ def calibrate(
     if exact and pitch is None:
         raise CalibrationError("--exact takes the pitch as it is given: add --pitch, such as --pitch 19.")
     known = bench.lengths()
-    pictures = [read_raw(path) for path in white]
+    pictures = [page for path in white for page in read_pages(path, "all").values()]
     picture = pictures[0]
     turn = None if rotation is None else math.radians(rotation)
     with progress("calibrate"):

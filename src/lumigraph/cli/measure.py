@@ -104,15 +104,15 @@ def measure(
     what
         edge, point, noise or sensor.
     pictures
-        Picture files: one edge, one point, one or two even pictures, or pairs of flats.
+        Picture files, or stacks: one edge, one point, one or two even pictures, or pairs of flats.
     """
     common.check()
-    _check_count(what, pictures)
     if what != "sensor" and dark != Dark():
         raise FormatError(f"--dark, --exposure-time and --highest are for 'sensor', not for {what!r}.")
-    from lumigraph.preparation import read_raw
+    from lumigraph.preparation import read_pages
 
-    opened = [read_raw(path, "picture") for path in pictures]
+    opened = [page for path in pictures for page in read_pages(path, "all").values()]
+    _check_count(what, len(opened))
     areas = [looked.cut(picture) for picture in opened]
     pitch = looked.pixels(opened[0])
     if what == "edge":
@@ -130,8 +130,7 @@ _COUNTS = {
 }
 
 
-def _check_count(what: str, pictures: list[Path]) -> None:
-    n = len(pictures)
+def _check_count(what: str, n: int) -> None:
     fits = {"edge": n == 1, "point": n == 1, "noise": n in (1, 2), "sensor": n > 0 and n % 2 == 0}
     if not fits[what]:
         raise FormatError(f"measure {what} takes {_COUNTS[what]}, not {n} pictures.")

@@ -53,7 +53,7 @@ class Origin:
         """The raw image in a file, or on the page of a stack."""
         from lumigraph.preparation import read_pages
 
-        (found,) = read_pages(path, None if self.page is None else str(self.page)).values()
+        (found,) = read_pages(path, None if self.page is None else str(self.page), one=True).values()
         return found
 
     def views(self, path: Path) -> "LightField | RawImage":

@@ -159,7 +159,9 @@ def _exported(exhibits: list[Any], page: Page, path: Path) -> Result:
 def _opened(path: Path, origin: Shown) -> Any:
     from lumigraph import viewer
 
-    wanted = viewer.Origin(origin.calibration, origin.white, origin.dark, origin.described(), origin.patch)
+    wanted = viewer.Origin(
+        origin.calibration, origin.white, origin.dark, origin.described(), origin.patch, origin.page
+    )
     with progress(f"open {path.name}") as shown:
         return viewer.open_exhibit(path, wanted, shown)
 

@@ -62,7 +62,7 @@ def read_raw(path: Path, what: str = "raw image") -> RawImage:
     return raw
 
 
-def read_pages(path: Path, pages: str | None = None) -> dict[int, RawImage]:
+def read_pages(path: Path, pages: str | None = None, *, one: bool = False) -> dict[int, RawImage]:
     """Raw images of a file by their pages, counted from 0.
 
     Parameters
@@ -71,6 +71,8 @@ def read_pages(path: Path, pages: str | None = None) -> dict[int, RawImage]:
         A raw image, or a stack of them.
     pages
         Of a stack: one, such as "3", some as "first:last", or "all".
+    one
+        Whether a single page is needed, as an error then says.
 
     Raises
     ------
@@ -85,24 +87,24 @@ def read_pages(path: Path, pages: str | None = None) -> dict[int, RawImage]:
             raise FormatError(f"--page is {pages} but {path} has one page. Leave it out.")
         return {0: read_raw(path)}
     if pages is None:
-        raise FormatError(f"{path} has {len(found)} pages. Give --page 0 to {len(found) - 1}, or all.")
+        several = "" if one else ", or all"
+        raise FormatError(f"{path} has {len(found)} pages. Give --page 0 to {len(found) - 1}{several}.")
     chosen = {}
-    for k in _range(pages, len(found), path):
+    for k in _range(pages, len(found), path, one=one):
         checks.finite_array(f"page {k} of {path}", found[k], FormatError)
         chosen[k] = RawImage(found[k], found.pixel_pitch, found.bit_depth, metadata=found.metadata)
     return chosen
 
 
-def _range(pages: str, count: int, path: Path) -> range:
+def _range(pages: str, count: int, path: Path, *, one: bool) -> range:
     first, _, last = ("0", ":", str(count - 1)) if pages == "all" else pages.partition(":")
     try:
         found = range(int(first), int(last or first) + 1)
     except ValueError:
         found = range(0)
     if not found or found[0] < 0 or found[-1] >= count:
-        raise FormatError(
-            f"--page is {pages!r} but {path} has pages 0 to {count - 1}. Give one, 'first:last' or 'all'."
-        )
+        forms = "one of them" if one else "one, 'first:last' or 'all'"
+        raise FormatError(f"--page is {pages!r} but {path} has pages 0 to {count - 1}. Give {forms}.")
     return found
 
 

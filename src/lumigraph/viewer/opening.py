@@ -20,7 +20,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError, SamplingWarning
-from lumigraph.preparation import Described, Given, prepare
+from lumigraph.preparation import Described, Given, prepare, read_pages
 from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_map
 
 _CAMERA_FILE = 1 << 20  # bytes; camera files have some hundred
@@ -47,10 +47,13 @@ class Origin(Given):
         Its description.
     patch
         Of a camera 2.0 [px]: pictures with patches about this size.
+    page
+        Of a stack of raw images, counted from 0.
     """
 
     camera: Described | None = None
     patch: float | None = None
+    page: int | None = None
 
     @property
     def is_known(self) -> bool:
@@ -82,6 +85,10 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
         return _simulated(path, tell)
     tell(Stage(0.0, "reading"))
     found = io.open(path)
+    if origin is not None and (
+        origin.page is not None or (isinstance(found, Stack | Volume) and origin.is_known)
+    ):
+        (found,) = read_pages(path, None if origin.page is None else str(origin.page), one=True).values()
     if isinstance(found, RawImage):
         return _raw(path.name, found, origin or Origin(), tell)
     if origin not in (None, Origin()):
