@@ -33,6 +33,7 @@ from lumigraph.operators.microscope_bench import DEGREE, samples_needed
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_operator import Layout, microscope_operator, require_accuracy
 from lumigraph.operators.microscope_pixels import narrowed, placement
+from lumigraph.operators.points import OUTSIDE
 from lumigraph.sensor import Sensor
 from lumigraph.simulation.microscope_scene import SAMPLES, point_image
 
@@ -380,8 +381,14 @@ class LightFieldMicroscope(Instrument):
         if self.configuration == "fourier":
             operator = fourier_operator(self.objectives, self._mosaic(), (dz,))
             return operator.point_image(y, x), operator.error
-        layout = self._layout(SAMPLES, None, (dz,), accuracy)
-        return point_image(self.objectives, self.lenslet, layout, (y, x, dz), accuracy)
+        finer = accuracy
+        if any(
+            abs(at) > n * self.lenslet_size / 2 for at, n in zip((y, x), self.lenslets.count, strict=True)
+        ):
+            finer = max(accuracy * OUTSIDE, 1e-5)
+        layout = self._layout(SAMPLES, None, (dz,), finer)
+        image, error = point_image(self.objectives, self.lenslet, layout, (y, x, dz), finer)
+        return image, error * accuracy / finer
 
     def _layout(
         self, samples: int, pixels: int | Calibration | None, depths: Sequence[float], accuracy: float
