@@ -193,13 +193,41 @@ def points(camera: Any, dz: float, at: Sequence[Point], fineness: Fineness = FIN
     return [relay.pixels(np.abs(f) ** 2) for f in relay.fields([lens.light(point) for point in at])]
 
 
+class Sensor:
+    """Pixels of a camera without lenslets, and what a point's light is on their nodes."""
+
+    def __init__(self, camera: Any, dz: float, fineness: Fineness = FINE) -> None:
+        self.grid, (nodes, self.shares) = camera.sensor.grid, np.polynomial.legendre.leggauss(fineness.pixel)
+        self.lens = Lens(camera, dz, fineness, 2 * max(self.grid.size))
+        self.y, self.x = (
+            (-c[:, None] + nodes * p / 2).ravel()
+            for c, p in zip((self.grid.y, self.grid.x), self.grid.pitch, strict=True)
+        )
+
+    def field(self, point: Point) -> np.ndarray:
+        """Amplitude at all nodes, for 1 of light."""
+        return self.lens.light(point)(self.y, self.x)
+
+    def pixels(self, intensity: np.ndarray) -> np.ndarray:
+        """Means over pixels (ny, nx)."""
+        (ny, nx), q, shares = self.grid.shape, len(self.shares), self.shares / 2
+        return np.einsum("yixj,i,j->yx", intensity.reshape(ny, q, nx, q), shares, shares)
+
+
 def focused(camera: Any, dz: float, at: Sequence[Point], fineness: Fineness = FINE) -> list[np.ndarray]:
     """Raw image (ny, nx) of each point before a camera without lenslets, for 1 of light on the sensor."""
-    grid, (nodes, shares) = camera.sensor.grid, np.polynomial.legendre.leggauss(fineness.pixel)
-    y, x = ((-c[:, None] + nodes * p / 2).ravel() for c, p in zip((grid.y, grid.x), grid.pitch, strict=True))
-    lens, (ny, nx), q = Lens(camera, dz, fineness, 2 * max(grid.size)), grid.shape, fineness.pixel
-    light = (np.abs(lens.light(point)(y, x)) ** 2 for point in at)
-    return [np.einsum("yixj,i,j->yx", one.reshape(ny, q, nx, q), shares / 2, shares / 2) for one in light]
+    sensor = Sensor(camera, dz, fineness)
+    return [sensor.pixels(np.abs(sensor.field(point)) ** 2) for point in at]
+
+
+def coherent_focused(
+    camera: Any, dz: float, samples: Iterator[tuple[Point, float]], area: float, fineness: Fineness = FINE
+) -> np.ndarray:
+    """As `coherent`, before a camera without lenslets."""
+    sensor, distance = Sensor(camera, dz, fineness), camera.object_distance + dz
+    total: Any = sum(amplitude * sensor.field(place) for place, amplitude in samples)
+    pupil = math.pi * camera.pupil_diameter**2 / 4
+    return sensor.pixels(np.abs(total) ** 2) * area**2 * pupil / (camera.wavelength * distance) ** 2
 
 
 def coherent(

@@ -15,7 +15,7 @@ FINENESS = references.Fineness(80, 4, 120, 16)
     [
         ("scalar", 0.0, 1e-2, (0.6e-6, -1.4e-6)),
         ("vector", 2e-6, 1e-3, (0.6e-6, -1.4e-6)),
-        ("scalar", 0.0, 1e-2, (7e-6, 1e-6)),  # beside the array, where 4e-3 of its light falls: 3e-2 if it is treated as the others
+        ("scalar", 0.0, 1e-2, (7e-6, 1e-6)),  # beside the array: 3e-2 if it is followed as the others
     ],
 )
 def test_a_points_image_is_as_exact_as_asked(model, dz, accuracy, place):

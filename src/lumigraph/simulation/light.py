@@ -12,9 +12,6 @@ from lumigraph.simulation import error
 from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.coherence import Coherence, Incoherent
 
-# Seen on a few cameras, 1e-2 to 3e-2; not estimated from the image.
-_PROPAGATED = error.Reached(0.03, "propagation on grids twice as fine as the rules ask")
-
 
 @dataclass(slots=True)
 class Light:
@@ -56,7 +53,7 @@ def read_out(camera: Camera, light: Light, coherence: Coherence | Incoherent) ->
     reached = list(light.reached)
     if light.intensity.any():
         seen = integrate(light.intensity, camera.image_grid, camera.sensor)
-        reached.append((error.norm(seen), error.SINGLE_LENS if camera.lattice is None else _PROPAGATED))
+        reached.append((error.norm(seen), error.of_grids(camera)))
         pixels = pixels + seen
     halves = {k: integrate(image, camera.image_grid, camera.sensor) for k, image in light.halves.items()}
     for half in halves.values():
@@ -66,8 +63,8 @@ def read_out(camera: Camera, light: Light, coherence: Coherence | Incoherent) ->
     known = {"simulated": repr(coherence), "shots": light.done, "wavelength": camera.wavelength}
     if len(halves) == 2 and not isinstance(coherence, Incoherent):
         known["estimated_error"] = _error(halves, light.drawn, pixels, coherence.convergence)
-        drawn = error.Reached(known["estimated_error"], f"two halves of {light.done} shots")
-        reached.append((error.norm(pixels), drawn))
+        drawn = error.Reached(known["estimated_error"], f"two halves of {light.done} shots on grids")
+        reached.append((error.norm(pixels), drawn.and_also(error.of_grids(camera).rms)))
     if (whole := error.together(reached)) is not None:
         known["error"] = {"rms": whole.rms, "source": whole.source}
     if isinstance(coherence, Incoherent):
