@@ -1,9 +1,9 @@
-"""Errors that raw images state, ``metadata["error"]``, beside their true ones: drawn cameras, scenes, methods.
+"""Errors that raw images state, ``metadata["error"]``, beside the true ones of drawn scenes.
 
     python -m benchmarks.estimates [--count 60] [--seed 0] [--rows FILE]
 
-Points, edges and fine gratings of a few samples, each a sum of `references`; tilted waves and snapshots beside
-exact incoherent images. An estimate is good within a factor 2 of the truth; one that is larger is safe.
+Points, edges and fine gratings of a few samples, sums of `references`; tilted waves and snapshots
+beside exact incoherent images. An estimate is good within a factor 2 of the truth; a larger one is safe.
 """
 
 import argparse

@@ -14,7 +14,7 @@ _MEASURED = {  # worst of some cameras, over the accuracy asked: not of the imag
     "points": (0.35, 0.03),
     "white image": (0.25, 0.5),
     "operator": (0.5, 0.4),
-    "coherent": (0.3, 0.3),
+    "coherent": (0.3, 0.025),
 }
 
 

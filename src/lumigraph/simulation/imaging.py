@@ -24,6 +24,9 @@ from lumigraph.simulation.microscope_scene import Microscope, microscope_image
 from lumigraph.simulation.shots import Shot, number_of_shots, shots
 from lumigraph.simulation.spectrum import Spectrum, by_wavelength
 
+COHERENT = 1e-4
+"""Accuracy to which coherent light is followed: little is gained by less."""
+
 
 class Interrupted(KeyboardInterrupt):
     """`simulate` was interrupted; `partial` is the raw image of the shots that were finished.
@@ -107,6 +110,7 @@ def _imaged(
     if isinstance(coherence, Incoherent):
         accuracy = coherence.accuracy
     elif coherent:
+        accuracy = COHERENT
         scene = Scene(part.trimmed() if isinstance(part, Slice) else part for part in scene.parts)
     elif slices := [part.trimmed() for part in scene.parts if isinstance(part, Slice)]:
         fields = shots(camera, slices, coherence)
