@@ -150,7 +150,7 @@ def _white(whole: Any, cell: Cell) -> dict[str, float]:
     count = (4, 3) if whole.lenslets.layout == "hex" else (3, 3)
     found = whole.replace(lenslets={"count": count}, sensor={"pixel_pitch": whole.lenslets.pitch / 5.3})
     image = _simulated(found, lg.targets.white(), cell)
-    return {"middle": relative(image, references.white(found, 24, references.Fineness(40, 6)))}
+    return {"middle": relative(image, references.white(found, 48, references.Fineness(40, 6)))}
 
 
 def _simulated(found: Any, scene: Any, cell: Cell, spectrum: Any = None) -> np.ndarray:
