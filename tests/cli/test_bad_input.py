@@ -151,7 +151,7 @@ FILES = {
         lambda p: io.save(np.random.default_rng(1).integers(0, 255, (99, 99), np.uint8), p),
         ["white image"],
     ),
-    "stack": ("w.tiff", stack, ["w.tiff holds a stack where a raw image"]),
+    "stack": ("w.tiff", stack, ["the white image has 8 x 8 pixels"]),
     "views": ("w.zarr", views, ["w.zarr holds a light field where a raw image is needed"]),
     "TOML": ("camera.toml", lambda p: None, ["camera.toml describes a 'plenoptic', not a calibration"]),
 }
