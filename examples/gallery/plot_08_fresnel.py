@@ -16,7 +16,7 @@ hole = lg.Field(lg.CircularAperture(1 * mm).transmission(grid, wavelength), grid
 pictures = []
 for zones in (6, 5, 2, 1, 0.5, 0.25):
     z = (0.5 * mm) ** 2 / (zones * wavelength)
-    image = lg.propagate(hole, z).intensity[200:440, 200:440]
+    image = lg.propagate(hole, z, "auto").intensity[200:440, 200:440]
     pictures.append((image, f"{zones:g} zones, {z:.3g} m"))
 figure = lg.plots.images(pictures, columns=3)
 
@@ -24,5 +24,5 @@ figure = lg.plots.images(pictures, columns=3)
 # Move through them:
 
 z = np.geomspace(0.05, 2.0, 24)
-planes = [lg.propagate(hole, each).intensity[200:440, 200:440].astype(np.float32) for each in z]
+planes = [lg.propagate(hole, each, "auto").intensity[200:440, 200:440].astype(np.float32) for each in z]
 lg.view_inline(lg.Stack(np.stack(planes), tuple(z), "dz [m]"))
