@@ -68,7 +68,8 @@ def test_the_focal_stack_of_fused_suits_views_far_apart(lumigraph, views, tmp_pa
     assert error("--alphas", "0.9:1.1:21") > 0.007  # planes a pixel per view apart
 
 
-def test_patches_of_a_raw_image(lumigraph, tmp_path):
+@pytest.mark.parametrize(("method", "shape"), [("correlation", (8, 9)), ("dense", (28, 32))])
+def test_patches_of_a_raw_image(lumigraph, tmp_path, method, shape):
     lattice = lg.Lattice.square(12.0, origin=(6, 6))
     y, x = np.meshgrid(*map(np.arange, (96, 108)), indexing="ij")
     dy, dx = lattice.offset(y, x)
@@ -77,10 +78,11 @@ def test_patches_of_a_raw_image(lumigraph, tmp_path):
     none = np.zeros((0, 2))
     lg.save(lg.RawImage(raw.astype(np.float32)), tmp_path / "raw.tiff")
     lg.save(lg.Calibration(lattice, raw.shape, none.astype(int), none, 0.0), tmp_path / "camera.toml")
-    words = ("depth", "raw.tiff", "--calibration", "camera.toml", "--method", "correlation", "-o", "map.tiff")
+    words = ("depth", "raw.tiff", "--calibration", "camera.toml", "--method", method, "-o", "map.tiff")
     found = lumigraph(*words, "--between", "2:6", "--smooth", 1, "--json")
     assert found.code == 0, found.err
     assert json.loads(found.out)["median"] == pytest.approx(4.0, abs=0.1)
+    assert tuple(json.loads(found.out)["shape"]) == shape
 
 
 def test_wrong_words_are_told_in_one_line(lumigraph, views):

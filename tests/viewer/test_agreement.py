@@ -69,3 +69,27 @@ def test_refocused_pictures_and_depths_agree_to_a_grey_level(bench, monkeypatch)
     np.testing.assert_allclose(
         np.asarray(shown.depth().values), np.asarray(lg.depth.alpha_of(found, views).values), atol=1e-6
     )
+
+
+def test_depths_of_a_camera_2_agree_in_metres(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    camera = lg.FocusedPlenopticCamera(
+        wavelength="633 nm", object_distance="120 mm", main_lens={"focal_length": "60 mm"},
+        lenslets={"pitch": "150 um", "focal_length": "3 mm", "count": (5, 5), "magnification": 0.3},
+        sensor={"pixel_pitch": "9 um"},
+    )  # fmt: skip
+    (tmp_path / "camera.toml").write_text(camera.to_toml())
+    y, x = np.meshgrid(*map(np.arange, camera.sensor.shape), indexing="ij")
+    (dy, dx), step = camera.calibration.offset(y, x), camera.calibration.lattice.pitch / camera.patch
+    raw = 2 + np.sin(0.4 * (y - dy - dy * step)) + np.cos(0.5 * (x - dx - dx * step))
+    lg.save(lg.RawImage(raw.astype(np.float32)), "raw.tiff")
+    assert main(["depth", "raw.tiff", "--camera", "camera.toml", "-o", "map.tiff"]) == 0
+    patches = lg.depth.dense(lg.open("raw.tiff"), camera.calibration)
+    found = lg.depth.metric(patches, camera.calibration, focal_length=0.06, object_distance=0.12)
+    shown = viewer.open_exhibit(
+        tmp_path / "raw.tiff", viewer.Origin(camera=lg.load_camera("camera.toml"), patch=camera.patch)
+    )
+    assert shown.measure == ("Depth", "m")
+    assert np.abs(np.median(found.values)) < 1e-3
+    for other in (lg.open("map.tiff").data, shown.depth().values):
+        np.testing.assert_allclose(np.asarray(other), found.values, atol=1e-6)

@@ -1,7 +1,7 @@
 """`lumigraph depth`."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -13,7 +13,7 @@ from lumigraph.cli.options import Output, above_zero, length
 from lumigraph.cli.origin import NO_ORIGIN, Origin
 from lumigraph.cli.refocus import range_of
 from lumigraph.cli.reporting import REPORTED, Reported, enlarged
-from lumigraph.core.progress import Progress, silent
+from lumigraph.core.progress import Progress, silent, within
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from lumigraph.core.calibration import Calibration
+    from lumigraph.core.grid import Grid
     from lumigraph.core.lightfield import LightField
     from lumigraph.core.raw import RawImage
     from lumigraph.depth import DepthMap
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 MAPS = (".pfm", ".tif", ".tiff", ".png", ".zarr", ".ply")
 _PLANES = "0.9:1.1:21"
 _MOST_PLANES = 101
+_OF_RAW = ("dense", "correlation")
 
 
 @Parameter(name="*")
@@ -39,11 +41,12 @@ class Search:
     Parameters
     ----------
     method
-        auto: epi for cameras 1.0 and views, correlation for cameras 2.0; epi: lines of epipolar-plane images;
-        focus: the sharpest picture of a focal stack; fused: both; correlation: neighbouring micro-images.
+        auto: epi for cameras 1.0 and views, dense for cameras 2.0; epi: lines of epipolar-plane images;
+        focus: the sharpest picture of a focal stack; fused: both; dense: each pixel of a camera 2.0's
+        picture, by all micro-images that show it; correlation: each of its lenslets, as render takes it.
     between
         Least and most that may occur, 'least:most': disparities [px per view] for epi, patches [px] for
-        correlation; found by itself if left out.
+        dense and correlation; found by itself if left out.
     alphas
         Refocus factors 'first:last:count' of the focal stack; if left out, 0.9:1.1:21 for focus, and those
         that epi has found for fused.
@@ -54,7 +57,7 @@ class Search:
         Smooth the map where it is not sure, along the picture's edges; 1 is usual.
     """
 
-    method: Literal["auto", "epi", "focus", "fused", "correlation"] = "auto"
+    method: Literal["auto", "epi", "focus", "fused", "dense", "correlation"] = "auto"
     between: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
     alphas: str | None = None
     correct: bool = False
@@ -76,8 +79,8 @@ class Search:
         """Disparities or refocus factors of the middle view."""
         from lumigraph import depth
 
-        if self.method == "correlation":
-            raise FormatError("--method correlation is for raw images of cameras 2.0. Use --method epi.")
+        if self.method in _OF_RAW:
+            raise FormatError(f"--method {self.method} is for raw images of cameras 2.0. Use --method epi.")
         found: list[DepthMap] = []
         if self.method != "focus":
             found.append(depth.epi(views, self.ends(), progress=shown))
@@ -105,12 +108,35 @@ class Search:
         planes = math.ceil((high - low + 2 * spare) * count) + 1
         return [float(alpha) for alpha in np.linspace(first, last, min(max(21, planes), _MOST_PLANES))]
 
-    def of_raw(self, raw: "RawImage", calibration: "Calibration", shown: Progress) -> "DepthMap":
-        """Patches of the lenslets."""
-        from lumigraph import depth
+    def of_raw(
+        self, raw: "RawImage", calibration: "Calibration", sharp: list[float] | None, shown: Progress
+    ) -> "_Measured":
+        """Patches of the lenslets, or of the samples of the picture."""
+        from lumigraph import depth, preparation, rendering
 
-        found = depth.correlation(raw, calibration, self.ends(), progress=shown)
-        return depth.fuse(found, smoothness=self.smooth) if self.smooth else found
+        share = 1.0 if self.method == "correlation" else 0.3
+        found = depth.correlation(raw, calibration, self.ends(), progress=within(shown, 0, share))
+        if self.method == "correlation":
+            found = depth.fuse(found, smoothness=self.smooth) if self.smooth else found
+            return _Measured(found, calibration)
+        if sharp is not None:
+            sharp = list(rendering.match_kinds(raw, calibration, found.values, sharp))
+        picture = preparation.render(raw, calibration, found.values, blend=True, focus=sharp)
+        grid = rendering.sight_grid(calibration, found.values)
+        found = depth.dense(raw, calibration, found, focus=sharp, progress=within(shown, share, 1))
+        found = depth.fuse(found, picture, smoothness=self.smooth) if self.smooth else found
+        return _Measured(found, calibration, picture, grid)
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """A map, what it was measured on, the picture of the same places and where they are, if known; notes."""
+
+    depth: "DepthMap"
+    grounds: "LightField | Calibration"
+    picture: Any = None
+    grid: "Grid | None" = None
+    notes: tuple[str, ...] = ()
 
 
 @Parameter(name="*")
@@ -191,37 +217,38 @@ def depth(
     if search.correct and not _is_correctable(camera):
         raise FormatError("--correct simulates a camera. Give --camera FILE of a plenoptic camera 1.0.")
     with progress("depth") as shown:
-        found, grounds, picture, notes = _measured(source, (origin, search), shown)
+        made = _measured(source, (origin, search), shown)
         if search.correct:
-            found = _corrected(found, grounds, (camera, search), shown)
-    found, distance = _in_metres(found, grounds, lengths, camera)
-    _save(found, output, (grounds, picture), (distance, lowest))
+            made = replace(made, depth=_corrected(made.depth, made.grounds, (camera, search), shown))
+    found, distance = _in_metres(made.depth, made.grounds, lengths, camera)
+    made = replace(made, depth=found)
+    _save(made, output, (distance, lowest))
     if confidence is not None:
         from lumigraph import io
 
         io.save(found.confidence, confidence)
-    return _result(found, picture, notes, tuple(path for path in (output, confidence) if path is not None))
+    return _result(
+        found, made.picture, made.notes, tuple(path for path in (output, confidence) if path is not None)
+    )
 
 
-def _measured(
-    source: Path, how: tuple[Origin, Search], shown: Progress
-) -> "tuple[DepthMap, Any, Any, tuple[str, ...]]":
-    """The map, what it was measured on, the picture of the same places or None, and notes."""
+def _measured(source: Path, how: tuple[Origin, Search], shown: Progress) -> _Measured:
     from lumigraph import preparation
     from lumigraph.core.lightfield import LightField
+    from lumigraph.instruments.capabilities import Rendered
 
     origin, search = how
     found, notes = origin.views(source), ()
     if not isinstance(found, LightField):
-        raw = origin.prepared(found)
+        raw, camera = origin.prepared(found), origin.described()
         calibration: Any = raw.calibration
-        if search.method == "correlation" or (
-            search.method == "auto" and _is_focused(origin.described(), calibration)
-        ):
-            return search.of_raw(raw, calibration, shown), calibration, None, raw.notes
+        if search.method in _OF_RAW or (search.method == "auto" and _is_focused(camera, calibration)):
+            patches = camera.patches_on_raw() if isinstance(camera, Rendered) else ()
+            sharp = preparation.sharp_kinds(calibration, patches, origin.calibration)
+            return replace(search.of_raw(raw, calibration, sharp, shown), notes=raw.notes)
         found, notes = preparation.decode(raw), raw.notes
     v, u = (n // 2 for n in found.aperture.shape)
-    return search.of_views(found, shown), found, found.view(v, u), notes
+    return _Measured(search.of_views(found, shown), found, found.view(v, u), None, notes)
 
 
 def _is_correctable(camera: "Instrument | None") -> bool:
@@ -265,22 +292,21 @@ def _in_metres(
     return verbs.metric(found, grounds, focal_length=lens[0], object_distance=lens[1]), lens[1]
 
 
-def _save(
-    found: "DepthMap", output: Path, shown: tuple[Any, Any], points: tuple[float | None, float]
-) -> None:
+def _save(made: _Measured, output: Path, points: tuple[float | None, float]) -> None:
     import numpy as np
 
     from lumigraph import depth as verbs
     from lumigraph import io
     from lumigraph.core.arrays import to_numpy
 
-    name = output.name.lower()
+    found, name = made.depth, output.name.lower()
     if name.endswith(".ply") and points[0] is not None:
-        picture = None if shown[1] is None else to_numpy(shown[1]).astype(float)
+        picture = None if made.picture is None else to_numpy(made.picture).astype(float)
         picture = None if picture is None else np.clip(picture / (np.quantile(picture, 0.999) or 1), 0, 1)
-        io.save(
-            verbs.cloud(found, shown[0], object_distance=points[0], colours=picture, lowest=points[1]), output
+        cloud = verbs.cloud(
+            found, made.grounds, object_distance=points[0], colours=picture, lowest=points[1], grid=made.grid
         )
+        io.save(cloud, output)
     elif name.endswith(".png"):
         values = to_numpy(found.values).astype(float)
         low, high = np.nanquantile(values, (0.01, 0.99)) if np.isfinite(values).any() else (0.0, 1.0)

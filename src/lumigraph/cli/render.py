@@ -124,16 +124,11 @@ class Tiles:
         self, camera: "Rendered | None", calibration: "Calibration", origin: Origin
     ) -> list[float] | None:
         """The patch at which each kind of lenslets is sharp, where there are three and it is known."""
-        if self.focus is not None or calibration.lattice.kinds == 1:
+        if self.focus is not None:
             return self.chosen_focus()
-        if camera is not None and len(sizes := camera.patches_on_raw()) == calibration.lattice.kinds:
-            return list(sizes)
-        if origin.calibration is not None and origin.calibration.suffix.lower() == ".xml":
-            from lumigraph.io.raytrix import lens_types
-            from lumigraph.rendering import sharp_patches
+        from lumigraph.preparation import sharp_kinds
 
-            return list(sharp_patches(calibration, lens_types(origin.calibration)))
-        return None
+        return sharp_kinds(calibration, () if camera is None else camera.patches_on_raw(), origin.calibration)
 
 
 @Parameter(name="*")

@@ -7,21 +7,24 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from lumigraph.core import checks, memory
-from lumigraph.core.arrays import Array, like, to_numpy
+from lumigraph.core.arrays import Array, like
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.progress import Progress, silent, within
 from lumigraph.core.raw import RawImage
+from lumigraph.depth.flat import Flat
 from lumigraph.depth.smooth import Stiffness, update
 from lumigraph.depth.volume import cheapest, semi_global
 from lumigraph.errors import CalibrationError, GeometryError
 from lumigraph.preparation import of_raw
 from lumigraph.rendering import lenslet_indices
 from lumigraph.rendering.decode import check_raw
-from lumigraph.rendering.interpolate import as_float, sample
+from lumigraph.rendering.interpolate import sample
 
 _STEP = 0.5  # between the sizes that are compared [px]
-_SMALLEST, _LARGEST = 0.08, 0.6  # of the pitch
+WIDEST = 0.08, 0.6
+"""Least and most size that is tried where nothing is known, of the pitch."""
+
 _REACH = 1.8  # pitches: nearest neighbours, and the next ones, which in a multi-focus array have one kind
 _LEAST_SEEN = 0.12  # part of a micro-image that both must show
 _FEWEST_PIXELS = 6  # pitch below which a micro-image has nothing to compare
@@ -104,7 +107,7 @@ def correlation(
 
 def _ranges(patches: tuple[float, float] | None, pitch: float) -> list[tuple[float, float]]:
     if patches is None:
-        low, high = _SMALLEST * pitch, _LARGEST * pitch
+        low, high = (part * pitch for part in WIDEST)
         return [(low, high), (-high, -low)]
     low, high = checks.pair("patches", patches, "px")
     if not low < high or low <= 0 <= high or max(abs(low), abs(high)) > pitch:
@@ -162,16 +165,15 @@ class _MicroImages:
             f"comparing {indices.shape[0]} x {indices.shape[1]} micro-images of {2 * half + 1} px",
             "Crop the raw image to a part {factor:.1f}x smaller.",
         )
-        image = to_numpy(as_float(raw.data)).astype(np.float32)
-        image = image.mean(2) if image.ndim == 3 else image
-        image = gaussian_filter(image / (float(np.quantile(image, 0.999)) or 1.0), 0.5)
+        flat = Flat.of(raw, calibration)
+        image = gaussian_filter(flat.image, 0.5)
         steps = np.arange(-half, half + 1.0)
         centers = calibration.position(indices)
         y = centers[..., 0, None, None] + steps[:, None]
         x = centers[..., 1, None, None] + steps
         data = np.asarray(sample(image, y, x, "cubic"), np.float32)
         radius = np.hypot(steps[:, None], steps)
-        inside = radius <= _lit_radius(data, radius, calibration)
+        inside = radius <= flat.radius
         return cls(data, inside.astype(np.float32), indices, calibration)
 
     def scores(self, sizes: np.ndarray, progress: Progress) -> np.ndarray:
@@ -253,16 +255,3 @@ def _moved(images: np.ndarray, steps: int, axis: int) -> np.ndarray:
         left = (Ellipsis,) + (slice(None),) * (-axis - 1)
         out[(left[0], target, *left[1:])] = images[(left[0], source, *left[1:])]
     return out
-
-
-def _lit_radius(data: np.ndarray, radius: np.ndarray, calibration: Calibration) -> float:
-    """Radius of the lit part of the micro-images [px], a pixel and a half from their edge."""
-    half = calibration.lattice.pitch / 2
-    if calibration.fill is not None:
-        return min(1.0, calibration.fill) * half - 1.5
-    bright = np.quantile(data.reshape(-1, data.shape[2] * data.shape[3]), 0.98, axis=0)
-    rings = np.rint(radius).astype(int).ravel()
-    profile = np.bincount(rings, bright) / np.maximum(np.bincount(rings), 1)
-    profile = profile[: int(half) + 1]
-    dark = np.flatnonzero(profile < 0.5 * np.median(profile))
-    return min(half, float(dark[0]) if len(dark) else half) - 1.5

@@ -1,13 +1,14 @@
 """Depth from the lines of epipolar-plane images."""
 
 import numpy as np
-from scipy.ndimage import maximum_filter, median_filter, minimum_filter
+from scipy.ndimage import median_filter
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import like
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Progress, silent, within
+from lumigraph.depth.expected import expected
 from lumigraph.depth.lines import refined
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.sweep import labels, span, swept
@@ -15,12 +16,6 @@ from lumigraph.errors import GeometryError
 
 _DOUBT = 0.2
 """Expected error [px per view, or in the outermost view if that is less] with a confidence of 1/e."""
-
-_NOISE, _STAKES = 0.385, ((3, 0.17), (5, 0.073), (9, 0.03))
-"""Expected error per standard deviation, and per difference between neighbours (width of the window, part).
-
-By least squares without negative numbers, from the errors on the rendered scenes *antinous* and *cotton*.
-"""
 
 
 def epi(
@@ -83,18 +78,10 @@ def epi(
     first = swept(pictures, moves, shading, within(progress, 0, share))
     first = np.clip(median_filter(first, 5), moves[0], moves[-1])
     found, deviation = refined(pictures, first, shading, within(progress, share, 1))
-    found, error = found / pictures.reach, _expected(found / pictures.reach, deviation / pictures.reach)
+    found, error = found / pictures.reach, expected(found / pictures.reach, deviation / pictures.reach)
     trust = np.exp(-error / min(_DOUBT, _DOUBT * 4 / pictures.reach))
     found, trust, error = (like(part, views.data) for part in (found, trust, error))
     return DepthMap(found, trust, "disparity", error)
-
-
-def _expected(values: np.ndarray, deviation: np.ndarray) -> np.ndarray:
-    """Error (y, x) to expect: what noise does, and what is at stake beside an edge of depth."""
-    error = _NOISE * deviation
-    for width, part in _STAKES:
-        error = error + part * (maximum_filter(values, width) - minimum_filter(values, width))
-    return error
 
 
 def _range(disparities: tuple[float, float], reach: float) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.cloud import PointCloud
 from lumigraph.core.depth_map import DepthMap
+from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.depth.quantities import alpha_of
 from lumigraph.design import thin_lens
@@ -74,7 +75,8 @@ def metric(
     f = checks.positive("focal_length", focal_length)
     found.check("disparity", "alpha", "patch")
     if found.quantity == "patch":
-        image, focused = _image_of_patches(found, _calibration(source)), object_distance
+        image, image_per_value = _image_of_patches(found, _calibration(source))
+        focused = object_distance
         if focused is None:
             raise GeometryError("patches do not tell where the camera is focused. Give object_distance= [m].")
     else:
@@ -83,10 +85,10 @@ def metric(
         alpha = to_numpy(found.values).astype(float)
         alpha = alpha if correction is None else np.asarray(correction(alpha), float)
         image = views.separation / np.where(alpha > 0, alpha, np.nan)
+        image_per_value = image / np.where(alpha > 0, alpha, np.nan)
         focused = object_distance or thin_lens.object_distance(f, views.separation)
     distance = 1 / (1 / f - 1 / np.where(image > f, image, np.nan))
-    known = found.quantity == "alpha" and correction is None
-    slope = distance**2 / (image * to_numpy(found.values)) if known else None
+    slope = (distance / image) ** 2 * image_per_value if correction is None else None
     return found.replaced(distance - checks.positive("object_distance", focused), "depth", slope)
 
 
@@ -144,11 +146,13 @@ def _relay(found: DepthMap, calibration: Calibration) -> np.ndarray:
     return b * pitch * length / np.where(below == 0, np.nan, below)
 
 
-def _image_of_patches(found: DepthMap, calibration: Calibration) -> np.ndarray:
-    """Main lens to its image, z2' = L - a' [m]."""
-    relay = _relay(found, calibration)
-    assert calibration.separation is not None  # _relay has seen to it
-    return calibration.separation - relay
+def _image_of_patches(found: DepthMap, calibration: Calibration) -> tuple[np.ndarray, np.ndarray]:
+    """Main lens to its image, z2' = L - a' [m], and how much it moves with the patch [m/px]."""
+    relay, c = _relay(found, calibration), calibration
+    assert c.separation is not None  # _relay has seen to it
+    assert c.lenslet_distance is not None
+    ratio = 1 + c.lenslet_distance / c.separation
+    return c.separation - relay, relay**2 * ratio / (c.lenslet_distance * c.lattice.pitch)
 
 
 def cloud(
@@ -158,6 +162,7 @@ def cloud(
     object_distance: float,
     colours: Array | None = None,
     lowest: float = 0.5,
+    grid: Grid | None = None,
 ) -> PointCloud:
     """Points (z, y, x) in space [m] of a map of depths; the main lens' middle is the origin.
 
@@ -176,6 +181,8 @@ def cloud(
         Picture (y, x) or (y, x, 3) of the map's shape, uint8 or 0 to 1; None for none.
     lowest
         Confidence below which a point is left out.
+    grid
+        Of a map of the samples of a picture, by `dense`: `lumigraph.rendering.sight_grid`.
 
     Raises
     ------
@@ -183,7 +190,7 @@ def cloud(
         No depths, or shapes that differ.
     """
     depth.check("depth")
-    y, x, separation = _places(source, depth)
+    y, x, separation = _places(source, depth, grid)
     distance = to_numpy(depth.values).astype(float) + checks.positive("object_distance", object_distance)
     trust = to_numpy(depth.confidence)
     kept = np.isfinite(distance) & (trust >= lowest)
@@ -192,18 +199,22 @@ def cloud(
     return PointCloud(points.astype(np.float32), paint, trust[kept].astype(np.float32))
 
 
-def _places(source: LightField | Calibration, depth: DepthMap) -> tuple[np.ndarray, np.ndarray, float]:
+def _places(
+    source: LightField | Calibration, depth: DepthMap, grid: Grid | None
+) -> tuple[np.ndarray, np.ndarray, float]:
     """Where the map's samples stand at the lenslets (y, x) [m], and how far that is behind the main lens."""
-    if isinstance(source, LightField):
-        y, x = np.meshgrid(source.lenslets.y, source.lenslets.x, indexing="ij")
-        separation = source.separation
+    if isinstance(source, LightField) or grid is not None:
+        places = source.lenslets if isinstance(source, LightField) else grid
+        assert places is not None
+        y, x = np.meshgrid(places.y, places.x, indexing="ij")
+        separation = source.separation if isinstance(source, LightField) else Frame.of(source).separation
     else:
         source = _calibration(source)
         frame = Frame.of(source)
         places = (source.position(lenslet_indices(source)) - frame.axis) * frame.lenslet_per_px
         y, x, separation = places[..., 0], places[..., 1], frame.separation
     if y.shape != depth.shape:
-        raise GeometryError(f"the map has shape {depth.shape} but its source has {y.shape} lenslets.")
+        raise GeometryError(f"the map has shape {depth.shape} but its source has {y.shape} places.")
     return y, x, separation
 
 

@@ -87,7 +87,7 @@ class Pictures:
         right = (chosen[1] - middle[1]).astype(float)
         reach = float(max(np.abs(down).max(), np.abs(right).max()))
         center = data[len(chosen[0]) // 2, len(chosen[1]) // 2]
-        return cls(data, down / reach, right / reach, lit, _noise(center), reach)
+        return cls(data, down / reach, right / reach, lit, noise_of(center.mean(0)), reach)
 
 
 def _chosen(count: int) -> np.ndarray:
@@ -110,13 +110,13 @@ def _even(data: np.ndarray, middle: tuple[int, int]) -> tuple[np.ndarray, np.nda
     return np.sqrt(data * gain[:, :, None, None, None].astype(np.float32)), lit
 
 
-def _noise(picture: np.ndarray) -> float:
-    """Standard deviation of the noise of a picture (c, y, x), the mean over its colours' included.
+def noise_of(picture: np.ndarray) -> float:
+    """Standard deviation of the noise of a picture (y, x).
 
     References
     ----------
     Immerkær, "Fast noise variance estimation", Comput. Vis. Image Underst. 64, 300 (1996), with a median.
     """
     kernel = np.array([[1.0, -2, 1], [-2, 4, -2], [1, -2, 1]])
-    rough = convolve(picture.mean(0), kernel)
+    rough = convolve(picture, kernel)
     return max(float(np.median(np.abs(rough))) / (6 * 0.6745), _LEAST_NOISE)

@@ -13,7 +13,7 @@
 from lumigraph.core.prepared import PreparedImage, Reason
 from lumigraph.preparation.agreement import Described, implied
 from lumigraph.preparation.drift import Drift, drift
-from lumigraph.preparation.given import Given, read_calibration, read_pages, read_raw
+from lumigraph.preparation.given import Given, read_calibration, read_pages, read_raw, sharp_kinds
 from lumigraph.preparation.prepare import decode, of_raw, prepare, render, render_stack, super_resolve
 from lumigraph.preparation.vignetting import vignetting
 
@@ -33,6 +33,7 @@ __all__ = [
     "read_raw",
     "render",
     "render_stack",
+    "sharp_kinds",
     "super_resolve",
     "vignetting",
 ]

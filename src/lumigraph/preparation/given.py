@@ -1,5 +1,6 @@
 """The files that come with a raw image: `Given`, and their readers."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,9 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
+from lumigraph.io.raytrix import lens_types
 from lumigraph.preparation.prepare import prepare
+from lumigraph.rendering import sharp_patches
 
 _MAKERS = (".xml", ".ini")  # which do not say how large their raw images are
 
@@ -126,3 +129,26 @@ def read_calibration(path: Path, shape: tuple[int, int] | None = None) -> Calibr
     if not isinstance(found, Calibration):
         raise FormatError(f"{path} holds a {called(found)} where a calibration is needed.")
     return found
+
+
+def sharp_kinds(
+    calibration: Calibration, patches: Sequence[float] = (), file: Path | None = None
+) -> list[float] | None:
+    """Patch [px] at which each of three kinds of lenslets is sharp; None of one kind, or where unknown.
+
+    Parameters
+    ----------
+    calibration
+        Of the camera.
+    patches
+        What its description says; none without one.
+    file
+        Of the calibration: that of a maker of multi-focus cameras (.xml) says it, too.
+    """
+    if calibration.lattice.kinds == 1:
+        return None
+    if len(patches) == calibration.lattice.kinds:
+        return list(patches)
+    if file is None or file.suffix.lower() != ".xml":
+        return None
+    return list(sharp_patches(calibration, lens_types(file)))

@@ -17,7 +17,7 @@
 from lumigraph.rendering.decode import decode
 from lumigraph.rendering.encode import encode
 from lumigraph.rendering.focus_range import focus_range, focus_span
-from lumigraph.rendering.focused import render, render_stack, rendered_grid
+from lumigraph.rendering.focused import render, render_stack, rendered_grid, sight_grid
 from lumigraph.rendering.fourier_slice import refocus_fourier
 from lumigraph.rendering.kinds import match_kinds
 from lumigraph.rendering.patches import lenslet_indices, sharp_patches
@@ -55,6 +55,7 @@ __all__ = [
     "render_stack",
     "rendered_grid",
     "sharp_patches",
+    "sight_grid",
     "super_resolve",
     "view",
     "view_path",

@@ -177,6 +177,26 @@ def rendered_grid(calibration: Calibration, patch: float | Array, samples: int |
         magnified = sizes.middle / calibration.lattice.pitch * (1 + distance / separation)  # m z2 / L
         image_distance = distance / (magnified + distance / separation)
         scale = frame.lenslet_per_px * (1 - image_distance / separation)
+    return _grid(layout, frame, scale)
+
+
+def sight_grid(calibration: Calibration, patch: float | Array, samples: int | None = None) -> Grid:
+    """Where the lenslets are met by the rays from the middle of the main lens to a picture's samples [m].
+
+    Each sample lies somewhere on its ray, at the depth that its own patch says.
+
+    Parameters
+    ----------
+    calibration, patch, samples
+        As given to `render`.
+    """
+    layout = Layout.of(calibration, Patches.of(patch, calibration), samples)
+    frame = Frame.of(calibration)
+    return _grid(layout, frame, frame.lenslet_per_px)
+
+
+def _grid(layout: Layout, frame: Frame, scale: float) -> Grid:
+    """Places of a layout [px], `scale` metres each, from the optical axis."""
     middle = layout.y[len(layout.y) // 2], layout.x[len(layout.x) // 2]
     center = [(place - axis) * scale for place, axis in zip(middle, frame.axis, strict=True)]
     pitch = layout.step * scale

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -210,3 +210,7 @@ class Layout:
                 f"{calibration.shape[1]} px. Use a smaller patch or the whole sensor's picture."
             )
         return cls(axes[0][top:bottom], axes[1][left:right], step)
+
+    def part(self, rows: slice) -> "Layout":
+        """Some of its rows."""
+        return replace(self, y=self.y[rows])

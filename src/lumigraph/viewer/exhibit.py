@@ -66,6 +66,8 @@ class Exhibit:
         Focal stack, where there are no views.
     depth
         Depth map, or a function that computes it when somebody wants to see it.
+    measure
+        What the depths of that function are called, and their unit.
     volume
         Planes of space.
     facts
@@ -80,6 +82,7 @@ class Exhibit:
     calibration: Calibration | None = None
     planes: Planes | None = None
     depth: DepthMap | Callable[[], DepthMap] | None = None
+    measure: tuple[str, str] = ("Focus α′", "")
     volume: Volume | None = None
     facts: tuple[tuple[str, str], ...] = ()
     relative: bool = False
@@ -140,6 +143,26 @@ def depth_map(views: LightField) -> DepthMap:
     from lumigraph.depth import alpha_of, epi
 
     return alpha_of(epi(grey_or_colour(views)), views)
+
+
+def depth_of_pixels(
+    raw: RawImage, calibration: Calibration, focus: list[float] | None, camera: Any
+) -> DepthMap:
+    """Depth of each pixel of a camera 2.0's picture, as `lumigraph depth` measures it.
+
+    Depths from the focused plane [m] where the camera's description is known, else patches [px].
+    """
+    from lumigraph.depth import correlation, dense, metric
+    from lumigraph.rendering import match_kinds
+
+    lenslets = correlation(raw, calibration)
+    if focus is not None:
+        focus = list(match_kinds(raw, calibration, lenslets.values, focus))
+    found = dense(raw, calibration, lenslets, focus=focus)
+    if camera is None:
+        return found
+    lens, distance = camera.main_lens.focal_length, camera.object_distance
+    return metric(found, calibration, focal_length=lens, object_distance=distance)
 
 
 def grey_or_colour(views: LightField) -> LightField:

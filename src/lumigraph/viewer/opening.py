@@ -20,8 +20,9 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError, SamplingWarning
-from lumigraph.preparation import Described, Given, prepare, read_pages
-from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_map
+from lumigraph.instruments.capabilities import Rendered, WithMainLens
+from lumigraph.preparation import Described, Given, prepare, read_pages, sharp_kinds
+from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_map, depth_of_pixels
 
 _CAMERA_FILE = 1 << 20  # bytes; camera files have some hundred
 _PATCHES = 25
@@ -138,7 +139,11 @@ def of_volume(name: str, volume: Volume) -> Exhibit:
 
 
 def of_raw(
-    name: str, raw: RawImage, calibration: Calibration | None = None, patch: float | None = None
+    name: str,
+    raw: RawImage,
+    calibration: Calibration | None = None,
+    patch: float | None = None,
+    origin: Origin = Origin(),
 ) -> Exhibit:
     """A raw image; with a calibration also its views, or (camera 2.0) pictures with patches about `patch`."""
     checks.finite_array(name, raw.data, FormatError)
@@ -155,8 +160,15 @@ def of_raw(
         return Exhibit(name, raw=raw, facts=facts)
     patch = patch if patch is not None else _own_patch(raw, calibration)
     if patch is not None:
-        planes = rendered(raw, calibration, patch)
-        return Exhibit(name, raw=raw, calibration=calibration, planes=planes, facts=facts)
+        planes, camera = rendered(raw, calibration, patch), origin.camera
+        camera = camera if isinstance(camera, Rendered) and isinstance(camera, WithMainLens) else None
+        sizes = () if camera is None else camera.patches_on_raw()
+        focus = sharp_kinds(calibration, sizes, origin.calibration)
+        return Exhibit(
+            name, raw=raw, calibration=calibration, planes=planes, facts=facts,
+            depth=lambda: depth_of_pixels(raw, calibration, focus, camera),
+            measure=("Patch", "px") if camera is None else ("Depth", "m"),
+        )  # fmt: skip
     from lumigraph.rendering import decode
 
     with warnings.catch_warnings():
@@ -207,7 +219,7 @@ def _simulated(path: Path, tell: Progress) -> Exhibit:
         camera, targets.photo(camera.object_grid, picture),
         progress=within(tell, 0.0, 1.0, "simulating"),
     )  # fmt: skip
-    return of_raw(path.name, raw, camera.calibration, camera.patch)
+    return of_raw(path.name, raw, camera.calibration, camera.patch, Origin(camera=camera))
 
 
 def _raw(name: str, raw: RawImage, origin: Origin, tell: Progress) -> Exhibit:
@@ -216,7 +228,7 @@ def _raw(name: str, raw: RawImage, origin: Origin, tell: Progress) -> Exhibit:
     tell(Stage(0.3, "calibrating"))
     ready = origin.prepared(raw, camera=origin.camera)
     tell(Stage(0.6, "decoding"))
-    return of_raw(name, ready, ready.calibration, origin.patch)
+    return of_raw(name, ready, ready.calibration, origin.patch, origin)
 
 
 def _own_patch(raw: RawImage, calibration: Calibration) -> float | None:

@@ -132,10 +132,13 @@ class Parts:
                 found.append(depth() if callable(depth) else depth)
             return found[0]
 
-        label, unit = "Focus α′", ""
+        label, unit = exhibit.measure
         if isinstance(depth, DepthMap) and depth.quantity != "alpha":
             label, unit = depth.quantity.capitalize(), depth.unit
-        self.about["depth"] = {"label": label, "unit": unit}
+        told = callable(depth) or depth.error is not None  # what computes it tells it
+        self.about["depth"] = {"label": label, "unit": unit, "error": told}
+        if told:
+            self.arrays["error"] = lambda: Coded.of(_expected(once()))
         self.arrays["depth"] = lambda: Coded.of(_finite(to_numpy(once().values)))
         self.arrays["confidence"] = lambda: Coded.of(
             np.rint(255 * np.clip(_trusted(once()), 0, 1)).astype(np.uint8)
@@ -145,6 +148,12 @@ class Parts:
 def _trusted(depth: Any) -> np.ndarray:
     """Confidence, 0 where the depth is not known."""
     return np.where(np.isfinite(to_numpy(depth.values)), np.nan_to_num(to_numpy(depth.confidence)), 0.0)
+
+
+def _expected(depth: Any) -> np.ndarray:
+    """Expected errors, 0 where none is known."""
+    error = np.zeros(depth.shape) if depth.error is None else to_numpy(depth.error)
+    return np.nan_to_num(error, posinf=0.0)
 
 
 def _finite(values: np.ndarray) -> np.ndarray:

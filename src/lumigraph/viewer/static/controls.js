@@ -5,7 +5,7 @@ import { MAPS } from "./colours.js";
 import { Histogram } from "./histogram.js";
 import { depthMap } from "./models.js";
 import { canQuilt } from "./quilt.js";
-import { lengthText } from "./overlay.js";
+import { depthText, lengthText } from "./overlay.js";
 import { cachedMap } from "./tone.js";
 
 const by = (id) => document.getElementById(id);
@@ -162,10 +162,10 @@ export class Controls {
     const colours = Array.from({ length: 17 }, (_, k) => { const i = 4 * Math.round((k * 255) / 16); return `rgb(${map[i]} ${map[i + 1]} ${map[i + 2]})`; });
     by("legend-bar").style.background = `linear-gradient(to right, ${colours.join(", ")})`;
     const metric = model.views?.metric && model.about.depth.label.startsWith("Focus"), place = (x) => lengthText(model.views.separation / x);
-    const shown = (x) => (metric ? place(x) : x.toFixed(3));
+    const shown = (x) => (metric ? place(x) : depthText(model.about.depth, x));
     by("legend-low").textContent = range ? shown(range[0]) : "";
     by("legend-high").textContent = range ? shown(range[1]) : "";
-    by("legend-label").textContent = metric ? "image distance" : `${model.about.depth.label} ${model.about.depth.unit}`.trim();
+    by("legend-label").textContent = metric ? "image distance" : model.about.depth.label;
   }
 
   facts(exhibits) {

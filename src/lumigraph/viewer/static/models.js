@@ -205,6 +205,7 @@ export class Model {
   depthImage(state) {
     const depth = this.need("depth"), confidence = this.need("confidence");
     if (!depth || !confidence) return null;
+    if (this.about.depth.error) this.need("error");
     const key = `${state.map}/${state.trust}`;
     if (this.depthKey !== key) {
       this.depthKey = key;
@@ -225,7 +226,11 @@ export class Model {
     if (!depth || !confidence) return null;
     const [ny, nx] = depth.shape, k = Math.round(y) * nx + Math.round(x);
     if (y < -0.5 || x < -0.5 || y >= ny - 0.5 || x >= nx - 0.5) return null;
-    return { value: depth.offset + depth.scale * depth.numbers[k], confidence: confidence.numbers[k] / 255 };
+    const error = this.arrays.error;
+    return {
+      value: depth.offset + depth.scale * depth.numbers[k], confidence: confidence.numbers[k] / 255,
+      error: error ? error.offset + error.scale * error.numbers[k] : null,
+    };
   }
 }
 

@@ -93,3 +93,15 @@ export function lengthText(metres) {
   const [unit, value] = size >= 1 ? ["m", 1] : size >= 1e-3 ? ["mm", 1e3] : size >= 1e-6 ? ["µm", 1e6] : ["nm", 1e9];
   return `${Number((metres * value).toPrecision(4))} ${unit}`;
 }
+
+/** A depth as its map counts it. */
+export function depthText({ unit }, value, digits = 3) {
+  return unit === "m" ? lengthText(value) : `${value.toFixed(digits)} ${unit}`.trim();
+}
+
+/** What a place of a depth map says: value, the error to expect, confidence. */
+export function depthTexts(about, { value, error, confidence }) {
+  const label = about.label === "Focus α′" ? "α′" : about.label.toLowerCase();
+  const spread = error === null ? "" : ` ± ${depthText(about, error)}`;
+  return [`${label} ${depthText(about, value, 4)}${spread}`, `confidence ${confidence.toFixed(2)}`];
+}

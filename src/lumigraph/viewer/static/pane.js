@@ -5,7 +5,7 @@ import { CanvasDevice } from "./canvas.js";
 import { openDevice } from "./device.js";
 import { drawEpis } from "./epi.js";
 import { sharpestAlpha, sharpestPlane } from "./focusing.js";
-import { clearOverlay, drawCross, drawLattice, drawMark, drawScaleBar } from "./overlay.js";
+import { clearOverlay, depthTexts, drawCross, drawLattice, drawMark, drawScaleBar } from "./overlay.js";
 import { toneOf } from "./tone.js";
 
 const STILL = 4; // CSS px that a click may move
@@ -142,7 +142,7 @@ export class Pane {
     if (row < 0 || column < 0 || row >= image.ny || column >= image.nx) { this.readout.textContent = ""; return; }
     if (this.app.state.mode === "depth") {
       const found = this.model.depthAt(y, x);
-      if (found) parts.push(`α′ ${found.value.toFixed(4)}`, `confidence ${found.confidence.toFixed(2)}`);
+      if (found) parts.push(...depthTexts(this.model.about.depth, found));
     } else {
       const start = (row * image.nx + column) * image.channels;
       const numbers = image.texture ? this.device.sample(image, column, row) : image.numbers.subarray(start, start + image.channels);

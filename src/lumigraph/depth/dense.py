@@ -1,0 +1,173 @@
+"""Depth of each sample of a plenoptic 2.0 picture, by what all micro-images show that see it."""
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from lumigraph.core import memory
+from lumigraph.core.arrays import Array, like, to_numpy
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.depth_map import DepthMap
+from lumigraph.core.progress import Progress, silent, within
+from lumigraph.core.raw import RawImage
+from lumigraph.depth.correlation import WIDEST, correlation
+from lumigraph.depth.expected import expected
+from lumigraph.depth.flat import Flat
+from lumigraph.depth.pictures import noise_of
+from lumigraph.depth.sightings import Sightings
+from lumigraph.depth.smooth import Stiffness, tears, update
+from lumigraph.depth.volume import box, cheapest, guided, semi_global
+from lumigraph.preparation import of_raw
+from lumigraph.rendering.decode import check_raw
+from lumigraph.rendering.patches import Layout, Patches, checked_focus
+
+# Lengths in px are those by which a detail moves that stands at the edge of its micro-image.
+_STEP = 0.4  # px between sizes that are tried
+_SPARE = 2.0  # px beyond the sizes of the lenslets' map
+_SURE = 0.3  # confidence of the lenslets whose sizes span the range
+_MOST = 0.06  # of white: more says only that the size is wrong
+_ROUNDS = (2.0, 1.2)  # px: second difference that counts as an edge, round by round
+_TEAR = 2.0  # px between neighbours that are not of one surface
+_KINK, _STIFFNESS = 4e-3, 3e4  # px; per variance of the noise
+_FARTHEST = 1.2  # px that a round may move a place
+_DOUBT = 0.8  # px: expected error with a confidence of 1/e
+
+
+@of_raw
+def dense(
+    raw: RawImage | Array,
+    calibration: Calibration,
+    lenslets: DepthMap | None = None,
+    *,
+    samples: int | None = None,
+    focus: Sequence[float] | None = None,
+    progress: Progress = silent,
+) -> DepthMap:
+    r"""Patch size [px] of each sample of the picture that `lumigraph.render` makes: a depth for each pixel.
+
+    A sample at Y, in the lattice of the micro-images' centres, lies on the ray through the middle of the main
+    lens. If its patch is s, the lenslet at C shows it at
+
+    .. math:: C - \frac{s}{P} (Y - C)
+
+    on the sensor, as far as its micro-image reaches: some 0.8 (P/s)² of them do. For each size they are
+    compared with the nearest one that is sharp there, the better half of them on each axis, because what
+    stands before a place hides it from one side. Costs are smoothed along the picture's edges and by
+    semi-global matching; least squares on all lenslets, joined by a surface that may be slanted, bent and
+    torn, then find the sizes between the steps, as for `lumigraph.depth.epi`.
+
+    Parameters
+    ----------
+    raw
+        Pixels (y, x[, c]); colours are averaged.
+    calibration
+        Of the same camera; square or hexagonal lattice, of one kind of lenslets or three.
+    lenslets
+        Patch of each lenslet, from `correlation`, which measures it where None: says which sizes are tried.
+    samples
+        Of the picture, per lenslet, as for `lumigraph.render`.
+    focus
+        For three kinds of lenslets: the patch [px] at which each is sharp. Those that blur a place by more
+        than the sharpest kind, by the difference of the patches, count less.
+    progress
+        Called as ``progress(fraction)``.
+
+    Returns
+    -------
+    DepthMap
+        Patches (y, x) of the samples of ``render(raw, calibration, lenslets.values, samples=samples)``, whose
+        places are `lumigraph.rendering.sight_grid`. `error` and confidence as for `lumigraph.depth.epi`.
+
+    Raises
+    ------
+    CalibrationError
+        Micro-images of less than 6 px, or a raw image that does not belong to the calibration.
+    GeometryError
+        A map of another shape than the lenslets, or another number of `focus` than kinds of lenslets.
+    LumigraphError
+        It would not fit in memory.
+
+    References
+    ----------
+    Perwass and Wietzke, "Single lens 3D-camera with extended depth-of-field", Proc. SPIE 8291 (2012).
+    """
+    raw = raw if isinstance(raw, RawImage) else RawImage(raw)
+    check_raw(raw, calibration)
+    kinds = checked_focus(focus, calibration)
+    if lenslets is None:
+        lenslets = correlation(raw, calibration, progress=within(progress, 0, 0.3))
+    lenslets.check("patch")
+    sizes = Patches.of(lenslets.values, calibration)
+    flat = Flat.of(raw, calibration)
+    sights = Sightings(flat, calibration, Layout.of(calibration, sizes, samples), kinds)
+    sign, reach = math.copysign(1.0, sizes.middle), flat.even
+    moves = _labels(np.abs(sizes.values), to_numpy(lenslets.confidence), reach, calibration.lattice.pitch)
+    guide = _joined(sights, lambda part, rows: part.picture(sizes.between(*part.fractional)))
+    first = _swept(sights, moves, (sign, guide), within(progress, 0.3, 0.8))
+    found, deviation = _refined(sights, first, sign, within(progress, 0.8, 1))
+    error = expected(found, np.minimum(deviation, reach))
+    values = sign * np.exp(found / reach)
+    trust, error = np.exp(-error / _DOUBT), error * np.abs(values) / reach
+    values, trust, error = (like(part, raw.data) for part in (values, trust, error))
+    return DepthMap(values, trust, "patch", error)
+
+
+def _labels(sizes: np.ndarray, trust: np.ndarray, reach: float, pitch: float) -> np.ndarray:
+    """Logarithms of the sizes that are tried (n,), times the reach: `_STEP` px apart at its end."""
+    sure = sizes[trust >= min(_SURE, float(np.median(trust)))]
+    if not (trust >= _SURE).any():
+        sure = pitch * np.array(WIDEST)
+    low, high = (reach * math.log(end) for end in (sure.min(), sure.max()))
+    low, high = low - _SPARE, min(high + _SPARE, reach * math.log(pitch))
+    count = max(math.ceil((high - low) / _STEP), 4)
+    return low + (high - low) * np.arange(count + 1) / count
+
+
+def _swept(
+    sights: Sightings, moves: np.ndarray, how: tuple[float, np.ndarray], progress: Progress
+) -> np.ndarray:
+    """The label (y, x) of each place, to a fraction of a step."""
+    (sign, guide), reach = how, sights.flat.even
+    memory.require(
+        4.5 * 4 * len(moves) * guide.size,
+        f"the cost of {len(moves)} sizes for {guide.shape[0]} x {guide.shape[1]} samples",
+        "Ask for {factor:.1f}x fewer samples, or crop the raw image.",
+    )
+    cost = np.empty((len(moves), *guide.shape), np.float32)
+    for k, size in enumerate(sign * np.exp(moves / reach)):
+        images = sights.alike(float(size))
+        for rows, part in sights.bands():
+            cost[k, rows] = part.disagreement(float(size), _MOST, images)
+        progress((k + 1) / len(moves))
+    cost = semi_global(guided(cost, guide, 3), guide, 0.2 * _MOST, _MOST)
+    first = moves[0] + cheapest(cost)[0] * (moves[1] - moves[0])
+    return np.clip(median_filter(first, 5), moves[0], moves[-1]).astype(np.float32)
+
+
+def _refined(
+    sights: Sightings, moves: np.ndarray, sign: float, progress: Progress
+) -> tuple[np.ndarray, np.ndarray]:
+    """Labels (y, x) refined on all micro-images by least squares, and their standard deviation."""
+    noise, information = noise_of(sights.flat.image), np.zeros_like(moves)
+    for k, jump in enumerate(_ROUNDS):
+        sizes = sign * np.exp(moves / sights.flat.even)
+        asked = _joined(sights, partial(_asked, sizes=sizes, noise=noise))
+        pull, information, variance = np.moveaxis(asked, 1, 0)
+        noise = max(noise, float(np.sqrt(np.median(variance))))
+        how = Stiffness(_STIFFNESS * noise**2, _KINK, jump)
+        change = update(moves, information, pull, how, None, tears(moves, _TEAR)) - moves
+        moves = moves + np.clip(change, -_FARTHEST, _FARTHEST)
+        progress((k + 1) / len(_ROUNDS))
+    return moves, noise / np.sqrt(box(information, 3) + 1e-12)
+
+
+def _asked(part: Sightings, rows: slice, sizes: np.ndarray, noise: float) -> np.ndarray:
+    return part.asked(sizes[rows], noise).swapaxes(0, 1)
+
+
+def _joined(sights: Sightings, made: Callable[[Sightings, slice], np.ndarray]) -> np.ndarray:
+    """Something that is made of each band of rows (y, ...)."""
+    return np.concatenate([made(part, rows) for rows, part in sights.bands()])

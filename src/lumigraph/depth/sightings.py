@@ -1,0 +1,217 @@
+"""What the micro-images around each place of a plenoptic 2.0 picture show of it, if its patch has a size."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from lumigraph.core.calibration import Calibration
+from lumigraph.depth.flat import Flat
+from lumigraph.rendering.patches import Layout
+
+Pair = tuple[np.ndarray, np.ndarray]
+
+_SHARP = 1.5  # px of blur by which another kind of lenslet loses against the sharpest one
+_FARTHEST = 3.0  # pitches to the farthest lenslet that is asked
+_MIDDLE = 0.15  # pitches: lenslets this near to a place stand on both of its sides
+_SIGMA = 0.25  # standard deviation of a disc along an axis, over its diameter
+_COUNTS = 0.1  # weight of the kinds of lenslets whose blur the others are given, too
+_UNKNOWN, _FEW = 0.8, 0.05  # part of the most that lenslets differ by where no two see a place, its weight
+_BAND = 1 << 18  # samples handled at a time
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """What one neighbour of the nearest lenslet shows of each place (y, x).
+
+    `away` is from the lenslet to the place, along y and x [px of the lattice]; `at` is where on the sensor it
+    is seen, and `weight` whether: 0 where it is not, and less for a kind of lenslet that blurs it.
+    """
+
+    weight: np.ndarray
+    value: np.ndarray
+    away: Pair
+    at: Pair
+
+
+@dataclass(frozen=True)
+class Sightings:
+    """Rows of a picture, and the raw image that shows them.
+
+    Parameters
+    ----------
+    flat
+        Of the raw image.
+    calibration
+        Of the camera.
+    layout
+        Places of the picture.
+    focus
+        Patch [px] at which each kind of lenslets is sharp; None where that is not known.
+    """
+
+    flat: Flat
+    calibration: Calibration
+    layout: Layout
+    focus: np.ndarray | None
+
+    def bands(self) -> Iterator[tuple[slice, "Sightings"]]:
+        """Some rows at a time."""
+        rows = max(1, _BAND // len(self.layout.x))
+        for k in range(0, len(self.layout.y), rows):
+            part = slice(k, k + rows)
+            yield part, Sightings(self.flat, self.calibration, self.layout.part(part), self.focus)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of the picture."""
+        return len(self.layout.y), len(self.layout.x)
+
+    @cached_property
+    def fractional(self) -> Pair:
+        """Index (i, j) of each place (y, x) in the lattice, not only whole numbers."""
+        lattice = self.calibration.lattice
+        inverse = np.linalg.inv(lattice.matrix)
+        dy, dx = self.layout.y[:, None] - lattice.origin[0], self.layout.x - lattice.origin[1]
+        return inverse[0, 0] * dy + inverse[0, 1] * dx, inverse[1, 0] * dy + inverse[1, 1] * dx
+
+    @cached_property
+    def _index(self) -> Pair:
+        """Of the lenslet nearest to each place."""
+        return self.calibration.lattice.index(self.layout.y[:, None], self.layout.x)
+
+    @cached_property
+    def _nearest(self) -> Pair:
+        """From the nearest lenslet to each place [px]."""
+        flat = self.calibration.lattice.position(np.stack(self._index, -1)).astype(np.float32)
+        return np.float32(self.layout.y[:, None]) - flat[..., 0], np.float32(self.layout.x) - flat[..., 1]
+
+    def alike(self, size: float) -> list[np.ndarray]:
+        """The raw image (y, x) for each kind of lenslets, as blurred as the others' if patches have a size.
+
+        A lenslet spreads a point over a disc as wide as the size differs from that at which it is sharp. So
+        another size is also told by micro-images that are not blurred as they should be.
+        """
+        trust = self._trust(size)
+        if trust is None or self.focus is None:
+            return [self.flat.image]
+        blur = _SIGMA * np.abs(size - self.focus)
+        more = np.sqrt(np.maximum(blur[trust >= _COUNTS].max() ** 2 - blur**2, 0))
+        return [gaussian_filter(self.flat.image, sigma) for sigma in more]
+
+    def around(self, size: np.ndarray | float, images: Sequence[np.ndarray] = ()) -> Iterator[Sight]:
+        """What each lenslet near a place shows of it if its patch has a size, one or (y, x) [px].
+
+        `images` are the raw image for each kind of lenslets, or one for all.
+        """
+        images = images or [self.flat.image]
+        lattice, (ny, nx) = self.calibration.lattice, self.calibration.shape
+        reach = min(self.flat.even / float(np.abs(size).min()), _FARTHEST) * lattice.pitch
+        ratio, trust = np.asarray(size / lattice.pitch, np.float32), self._trust(size)
+        half = lattice.pitch / 2
+        for step in self._steps(reach + 0.75 * lattice.pitch):
+            index = self._index[0] + step[0], self._index[1] + step[1]
+            center = self.calibration.position(np.stack(index, -1))
+            cy, cx = center[..., 0].astype(np.float32), center[..., 1].astype(np.float32)
+            move = lattice.matrix @ step
+            away = self._nearest[0] - np.float32(move[0]), self._nearest[1] - np.float32(move[1])
+            distance = np.hypot(*away) * np.abs(ratio)
+            light = self.flat.light(distance / np.float32(half))
+            whole = (cy >= half - 1) & (cy + half <= ny) & (cx >= half - 1) & (cx + half <= nx)
+            weight = np.clip(self.flat.even - distance, 0, 1) * light**2 * whole
+            if trust is not None:
+                kind = lattice.kind(*index)
+                weight *= np.choose(kind, [np.broadcast_to(part, kind.shape) for part in trust])
+            if weight.any():
+                at = cy - ratio * away[0], cx - ratio * away[1]
+                value = _read(images, at, lattice.kind(*index))
+                yield Sight(weight, value, away, at)
+
+    def _steps(self, reach: float) -> list[tuple[int, int]]:
+        lattice = self.calibration.lattice
+        count = math.ceil(1.2 * reach / lattice.pitch)
+        around = range(-count, count + 1)
+        return [(i, j) for i in around for j in around if np.hypot(*(lattice.matrix @ (i, j))) <= reach]
+
+    def _trust(self, size: np.ndarray | float) -> np.ndarray | None:
+        """Weight of each kind of lenslets (kinds, ...); the sharpest one has 1. See `rendering.focused`."""
+        if self.focus is None:
+            return None
+        blur = np.stack([np.square(np.asarray(size, np.float32) - np.float32(sharp)) for sharp in self.focus])
+        return np.exp(-(blur - blur.min(0)) / (2 * _SHARP**2))
+
+    def picture(self, size: np.ndarray) -> np.ndarray:
+        """The mean (y, x) of what the lenslets show of places of patches (y, x)."""
+        total, weights = np.zeros(self.shape, np.float32), np.full(self.shape, 1e-6, np.float32)
+        for sight in self.around(size):
+            total += sight.weight * sight.value
+            weights += sight.weight
+        return total / weights
+
+    def disagreement(self, size: float, most: float, images: Sequence[np.ndarray]) -> np.ndarray:
+        """How much lenslets differ (y, x) from the nearest sharp one if all patches have a size, to 2 `most`.
+
+        What stands before a place hides it from the lenslets on one side; so the better of the left and the
+        right ones counts, and the better of the upper and the lower.
+        """
+        sights = list(self.around(size, images))
+        pitch = self.calibration.lattice.pitch
+        near = np.stack([sight.weight / (1 + np.hypot(*sight.away) / pitch) for sight in sights]).argmax(0)
+        mine = np.take_along_axis(np.stack([sight.value for sight in sights]), near[None], 0)[0]
+        sums = np.zeros((4, 2, *self.shape), np.float32)
+        for k, sight in enumerate(sights):
+            weight = sight.weight * (near != k)
+            off = weight * np.minimum(np.abs(sight.value - mine), np.float32(most))
+            for axis, away in enumerate(sight.away):
+                for side, total in zip((away, -away), sums[2 * axis : 2 * axis + 2], strict=True):
+                    here = side < np.float32(_MIDDLE * pitch)
+                    total[0] += off * here
+                    total[1] += weight * here
+        means = (sums[:, 0] + np.float32(_FEW * _UNKNOWN * most)) / (sums[:, 1] + np.float32(_FEW))
+        return np.minimum(means[0], means[1]) + np.minimum(means[2], means[3])
+
+    def asked(self, size: np.ndarray, noise: float) -> np.ndarray:
+        """What lenslets pull at patches (y, x), their information about them, and their variance (3, y, x).
+
+        The first two for a step of the patch by which a detail moves by 1 px where it stands at a
+        micro-image's edge. Values that are off by more than their noise count less.
+        """
+        step = np.asarray(size / self.calibration.lattice.pitch / self.flat.even, np.float32)
+        sights = list(self.around(size))
+        values = np.stack([sight.value for sight in sights])
+        slopes = np.stack([step * self._slope(sight) for sight in sights])
+        weights = seen = np.stack([sight.weight for sight in sights])
+        for _ in range(2):
+            off = values - (weights * values).sum(0) / (weights.sum(0) + np.float32(1e-9))
+            weights = seen / (1 + (off / np.float32(2.5 * noise)) ** 2)
+        total = weights.sum(0) + np.float32(1e-9)
+        slopes -= (weights * slopes).sum(0) / total
+        off = values - (weights * values).sum(0) / total
+        pulled = weights * slopes
+        return np.stack([-(pulled * off).sum(0), (pulled * slopes).sum(0), (weights * off**2).sum(0) / total])
+
+    def _slope(self, sight: Sight) -> np.ndarray:
+        """How much a lenslet's value changes with the logarithm of the patch, over patch/pitch (y, x)."""
+        image = self.flat.image
+        total = np.zeros(self.shape, np.float32)
+        for axis, away in enumerate(sight.away):
+            ends = []
+            for half in (-0.5, 0.5):
+                at = [place + half * (k == axis) for k, place in enumerate(sight.at)]
+                ends.append(map_coordinates(image, at, order=1, mode="nearest"))
+            total -= away * (ends[1] - ends[0])
+        return total
+
+
+def _read(images: Sequence[np.ndarray], at: Pair, kind: np.ndarray) -> np.ndarray:
+    """Values (y, x) of the image of each place's kind of lenslets."""
+    if len(images) == 1:
+        return map_coordinates(images[0], at, order=1, mode="nearest")
+    value = np.empty(kind.shape, np.float32)
+    for number, image in enumerate(images):
+        here = kind == number
+        value[here] = map_coordinates(image, [place[here] for place in at], order=1, mode="nearest")
+    return value

@@ -1,0 +1,154 @@
+"""Depth of each pixel of a 2.0 picture: scenes by rays and by wave optics, and what is refused."""
+
+import numpy as np
+import pytest
+from scenes import texture, traced_raw
+from scipy.ndimage import distance_transform_edt
+
+from lumigraph.core.arrays import namespace
+from lumigraph.core.grid import Grid
+from lumigraph.core.lattice import Lattice
+from lumigraph.depth import cloud, correlation, dense, metric
+from lumigraph.errors import GeometryError
+from lumigraph.instruments import FocusedPlenopticCamera
+from lumigraph.rendering import render, sight_grid
+from lumigraph.rendering.patches import Layout, Patches
+from lumigraph.scene import Scene, Slice
+from lumigraph.simulation import Incoherent, simulate
+
+CAMERAS = {
+    "square": (Lattice.square(21.3, 0.01, (10, 10)), [6.0]),
+    "three kinds": (Lattice.hex(21.3, 0.0, (10, 10), kinds=3), [4.7, 6.0, 7.3]),
+    "Galilean": (Lattice.square(21.3, 0.0, (10, 10)), [-6.0]),
+}
+SHAPE = (150, 170)
+
+
+def measured(name, surfaces, truth, noise=0.01):
+    """The map, the truth on its grid (y, x), and how many samples the map is off in each place."""
+    lattice, focus = CAMERAS[name]
+    raw, calibration = traced_raw(lattice, SHAPE, surfaces, focus)
+    raw = raw + noise * np.random.default_rng(5).standard_normal(raw.shape)
+    lenslets = correlation(raw, calibration)
+    found = dense(raw, calibration, lenslets, focus=focus if len(focus) > 1 else None)
+    layout = Layout.of(calibration, Patches.of(lenslets.values, calibration), None)
+    assert found.shape == render(raw, calibration, lenslets.values).shape
+    return found, truth(layout.y[:, None], layout.x)
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_a_disc_before_a_plane_has_its_outline_to_two_samples(name):
+    """A map of lenslets, 5 to 7 samples wide, would be 3 off."""
+    near, far = (-5.0, -7.0) if name == "Galilean" else (7.0, 5.0)
+    rng = np.random.default_rng(1)
+    paints = texture(rng, waves=12, longest=0.6), texture(rng, waves=12, longest=0.6)
+
+    def disc(y, x):
+        return np.hypot(y - 75, x - 85) < 42
+
+    surfaces = (paints[0], lambda y, x: near, disc), (paints[1], lambda y, x: far, None)
+    found, truth = measured(name, surfaces, lambda y, x: np.where(disc(y, x), near, far))
+    assert np.median(np.abs(found.values - truth)) < 0.03
+    inside, seen = truth == near, np.abs(found.values - near) < 1
+    beyond = np.where(inside, distance_transform_edt(inside), distance_transform_edt(~inside))
+    assert beyond[inside != seen].max(initial=0) <= 2
+    error = np.abs(found.values - truth)
+    assert np.corrcoef(found.confidence.ravel(), error.ravel())[0, 1] < -0.2
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_a_slanted_plane_is_smooth_and_right(name):
+    sign = -1 if name == "Galilean" else 1
+
+    def slant(y, x):
+        return sign * (6.0 + (x - 85) * 0.012 + (y - 75) * 0.004)
+
+    found, truth = measured(
+        name, ((texture(np.random.default_rng(1), waves=12, longest=0.6), slant, None),), slant
+    )
+    error = np.abs(found.values - truth)
+    assert np.median(error) < 0.015
+    assert np.quantile(error, 0.98) < 0.15
+    assert found.error is not None
+    assert np.mean(error) < np.mean(found.error) < 20 * np.mean(error)
+
+
+def test_libraries_progress_and_grid(xp):
+    lattice, focus = CAMERAS["square"]
+    surfaces = ((texture(np.random.default_rng(1), waves=12, longest=0.6), lambda y, x: 6.0, None),)
+    raw, calibration = traced_raw(lattice, (110, 120), surfaces, focus)
+    seen = []
+    found = dense(xp.asarray(raw.astype(np.float32)), calibration, samples=4, progress=seen.append)
+    assert namespace(found.values) is namespace(xp.asarray(raw))
+    assert seen == sorted(seen)
+    assert seen[-1] == pytest.approx(1)
+    assert sight_grid(calibration, 6.0, 4).shape == found.shape
+
+
+def test_an_even_picture_has_no_confidence():
+    lattice, _ = CAMERAS["square"]
+    raw, calibration = traced_raw(
+        lattice, (110, 120), ((lambda y, x: 1 + 0 * y, lambda y, x: 6.0, None),), [6]
+    )
+    found = dense(raw, calibration)
+    assert np.asarray(found.confidence).max() < 0.05
+    assert np.isfinite(found.values).all()
+
+
+def test_what_does_not_fit_is_refused(monkeypatch):
+    lattice, _ = CAMERAS["square"]
+    raw, calibration = traced_raw(
+        lattice, (110, 120), ((lambda y, x: 1 + 0 * y, lambda y, x: 6.0, None),), [6]
+    )
+    with pytest.raises(GeometryError, match="focus is"):
+        dense(raw, calibration, focus=[5, 6, 7])
+    lenslets = correlation(raw, calibration)
+    monkeypatch.setattr("lumigraph.core.memory.available", lambda: 400_000)
+    with pytest.raises(ValueError, match=r"sizes for .* samples needs"):
+        dense(raw, calibration, lenslets)
+
+
+def stepped(camera, near, far):
+    """Two textured planes above, a slanted one below; and its depth at (y, x) of the focused plane [m]."""
+    own = camera.object_grid
+    grid = Grid(tuple(int(1.2 * n) // 2 * 2 + 1 for n in own.shape), own.pitch, own.center)
+    paints = [texture(np.random.default_rng(seed), longest=1.0) for seed in (3, 4)]
+    width, unit = 0.75 * float(own.x.max()), 14e-6
+
+    def depth(y, x):
+        slant = near + (far - near) * np.clip((x / width + 1) / 2, 0, 1)
+        return np.where(y < 0, np.where(x < 0, near, far), slant + 0 * y)
+
+    planes = np.linspace(near, far, 8)
+    parts = []
+    for dz in planes:  # the slanted plane as thin ones that share its light
+        y, x = (a / (1 + dz / camera.object_distance) for a in (grid.y[:, None], grid.x))
+        share = np.clip(1 - np.abs(depth(y, x) - dz) / (planes[1] - planes[0]), 0, 1)
+        paint = np.where((y < 0) & (x >= 0), paints[1](y / unit, x / unit), paints[0](y / unit, x / unit))
+        parts.append(Slice(np.maximum(paint, 0) * share, grid, float(dz)))
+    return Scene(tuple(parts)), depth
+
+
+@pytest.mark.long  # 20 s of wave optics
+def test_wave_optics_of_two_planes_and_a_slanted_one():
+    """Within 5 % of the depth of field of the whole aperture, 1.7 mm, and edges within two samples."""
+    camera = FocusedPlenopticCamera(
+        wavelength="633 nm", object_distance="120 mm", main_lens={"focal_length": "60 mm"},
+        lenslets={"pitch": "150 um", "focal_length": "3 mm", "count": (11, 11), "magnification": 0.3},
+        sensor={"pixel_pitch": "6 um"},
+    )  # fmt: skip
+    scene, truth = stepped(camera, -1.5e-3, 3e-3)
+    raw, calibration = simulate(camera, scene, Incoherent(1e-2)), camera.calibration
+    lenslets = correlation(raw, calibration)
+    found = metric(dense(raw, calibration, lenslets), calibration, focal_length=0.06, object_distance=0.12)
+    grid = sight_grid(calibration, lenslets.values)
+    scale = camera.object_distance / camera.separation
+    y, x = grid.y[:, None] * scale, grid.x * scale
+    error = np.abs(found.values - truth(y, x))
+    field = next(row.value for row in camera.trade_offs() if row.name == "depth of field")
+    assert np.median(error) < 0.05 * field
+    above = y[:, 0] < -0.1e-3
+    wrong = (np.asarray(found.values)[above] > 0.75e-3) != (x > 0)
+    assert wrong.sum(1).max() <= 2
+    points = cloud(found, calibration, object_distance=0.12, lowest=0.0, grid=grid)
+    assert np.ptp(points.points[:, 2]) == pytest.approx(np.ptp(x), rel=0.05)
