@@ -15,7 +15,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
-from lumigraph.errors import FormatError, GeometryError
+from lumigraph.errors import FormatError, GeometryError, SamplingWarning
 from lumigraph.io import cameras as cameras_module
 from lumigraph.io import eslf, movie, views
 from lumigraph.io.cameras import from_cameras
@@ -84,7 +84,9 @@ def test_real_hci_views_are_the_right_way_round():
 def test_hci_names_and_parameters(tmp_path, rng):
     for k in range(6):
         io.save(np.full((4, 5), k, np.uint8), tmp_path / f"input_Cam{k:03}.png")
-    with pytest.raises(FormatError, match=r"holds 6 views input_CamNNN\.png, which make no square"):
+    with pytest.raises(
+        FormatError, match=r"holds 6 views up to input_Cam005\.png, and how many stand in a row"
+    ):
         io.open(tmp_path)
     (tmp_path / "parameters.cfg").write_text(
         "[extrinsics]\nnum_cams_x = 3\n[meta]\ndisp_min = -1\ndisp_max = 2.5\n"
@@ -96,6 +98,18 @@ def test_hci_names_and_parameters(tmp_path, rng):
     (tmp_path / "parameters.cfg").write_text("no section")
     with pytest.raises(FormatError, match="is not an INI file"):
         io.open(tmp_path)
+
+
+def test_a_star_of_hci_views_stands_where_its_numbers_say(tmp_path):
+    for k in (0, 2, 4, 6, 7, 8, 12, 16, 20, 24):
+        io.save(np.full((4, 5), k + 1, np.uint8), tmp_path / f"input_Cam{k:03}.png")
+    with pytest.warns(
+        SamplingWarning, match="holds 10 of 5 x 5 views; row/column 0/1, 0/3, 1/0 ... are left"
+    ):
+        found = io.open(tmp_path)
+    assert found.data[2, 2, 0, 0] == 13  # the middle
+    assert found.data[4, 4, 0, 0] == 1
+    assert found.valid.sum() == 10 * 4 * 5
 
 
 def test_stanford_names_tell_the_spacing_of_the_cameras(tmp_path):
@@ -111,8 +125,13 @@ def test_stanford_names_tell_the_spacing_of_the_cameras(tmp_path):
 def test_a_view_that_is_missing_or_different_is_named(tmp_path):
     for name in ("view_01_01", "view_01_02", "view_02_02"):
         io.save(np.ones((4, 5), np.uint8), tmp_path / f"{name}.png")
-    with pytest.raises(FormatError, match="holds 3 of 2 x 2 views: row 1, column 0 is missing"):
-        io.open(tmp_path)
+    with pytest.warns(SamplingWarning, match="holds 3 of 2 x 2 views; row/column 1/0 are left out"):
+        found = io.open(tmp_path)
+    np.testing.assert_array_equal(found.valid[..., 0, 0], [[True, False], [True, True]])
+    assert not found.data[0, 1].any()
+    io.save(found, tmp_path / "kept.zarr")
+    np.testing.assert_array_equal(io.open(tmp_path / "kept.zarr").valid, found.valid)
+    assert io.contents(tmp_path)[0].about == "3 of 2 x 2 views"
     io.save(np.ones((4, 6), np.uint8), tmp_path / "view_02_01.png")
     with pytest.raises(FormatError, match="all views must be alike"):
         io.open(tmp_path)

@@ -105,7 +105,12 @@ def _even(data: np.ndarray, middle: tuple[int, int]) -> tuple[np.ndarray, np.nda
     level = data.mean((2, 3, 4))
     lit = level > _DARK * level[middle]
     if not level[middle] > 0:
-        raise GeometryError("the middle view is dark everywhere. Decode a lit raw image.")
+        v, u = middle
+        raise GeometryError(
+            f"the middle view, {v}/{u} of {data.shape[0]} x {data.shape[1]}, is dark or missing, but "
+            "the map is made for it. Add its picture, leave out a row or column so that another one is in "
+            "the middle, or decode a lit raw image."
+        )
     gain = np.where(lit, level[middle] / np.where(lit, level, 1), 0) / white
     return np.sqrt(data * gain[:, :, None, None, None].astype(np.float32)), lit
 

@@ -9,7 +9,9 @@ Row 0, column 0 is the camera top left; `cameras` says how that becomes (v, u).
 import json
 import math
 import re
+import warnings
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,7 @@ import numpy as np
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
-from lumigraph.errors import FormatError
+from lumigraph.errors import FormatError, SamplingWarning
 from lumigraph.io import header, png, source, target, tiff
 from lumigraph.io.cameras import from_cameras, to_cameras
 
@@ -27,6 +29,7 @@ _POSITION = r"(-?\d{1,9}(?:\.\d{1,12})?)"
 _STANFORD = re.compile(rf"out_(\d{{1,4}})_(\d{{1,4}})_{_POSITION}_{_POSITION}_?\.png", re.I)
 _PLACED = re.compile(r".*?(\d{1,4})[_x\-](\d{1,4})\.(?:png|tiff?)", re.I)
 _MOST = 10_000  # views
+_NAMED = 3  # missing views in a warning
 _LONGEST_NUMBER = 400  # characters
 Files = dict[tuple[int, int], Path]
 
@@ -37,23 +40,22 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> LightField:
     Raises
     ------
     FormatError
-        No such names, a view that is missing, or pictures of several sizes.
+        No such names, or pictures of several sizes.
+
+    Warns
+    -----
+    SamplingWarning
+        Views are missing, as of a star or a cross: they are black and not `valid`.
     """
     files, spacing = _files(path)
     rows, columns = (max(place[k] for place in files) + 1 for k in (0, 1))
-    missing = next(((r, c) for r in range(rows) for c in range(columns) if (r, c) not in files), None)
-    if missing:
-        raise FormatError(
-            f"{path} holds {len(files)} of {rows} x {columns} views: row {missing[0]}, column "
-            f"{missing[1]} is missing. Copy the folder again."
-        )
     data = None
     for (row, column), file in sorted(files.items()):
         picture = _picture(file, max_pixels)
         if data is None:
             whole = (rows, columns, *picture.shape)
             source.check_size(path, whole, max_pixels)
-            data = np.empty(whole, picture.dtype)
+            data = np.zeros(whole, picture.dtype)
         if picture.shape != data.shape[2:] or picture.dtype != data.dtype:
             raise FormatError(
                 f"{file} has {picture.shape} {picture.dtype} but the first view has {data.shape[2:]} "
@@ -61,7 +63,25 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> LightField:
             )
         data[row, column] = picture
     assert data is not None  # _files found at least one
-    return _restored(path, data, spacing)
+    there = np.zeros((rows, columns), bool)
+    there[tuple(np.transpose(list(files)))] = True
+    return _without(path, _restored(path, data, spacing), there)
+
+
+def _without(path: Path, views: LightField, there: np.ndarray) -> LightField:
+    """The light field whose missing cameras (row, column) do not count."""
+    if there.all():
+        return views
+    missing = ", ".join(f"{row}/{column}" for row, column in np.argwhere(~there)[:_NAMED])
+    more = " ..." if (~there).sum() > _NAMED else ""
+    warnings.warn(
+        f"{path} holds {there.sum()} of {there.shape[0]} x {there.shape[1]} views; row/column {missing}"
+        f"{more} are left out. Copy the folder again if it should hold them.",
+        SamplingWarning,
+        stacklevel=2,
+    )
+    valid = np.broadcast_to(there[::-1, ::-1, None, None], views.data.shape[:4])
+    return replace(views, valid=valid)
 
 
 def save(views: LightField, path: Path, *, white: float | None = None) -> None:
@@ -141,7 +161,8 @@ def contents(path: Path) -> list[tuple[str, str, str]]:
     told = ""
     if {"disp_min", "disp_max"} <= known.keys():
         told = f", disparity {known['disp_min']:g} to {known['disp_max']:g} px"
-    return [("", "LightField", f"{rows} x {columns} views{told}")]
+    some = "" if len(files) == rows * columns else f"{len(files)} of "
+    return [("", "LightField", f"{some}{rows} x {columns} views{told}")]
 
 
 def _files(path: Path) -> tuple[Files, tuple[float, float]]:
@@ -166,12 +187,14 @@ def _files(path: Path) -> tuple[Files, tuple[float, float]]:
 
 
 def _hci(path: Path, found: dict[re.Match[str], Path]) -> Files:
-    known = parameters(path)
-    count = len(found)
-    columns = int(known.get("num_cams_x", math.isqrt(count)))
-    if columns < 1 or count % columns or ("num_cams_x" not in known and columns**2 != count):
+    numbers = [int(match[1]) for match in found]
+    count = max(len(found), max(numbers) + 1)  # the last of a star's views stands in a corner
+    columns = int(parameters(path).get("num_cams_x", math.isqrt(count)))
+    if columns < 1 or ("num_cams_x" not in parameters(path) and columns**2 != count):
         raise FormatError(
-            f"{path} holds {count} views input_CamNNN.png, which make no square. Copy it again."
+            f"{path} holds {len(found)} views up to input_Cam{max(numbers):03}.png, and how many stand in a "
+            "row is not known: no square has so many. Give num_cams_x in parameters.cfg, or name them "
+            "view_ROW_COLUMN."
         )
     return {divmod(int(match[1]), columns): file for match, file in found.items()}
 
