@@ -12,7 +12,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.progress import Progress, silent, within
 from lumigraph.core.raw import RawImage
-from lumigraph.depth.flat import Flat
+from lumigraph.depth.flat import Flat, grey
 from lumigraph.depth.smooth import Stiffness, update
 from lumigraph.depth.volume import cheapest, semi_global
 from lumigraph.errors import CalibrationError, GeometryError
@@ -165,15 +165,14 @@ class _MicroImages:
             f"comparing {indices.shape[0]} x {indices.shape[1]} micro-images of {2 * half + 1} px",
             "Crop the raw image to a part {factor:.1f}x smaller.",
         )
-        flat = Flat.of(raw, calibration)
-        image = gaussian_filter(flat.image, 0.5)
+        image = gaussian_filter(grey(raw), 0.5)
         steps = np.arange(-half, half + 1.0)
         centers = calibration.position(indices)
         y = centers[..., 0, None, None] + steps[:, None]
         x = centers[..., 1, None, None] + steps
         data = np.asarray(sample(image, y, x, "cubic"), np.float32)
         radius = np.hypot(steps[:, None], steps)
-        inside = radius <= flat.radius
+        inside = radius <= Flat.of(raw, calibration).radius
         return cls(data, inside.astype(np.float32), indices, calibration)
 
     def scores(self, sizes: np.ndarray, progress: Progress) -> np.ndarray:

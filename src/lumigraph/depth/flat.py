@@ -39,9 +39,7 @@ class Flat:
         That shading stands still while details move from one micro-image to the next, and would pull patches
         to 0. Without a white image it is what all micro-images have in common.
         """
-        image = to_numpy(as_float(raw.data)).astype(np.float32)
-        image = np.maximum(image.mean(2) if image.ndim == 3 else image, 0)
-        image /= float(np.quantile(image, 0.999)) or 1.0
+        image = grey(raw)
         y, x = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in image.shape), indexing="ij", sparse=True)
         i, j = calibration.index(y, x)
         center = calibration.position(np.stack([i, j], -1)).astype(np.float32)
@@ -61,6 +59,13 @@ class Flat:
     def light(self, distance: np.ndarray) -> np.ndarray:
         """Part of the light that reaches places at a distance from a centre, in half pitches."""
         return np.clip(np.polyval(np.float32(self.fall_off[::-1]), distance**2), *_FALL_OFF)
+
+
+def grey(raw: RawImage) -> np.ndarray:
+    """A raw image (y, x) over its white, the mean of its colours, float32."""
+    image = to_numpy(as_float(raw.data)).astype(np.float32)
+    image = np.maximum(image.mean(2) if image.ndim == 3 else image, 0)
+    return image / np.float32(float(np.quantile(image, 0.999)) or 1.0)
 
 
 def _shapes(dy: np.ndarray, dx: np.ndarray) -> list[np.ndarray]:

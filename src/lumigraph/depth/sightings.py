@@ -143,8 +143,8 @@ class Sightings:
         blur = np.stack([np.square(np.asarray(size, np.float32) - np.float32(sharp)) for sharp in self.focus])
         return np.exp(-(blur - blur.min(0)) / (2 * _SHARP**2))
 
-    def picture(self, size: np.ndarray) -> np.ndarray:
-        """The mean (y, x) of what the lenslets show of places of patches (y, x)."""
+    def picture(self, size: np.ndarray | float) -> np.ndarray:
+        """The mean (y, x) of what the lenslets show of places of a patch, one or (y, x)."""
         total, weights = np.zeros(self.shape, np.float32), np.full(self.shape, 1e-6, np.float32)
         for sight in self.around(size):
             total += sight.weight * sight.value
