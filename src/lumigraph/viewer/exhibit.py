@@ -15,6 +15,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.errors import LumigraphError
+from lumigraph.instruments.capabilities import WithMainLens
 from lumigraph.rendering import focus_range, focus_span
 
 _FEWEST_PIXELS = 200
@@ -146,7 +147,7 @@ def depth_map(views: LightField) -> DepthMap:
 
 
 def depth_of_pixels(
-    raw: RawImage, calibration: Calibration, focus: list[float] | None, camera: Any
+    raw: RawImage, calibration: Calibration, focus: list[float] | None, camera: WithMainLens | None
 ) -> DepthMap:
     """Depth of each pixel of a camera 2.0's picture, as `lumigraph depth` measures it.
 
