@@ -11,6 +11,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.elements import LensletArray
 from lumigraph.operators.cell_response import INFINITE, Axis, Lenslets, legendre, nodes
+from lumigraph.operators.lenslet_light import LensletLight
 from lumigraph.propagation import propagate
 from lumigraph.units import mm, nm, um
 
@@ -71,11 +72,28 @@ def light(y, x):
 
 
 def image_of(array, axes, center, limits=(INFINITE, INFINITE)):
-    """Field (y, x) on the samples of a cell, by `Lenslets`."""
+    """Field (y, x) on the samples of a cell, by `Lenslets` or lenslet by lenslet."""
+    lenslets = Lenslets(axes, array, WAVELENGTH, DISTANCE)
+    if array.shape != "square":
+        return one_by_one(lenslets, center, limits)
     y, x = (c + a.window for c, a in zip(center, axes, strict=True))
-    found = Lenslets(axes, array, WAVELENGTH, DISTANCE).response(center, limits)
-    field = found.down @ light(y[:, None], x) @ found.across.T
-    return field if found.core is None else (found.core @ field.ravel()).reshape(axes[0].samples, -1)
+    found = lenslets.response(center, limits)
+    return found.down @ light(y[:, None], x) @ found.across.T
+
+
+def one_by_one(lenslets, center, limits):
+    """The sum over the lenslets by `LensletLight`, with the phase that it leaves out."""
+    one, axes = LensletLight(lenslets, None, 0.0), lenslets.axes
+    (down, _), (across, _) = one.bases
+    field = np.zeros((axes[0].samples, axes[1].samples), complex)
+    for place, members in lenslets.rows(center, limits):
+        for x, focal_length in members:
+            at = [c + p + a.window for c, p, a in zip(center, (place, x), one.window, strict=True)]
+            around = (down @ light(at[0][:, None], at[1]) @ across.T).ravel()
+            few = (around @ one.kept @ one.matrix(place, x, focal_length)).reshape(one.modes[0].shape[1], -1)
+            field += one.carried(0, place) @ few @ one.carried(1, x).T
+    phase = (np.exp(1j * np.pi * a.image**2 / (WAVELENGTH * DISTANCE)) for a in axes)
+    return field * np.outer(*phase)
 
 
 def propagated(array, axes, center):

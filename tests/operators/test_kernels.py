@@ -9,7 +9,7 @@ import pytest
 import cameras
 from lumigraph.core.cache import Budget, ByteCache
 from lumigraph.instruments import PlenopticCamera
-from lumigraph.operators import blocks, kernels, point_images
+from lumigraph.operators import blocks, factors, few_points, kernels, point_images
 from lumigraph.operators.cells import Fineness
 from lumigraph.operators.kernels import matrix
 from lumigraph.operators.optics import Optics
@@ -162,7 +162,7 @@ def test_few_factors_give_the_block_back(rng):
     left, right = (np.linalg.qr(rng.standard_normal((n, 30)))[0] for n in (200, 90))
     strengths = 10.0 ** -np.arange(30)[:]
     dense = ((left * strengths) @ right.T).astype(np.float32)
-    found_left, found_right, kept = point_images.factors(dense, 3e-4)
+    found_left, found_right, kept = factors.factors(dense, 3e-4)
     np.testing.assert_allclose(kept[::-1], [1, 0.1, 1e-2, 1e-3], rtol=1e-3)
     np.testing.assert_allclose(found_left.T @ found_left, np.eye(4), atol=1e-5)
     assert np.linalg.norm(found_left @ found_right - dense) < 1.1e-4
@@ -172,12 +172,12 @@ def test_few_factors_give_the_block_back(rng):
 def test_a_block_of_many_patterns_is_not_cut_short(rng, points):
     """Few points stand in a cell where the main lens is small."""
     dense = rng.standard_normal((points, 50)).astype(np.float32)
-    left, right, _ = point_images.factors(dense, 1e-3)
+    left, right, _ = factors.factors(dense, 1e-3)
     np.testing.assert_allclose(left @ right, dense, atol=1e-4)
 
 
 def test_a_faint_block_has_no_factors(rng):
-    left, right, kept = point_images.factors(rng.random((20, 10)), 100.0)
+    left, right, kept = factors.factors(rng.random((20, 10)), 100.0)
     assert (left.shape, right.shape, kept.shape) == ((20, 0), (0, 10), (0,))
 
 
@@ -247,3 +247,16 @@ def test_images_have_the_same_bits_whether_the_operator_was_built_or_found(tmp_p
     for raw, back in images[1:]:
         np.testing.assert_array_equal(raw, images[0][0])
         np.testing.assert_array_equal(back, images[0][1])
+
+
+def test_the_points_chosen_of_a_block_give_the_others(rng):
+    """Points between others in a smooth block: a few give all, but for what is told to be left out."""
+    at = np.linspace(0, 1, 60)
+    block = np.exp(-(((at[:, None] - rng.random(300)) / 0.3) ** 2)).astype(np.float32)
+    found = few_points.chosen(block, 1e-2)
+    assert 4 < len(found.numbers) < 20
+    assert np.linalg.norm(found.weights @ block[found.numbers] - block) < 5e-2
+    turned = found.turned((6, 10), up=True, left=False)
+    plane = block.reshape(6, 10, 300)[::-1].reshape(60, 300)
+    np.testing.assert_allclose(plane[turned.numbers], block[found.numbers])
+    np.testing.assert_allclose(turned.weights @ plane[turned.numbers], plane, atol=2e-2)

@@ -27,10 +27,14 @@ from lumigraph.core.progress import Progress
 from lumigraph.core.threads import each
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.cell_response import INFINITE, Lenslets, Limits
+from lumigraph.operators.factors import Found, factors, weakest
+from lumigraph.operators.few_points import Chosen, Few, chosen, few
+from lumigraph.operators.lenslet_light import LensletLight, windows
+from lumigraph.operators.missing import Missing
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.places import INSIDE, Place, State, alike, flipped, inside, places, terms
-from lumigraph.operators.point_images import Apart, Few, Line, Lit, factors, few, lit, mirrored, wave
-from lumigraph.operators.sizes import build_bytes, states_of, symmetric, together
+from lumigraph.operators.point_images import Apart, Line, Lit, lit, mirrored, wave
+from lumigraph.operators.sizes import build_bytes, states_of, symmetric
 
 Offset = tuple[int, int]
 
@@ -42,6 +46,9 @@ Means = dict[Offset, np.ndarray]
 
 BORDER = 3.0
 """How much stronger than elsewhere factors are that are looked at in the border's blocks."""
+
+CHOSEN = 10.0
+"""The same of what the points that are chosen for the border leave out."""
 
 Job = tuple[int, tuple[int, ...]]
 
@@ -74,21 +81,6 @@ class Part:
         """The left one, of a part in factors."""
         assert self.left is not None  # a single block
         return self.left
-
-
-@dataclass(slots=True)
-class _Found:
-    """Factors of one block, more of them than needed at first."""
-
-    left: np.ndarray
-    right: np.ndarray
-    strength: np.ndarray
-    copies: int
-    mean: np.ndarray
-
-    def cut(self, least: float) -> Factors:
-        kept = self.strength > least
-        return self.left[:, kept], self.right[kept]
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,12 +140,18 @@ class Builder:
         self.optics, self.axes, self.progress, self.workers = optics, optics.axes, progress, workers
         distance = _cells.telecentric_distance(optics.camera)
         self.lenslets = Lenslets(self.axes, optics.array, optics.camera.wavelength, distance)
-        light = wave(optics.camera, optics.distance, self.axes, optics.margin(optics.reach))
+        axes, cells = self.axes, optics.margin(optics.reach)
+        if not optics.straight:
+            axes = windows(self.lenslets)
+            cells = [math.ceil(optics.lit / axis.size) for axis in axes]
+        light = wave(optics.camera, optics.distance, axes, cells)
         self.light = light.dimmed(optics.image_scale)
+        self.apart = None if optics.straight else LensletLight(self.lenslets, self.light, optics.lit)
         self.even = self.light.even, self.light.even and symmetric(optics.array)
         y, x = self.axes
         self.square = y == x and bool(np.allclose(self.light.data, self.light.data.T))
         self.norm = self.least = 0.0
+        self.chosen: dict[int, dict[Offset, Chosen]] = {}
 
     def periodic(self) -> tuple[list[Blocks], list[Means]]:
         """For each kind: blocks inside the array, and the mean images (samples,) of a cell's points."""
@@ -163,14 +161,14 @@ class Builder:
             self.progress(0.1 * (kind + 1) / kinds)
         return self._completed(found)
 
-    def _inside(self, state: State) -> dict[Offset, _Found]:
+    def _inside(self, state: State) -> dict[Offset, Found]:
         reach = self.optics.reach
-        images, (up, left) = self.images([state], reach)[state], self.even
+        images, (up, left) = self.images([state], reach, folded=True)[state], self.even
         if not self.least:
             own = images.line(0)(0)
             self.least = 0.02 * self.optics.fineness.rank * float(np.linalg.norm(own))
 
-        def piece(job: Job) -> tuple[float, dict[Offset, _Found]]:
+        def piece(job: Job) -> tuple[float, dict[Offset, Found]]:
             (dy, across), found, norm = job, {}, 0.0
             line = images.line(dy)
             for dx in across if left else self.signed(dy, across):
@@ -178,11 +176,22 @@ class Builder:
                 copies *= 2 if left and self.optics.cells.mirrored(dy, dx) != dx else 1
                 norm += copies * float(np.linalg.norm(block)) ** 2
                 found[dy, dx] = self._factored(block, copies)
+                if self.apart is not None:
+                    self._choose(state.kind, (dy, dx), block)
             return norm, found
 
         pieces = list(each(piece, self.jobs(up, reach), self.workers))
         self.norm += sum(norm for norm, _ in pieces) / self.optics.cells.kinds
         return {key: f for _, part in pieces for key, f in part.items()}
+
+    def _choose(self, kind: int, offset: Offset, block: np.ndarray) -> None:
+        """Points for the border, of a cell and those that it mirrors."""
+        found, (dy, dx), shape = chosen(block, CHOSEN * self.least), offset, self.optics.cells.points
+        for up in {False, self.even[0]}:
+            for left in {False, self.even[1]}:
+                side = self.optics.cells.mirrored(dy, dx) if left else dx
+                known = self.chosen.setdefault(kind, {})
+                known.setdefault((-dy if up else dy, side), found.turned(shape, up, left))
 
     def jobs(self, folded: bool, reach: tuple[int, int]) -> list[Job]:
         """Offsets that share work, those of dx and -dx together."""
@@ -212,10 +221,10 @@ class Builder:
         blocks = {key: (none, mean[None]) for key, mean in means.items()}
         return {key: mean[0] for key, (_, mean) in self._unfolded(blocks, self.even).items()}
 
-    def _completed(self, found: list[dict[Offset, _Found]]) -> tuple[list[Blocks], list[Means]]:
+    def _completed(self, found: list[dict[Offset, Found]]) -> tuple[list[Blocks], list[Means]]:
         """The factors that are strong enough, and the light of what is left out."""
         everything, result, means = [f for mine in found for f in mine.values()], [], []
-        least = _least(everything, self.optics.fineness.rank**2 * self.norm * len(found))
+        least = weakest(everything, self.optics.fineness.rank**2 * self.norm * len(found))
         even = np.ones((math.prod(self.optics.cells.points), 1), np.float32)
         for mine in found:
             blocks = self._unfolded({key: f.cut(least) for key, f in mine.items()}, self.even)
@@ -240,31 +249,52 @@ class Builder:
 
     def _border_blocks(self, wanted: Sequence[Place]) -> dict[Place, Blocks]:
         """Of some places: row after row of cells, so that what they share is computed once."""
-        found: dict[Place, dict[Offset, _Found]] = {place: {} for place in wanted}
-        jobs, groups = self.jobs(False, self.optics.near), together(self.optics, wanted)
-        known: dict[State, Apart | Few] = {}
-        for number, group in enumerate(groups):
-            states = states_of(group)
-            known = {state: images for state, images in known.items() if state in states}
-            known |= self.images(states - known.keys(), self.optics.near)
-            for done, part in enumerate(each(self._border_piece(group, known), jobs, self.workers)):
-                for (place, offset), block in part.items():
-                    found[place][offset] = block
-                self.progress(0.1 + 0.9 * (number + (done + 1) / len(jobs)) / len(groups))
         # A row of cells is a small part of the picture: its error may be larger.
         budget = (2 * self.optics.fineness.rank) ** 2 * self.norm
-        result = {}
-        for place in wanted:
-            blocks = found.pop(place)
-            least = _least(blocks.values(), budget)
+        result, pieces = {}, self._row_by_row if self.apart is None else self._place_by_place
+        for place, blocks in pieces(wanted):
+            least = weakest(blocks.values(), budget)
             cut = {key: f.cut(least) for key, f in blocks.items()}
             result[place] = self._unfolded(cut, self._folds(place))
         return result
 
+    def _row_by_row(self, wanted: Sequence[Place]) -> Iterator[tuple[Place, dict[Offset, Found]]]:
+        found: dict[Place, dict[Offset, Found]] = {place: {} for place in wanted}
+        jobs, known = self.jobs(False, self.optics.near), self.images(states_of(wanted), self.optics.near)
+        for done, part in enumerate(each(self._border_piece(wanted, known), jobs, self.workers)):
+            for (place, offset), block in part.items():
+                found[place][offset] = block
+            self.progress(0.1 + 0.9 * (done + 1) / len(jobs))
+        for place in wanted:
+            yield place, found.pop(place)
+
+    def _place_by_place(self, wanted: Sequence[Place]) -> Iterator[tuple[Place, dict[Offset, Found]]]:
+        jobs, mirrored = self.jobs(False, self.optics.near), self.optics.cells.mirrored
+        offsets = [(dy, dx) for dy, across in jobs for dx in self.signed(dy, across)]
+        missing, least = self._missing(-1, ()), BORDER * self.least
+        for done, place in enumerate(sorted(wanted, key=lambda place: place.state[::-1])):
+            if missing.kind != place.kind:
+                missing = self._missing(place.kind, offsets)
+            up, left = self._folds(place)
+            mine = [
+                (dy, dx)
+                for dy, dx in missing.chosen
+                if not (up and dy < 0) and not (left and dx < mirrored(dy, dx))
+            ]
+            blocks = each(missing.factors(terms(place), least), mine, self.workers)
+            yield place, dict(zip(mine, blocks, strict=True))
+            self.progress(0.1 + 0.9 * (done + 1) / len(wanted))
+
+    def _missing(self, kind: int, offsets: Iterable[Offset]) -> Missing:
+        assert self.apart is not None  # asked by the caller
+        near = {offset: self.chosen[kind][offset] for offset in offsets}
+        near = {offset: points for offset, points in near.items() if len(points.numbers)}
+        return Missing(self.lenslets, self.apart, self.optics.cells, near, kind, self.workers)
+
     def _border_piece(
         self, wanted: Sequence[Place], known: dict[State, Apart | Few]
-    ) -> Callable[[Job], dict[tuple[Place, Offset], _Found]]:
-        def piece(job: Job) -> dict[tuple[Place, Offset], _Found]:
+    ) -> Callable[[Job], dict[tuple[Place, Offset], Found]]:
+        def piece(job: Job) -> dict[tuple[Place, Offset], Found]:
             (dy, across), found = job, {}
             shared = _Shared(self, known, dy)
             for dx in across:
@@ -279,23 +309,33 @@ class Builder:
 
         return piece
 
-    def images(self, states: Iterable[State], reach: tuple[int, int]) -> dict[State, Apart | Few]:
-        """Of points of `reach` cells to all sides, with the lenslets of each state."""
-        cells, light = self.optics.cells, self.light
+    def images(
+        self, states: Iterable[State], reach: tuple[int, int], *, folded: bool = False
+    ) -> dict[State, Apart | Few]:
+        """Of points of `reach` cells to all sides, with the lenslets of each state; folded, of some sides."""
+        states = list(states)
+        if self.apart is not None:
+            folds = self.even if folded else (False, False)
+            return {state: self._few(self.apart, state, reach, folds) for state in states}
         behind: dict[Limits, Lit] = {}
 
-        def of(state: State) -> Apart | Few:
-            # Any cell of the kind: only the border makes a difference.
-            response = self.lenslets.response(cells.middle(state.kind), (state.y, state.x))
-            if response.core is not None:
-                return few(light, response, self.axes, self.optics.margin(reach), cells.staggered)
+        def of(state: State) -> Apart:
+            response = self.lenslets.response(self.optics.cells.middle(state.kind), (state.y, state.x))
             if state.x not in behind:
                 columns = self._columns(self.folded(1, state.x), reach[1])
-                behind[state.x] = lit(light, response.across, self.axes[1], columns)
+                behind[state.x] = lit(self.light, response.across, self.axes[1], columns)
             return Apart(behind[state.x], response.down, self.axes)
 
-        states = list(states)
         return dict(zip(states, each(of, states, self.workers), strict=True))
+
+    def _few(
+        self, light: LensletLight, state: State, reach: tuple[int, int], folds: tuple[bool, bool]
+    ) -> Few:
+        # Any cell of the kind: only the border makes a difference.
+        cells, margin = self.optics.cells, self.optics.margin(reach)
+        rows = list(self.lenslets.rows(cells.middle(state.kind), (state.y, state.x)))
+        y, x = (range(0 if fold else -m, m + 1) for m, fold in zip(margin, folds, strict=True))
+        return few(light, rows, (y, x), self.workers, staggered=cells.staggered)
 
     def _columns(self, folded: bool, reach: int) -> range:
         return range(0 if folded else -reach, reach + 1)
@@ -334,9 +374,9 @@ class Builder:
                         result[key] = self._turned(pair, up, left)
         return result
 
-    def _factored(self, block: np.ndarray, copies: int, coarser: float = 1.0) -> _Found:
+    def _factored(self, block: np.ndarray, copies: int, coarser: float = 1.0) -> Found:
         left, right, strength = factors(block, coarser * self.least)
-        return _Found(left, right, strength, copies, block.mean(0, dtype=np.float64))
+        return Found(left, right, strength, copies, block.mean(0, dtype=np.float64))
 
 
 class _Shared:
@@ -378,13 +418,3 @@ class _Shared:
         if state not in self.lines:
             self.lines[state] = self.known[state].line(self.dy)
         return self.lines[state](dx)
-
-
-def _least(found: Iterable[_Found], budget: float) -> float:
-    """The strength up to which all factors together stay within a squared norm."""
-    strengths = np.concatenate([f.strength for f in found])
-    copies = np.concatenate([np.full(len(f.strength), f.copies) for f in found])
-    order = np.argsort(strengths)
-    spent = np.cumsum(copies[order] * strengths[order] ** 2)
-    k = int(np.searchsorted(spent, budget))
-    return float(strengths[order[k - 1]]) if k else 0.0

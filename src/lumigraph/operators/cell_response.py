@@ -26,9 +26,6 @@ SLACK = 1.04
 STEP = 2
 """Points between those of the window: an amplitude has half the band of its intensity."""
 
-FAINTEST = 1e-5
-"""Weight of a line of light that is left out."""
-
 Pair = tuple[float, float]
 
 Limits = Pair
@@ -94,19 +91,16 @@ class Axis:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
-    """Field on a cell's samples: ``core @ vec(down @ light @ across.T)``.
+    """Field on a cell's samples behind square lenslets: ``down @ light @ across.T``.
 
     Parameters
     ----------
     down, across
-        (k, window) and (l, window), complex.
-    core
-        (samples, k l), or None where k and l are the cell's samples themselves.
+        (samples along y, window) and (samples along x, window), complex.
     """
 
     down: np.ndarray
     across: np.ndarray
-    core: np.ndarray | None
 
 
 class Lenslets:
@@ -138,14 +132,11 @@ class Lenslets:
         return self._bases[0][0], self._bases[1][0]
 
     def response(self, center: Pair, limits: tuple[Limits, Limits] = (INFINITE, INFINITE)) -> Response:
-        """Of the cell centred at (y, x) [m].
+        """Of the cell centred at (y, x) [m], behind square lenslets; others: `lenslet_light`.
 
         Only lenslets whose centres lie within the limits, along y and x from the cell's centre [m], exist.
         """
-        if self.array.shape == "square":
-            pieces = [self.along(k, center[k], limits[k]) for k in (0, 1)]
-            return Response(pieces[0], pieces[1], None)
-        return self._dense(center, limits)
+        return Response(*(self.along(k, center[k], limits[k]) for k in (0, 1)))
 
     def along(self, which: int, center: float, limits: Limits) -> np.ndarray:
         """Square lenslets: the field (samples, window) along one axis."""
@@ -161,23 +152,6 @@ class Lenslets:
             weight = weight * axis.fade(at, step)
             total = total + (fresnel(axis.image, at, squared) * (weight * phase)) @ light(at)
         return total @ coefficients
-
-    def _dense(self, center: Pair, limits: tuple[Limits, Limits]) -> Response:
-        """Lenslets of any shape: line after line across each row of them."""
-        (down, light), (across, _) = self._bases
-        n, m = [axis.samples for axis in self.axes], (len(down), len(across))
-        core = np.zeros((n[0] * m[0], n[1] * m[1]), np.complex64)
-        at, weight, _ = self.lines
-        for row, members in self.rows(center, limits):
-            shade = weight * self.axes[0].fade(row + at, self.array.lattice.pitch)
-            seen = shade > FAINTEST * weight
-            places = (row + at)[seen]
-            spread = fresnel(self.axes[0].image, places, self.optics[0] * self.optics[1]) * shade[seen]
-            along_y = spread[:, None, :] * light(places).T  # (n_y, m_y, lines)
-            along_x = np.sum([self.member(*member) for member in members], axis=0)  # (lines, n_x m_x)
-            core += along_y.reshape(-1, len(places)).astype(np.complex64) @ along_x[seen]
-        core = core.reshape(n[0], m[0], n[1], m[1]).transpose(0, 2, 1, 3)
-        return Response(down, across, core.reshape(n[0] * n[1], m[0] * m[1]))
 
     def rows(self, center: Pair, limits: tuple[Limits, Limits]) -> Iterator[tuple[float, list[Pair]]]:
         """Rows of lenslets: their y, and (x, focal length) of their members."""

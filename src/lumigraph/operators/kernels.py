@@ -56,6 +56,9 @@ HELD = 2.0**32
 LONGEST = 3e14
 """Operations that building may take: some 50 minutes of one processor that does 1e11 a second."""
 
+A_MINUTE = 6e12
+"""Operations in a minute of that processor."""
+
 
 def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None = None) -> Matrix | Streamed:
     """Of one depth: from memory, from disk, or built; streamed where building takes more than `HELD`.
@@ -104,15 +107,24 @@ def _require(optics: Optics) -> None:
         return
     coarser = (a for a in (1e-4, 1e-3, 1e-2) if a > optics.fineness.accuracy)
     others = (Optics.of(optics.camera, optics.distance, a).bricks for a in coarser)
-    fits = next((o.fineness.accuracy for o in others if _held(o) or _streams(o)), None)
-    remedy = "Use slower lenslets" if fits is None else f"An accuracy of {fits:g} fits: ask for that"
+    fits = next((o for o in others if _held(o) or _streams(o)), None)
+    remedy = "Use slower lenslets" if fits is None else f"{_price(fits)}: ask for that"
     if (operations := build_operations(optics)) > LONGEST:
         raise SamplingError(
-            f"the periodic operator takes {operations:.0e} operations to build, {operations / 6e12:.0f} min "
-            f"of a processor that does 1e11 a second; {LONGEST:.0e} are allowed. {remedy}, or use Snapshots."
+            f"the periodic operator takes {operations:.0e} operations to build, {operations / A_MINUTE:.0f} "
+            f"min of a processor that does 1e11 a second; {LONGEST:.0e} are allowed. "
+            f"{remedy}, or use Snapshots."
         )
     needed = stream_bytes(optics) if optics.straight else build_bytes(optics)
     memory.require(needed, "the periodic operator", f"{remedy}, or use Snapshots.", SamplingError)
+
+
+def _price(fits: Optics) -> str:
+    """What an operator that can be had takes."""
+    needed = build_bytes(fits) if _held(fits) else stream_bytes(fits)
+    minutes = build_operations(fits) / A_MINUTE
+    time = f", some {minutes:.2g} min of a processor" if minutes > 1 else ""
+    return f"An accuracy of {fits.fineness.accuracy:g} fits ({needed / 2**30:.2g} GiB{time})"
 
 
 def _build(optics: Optics, progress: Progress | None = None) -> dict[str, np.ndarray]:

@@ -12,7 +12,7 @@ from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.cell_response import SLACK, Axis
 from lumigraph.operators.cells import Cells, Fineness
 
-VERSION = 9
+VERSION = 10
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 
@@ -96,6 +96,11 @@ class Optics:
         return y, x
 
     @property
+    def lit(self) -> float:
+        """How far from a point's image lenslets are lit [m]: as far as their light is followed."""
+        return self.fineness.reach(*self._spread) + 2 * self.array.lattice.pitch
+
+    @property
     def near(self) -> tuple[int, int]:
         """Cells to which a point's light is followed at the border of the array."""
         far = self.fineness.near(*self._spread)
@@ -117,23 +122,9 @@ class Optics:
         return blur + self.spill, max(_cells.diffraction(self.camera), cut)
 
     def images_bytes(self, reach: tuple[int, int]) -> float:
-        """Memory that images of points `reach` cells around are computed from [bytes]."""
-        samples = math.prod(self.cells.samples)
-        if self.straight:
-            (y, x), n = self.axes, 2 * reach[0] + 1
-            return 8.0 * (n * y.points + 2 * y.margin) * (2 * reach[1] + 1) * x.points * x.samples
-        return 8.0 * samples * math.prod(self.few(reach))
-
-    def line_bytes(self, reach: tuple[int, int]) -> float:
-        """As `images_bytes`, of all points of one row of cells behind lenslets that are not square."""
-        return 8.0 * math.prod(self.cells.samples) * self.cells.points[0] * self.few(reach)[1]
-
-    @property
-    def core_bytes(self) -> float:
-        """Memory of what such lenslets do to the light around one cell [bytes]."""
-        return 8.0 * math.prod(
-            axis.samples * (2 * axis.band * (axis.size + 2 * axis.neighbourhood) + 12) for axis in self.axes
-        )
+        """Memory that images of points `reach` cells around square lenslets are made from [bytes]."""
+        (y, x), n = self.axes, 2 * reach[0] + 1
+        return 8.0 * (n * y.points + 2 * y.margin) * (2 * reach[1] + 1) * x.points * x.samples
 
     def few(self, reach: tuple[int, int]) -> tuple[float, float]:
         """Points along y and x from whose light follows that of all, some more than the band has."""

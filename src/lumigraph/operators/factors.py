@@ -1,0 +1,73 @@
+"""Blocks of a matrix in factors: as many as the light there has patterns, the strongest of all blocks."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+_BLOCK = 2**21
+"""Numbers worked on at a time."""
+
+
+@dataclass(slots=True)
+class Found:
+    """tuple[np.ndarray, np.ndarray] of one block, more of them than needed at first."""
+
+    left: np.ndarray
+    right: np.ndarray
+    strength: np.ndarray
+    copies: int
+    mean: np.ndarray
+
+    def cut(self, least: float) -> tuple[np.ndarray, np.ndarray]:
+        """Those stronger than `least`."""
+        kept = self.strength > least
+        return self.left[:, kept], self.right[kept]
+
+
+def factors(block: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """``block ≈ left @ right``, (points, r) and (r, samples), and their strengths above `least`.
+
+    Most blocks have few: a sketch of a fifth of the points finds them, or finds that it needs them all.
+    """
+    points = block.shape[0]
+    if np.linalg.norm(block) <= least:
+        return np.zeros((points, 0)), np.zeros((0, block.shape[1])), np.zeros(0)
+    sketch = np.random.default_rng(0).standard_normal((points, math.ceil(points / 5)), np.float32)
+    for basis in (np.linalg.qr(block @ (block.T @ sketch))[0], None):
+        seen = block if basis is None else basis.T @ block
+        left, right, strength, weakest = _strongest(seen, least)
+        if weakest < least / 2:
+            break
+    return left if basis is None else basis @ left, right, strength
+
+
+def strongest(rows: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """As `factors`, of few rows that need no sketch."""
+    return _strongest(rows, least)[:3]
+
+
+def _strongest(rows: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Orthonormal left factors, right ones, their strengths above `least`, and the weakest of all."""
+    strength, vectors = np.linalg.eigh(_products(rows))
+    strength = np.sqrt(np.maximum(strength, 0))
+    kept = strength > least
+    left = vectors[:, kept].astype(np.float32)
+    return left, left.T @ rows, strength[kept], float(strength[0])
+
+
+def _products(rows: np.ndarray) -> np.ndarray:
+    """``rows @ rows.T`` in double precision, from some columns at a time."""
+    parts = np.array_split(rows, math.ceil(rows.size / _BLOCK), axis=1)
+    return np.sum([part @ part.T for part in (p.astype(np.float64) for p in parts)], axis=0)
+
+
+def weakest(found: Iterable[Found], budget: float) -> float:
+    """The strength up to which all factors together stay within a squared norm."""
+    strengths = np.concatenate([f.strength for f in found])
+    copies = np.concatenate([np.full(len(f.strength), f.copies) for f in found])
+    order = np.argsort(strengths)
+    spent = np.cumsum(copies[order] * strengths[order] ** 2)
+    k = int(np.searchsorted(spent, budget))
+    return float(strengths[order[k - 1]]) if k else 0.0

@@ -1,0 +1,136 @@
+"""Images of the points of a cell behind lenslets of any shape, from few of the points.
+
+A field is band-limited in the point's place too, so that those of some points give those of all. What is
+faint besides, as where lenslets are missing, follows from the intensities of fewer points still (`Chosen`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import scipy.linalg
+
+from lumigraph.core.threads import each
+from lumigraph.operators.cell_response import Axis
+from lumigraph.operators.lenslet_light import LensletLight, Row
+from lumigraph.operators.point_images import Line, intensity, mirrored
+
+AT_A_TIME = 2**20
+"""Numbers worked on at a time."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Few:
+    """Images of points behind lenslets of any shape, from the fields of few of the points.
+
+    Parameters
+    ----------
+    fields
+        (few along y, few along x, samples).
+    down, across
+        (points, few) along y and x, for the points of all cells.
+    cells
+        Of the points, along y and x, counted from the image's.
+    staggered
+        Whether odd rows of cells stand half a cell towards larger x.
+    """
+
+    fields: np.ndarray
+    down: np.ndarray
+    across: np.ndarray
+    cells: tuple[range, range]
+    staggered: bool = False
+
+    def line(self, dy: int) -> Line:
+        """As `point_images.Apart.line`."""
+        y, x = (len(m) // len(c) for m, c in zip((self.down, self.across), self.cells, strict=True))
+        parts, samples = self.fields.view(np.float32), self.fields.shape[2]
+        down = self.down[(dy - self.cells[0].start) * y :][:y]
+        rows = (down @ parts.reshape(len(parts), -1)).reshape(y, *parts.shape[1:])
+        first = dy % 2 * x // 2 if self.staggered else 0
+
+        def block(dx: int) -> np.ndarray:
+            across = self.across[first + (dx - self.cells[1].start) * x :][:x]
+            result = np.empty((y, x, samples), np.float32)
+            for row, image in zip(rows, result, strict=True):
+                intensity((across @ row).view(np.complex64), image)
+            return result.reshape(y * x, samples)
+
+        return block
+
+
+def few(
+    light: LensletLight, lenslets: Sequence[Row], cells: tuple[range, range], workers: int, *, staggered: bool
+) -> Few:
+    """For the points of some cells along y and x."""
+    (rows, along_y), (columns, along_x) = map(_skeleton, light.axes, cells)
+    samples = light.axes[0].samples * light.axes[1].samples
+    fields = np.empty((len(rows), len(columns), samples), np.complex64)
+
+    _ = light.table  # computed once, not by each thread
+    step = max(1, AT_A_TIME // (len(columns) * samples))
+
+    def fill(first: int) -> None:
+        mine = fields[first : first + step]
+        numbers = np.stack(np.meshgrid(rows[first : first + step], columns, indexing="ij"), axis=-1)
+        mine[:] = light.amplitudes(numbers.reshape(-1, 2), lenslets).reshape(mine.shape)
+
+    for _ in each(fill, range(0, len(rows), step), workers):
+        pass
+    return Few(fields, along_y, along_x, cells, staggered)
+
+
+@cache
+def _skeleton(axis: Axis, cells: range) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of few points of some cells, and the matrix (points, few) from them to all.
+
+    Discrete prolate sequences hold what the band lets through; rows of theirs that are far from dependent
+    are found by a pivoted QR decomposition.
+    """
+    points = np.arange(cells.start * axis.points, cells.stop * axis.points)
+    at = points * (axis.size / axis.points)
+    strength, vectors = np.linalg.eigh(np.sinc(2 * axis.band * (at[:, None] - at)))
+    basis = vectors[:, strength > 1e-10 * strength[-1]]
+    chosen = np.asarray(scipy.linalg.qr(basis.T, mode="r", pivoting=True)[-1])
+    chosen = np.sort(chosen[: basis.shape[1]])
+    matrix = np.linalg.solve(basis[chosen].T, basis.T).T
+    return points[chosen], matrix.astype(np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chosen:
+    """Some points of a cell, from whose images those of all follow.
+
+    Parameters
+    ----------
+    numbers
+        (n,), of the cell's points.
+    weights
+        (points, n).
+    """
+
+    numbers: np.ndarray
+    weights: np.ndarray
+
+    def turned(self, shape: tuple[int, int], up: bool, left: bool) -> "Chosen":
+        """In the mirrored cell of (y, x) points."""
+        numbers = np.arange(len(self.weights)).reshape(shape)
+        numbers = numbers[:: -1 if up else 1, :: -1 if left else 1].ravel()
+        return Chosen(numbers[self.numbers], mirrored(self.weights, shape, up, left))
+
+
+def chosen(block: np.ndarray, least: float) -> Chosen:
+    """Points of a block (points, samples) that give the others but for `least`, by some of its samples.
+
+    A pivoted QR decomposition takes point after point that those before tell least of.
+    """
+    points, samples = block.shape
+    some = np.random.default_rng(0).permutation(samples)[: max(64, points // 2)]
+    triangle, order = scipy.linalg.qr(block[:, np.sort(some)].T, mode="r", pivoting=True)[-2:]
+    triangle = np.asarray(triangle)
+    rank = int((np.abs(np.diag(triangle)) * np.sqrt(samples / len(some)) > least).sum())
+    weights = np.empty((points, rank), np.float32)
+    if rank:
+        weights[order] = scipy.linalg.solve_triangular(triangle[:rank, :rank], triangle[:rank]).T
+    return Chosen(np.asarray(order[:rank]), weights)

@@ -1,0 +1,187 @@
+r"""Light of one lenslet at a time: how all that do not have two axes apart bring a point's light to a cell.
+
+Light behind a lenslet has few degrees of freedom, on both sides: band-limited light within its edge, and
+
+.. math:: E(s) = \frac{1}{i \lambda b} e^{i \pi s^2 / (\lambda b)} \int G(w) \, T(w) \,
+          e^{i \pi w^2 / (\lambda b)} \, e^{-2 \pi i s w / (\lambda b)} \, d^2w
+
+over a cell, whose first phase no intensity shows. Between the two stands a small matrix for each place of a
+lenslet and each focal length, by Gauss-Legendre quadrature line by line. Which lenslets exist is but a choice
+of those that are added up.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from lumigraph.operators.cell_response import STEP, Axis, Lenslets, legendre, nodes
+from lumigraph.operators.point_images import Wave, through
+
+Pair = tuple[float, float]
+
+Row = tuple[float, Sequence[Pair]]
+"""Lenslets that stand in a row: their y from a cell's centre [m], and their x and focal length."""
+
+FAINTEST = 1e-6
+"""Part of a light's amplitude that its few numbers may leave out."""
+
+AROUND = 6.0
+"""How far beyond a lenslet's edge light is sampled, in periods of the band."""
+
+
+class LensletLight:
+    """Amplitudes on a cell's samples behind single lenslets.
+
+    Parameters
+    ----------
+    lenslets
+        Of the array.
+    light
+        Of a point.
+    widest
+        Distances from the point's image at which a lenslet is lit [m].
+    """
+
+    def __init__(self, lenslets: Lenslets, light: Wave, widest: float) -> None:
+        self.lenslets, self.axes, self.squared = lenslets, lenslets.axes, math.prod(lenslets.optics)
+        self.window = windows(lenslets)
+        self.bases = [axis.basis() for axis in self.window]
+        self.modes = [_modes(a, h, self.squared) for a, h in zip(self.axes, _half(lenslets), strict=True)]
+        self._known: dict[tuple[float, float, float], np.ndarray] = {}
+        self._carriers: dict[tuple[int, float], np.ndarray] = {}
+        self.light, self.widest = light, widest
+
+    @cached_property
+    def kept(self) -> np.ndarray:
+        """Orthonormal (numbers along y times along x, q): what of the light around a lenslet it sees."""
+        (_, down), (_, across) = self.bases
+        lines, weight, chords = self.lenslets.lines
+        along_x = np.array([_gram(across, chord) for chord in chords])
+        along_y = down(lines)
+        products = np.einsum("l,la,lb->lab", weight, along_y, along_y).reshape(len(lines), -1)
+        n, m = along_y.shape[1], along_x.shape[1]
+        gram = (products.T @ along_x.reshape(len(lines), -1)).reshape(n, n, m, m)
+        strength, vectors = np.linalg.eigh(gram.transpose(0, 2, 1, 3).reshape(n * m, n * m))
+        return vectors[:, strength > FAINTEST**2 * strength[-1]].astype(np.float32)
+
+    @cached_property
+    def table(self) -> tuple[np.ndarray, tuple[int, int]]:
+        """Light (rows, columns, q) in a lenslet, by the point's number from there, and the first number."""
+        y, x = self.window
+        counts = [math.ceil(self.widest * axis.points / axis.size) for axis in (y, x)]
+        down, across = (coefficients.astype(np.complex64) for coefficients, _ in self.bases)
+        numbers = [np.arange(-n, n + axis.points) for n, axis in zip(counts, (y, x), strict=True)]
+        behind = through(self.light, across, x, numbers[1])
+        table = np.empty((len(numbers[0]), len(numbers[1]), self.kept.shape[1]), np.complex64)
+        for row, number in zip(table, numbers[0], strict=True):
+            top = -y.margin - number - self.light.first[0]
+            part = behind[top : top + STEP * down.shape[1] : STEP].reshape(down.shape[1], -1)
+            part = (down @ part).reshape(len(down), len(row), -1).transpose(1, 0, 2)
+            row[:] = part.reshape(len(row), -1) @ self.kept
+        return table, (-counts[0], -counts[1])
+
+    def lit(self, numbers: np.ndarray, y: float, x: float) -> np.ndarray | None:
+        """Light (n, q) of points (n, 2) in a lenslet at (y, x) from the cell; None where all is faint."""
+        table, first = self.table
+        from_lens = [
+            numbers[:, k] - round(at * axis.points / axis.size) - first[k]
+            for k, (at, axis) in enumerate(zip((y, x), self.axes, strict=True))
+        ]
+        inside = [(n >= 0) & (n < size) for n, size in zip(from_lens, table.shape[:2], strict=True)]
+        if not (seen := inside[0] & inside[1]).any():
+            return None
+        found = table[from_lens[0] * seen, from_lens[1] * seen]
+        found[~seen] = 0
+        return found
+
+    def amplitudes(self, numbers: np.ndarray, rows: Sequence[Row]) -> np.ndarray:
+        """(n, samples) of points (n, 2), summed over the lenslets of some rows."""
+        total = np.zeros((len(numbers), *(axis.samples for axis in self.axes)), np.complex64)
+        for row in rows:
+            if (seen := self.across(numbers, row)) is not None:
+                total += self.carried(0, row[0]) @ seen
+        return total.reshape(len(numbers), -1)
+
+    def across(self, numbers: np.ndarray, row: Row) -> np.ndarray | None:
+        """Amplitudes (n, modes along y, samples along x) behind a row; None where all of it is dark."""
+        (y, members), total = row, None
+        n, m = (modes.shape[1] for modes in self.modes)
+        for x, focal_length in members:
+            if (lit := self.lit(numbers, y, x)) is not None:
+                few = (lit @ self.matrix(y, x, focal_length)).reshape(-1, m) @ self.carried(1, x).T
+                total = few if total is None else np.add(total, few, out=total)
+        return None if total is None else total.reshape(len(numbers), n, -1)
+
+    def carried(self, which: int, place: float) -> np.ndarray:
+        """Amplitudes (samples, modes) along y (0) or x (1) of the few numbers of a lenslet at a place."""
+        if (key := (which, place)) not in self._carriers:
+            turn = np.exp(-2j * np.pi / self.squared * place * self.axes[which].image)
+            self._carriers[key] = (turn[:, None] * self.modes[which]).astype(np.complex64)
+        return self._carriers[key]
+
+    def matrix(self, y: float, x: float, focal_length: float) -> np.ndarray:
+        """From light in a lenslet at (y, x) to the few numbers on a cell: (q, numbers)."""
+        if (key := (y, x, focal_length)) not in self._known:
+            self._known[key] = self._quadrature(y, x, focal_length)
+        return self._known[key]
+
+    def _quadrature(self, y: float, x: float, focal_length: float) -> np.ndarray:
+        (_, down), (_, across) = self.bases
+        wavelength = self.lenslets.optics[0]
+        pitch, (lines, weight, chords) = self.lenslets.array.lattice.pitch, self.lenslets.lines
+        bend = -1 / (wavelength * focal_length) + 1 / self.squared
+        turn = np.exp(1j * np.pi * (bend * lines**2 + (2 * lines * y + y**2) / self.squared))
+        seen = self._seen(0, lines) * (turn * weight * self.axes[0].fade(y + lines, pitch))
+        along_y = (seen[:, None, :] * down(lines).T).reshape(-1, len(lines))
+        chords, like = np.unique(chords.round(12), return_inverse=True)
+        along_x = []
+        for chord in chords.tolist():
+            at, share = legendre(
+                -chord, chord, nodes(chord, focal_length, self.axes[1], self.lenslets.optics)
+            )
+            turn = np.exp(1j * np.pi * (bend * at**2 + (2 * at * x + x**2) / self.squared))
+            seen = self._seen(1, at) * (turn * share * self.axes[1].fade(x + at, pitch))
+            along_x.append((seen @ across(at)).ravel())
+        both = along_y.astype(np.complex64) @ np.array(along_x, np.complex64)[like]
+        (n, a), (m, b) = (
+            (len(seen.T), base[0].shape[0]) for seen, base in zip(self.modes, self.bases, strict=True)
+        )
+        both = both.reshape(n, a, m, b).transpose(0, 2, 1, 3).reshape(n * m, a * b)
+        return np.ascontiguousarray((both @ self.kept).T)
+
+    def _seen(self, which: int, at: np.ndarray) -> np.ndarray:
+        """Few numbers (modes, nodes) of what nodes of a lenslet, counted from its middle, bring to a cell."""
+        turn = np.exp(-2j * np.pi / self.squared * self.axes[which].image[:, None] * at)
+        return self.modes[which].conj().T @ turn / math.sqrt(self.squared)
+
+
+def windows(lenslets: Lenslets) -> tuple[Axis, Axis]:
+    """Of the light around a single lenslet, in a cell's coordinates."""
+    beyond = AROUND / lenslets.axes[0].band / 2
+    y, x = (
+        replace(axis, neighbourhood=max(0.0, half - axis.size / 2) + beyond)
+        for axis, half in zip(lenslets.axes, _half(lenslets), strict=True)
+    )
+    return y, x
+
+
+def _half(lenslets: Lenslets) -> Pair:
+    """Height and width of a lenslet, halved [m]."""
+    lines, _, chords = lenslets.lines
+    return float(np.abs(lines).max()), float(chords.max())
+
+
+def _gram(light, chord: float) -> np.ndarray:
+    at, weight = legendre(-chord, chord, 96)
+    return (light(at).T * weight) @ light(at)
+
+
+def _modes(axis: Axis, half: float, squared: float) -> np.ndarray:
+    """Orthonormal (samples, modes): all that a lenslet brings to a cell, but for where the lenslet is."""
+    at = np.linspace(-half, half, 4 * math.ceil(2 * half * axis.size / squared) + 40)
+    turn = np.exp(-2j * np.pi / squared * axis.image[:, None] * at)
+    vectors, strength, _ = np.linalg.svd(turn, full_matrices=False)
+    return vectors[:, strength > FAINTEST * strength[0]]
