@@ -4,6 +4,8 @@
 - `kernels`: its matrices; `optics`, what they depend on; `blocks`, how they are made, in factors; `cells`,
   what they are matrices between; `point_images`, where they come from; `cell_response`, what lenslets do to
   light; `glare`, what falls far from a point's image
+- behind lenslets that are not square: `lenslet_light`, one at a time; `few_points`, from which all points'
+  images follow; `missing`, what lenslets beyond the border take away
 - `points`, `white`: single points, and the evenly lit main lens, before lenslets; `relay`, any light through
   lenslets, cell by cell; `point_light`, a point's light in their plane
 - `resampling`, `turning`: from an object's samples to points and from the image's samples to pixels

@@ -127,10 +127,10 @@ def chosen(block: np.ndarray, least: float) -> Chosen:
     """
     points, samples = block.shape
     some = np.random.default_rng(0).permutation(samples)[: max(64, points // 2)]
-    triangle, order = scipy.linalg.qr(block[:, np.sort(some)].T, mode="r", pivoting=True)[-2:]
-    triangle = np.asarray(triangle)
+    found = scipy.linalg.qr(block[:, np.sort(some)].T, mode="r", pivoting=True)
+    triangle, order = np.asarray(found[0]), np.asarray(found[-1])
     rank = int((np.abs(np.diag(triangle)) * np.sqrt(samples / len(some)) > least).sum())
     weights = np.empty((points, rank), np.float32)
     if rank:
         weights[order] = scipy.linalg.solve_triangular(triangle[:rank, :rank], triangle[:rank]).T
-    return Chosen(np.asarray(order[:rank]), weights)
+    return Chosen(order[:rank], weights)

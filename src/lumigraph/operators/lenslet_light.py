@@ -11,7 +11,7 @@ of those that are added up.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -174,7 +174,7 @@ def _half(lenslets: Lenslets) -> Pair:
     return float(np.abs(lines).max()), float(chords.max())
 
 
-def _gram(light, chord: float) -> np.ndarray:
+def _gram(light: Callable[[np.ndarray], np.ndarray], chord: float) -> np.ndarray:
     at, weight = legendre(-chord, chord, 96)
     return (light(at).T * weight) @ light(at)
 
