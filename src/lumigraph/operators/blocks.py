@@ -47,7 +47,7 @@ Means = dict[Offset, np.ndarray]
 BORDER = 3.0
 """How much stronger than elsewhere factors are that are looked at in the border's blocks."""
 
-CHOSEN = 10.0
+CHOSEN = 5.0
 """The same of what the points that are chosen for the border leave out."""
 
 Job = tuple[int, tuple[int, ...]]
