@@ -46,7 +46,7 @@ def of_quadrature(path: str, accuracy: float) -> Reached:
     return Reached(accuracy * coarse ** (1 - towards) * fine**towards, f"{path} at accuracy {accuracy:g}")
 
 
-SINGLE_LENS = Reached(5e-6, "convolution with a point's image")
+SINGLE_LENS = Reached(1e-5, "convolution with a point's image")
 """Of a camera without lenslets."""
 
 
