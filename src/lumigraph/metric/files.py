@@ -93,7 +93,7 @@ def load_compote(folder: str | os.PathLike[str]) -> tuple[Corners, Board, Nomina
 def _centers(found: dict[str, np.ndarray]) -> Any:
     """Centres (n, 2) of a hexagonal lattice's columns k and rows l, by the lattice that fits them best."""
     measured, best = _pair(found, "v", "u"), None
-    columns = [_whole(name, found) for name in "kl"]
+    column, line = (_whole(name, found) for name in "kl")
     if not np.abs(measured).max() <= FARTHEST:  # not a number is refused too; LAPACK would print lines
         raise FormatError(f"centers.csv has centres beyond {FARTHEST:g} px.")
     for shifted in (0, 1):
@@ -101,7 +101,7 @@ def _centers(found: dict[str, np.ndarray]) -> Any:
         def lattice(k: np.ndarray, row: np.ndarray, shifted: int = shifted) -> np.ndarray:
             return np.column_stack([np.ones(len(k)), k + 0.5 * (row % 2 == shifted), row])
 
-        known = lattice(*columns)
+        known = lattice(column, line)
         basis, *_ = np.linalg.lstsq(known, measured, rcond=None)
         off = float(np.mean((known @ basis - measured) ** 2))
         if best is None or off < best[0]:
