@@ -200,7 +200,7 @@ def test_light_fields_that_hold_no_depth_are_refused(monkeypatch):
         epi(field((3, 3, 4, 16)))
     with pytest.raises(GeometryError, match="NaN"):
         epi(field(value=np.nan))
-    with pytest.raises(GeometryError, match="dark everywhere"):
+    with pytest.raises(GeometryError, match="the middle view, 1/1 of 3 x 3, is dark or missing"):
         epi(field(value=0.0))
     with pytest.raises(GeometryError, match="from 1 to -1 px but the first must be less"):
         epi(field(), (1, -1))

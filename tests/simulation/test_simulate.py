@@ -268,7 +268,7 @@ def test_impossible_coherences_are_refused(two_f):
         Snapshots(3, coherence_index=0)
     with pytest.raises(LumigraphError, match="na is 2"):
         TiltedWaves(3, na=2)
-    with pytest.raises(SamplingError, match="tells directions"):
+    with pytest.raises(SamplingError, match="resolves directions up to"):
         simulate(two_f, even(two_f.object_grid), TiltedWaves(3, na=0.5))
 
 

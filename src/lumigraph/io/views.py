@@ -49,6 +49,11 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> LightField:
     """
     files, spacing = _files(path)
     rows, columns = (max(place[k] for place in files) + 1 for k in (0, 1))
+    if rows * columns > _MOST:
+        raise FormatError(
+            f"{path} names {rows} x {columns} views but holds {len(files)}; at most {_MOST} are read: "
+            "the rest is missing. Check the numbers in the names."
+        )
     data = None
     for (row, column), file in sorted(files.items()):
         picture = _picture(file, max_pixels)

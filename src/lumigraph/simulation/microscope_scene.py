@@ -217,9 +217,10 @@ def point_image(
     cells, error = point_cells(objectives, lenslet, layout.sampling, within, (position[2], demand))
     plane = np.zeros((layout.cells[0], N, layout.cells[1], N))
     reach = len(cells) // 2
+    starts = [min(n, max(0, k - reach)) for k, n in zip(own, layout.cells, strict=True)]
     rows, columns = (
-        slice(max(0, k - reach), max(0, min(n, k + reach + 1)))
-        for k, n in zip(own, layout.cells, strict=True)
+        slice(start, max(start, min(n, k + reach + 1)))
+        for start, k, n in zip(starts, own, layout.cells, strict=True)
     )
     first = (rows.start - own[0] + reach, columns.start - own[1] + reach)
     lit = cells[first[0] :, first[1] :][: rows.stop - rows.start, : columns.stop - columns.start]
