@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from lumigraph.core import checks, memory
 from lumigraph.core.grid import Grid
 
 
@@ -104,3 +105,9 @@ def supersampled(grid: Grid, inside, factor: int = 8) -> np.ndarray:
 def sides(angle: float) -> tuple[float, float]:
     """Unit vector (y, x) turned by `angle` [rad] from +x towards +y."""
     return math.sin(angle), math.cos(angle)
+
+
+def check_canvas(grid: Grid) -> None:
+    """Refuse what is no grid to draw on, or one whose picture would not fit in memory."""
+    checks.instance("grid", grid, Grid)
+    memory.require_plane(grid.shape, 32, "a target")

@@ -2,6 +2,7 @@
 
 - `volumes`: `Scene` and its parts: `Slice`, `Points`, `Diffuser`
 - `targets`: test charts as scenes: pinhole, edge, USAF-1951, gratings, star, chessboard, photo
+- `usaf`: the chart USAF-1951
 - `sources`: waves: `plane_wave`, `point_source`, `gaussian_beam`
 """
 
