@@ -15,6 +15,7 @@ import pytest
 
 import lumigraph.io as io
 from lumigraph.cli import app as cli_app
+from lumigraph.cli import console
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Stage
@@ -357,6 +358,25 @@ def test_ctrl_c_ends_with_130_and_one_line(bench):
         "lumigraph: interrupted; what was finished is in raw.partial.tiff.\n",
     )
     assert not any(path.name.startswith(".raw") for path in bench.iterdir())
+
+
+def test_ctrl_c_that_python_drops_stops_the_work_at_its_next_step(monkeypatch):
+    dropped = []
+    monkeypatch.setattr(sys, "unraisablehook", dropped.append)
+
+    class Dropping:
+        def __del__(self):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.01)
+
+    before = signal.getsignal(signal.SIGINT)
+    with console.interrupts(), console.progress("work") as tell:
+        tell(0.1)
+        Dropping()
+        assert dropped
+        with pytest.raises(KeyboardInterrupt):
+            tell(0.2)
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_ctrl_c_keeps_the_shots_that_are_finished(lumigraph, bench, monkeypatch):

@@ -29,11 +29,12 @@ def main(arguments: "Sequence[str] | None" = None) -> int:
         if ours:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
         _fill_closed()
-        from lumigraph.cli import app
+        from lumigraph.cli import app, console
 
-        if ours:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-        return app.main(arguments)
+        if not ours:
+            return app.main(arguments)
+        with console.interrupts():
+            return app.main(arguments)
     except KeyboardInterrupt:
         return 130
 

@@ -1,7 +1,9 @@
 """Results on standard output, progress on standard error."""
 
 import json
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -12,6 +14,9 @@ from lumigraph.core.progress import Progress, what_of
 
 FIRST_LINE = 10.0
 """Seconds before progress is written where there is no terminal."""
+
+
+_interrupted = threading.Event()
 
 
 def report(common: Common, text: str, values: Mapping[str, Any] | Sequence[Any]) -> None:
@@ -29,9 +34,31 @@ def progress(task: str) -> Iterator[Progress]:
     Until it is called, and where it never is, the bar only shows that something goes on.
     """
     with _bar(task) as update:
-        yield lambda fraction: update(
-            description=": ".join(filter(None, (task, what_of(fraction)))), completed=fraction, total=1.0
-        )
+
+        def tell(fraction: float) -> None:
+            if _interrupted.is_set():
+                raise KeyboardInterrupt
+            text = ": ".join(filter(None, (task, what_of(fraction))))
+            update(description=text, completed=fraction, total=1.0)
+
+        yield tell
+
+
+@contextmanager
+def interrupts() -> Iterator[None]:
+    """Context in which no Ctrl-C is lost: what Python drops in a finaliser is raised again by progress."""
+
+    def stop(*_: object) -> None:
+        _interrupted.set()
+        raise KeyboardInterrupt
+
+    _interrupted.clear()
+    signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        _interrupted.clear()
 
 
 @contextmanager
