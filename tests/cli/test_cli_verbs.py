@@ -369,14 +369,13 @@ def test_ctrl_c_that_python_drops_stops_the_work_at_its_next_step(monkeypatch):
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(0.01)
 
-    before = signal.getsignal(signal.SIGINT)
     with console.interrupts(), console.progress("work") as tell:
         tell(0.1)
         Dropping()
         assert dropped
         with pytest.raises(KeyboardInterrupt):
             tell(0.2)
-    assert signal.getsignal(signal.SIGINT) is before
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_ctrl_c_keeps_the_shots_that_are_finished(lumigraph, bench, monkeypatch):
