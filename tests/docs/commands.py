@@ -67,7 +67,7 @@ def address(log: Path, server: subprocess.Popen) -> str:
         if server.poll() is not None:
             break
         time.sleep(0.25)
-    raise RuntimeError(f"{shlex.join(server.args)} served no page")  # type: ignore[arg-type]
+    raise RuntimeError(f"{shlex.join(server.args)} served no page")
 
 
 def own_files(page: str, folder: Path) -> None:

@@ -47,11 +47,11 @@ class Panel(Container):
 
     def job(self) -> Job:
         """What is to be computed, from what the controls say; called in the main thread."""
-        raise NotImplementedError
+        raise NotImplementedError  # each verb's panel has its own
 
     def take(self, found: Any) -> str:
         """Show what was found, and say it in a line."""
-        raise NotImplementedError
+        raise NotImplementedError  # each verb's panel has its own
 
     def start(self) -> None:
         """Compute, unless a computation goes on; what is wrong with the controls is said at once."""
