@@ -279,7 +279,7 @@ def test_the_command_exports_and_tells_the_size(tmp_path, capsys):
     io.save(field(step=10.0), tmp_path / "views.zarr")
     page = tmp_path / "page.html"
     assert main(["view", str(tmp_path / "views.zarr"), "--export", str(page)]) == 0
-    assert re.search(r"[\d.]+ k?M?B \(views [\d.]+ kB, stack", capsys.readouterr().out)
+    assert re.search(r"[\d.]+ k?M?B \(views [\d.]+ kB, poster [\d.]+ kB, stack", capsys.readouterr().out)
     assert main(["view", str(tmp_path / "views.zarr"), "--export", str(page), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["bytes"] == page.stat().st_size
 

@@ -217,7 +217,7 @@ def _streamed(exhibit: Exhibit, tiles: _Tiles) -> Parts:
         if pyramid.coarsest > 1:
             finer["volume"], white["volume"] = pyramid, white_level(full)
             exhibit = dataclasses.replace(exhibit, volume=_coarser_volume(volume, pyramid.coarsest, data))
-    parts = Parts.of(exhibit)
+    parts = Parts.of(exhibit, written=True)
     for what, pyramid in finer.items():
         parts.about[what] |= {"finer": pyramid.about(), "white": white[what]}
     return parts

@@ -13,6 +13,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.rendering.geometry import lit
 from lumigraph.viewer.encoding import Coded, white_level
 from lumigraph.viewer.exhibit import Exhibit, Planes, detail, focal_stack, focus_range, grey_or_colour
+from lumigraph.viewer.start import poster, subject_focus
 
 CHUNK = 8 << 20
 """Bytes of views sent at a time, so that a picture can be shown before all have come."""
@@ -32,15 +33,19 @@ class Parts:
         What the page must know, as JSON can hold it.
     arrays
         Functions that give an array's numbers; called late, because some are computed.
+    written
+        Whether the page is written into files, with the picture that it opens with.
     """
 
     about: dict[str, Any] = field(default_factory=dict)
     arrays: dict[str, Callable[[], Coded]] = field(default_factory=dict)
+    written: bool = False
 
     @classmethod
-    def of(cls, exhibit: Exhibit) -> "Parts":
+    def of(cls, exhibit: Exhibit, *, written: bool = False) -> "Parts":
         """Everything of an exhibit."""
-        parts = cls({"name": exhibit.name, "facts": [list(fact) for fact in exhibit.facts]})
+        facts = [list(fact) for fact in exhibit.facts]
+        parts = cls({"name": exhibit.name, "facts": facts}, written=written)
         parts._add_views(exhibit)
         parts._add_raw(exhibit)
         parts._add_planes(exhibit)
@@ -54,11 +59,12 @@ class Parts:
         views = grey_or_colour(exhibit.views)
         coded, data = Coded.of(views.data), to_numpy(views.data)
         low, high = focus_range(views)
+        start, white = subject_focus(views), white_level(data)
         self.about["views"] = {
             "shape": list(data.shape[:4]),
             "channels": 3 if data.ndim == 5 else 1,
             "bits": coded.bits,
-            "white": white_level(data),
+            "white": white,
             "aperture": _grid(views.aperture),
             "lenslets": _grid(views.lenslets),
             "separation": views.separation,
@@ -66,11 +72,15 @@ class Parts:
             "metric": not exhibit.relative and max(views.lenslets.pitch) < _LARGEST_LENSLET,
             "lit": "".join("1" if on else "0" for on in lit(views.data).ravel()),
             "focus": [low, high],
+            "start": start,
+            "poster": self.written,
             "detail": detail(views),
             "masked": views.valid is not None,
             "chunks": _chunks(data.shape, coded.numbers.itemsize),
         }
         self.arrays["views"] = lambda: coded
+        if self.written:
+            self.arrays["poster"] = lambda: poster(views, start, detail(views), white)
         if views.valid is not None:
             self.arrays["valid"] = lambda: Coded.of(to_numpy(views.valid) > 0)
 

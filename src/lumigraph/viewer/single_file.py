@@ -73,7 +73,7 @@ def exported(
 ) -> tuple[str, dict[str, int]]:
     """The page as text, and the bytes of each array in it; as `export`, which writes it."""
     check_quality(quality)
-    parts = [Parts.of(exhibit) for exhibit in exhibits]
+    parts = [Parts.of(exhibit, written=True) for exhibit in exhibits]
     names = [(number, name) for number, part in enumerate(parts) for name in part.arrays]
     blobs: dict[str, str] = {}
     sizes: dict[str, int] = {}

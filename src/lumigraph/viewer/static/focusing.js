@@ -13,24 +13,6 @@ export function sharpestAlpha(views, numbers, [t, s]) {
   return vertex(alphas, costs.map((cost) => -cost));
 }
 
-/** Place (t, s) with the most detail in the middle view, the nearer to the middle the better. */
-export function subject(views, numbers) {
-  const [nv, nu, nt, ns] = views.shape, { channels } = views, size = nt * ns * channels, c = channels === 3 ? 1 : 0;
-  const base = (Math.floor(nv / 2) * nu + Math.floor(nu / 2)) * size + c, step = Math.max(2, Math.round(Math.min(nt, ns) / 24));
-  let best = [Math.floor(nt / 2), Math.floor(ns / 2)], most = -1;
-  for (let t = step; t < nt - step; t += step) for (let s = step; s < ns - step; s += step) {
-    let sum = 0, square = 0;
-    for (let j = -step; j <= step; j++) for (let i = -step; i <= step; i++) {
-      const x = numbers[base + ((t + j) * ns + s + i) * channels];
-      sum += x; square += x * x;
-    }
-    const count = (2 * step + 1) ** 2, far = ((t / nt - 0.5) ** 2 + (s / ns - 0.5) ** 2) / 0.04;
-    const detail = (square / count - (sum / count) ** 2) * Math.exp(-far);
-    if (detail > most) { most = detail; best = [t, s]; }
-  }
-  return best;
-}
-
 /** Up to 13 × 13 lit views, evenly spread. */
 function someViews(views) {
   const [nv, nu] = views.shape, step = Math.max(1, Math.ceil(Math.sqrt((nv * nu) / MOST_VIEWS)));

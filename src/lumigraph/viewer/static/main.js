@@ -36,12 +36,12 @@ class App {
     document.getElementById("title").textContent = models.map((model) => model.about.name).join(" and ");
   }
 
-  /** Opens on the subject, unless the link or the user has chosen a focus. */
-  settle() {
-    const { model } = this.main;
-    if (!model.views || this.state.focus !== this.base.focus || "focus" in parseLink(location.hash)) return;
-    this.base.focus = this.state.focus = Number(model.subjectFocus().toFixed(5));
-    this.touched();
+  /** Shows what a written page opens with, before the graphics processor has anything to do. */
+  async preview() {
+    await Promise.all(this.panes.map(({ model }) => model.loadPoster()));
+    if (!this.panes.some(({ model }) => model.arrays.poster)) return;
+    this.schedule();
+    await painted();
   }
 
   /** Settings out of the link; a mode that is not there is left out. */
@@ -77,12 +77,21 @@ class App {
   draw(now) {
     const shown = this.panes.map((pane) => pane.draw(now));
     this.moving = false;
-    if (shown[0] && !this.first) { this.first = performance.now(); performance.mark("first-picture"); }
+    if (shown[0] && !this.shown) this.timeFirst();
     this.controls.refresh();
     this.say();
     clearTimeout(this.linking);
     this.linking = setTimeout(() => this.writeLink(), 250);
     for (const wake of this.waiting?.splice(0) ?? []) wake();
+  }
+
+  /** Notes when the first picture has been painted: in the frame after. */
+  async timeFirst() {
+    this.shown = true;
+    await painted();
+    this.main.device?.finish();
+    this.first = performance.now();
+    performance.mark("first-picture");
   }
 
   writeLink() {
@@ -123,6 +132,14 @@ class App {
     this.moving = false;
     await new Promise((wake) => { (this.waiting ??= []).push(wake); this.schedule(); });
   }
+}
+
+/** Waits until what is drawn now is on the screen: its frame is over when the next begins. Hidden pages have no frames. */
+function painted() {
+  return new Promise((done) => {
+    setTimeout(done, document.hidden ? 0 : 500);
+    requestAnimationFrame(() => requestAnimationFrame(done));
+  });
 }
 
 function fileName(app) {
@@ -206,9 +223,10 @@ async function open() {
     const app = new App(await loadAbout());
     window.lumigraph = { app, set: async (changes) => { app.set(changes); await app.settled(); }, pixels: (k = 0) => app.panes[k].pixels(), picture: () => pictureCanvas(app) };
     wire(app);
+    await app.preview();
+    for (const pane of app.panes) pane.open();
     app.schedule();
     await Promise.all(app.panes.filter(({ model }) => model.views).map((pane) => pane.model.loadViews(pane.device, isExported())));
-    app.settle();
     window.lumigraph.ready = true;
     app.schedule();
   } catch (error) {

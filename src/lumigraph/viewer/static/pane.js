@@ -26,10 +26,15 @@ export class Pane {
     this.name = root.querySelector(".name");
     this.readout = root.querySelector(".readout");
     this.name.textContent = model.about.name;
-    this.device = (app.state.renderer === "canvas" ? null : openDevice(this.canvas)) ?? new CanvasDevice(this.canvas);
-    this.canvas.addEventListener("webglcontextlost", () => app.tell("The graphics processor was lost. Load the page again.", true));
     this.listen();
     new ResizeObserver(() => app.schedule()).observe(this.stage);
+  }
+
+  /** Asks for the graphics processor, which takes its time where it is software: the first picture does without. */
+  open() {
+    const { app, canvas } = this;
+    this.device = (app.state.renderer === "canvas" ? null : openDevice(canvas)) ?? new CanvasDevice(canvas);
+    canvas.addEventListener("webglcontextlost", () => app.tell("The graphics processor was lost. Load the page again.", true));
   }
 
   /** Middle of what is seen, in samples of this exhibit: the link's, which counts in those of the first. */
@@ -59,13 +64,15 @@ export class Pane {
     }
     const image = this.model.image(state, this.device, settled);
     if (!image) return this.blank();
-    if (!this.device.fits(image)) return this.app.tell(`${image.nx} × ${image.ny} pixels are too many for this graphics processor.`, true);
+    if (this.device && !this.device.fits(image)) return this.app.tell(`${image.nx} × ${image.ny} pixels are too many for this graphics processor.`, true);
     const view = { ...this.layout(image), smooth: state.smooth && !image.sharp && this.scale[0] / image.detail < 24, ground: this.app.ground };
     this.tone = image.plain ? { gain: 1 / 255, lift: 0, power: 1, map: "grey", channel: "colour" } : toneOf(state, image);
     const device = this.deviceFor(image, settled);
     device.show(image, view, this.tone);
-    if (device === this.device) this.drawFine(state, view, settled);
-    if (this.image && this.heavy === undefined) this.weigh(image, view);
+    if (device === this.device) {
+      this.drawFine(state, view, settled);
+      if (this.image && this.heavy === undefined) this.weigh(image, view);
+    }
     this.image = image;
     this.over(state, image);
     if ((this.heavy || (this.model.slow && !image.exact) || this.model.factor > 1) && !settled) setTimeout(() => this.app.schedule(), SETTLED + 20);
@@ -83,9 +90,9 @@ export class Pane {
     this.device.show(image, { ...view, origin: place(origin), scale: [across * factor, down * factor], clip }, toneOf(state, image));
   }
 
-  /** Where WebGL is software, the browser's own canvas shows the planes of a stack twice as fast. */
+  /** Where WebGL is software, the browser's own canvas shows the planes of a stack twice as fast; and the first picture. */
   deviceFor(image, settled) {
-    const quick = Boolean(this.heavy && !settled && image.numbers && this.device.kind === "webgl");
+    const quick = Boolean(image.early || (this.heavy && !settled && image.numbers && this.device.kind === "webgl"));
     this.quick.hidden = !quick;
     this.canvas.hidden = quick;
     return quick ? (this.quickDevice ??= new CanvasDevice(this.quick)) : this.device;
@@ -93,6 +100,7 @@ export class Pane {
 
   /** Whether pictures reach the screen too slowly for a movement. */
   weigh(image, view) {
+    if (this.model.slow) { this.heavy = true; return; } // no need to wait for what is being drawn
     this.device.finish();
     const start = performance.now();
     this.device.show(image, view, this.tone);
@@ -101,6 +109,7 @@ export class Pane {
   }
 
   blank() {
+    if (!this.device) return false;
     const { gl, context } = this.device, g = this.app.ground;
     if (gl) { gl.bindFramebuffer(gl.FRAMEBUFFER, null); gl.clearColor(...g, 1); gl.clear(gl.COLOR_BUFFER_BIT); }
     else { context.fillStyle = `rgb(${g.map((x) => 255 * x).join(" ")})`; context.fillRect(0, 0, this.canvas.width, this.canvas.height); }
