@@ -2,54 +2,63 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
+TOOLS := .venv/.tools
 
 .PHONY: demo test lint format bench reproduce fuzz audit docs torch lock clean
 .DEFAULT_GOAL := demo
 
+define install
+	if command -v uv >/dev/null 2>&1; then \
+		uv pip install --quiet --python $(BIN)/python $(1); \
+	else \
+		$(BIN)/python -m pip install --quiet --disable-pip-version-check $(1); \
+	fi
+endef
+
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lumigraph needs Python 3.11 or newer, this is " + sys.version.split()[0])'
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	@echo "Installing lumigraph into .venv (once; a minute or two) ..."
-	@if command -v uv >/dev/null 2>&1; then \
-		uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock && \
-		uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e . ; \
-	else \
-		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock && \
-		$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e . ; \
-	fi
+	@echo "Installing lumigraph into .venv (once; a minute or so) ..."
+	@$(call install,--require-hashes -r requirements.lock)
+	@$(call install,--no-deps --no-build-isolation -e .)
 	@touch $(READY)
 
-.venv: $(READY)
+$(TOOLS): requirements-dev.lock $(READY)
+	@echo "Installing what tests and checks need into .venv (once) ..."
+	@$(call install,--require-hashes -r requirements-dev.lock)
+	@touch $(TOOLS)
+
+.venv: $(TOOLS)
 
 demo: $(READY)  ## design, simulate, calibrate, decode, refocus: demo/report.html
 	$(BIN)/lumigraph demo
 
-test: $(READY)  ## the whole test suite and the doctests
+test: $(TOOLS)  ## the whole test suite and the doctests
 	$(BIN)/python -m pytest -n auto -m "not long"
 
-lint: $(READY)  ## format, rules, types, import floors
+lint: $(TOOLS)  ## format, rules, types, import floors
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/pyright
 	$(BIN)/lint-imports
 
-format: $(READY)
+format: $(TOOLS)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: $(READY)  ## speed against plain SciPy, ratios within one run
+bench: $(TOOLS)  ## speed against plain SciPy, ratios within one run
 	$(BIN)/python -m benchmarks
 
-reproduce: $(READY)  ## the thesis' experiments at full size, and the long tests; resumes what was interrupted
+reproduce: $(TOOLS)  ## the thesis' experiments at full size, and the long tests; resumes what was interrupted
 	$(BIN)/lumigraph reproduce
 	$(BIN)/python -m pytest -m long tests
 
-fuzz: $(READY)  ## 100,000 damaged files for every reader, each in a process of its own with bounds on memory and time
+fuzz: $(TOOLS)  ## 100,000 damaged files for every reader, each in a process of its own with bounds on memory and time
 	$(BIN)/python tests/fuzz/run.py --count 100000
 
 audit: $(READY)  ## known holes in the locked dependencies; fails where no advisory service answers
 	@test -x .venv/audit/bin/pip-audit || { $(PYTHON) -m venv .venv/audit && .venv/audit/bin/pip install -qq --disable-pip-version-check pip-audit; }
-	@.venv/audit/bin/pip-audit --strict --disable-pip --require-hashes -r requirements.lock || \
+	@.venv/audit/bin/pip-audit --strict --disable-pip --require-hashes -r requirements-dev.lock || \
 		{ echo "audit: holes are listed above; if none are, the advisory service of PyPI did not answer"; exit 1; }
 
 docs: $(READY)  ## the site, with its gallery: site/index.html; strict, without a network once its tools are there
@@ -60,11 +69,13 @@ docs: $(READY)  ## the site, with its gallery: site/index.html; strict, without 
 torch: $(READY)  ## optional: PyTorch, so that the array tests run on it too
 	@$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/python -m pip install --quiet --disable-pip-version-check "torch==2.13.0"
 
-lock: $(READY)  ## compile requirements.lock again (needs uv)
-	uv pip compile --universal --python-version 3.11 --generate-hashes --extra dev --extra video --extra board --no-emit-index-url --no-emit-find-links \
-		--custom-compile-command "make lock" -o requirements.lock pyproject.toml
-	uv pip compile --universal --python-version 3.11 --generate-hashes --extra docs --constraint requirements.lock --no-emit-index-url --no-emit-find-links \
-		--custom-compile-command "make lock" -o docs/requirements.lock pyproject.toml
+COMPILE := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
+	--custom-compile-command "make lock" pyproject.toml
+
+lock:  ## compile the three locks again (needs uv); nothing is installed
+	$(COMPILE) --extra build -o requirements.lock
+	$(COMPILE) --extra build --extra dev --extra video --extra board --constraint requirements.lock -o requirements-dev.lock
+	$(COMPILE) --extra docs --constraint requirements-dev.lock -o docs/requirements.lock
 
 clean:
 	rm -rf .venv demo reproduce build dist site docs/gallery docs/api

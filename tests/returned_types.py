@@ -1,10 +1,12 @@
 """What a type checker says of the values that verbs return; `make lint` runs one on it."""
 
-from typing import assert_type
+from typing import Any, assert_type
 
 import numpy as np
 
 import lumigraph as lg
+from lumigraph.core.linear import Linear
+from lumigraph.io.formats import Noun
 
 
 def arrays_keep_their_type(views: lg.LightField[np.ndarray], raw: lg.RawImage[np.ndarray]) -> None:
@@ -30,3 +32,19 @@ def verbs_return_nouns(raw: lg.RawImage, calibration: lg.Calibration, camera: lg
     assert_type(lg.RawImage(np.ones((2, 2))).data, np.ndarray[tuple[int, int], np.dtype[np.float64]])
     assert_type(lg.LightField.from_xarray(raw), lg.LightField)
     lg.decode(raw, calibration, direction=9)  # pyright: ignore[reportCallIssue]
+
+
+def files_hold_a_noun_or_the_one_asked_for() -> None:
+    """Of the noun that is asked for, or one of those that files can hold."""
+    assert_type(lg.open("white.png", lg.RawImage), lg.RawImage)
+    assert_type(lg.open("views.zarr", lg.LightField).view(0, 0), Any)
+    assert_type(lg.open("file"), Noun)
+
+
+def volumes_keep_their_arrays(
+    raw: lg.RawImage[np.ndarray], data: np.ndarray, operator: Linear, frames: list[np.ndarray]
+) -> None:
+    """Of a raw image a volume or a picture, of an array an array."""
+    assert_type(lg.deconvolve(data, operator), np.ndarray)
+    assert_type(lg.deconvolve(raw, operator), lg.Volume[np.ndarray] | lg.RawImage[np.ndarray] | np.ndarray)
+    assert_type(next(lg.deconvolve_series(frames, operator)), np.ndarray)

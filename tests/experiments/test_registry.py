@@ -227,3 +227,11 @@ def test_reproduce_refuses_in_one_line(tmp_path, capsys, arguments, message):
     file.write_text("x")
     assert main(["reproduce", *(text.format(file=file) for text in arguments)]) == 1
     assert message in capsys.readouterr().err
+
+
+def test_experiments_run_without_the_extras(monkeypatch):
+    def version(name):
+        raise run.PackageNotFoundError(name)
+
+    monkeypatch.setattr(run, "version", version)
+    assert run._files.__wrapped__()[-1] == ("", b"numpy  scipy  scikit-image ")

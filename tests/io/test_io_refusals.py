@@ -314,3 +314,10 @@ def test_a_path_is_text(path):
         io.open(path)
     with pytest.raises(FormatError, match=r"the path is .* but must be text"):
         io.save(np.ones((2, 2)), path)
+
+
+def test_a_file_that_holds_another_noun_than_asked_for_is_refused(tmp_path):
+    io.save(np.zeros((3, 4), np.uint8), tmp_path / "raw.tiff")
+    assert io.open(tmp_path / "raw.tiff", RawImage).shape == (3, 4)
+    with pytest.raises(FormatError, match=r"raw\.tiff holds a raw image but must hold a light field\."):
+        io.open(tmp_path / "raw.tiff", LightField)

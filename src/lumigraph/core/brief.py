@@ -35,7 +35,7 @@ def brief(self: Any) -> str:
 
 
 def called(thing: Any) -> str:
-    """What people call a thing of this type.
+    """What people call a type, or a thing of it.
 
     Examples
     --------
@@ -43,7 +43,8 @@ def called(thing: Any) -> str:
     >>> called(Grid((1, 1), 1.0)), called(type("LightField", (), {})())
     ('grid', 'light field')
     """
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(thing).__name__).lower()
+    name = (thing if isinstance(thing, type) else type(thing)).__name__
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
 
 
 def table(self: Any) -> str:

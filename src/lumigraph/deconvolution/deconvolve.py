@@ -5,12 +5,12 @@ import os
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import overload
 
 import numpy as np
 
 from lumigraph.core import arrays, checks, memory
-from lumigraph.core.arrays import Array
+from lumigraph.core.arrays import A, Array
 from lumigraph.core.linear import Linear
 from lumigraph.core.raw import RawImage
 from lumigraph.core.threads import single_products
@@ -69,6 +69,32 @@ class Interrupted(KeyboardInterrupt):
         self.iterations = iterations
 
 
+@overload
+def deconvolve(
+    raw: RawImage[A],
+    operator: Linear,
+    iterations: int | Stop = 30,
+    *,
+    method: Method = ...,
+    exposure: Exposure | None = None,
+    progress: Report | None = None,
+    checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
+) -> Volume[A] | RawImage[A] | A: ...
+
+
+@overload
+def deconvolve(
+    raw: A,
+    operator: Linear,
+    iterations: int | Stop = 30,
+    *,
+    method: Method = ...,
+    exposure: Exposure | None = None,
+    progress: Report | None = None,
+    checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
+) -> A: ...
+
+
 def deconvolve(
     raw: RawImage | Array,
     operator: Linear,
@@ -78,7 +104,7 @@ def deconvolve(
     exposure: Exposure | None = None,
     progress: Report | None = None,
     checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
-) -> Any:
+) -> Result:
     """What was in front of the camera: intensities (y, x) or (z, y, x), at least 0.
 
     Where the operator can look beyond the picture (`beyond.Widening`), the object reaches as far as light
@@ -120,8 +146,42 @@ def deconvolve(
         A KeyboardInterrupt; it carries the estimate that was reached, and the checkpoint is written.
 
     """
-    options: dict[str, Any] = {"method": method, "exposure": exposure, "progress": progress}
-    return next(deconvolve_series([raw], operator, iterations, **options, checkpoint=checkpoint))
+    found = deconvolve_series(
+        [raw],
+        operator,
+        iterations,
+        method=method,
+        exposure=exposure,
+        progress=progress,
+        checkpoint=checkpoint,
+    )
+    return next(found)
+
+
+@overload
+def deconvolve_series(
+    frames: Iterable[RawImage[A]],
+    operator: Linear,
+    iterations: int | Stop = 30,
+    *,
+    method: Method = ...,
+    exposure: Exposure | None = None,
+    progress: Report | None = None,
+    checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
+) -> Iterator[Volume[A] | RawImage[A] | A]: ...
+
+
+@overload
+def deconvolve_series(
+    frames: Iterable[A],
+    operator: Linear,
+    iterations: int | Stop = 30,
+    *,
+    method: Method = ...,
+    exposure: Exposure | None = None,
+    progress: Report | None = None,
+    checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
+) -> Iterator[A]: ...
 
 
 def deconvolve_series(
@@ -133,7 +193,7 @@ def deconvolve_series(
     exposure: Exposure | None = None,
     progress: Report | None = None,
     checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
-) -> Iterator[Any]:
+) -> Iterator[Result]:
     """The result of each frame of a time series, one after the other, as `deconvolve` gives it.
 
     The operator and its sensitivity are held once; a frame is read when its turn comes and forgotten, so
@@ -195,7 +255,7 @@ class _Run:
         if self.checkpoint is not None and state.done > first:
             self.checkpoint.keep(self.problem, state, self.key, now=True)
 
-    def result(self, state: State, raw: RawImage | Array) -> Any:
+    def result(self, state: State, raw: RawImage | Array) -> Result:
         """What is asked for of the object, with its place in space."""
         operator, inside = self.wanted
         return _placed(cut(state.estimate, inside), raw, operator)
@@ -224,7 +284,7 @@ class _Run:
         )
 
 
-def _finished(run: _Run, raw: RawImage | Array) -> Any:
+def _finished(run: _Run, raw: RawImage | Array) -> Result:
     reached: list[State] = []
     try:
         for state in run.states():
@@ -238,7 +298,7 @@ def _finished(run: _Run, raw: RawImage | Array) -> Any:
     return run.result(reached[0], raw)
 
 
-def _placed(estimate: Array, raw: RawImage | Array, operator: Linear) -> Any:
+def _placed(estimate: Array, raw: RawImage | Array, operator: Linear) -> Result:
     """The estimate with its place in space, where the raw image is one and the operator knows it."""
     grid = operator.object_grid
     if not isinstance(raw, RawImage) or grid is None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -173,8 +173,15 @@ def _files() -> tuple[tuple[str, bytes], ...]:
         parts = path.relative_to(root.parent).with_suffix("").parts
         if parts[1] not in _APART:
             found.append((".".join(parts), hashlib.sha256(path.read_bytes()).digest()))
-    used = " ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "scikit-image"))
+    used = " ".join(f"{name} {_version(name)}" for name in ("numpy", "scipy", "scikit-image"))
     return (*found, ("", used.encode()))
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:  # an extra
+        return ""
 
 
 def _peak_memory() -> int:

@@ -3,11 +3,13 @@
 import os
 from dataclasses import dataclass, replace
 from importlib import import_module
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar, overload
 
 import numpy as np
 
 from lumigraph.core.arrays import to_numpy
+from lumigraph.core.brief import called
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.cloud import PointCloud
 from lumigraph.core.depth_map import DepthMap
@@ -22,6 +24,8 @@ from lumigraph.io.target import check_target
 
 Noun = RawImage | LightField | Stack | Volume | Calibration | PointCloud
 """What a file can hold."""
+
+N = TypeVar("N", bound=Noun)
 
 FOLDER = "/"
 """Stands for the ending of a folder of views, which has none."""
@@ -127,15 +131,42 @@ def format_of(path: str | os.PathLike[str]) -> Format:
     raise FormatError(f"{path} has no extension that lumigraph knows. Known are {known}.")
 
 
-def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
+@overload
+def open(  # noqa: A001
     path: str | os.PathLike[str],
+    noun: type[N],
     *,
     what: str | None = None,
     page: int | None = None,
     views: int | tuple[int, int] | None = None,
     shape: tuple[int, int] | None = None,
     max_pixels: int = MAX_PIXELS,
-) -> Any:
+) -> N: ...
+
+
+@overload
+def open(  # noqa: A001
+    path: str | os.PathLike[str],
+    noun: None = None,
+    *,
+    what: str | None = None,
+    page: int | None = None,
+    views: int | tuple[int, int] | None = None,
+    shape: tuple[int, int] | None = None,
+    max_pixels: int = MAX_PIXELS,
+) -> Noun: ...
+
+
+def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
+    path: str | os.PathLike[str],
+    noun: type[Noun] | None = None,
+    *,
+    what: str | None = None,
+    page: int | None = None,
+    views: int | tuple[int, int] | None = None,
+    shape: tuple[int, int] | None = None,
+    max_pixels: int = MAX_PIXELS,
+) -> Noun:
     """What a file or a folder of views holds; its ending says which format (`docs/formats.md` has the table).
 
     Sizes are read from the headers and checked, against the file's own size too, before anything is
@@ -145,6 +176,8 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     ----------
     path
         A file, a Zarr store, or a folder of views.
+    noun
+        What it must hold, such as `RawImage`: anything else is refused, and type checkers know what returns.
     what
         Which part, where a file holds several (Lytro, HDF5): `contents` lists them.
     page
@@ -174,21 +207,28 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     >>> from pathlib import Path
     >>> path = Path(tempfile.mkdtemp()) / "raw.tiff"
     >>> save(RawImage(np.eye(4, dtype=np.uint16), pixel_pitch=1e-6, bit_depth=12), path)
-    >>> raw = open(path)
+    >>> raw = open(path, RawImage)
     >>> raw.shape, raw.pixel_pitch, raw.bit_depth
     ((4, 4), 1e-06, 12)
     """
-    path = source.existing(path)
+    found = _opened(
+        source.existing(path), max_pixels, {"what": what, "page": page, "views": views, "shape": shape}
+    )
+    if noun is not None and not isinstance(found, noun):
+        raise FormatError(f"{path} holds a {called(found)} but must hold a {called(noun)}.")
+    return found
+
+
+def _opened(path: Path, max_pixels: int, given: dict[str, Any]) -> Noun:
     row = format_of(path)
     if not row.reads:
         raise FormatError(f"{path}: {row.name} files are written, not read. Open the pictures themselves.")
-    given = {"what": what, "page": page, "views": views, "shape": shape}
     options = {name: value for name, value in given.items() if value is not None}
     for name in options:
         if name not in row.options:
             raise FormatError(f"{name}= means nothing for {path}, a {row.name} file. Leave it out.")
-    if row.module == "png" and views is not None:
-        return import_module("lumigraph.io.eslf").load(path, views=views, max_pixels=max_pixels)
+    if row.module == "png" and options:
+        return import_module("lumigraph.io.eslf").load(path, max_pixels=max_pixels, **options)
     with source.ours(path, row.name):
         return row.imported().load(path, max_pixels=max_pixels, **options)
 

@@ -9,6 +9,7 @@ from lumigraph import io, plots
 from lumigraph.calibration import calibrate, devignette
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
+from lumigraph.core.raw import RawImage
 from lumigraph.depth import sharpness
 from lumigraph.experiments.registry import Context, Outcome, Row, experiment
 from lumigraph.experiments.thesis import table_4_1
@@ -110,7 +111,7 @@ def _real_folder() -> Path | None:
 
 def _real_views(folder: Path) -> tuple[LightField, float]:
     """Light field of the letters and the pitch of its lenslets [m]."""
-    raw, white = (io.open(folder / name) for name in _REAL[1:])
+    raw, white = (io.open(folder / name, RawImage) for name in _REAL[1:])
     calibration = calibrate(white, pixel_pitch=6.45 * um, separation=400 * mm, lenslet_distance=18.6 * mm)
     views = decode(devignette(raw, white), calibration)
     return views, float(np.mean(views.lenslets.pitch))
