@@ -5,7 +5,7 @@ from typing import Any
 
 from magicgui.widgets import ComboBox, FloatSpinBox, SpinBox
 
-from lumigraph import depth, preparation
+from lumigraph import depth
 from lumigraph.calibration import calibrate
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
@@ -15,6 +15,7 @@ from lumigraph.errors import LumigraphError
 from lumigraph.napari.panel import Panel, chosen
 from lumigraph.napari.shown import depth_beside, layer_of
 from lumigraph.napari.work import Job
+from lumigraph.preparation import decode, prepare
 
 _LAYOUTS: list[tuple[str, Any]] = [("found", None), ("square", "square"), ("hexagonal", "hex")]
 _FOCI = 21
@@ -70,9 +71,9 @@ class Decode(Panel):
 
         def work(tell: Progress) -> LightField:
             tell(Stage(0.0, "preparing"))
-            ready = preparation.prepare(raw, given, white=white)
+            ready = prepare(raw, given, white=white)
             tell(Stage(0.5, "decoding"))
-            return preparation.decode(ready, samples=samples)
+            return decode(ready, samples=samples)
 
         return work
 
