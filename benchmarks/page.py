@@ -1,10 +1,10 @@
 """An exported page in Chromium with WebGL in software: first picture, frame times of drags, what axe finds.
 
 `python -m benchmarks.page [PAGE.html ...]` opens pages that `lumigraph view FILE --export PAGE.html`
-wrote, or one of the sample scene. "painted" is when the page had drawn its first picture and the next frame began, by
-its own clock from the start of navigation; "seen" is when a frame from the browser's compositor first showed
-a picture where it stands. Frame times are those between animation frames while focus or viewpoint move with
-each. Needs playwright and Chromium; axe needs axe-playwright-python. Takes a minute.
+wrote, or one of the sample scene. "painted" is when the page had drawn its first picture and the next frame
+began, by its own clock from the start of navigation; "seen" is when a frame of the browser's compositor first
+showed a picture where it stands. Frame times are those between animation frames while focus or viewpoint move
+with each. Needs playwright and Chromium; axe needs axe-playwright-python. Takes a minute.
 """
 
 import base64

@@ -96,14 +96,17 @@ class Page:
     def state(self, name):
         return self.page.evaluate("name => lumigraph.app.state[name]", name)
 
-    def click_at(self, y, x):
-        """A click at a place of the picture."""
-        left, top = self.page.evaluate(
+    def window_place(self, y, x):
+        """Where a place of the picture stands in the window (x, y)."""
+        return self.page.evaluate(
             "([y, x]) => { const p = lumigraph.app.main, b = p.stage.getBoundingClientRect(),"
             " s = p.toScreen(y, x); return [s[0] + b.left, s[1] + b.top]; }",
             [y, x],
         )
-        self.page.mouse.click(left, top)
+
+    def click_at(self, y, x):
+        """A click at a place of the picture."""
+        self.page.mouse.click(*self.window_place(y, x))
 
     def close(self):
         self.context.close()

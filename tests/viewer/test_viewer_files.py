@@ -135,7 +135,9 @@ def test_views_are_sent_the_middle_one_first_and_all_once():
 
 def test_the_table_has_the_page_its_modules_and_nothing_else():
     names = set(viewer.site([of_views("x", field())]).resources)
-    arrays = {f"data/0/{name}" for name in ("views/0", "views/1", "stack", "depth", "confidence", "error")}
+    arrays = {
+        f"data/0/{name}" for name in ("views/0", "views/1", "stack", "depth", "confidence", "error", "sharp")
+    }
     assert names == {"", "app/style.css", "data/about", *arrays, *(f"app/{name}" for name in MODULES)}
 
 

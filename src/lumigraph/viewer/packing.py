@@ -21,6 +21,9 @@ def packed(name: str, coded: Coded, part: Parts, quality: int) -> bytes:
     """An array as a blob: views (n, y, x[, c]) and pictures of them as WebP, all else without loss."""
     if name == "poster":  # stands until the views are there
         return coded.pictures(min(quality, LOSSLESS - 1))
+    if name == "sharp" and quality < LOSSLESS:
+        one = Coded(coded.numbers[None], coded.scale, coded.offset)
+        return _eight_bits(one, part.about["views"]["white"]).pictures(quality)
     if name not in ("views", "stack") or (name == "stack" and "fallback" not in part.about["stack"]):
         return coded.deflated()
     small = coded.bits == 16 and coded.numbers.nbytes <= _EXACT_16 and name == "views"

@@ -10,6 +10,8 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.grid import Grid
+from lumigraph.core.lightfield import LightField
+from lumigraph.rendering import all_in_focus
 from lumigraph.rendering.geometry import lit
 from lumigraph.viewer.encoding import Coded, white_level
 from lumigraph.viewer.exhibit import Exhibit, Planes, detail, focal_stack, focus_range, grey_or_colour
@@ -149,10 +151,20 @@ class Parts:
         self.about["depth"] = {"label": label, "unit": unit, "error": told}
         if told:
             self.arrays["error"] = lambda: Coded.of(_expected(once()))
+        if (views := exhibit.views) is not None:
+            self.about["sharp"] = True
+            self.arrays["sharp"] = lambda: Coded.of(_sharp(views, once()))
         self.arrays["depth"] = lambda: Coded.of(_finite(to_numpy(once().values)))
         self.arrays["confidence"] = lambda: Coded.of(
             np.rint(255 * np.clip(_trusted(once()), 0, 1)).astype(np.uint8)
         )
+
+
+def _sharp(views: LightField, depth: Any) -> np.ndarray:
+    """Every place focused on what is there, by its refocus factor."""
+    factors = np.where(_trusted(depth) > 0, to_numpy(depth.values), np.nan)
+    factors = factors if np.isfinite(factors).any() else np.ones(factors.shape)
+    return to_numpy(all_in_focus(grey_or_colour(views), depth=factors).picture)
 
 
 def _trusted(depth: Any) -> np.ndarray:

@@ -17,7 +17,7 @@ export class CanvasDevice {
 
   forget(image) { if (image) this.buffers.delete(image.numbers); }
 
-  show(image, { origin, scale, smooth, ground, clip }, tone) {
+  show(image, { origin, scale, smooth, ground, clip, turn = 0 }, tone) {
     const buffer = this.buffer(image, tone);
     const { context, canvas } = this, byte = (x) => Math.round(255 * x);
     context.save();
@@ -31,8 +31,9 @@ export class CanvasDevice {
     }
     context.imageSmoothingEnabled = smooth || scale[0] < 1;
     context.imageSmoothingQuality = "low";
-    const [left, top] = origin.map((o, k) => o - scale[k] / 2);
-    context.drawImage(buffer, left, top, image.nx * scale[0], image.ny * scale[1]);
+    context.translate(...origin);
+    context.rotate((turn * Math.PI) / 2);
+    context.drawImage(buffer, -scale[0] / 2, -scale[1] / 2, image.nx * scale[0], image.ny * scale[1]);
     context.restore();
   }
 

@@ -5,13 +5,16 @@ import { MAPS } from "./colours.js";
 import { Histogram } from "./histogram.js";
 import { depthMap } from "./models.js";
 import { canQuilt } from "./quilt.js";
+import { filmsOf } from "./film.js";
+import { rulerText } from "./measures.js";
 import { depthText, lengthText } from "./overlay.js";
+import { turned } from "./turning.js";
 import { cachedMap } from "./tone.js";
 
 const by = (id) => document.getElementById(id);
-const SELECTS = { shape: String, detail: Number, projection: String, map: String, channel: String };
-const RANGES = ["focus", "trust", "plane", "ev", "black", "gamma"];
-const CHECKS = ["epi", "lattice", "smooth"];
+const SELECTS = { shape: String, drag: String, detail: Number, projection: String, map: String, channel: String };
+const RANGES = ["focus", "trust", "plane", "density", "ev", "black", "gamma"];
+const CHECKS = ["epi", "lattice", "smooth", "sharp"];
 
 /** Writes into an output only what is new: the browser lays a page out afresh after every write. */
 function tell(id, text) {
@@ -23,11 +26,12 @@ export class Controls {
   constructor(app) {
     this.app = app;
     for (const name of MAPS) by("map").append(new Option(name[0].toUpperCase() + name.slice(1), name));
-    for (const id of RANGES) by(id).addEventListener("input", (e) => app.set({ [id]: Number(e.target.value) }));
+    for (const id of RANGES) by(id).addEventListener("input", (e) => app.set({ [id]: id === "density" ? 10 ** Number(e.target.value) : Number(e.target.value) }));
     for (const [id, read] of Object.entries(SELECTS)) by(id).addEventListener("change", (e) => app.set({ [id]: read(e.target.value) }));
     for (const id of CHECKS) by(id).addEventListener("change", (e) => app.set({ [id]: e.target.checked }));
     by("aperture").addEventListener("input", (e) => app.set({ aperture: Math.max(0.001, Number(e.target.value) / 100) }));
     by("open").addEventListener("click", () => app.set({ aperture: 1, view: null }));
+    by("clear").addEventListener("click", () => app.set({ ruler: null, region: null }));
     by("close").addEventListener("click", () => app.set({ aperture: 0.001 }));
     for (const button of by("modes").children) button.addEventListener("click", () => app.set({ mode: button.dataset.mode }));
     by("modes").addEventListener("keydown", (event) => this.walk(event));
@@ -50,7 +54,8 @@ export class Controls {
     const pad = by("pad"), move = (event) => {
       if (!event.buttons) return;
       const { views } = this.app.main.model, box = pad.getBoundingClientRect();
-      const place = [(event.clientY - box.top) / box.height, (event.clientX - box.left) / box.width];
+      const off = turned([(event.clientX - box.left) / box.width - 0.5, (event.clientY - box.top) / box.height - 0.5], -this.app.state.turn);
+      const place = [off[1] + 0.5, off[0] + 0.5];
       const aperture = freedom(views, this.app.state.aperture).every(([low, high]) => low === high) ? 0.001 : this.app.state.aperture;
       const range = freedom(views, aperture), even = keptViews(views, aperture).map((k) => (k % 2 ? 0 : 0.5));
       this.app.set({ aperture, view: place.map((p, k) => Math.min(range[k][1], Math.max(range[k][0], p * views.shape[k] - 0.5 + even[k]))) });
@@ -60,7 +65,7 @@ export class Controls {
   }
 
   drawPad() {
-    const key = JSON.stringify([this.app.state.aperture, this.app.state.view, this.app.state.shape, this.app.line, devicePixelRatio]);
+    const key = JSON.stringify([this.app.state.aperture, this.app.state.view, this.app.state.shape, this.app.state.turn, this.app.line, devicePixelRatio]);
     if (key === this.padKey) return;
     this.padKey = key;
     const { views } = this.app.main.model, { state } = this.app, pad = by("pad"), ratio = Math.min(devicePixelRatio, 2), side = 120 * ratio;
@@ -68,6 +73,7 @@ export class Controls {
     const context = pad.getContext("2d"), [nv, nu] = views.shape, kept = keptViews(views, state.aperture), middle = middleView(views, state.aperture, state.view);
     const style = getComputedStyle(document.documentElement), cell = [side / nv, side / nu];
     context.clearRect(0, 0, side, side);
+    context.translate(side / 2, side / 2); context.rotate((state.turn * Math.PI) / 2); context.translate(-side / 2, -side / 2);
     context.fillStyle = style.getPropertyValue("--soft");
     context.globalAlpha = 0.45;
     const step = Math.max(1, Math.ceil(Math.max(nv, nu) / 24));
@@ -83,6 +89,7 @@ export class Controls {
     else context.rect(left, top, size[1], size[0]);
     context.globalAlpha = 0.28; context.fill();
     context.globalAlpha = 1; context.stroke();
+    context.resetTransform();
     const text = `view ${middle.map((m) => m.toFixed(1)).join(", ")} of ${nv} × ${nu}`;
     pad.setAttribute("aria-valuetext", text);
     pad.setAttribute("aria-valuenow", String(Math.round(middle[1])));
@@ -103,7 +110,9 @@ export class Controls {
     }
     by("modes").hidden = [...by("modes").children].filter((button) => !button.hidden).length < 2;
     for (const group of document.querySelectorAll("[data-modes]")) group.hidden = !group.dataset.modes.includes(state.mode);
-    by("sway").hidden = false;
+    for (const id of ["sway", "orbit"]) by(id).hidden = false;
+    by("save-film").hidden = !filmsOf(model, state).length;
+    for (const part of document.querySelectorAll('[data-part="sharp"]')) part.hidden = !about.sharp;
     by("quilt").hidden = state.mode !== "picture" || !canQuilt(model);
     for (const part of document.querySelectorAll('[data-part="views"]')) part.hidden ||= !model.views;
     for (const part of document.querySelectorAll('[data-part="lattice"]')) part.hidden = !about.raw?.lattice;
@@ -111,6 +120,7 @@ export class Controls {
     if (model.views) this.aperture(model, state);
     if (about.volume) this.volume(about.volume, state);
     if (state.mode === "depth") this.depth(model, state);
+    this.measures(state);
     const channels = this.app.main.image?.plain ? 3 : this.app.main.image?.channels ?? 1;
     document.querySelector('[data-colour="channel"]').hidden = channels !== 3 || state.mode === "depth";
     document.querySelector('[data-colour="map"]').hidden = channels === 3 && state.channel === "colour" && state.mode !== "depth";
@@ -120,7 +130,7 @@ export class Controls {
     tell("ev-out", `${state.ev > 0 ? "+" : ""}${state.ev.toFixed(2)} EV`);
     tell("black-out", `${Math.round(100 * state.black)} %`);
     tell("gamma-out", state.gamma.toFixed(2));
-    for (const id of ["shape", "projection", "channel"]) by(id).value = state[id];
+    for (const id of ["shape", "projection", "channel", "drag"]) by(id).value = state[id];
     by("map").value = state.mode === "depth" ? depthMap(state) : state.map;
     for (const id of CHECKS) by(id).checked = state[id];
   }
@@ -152,6 +162,12 @@ export class Controls {
     tell("plane-out", `${k + 1} of ${last + 1} · z ${lengthText(volume.depths[k])}`);
     input.setAttribute("aria-valuetext", by("plane-out").value);
     input.disabled = state.projection !== "plane";
+    const spins = this.app.main.model.spins(state);
+    for (const part of document.querySelectorAll('[data-part="rays"]')) part.hidden = !spins;
+    by("density").value = Math.log10(state.density);
+    by("density").disabled = state.projection !== "fog";
+    tell("density-out", state.density.toFixed(1));
+    tell("orbit-out", `${state.orbit[0].toFixed(0)}°, ${state.orbit[1].toFixed(0)}°`);
     by("projection").value = state.projection;
   }
 
@@ -166,6 +182,15 @@ export class Controls {
     by("legend-low").textContent = range ? shown(range[0]) : "";
     by("legend-high").textContent = range ? shown(range[1]) : "";
     by("legend-label").textContent = metric ? "image distance" : model.about.depth.label;
+  }
+
+  measures(state) {
+    const { main } = this.app, { image, model } = main, { ruler } = state;
+    by("clear").hidden = !ruler && !state.region;
+    if (!image) return;
+    tell("ruler-out", ruler ? `Length ${rulerText(ruler, image.unit, image.aspect, model.factor)}` : "");
+    const key = JSON.stringify([state.region, state.mode, state.focus, state.view, state.aperture, state.plane, state.projection, state.trust, image.nx, image.exact]);
+    if (key !== this.regionKey && !main.pointers.size) { this.regionKey = key; tell("region-out", state.region && main.device ? `Region ${main.regionText(state)}` : ""); }
   }
 
   facts(exhibits) {

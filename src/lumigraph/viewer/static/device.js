@@ -138,7 +138,7 @@ class Device {
   }
 
   /** Shows an image: {nx, ny, channels, bits, numbers} or {nx, ny, channels, texture (floats)}. */
-  show(image, { origin, scale, smooth, ground, clip }, tone, target = null) {
+  show(image, { origin, scale, smooth, ground, clip, turn = 0 }, tone, target = null) {
     const whole = !image.texture, weights = channelWeights(tone.channel);
     const texture = this.textureOf(image), map = this.map(tone.map);
     const size = target ? [image.nx, image.ny] : [this.canvas.width, this.canvas.height];
@@ -147,6 +147,7 @@ class Device {
       this.bind(0, whole ? gl.TEXTURE_2D_ARRAY : gl.TEXTURE_2D, texture, at.source);
       this.bind(1, gl.TEXTURE_2D, map, at.colours);
       gl.uniform2i(at.size, image.nx, image.ny);
+      gl.uniform2i(at.turn, [1, 0, -1, 0][turn], [0, 1, 0, -1][turn]);
       if (at.layer) gl.uniform1i(at.layer, 0);
       gl.uniform2fv(at.origin, origin);
       gl.uniform2fv(at.scale, scale);
@@ -179,12 +180,12 @@ class Device {
     return bytes;
   }
 
-  /** Numbers r, g, b of one sample of a drawn texture. */
-  sample(image, x, y) {
-    const { gl } = this, numbers = new Float32Array(4);
+  /** Numbers r, g, b, a of samples of a drawn texture, from one on. */
+  sample(image, x, y, nx = 1, ny = 1) {
+    const { gl } = this, numbers = new Float32Array(4 * nx * ny);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.buffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, image.texture, 0);
-    gl.readPixels(x, y, 1, 1, gl.RGBA, gl.FLOAT, numbers);
+    gl.readPixels(x, y, nx, ny, gl.RGBA, gl.FLOAT, numbers);
     return numbers;
   }
 

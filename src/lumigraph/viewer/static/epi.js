@@ -14,12 +14,13 @@ export function epiNumbers(views, numbers, [t, s], along, middle) {
   return { nx, ny, numbers: out };
 }
 
-/** Draws both EPIs beside the picture, on its own zoom, with a line at the slope that is in focus. */
-export function drawEpis({ bottom, right }, model, state, place, { origin, scale, ratio, tone, colour }) {
+/** Draws both EPIs beside the picture, on its own zoom and turned with it, with a line at the slope that is in focus. */
+export function drawEpis({ bottom, right }, model, state, place, { origin, scale, turn, ratio, tone, colour }) {
   const { views } = model, [nv, nu, nt, ns] = views.shape;
   const point = [Math.min(nt - 1, Math.max(0, Math.round(place[0]))), Math.min(ns - 1, Math.max(0, Math.round(place[1])))];
   const middle = middleView(views, state.aperture, state.view).map(Math.round);
-  for (const [canvas, along] of [[bottom, "s"], [right, "t"]]) {
+  for (const [canvas, across] of [[bottom, true], [right, false]]) {
+    const along = across === (turn % 2 === 0) ? "s" : "t", way = across ? [1, -1, -1, 1][turn] : [1, 1, -1, -1][turn];
     const box = canvas.getBoundingClientRect();
     canvas.width = Math.round(box.width * ratio); canvas.height = Math.round(box.height * ratio);
     const context = canvas.getContext("2d"), image = epiNumbers(views, views.numbers, point, along, middle);
@@ -27,11 +28,14 @@ export function drawEpis({ bottom, right }, model, state, place, { origin, scale
     small.width = image.nx; small.height = image.ny;
     small.getContext("2d").putImageData(new ImageData(toneBytes(image.numbers, views.channels, tone), image.nx, image.ny), 0, 0);
     context.imageSmoothingEnabled = false;
-    const across = along === "s", k = across ? 0 : 1, count = across ? nu : nv, n = across ? ns : nt;
-    const start = (origin[k] - scale[k] / 2), length = n * scale[k], thick = across ? canvas.height : canvas.width;
-    context.drawImage(small, ...(across ? [start, 0, length, thick] : [0, start, thick, length]));
-    const shift = viewShifts(views, state.focus, across ? 1 : 0), base = across ? point[1] : point[0];
-    const line = [0, count - 1].map((view) => [origin[k] + (base + shift.first + view * shift.step) * scale[k], ((view + 0.5) / count) * thick]);
+    const count = along === "s" ? nu : nv, thick = across ? canvas.height : canvas.width;
+    const step = way * scale[along === "s" ? 0 : 1], start = origin[across ? 0 : 1], view = thick / count, edge = start - step / 2;
+    if (along === "s") context.setTransform(...(across ? [step, 0, 0, view, edge, 0] : [0, step, view, 0, 0, edge]));
+    else context.setTransform(...(across ? [0, view, step, 0, edge, 0] : [view, 0, 0, step, 0, edge]));
+    context.drawImage(small, 0, 0);
+    context.resetTransform();
+    const shift = viewShifts(views, state.focus, along === "s" ? 1 : 0), base = along === "s" ? point[1] : point[0];
+    const line = [0, count - 1].map((k) => [start + (base + shift.first + k * shift.step) * step, (k + 0.5) * view]);
     context.strokeStyle = colour;
     context.lineWidth = 1.5 * ratio;
     context.beginPath();

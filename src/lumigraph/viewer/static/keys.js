@@ -13,6 +13,7 @@ export function listenToKeys(app, actions) {
 
 function act(app, actions, event) {
   const { state, main } = app, { key, shiftKey } = event, step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[key];
+  if (step && shiftKey && state.mode === "volume" && main.model.spins(state)) { main.orbit(10 * step[0], 10 * step[1]); return true; }
   if (step && (shiftKey || event.target.id === "pad")) {
     if (!main.model.views || state.mode !== "picture") return false;
     main.moveView((0.5 * step[0]) / 1.4 / main.model.views.shape[1], (0.5 * step[1]) / 1.4 / main.model.views.shape[0]);
@@ -22,6 +23,8 @@ function act(app, actions, event) {
   if (key in actions) { actions[key](); return true; }
   if (MODES[Number(key) - 1] && main.model.modes[MODES[Number(key) - 1]]) app.set({ mode: MODES[Number(key) - 1] });
   else if (key === "e") app.set({ epi: !state.epi });
+  else if (key === "a" && main.model.about.sharp) app.set({ sharp: !state.sharp });
+  else if (key === "m") app.set({ drag: { move: "ruler", ruler: "region", region: "move" }[state.drag] });
   else if (key === "l") app.set({ lattice: !state.lattice });
   else if (key === "[" || key === "]") app.set({ aperture: Math.min(1, Math.max(0.001, state.aperture + (key === "]" ? 0.1 : -0.1))) });
   else if (key === "," || key === ".") app.set({ ev: Math.min(12, Math.max(-12, state.ev + (key === "." ? 0.25 : -0.25))) });

@@ -1,12 +1,12 @@
 // The page: settings, panes, controls, the link.
 
 import { Controls } from "./controls.js";
+import { FilmDialog, filmsOf } from "./film.js";
 import { listenToKeys } from "./keys.js";
 import { Model } from "./models.js";
-import { drawScaleBar } from "./overlay.js";
 import { Pane } from "./pane.js";
 import { Player } from "./play.js";
-import { canQuilt, quilt } from "./quilt.js";
+import { pictureCanvas, savePicture, saveQuilt } from "./saving.js";
 import { isExported, loadAbout } from "./source.js";
 import { defaults, linkOf, parseLink } from "./state.js";
 
@@ -109,6 +109,7 @@ class App {
     if (failed) text = failed;
     else if (model.views && !model.complete) text = "Loading views …";
     else if (missing.some((name) => name === "depth" || name === "confidence")) text = "Measuring depth …";
+    else if (missing.includes("sharp")) text = "Focusing everywhere …";
     else if (missing.includes("stack")) text = "Preparing the focal stack …";
     else if (missing.length) text = "Loading …";
     else if (Object.values(model.finer).some(({ loading }) => loading)) text = "Loading what is finer …";
@@ -142,57 +143,6 @@ function painted() {
   });
 }
 
-function fileName(app) {
-  const { state, main } = app, stem = main.model.about.name.replace(/\.[^.]*$/, "");
-  const what = { picture: `focus-${state.focus.toFixed(4)}`, raw: "raw", depth: "depth", volume: `plane-${(state.plane ?? 0) + 1}` }[state.mode];
-  return `${stem}-${what}.png`;
-}
-
-const LEAST_BAR = 240; // pixels across a saved picture that shows a scale bar
-
-/** Every pane's picture side by side, in its own size, with square pixels and a scale bar where lengths are known. */
-export function pictureCanvas(app) {
-  const parts = app.panes.map((pane) => pane.pixels()).filter(Boolean), sheet = document.createElement("canvas");
-  const sizes = parts.map(({ width, height, aspect }) => [width, Math.max(1, Math.round(height * aspect))]);
-  sheet.width = sizes.reduce((sum, [w]) => sum + w, 0);
-  sheet.height = Math.max(...sizes.map(([, h]) => h));
-  let left = 0;
-  parts.forEach(({ width, height, data, unit }, k) => {
-    const one = document.createElement("canvas");
-    Object.assign(one, { width, height });
-    one.getContext("2d").putImageData(new ImageData(data, width, height), 0, 0);
-    const context = sheet.getContext("2d");
-    context.drawImage(one, left, 0, ...sizes[k]);
-    left += sizes[k][0];
-    if (unit && sizes[k][0] >= LEAST_BAR) {
-      context.save(); context.translate(left - sizes[k][0], 0);
-      drawScaleBar(context, unit, { width: sizes[k][0], height: sizes[k][1] });
-      context.restore();
-    }
-  });
-  return sheet;
-}
-
-async function savePicture(app) {
-  await app.settled();
-  await saveCanvas(app, pictureCanvas(app), fileName(app));
-}
-
-async function saveQuilt(app) {
-  if (!canQuilt(app.main.model)) { app.tell("A quilt needs views beside each other, and WebGL 2."); return; }
-  const { sheet, ending } = quilt(app.main, app.state);
-  await saveCanvas(app, sheet, `${app.main.model.about.name.replace(/\.[^.]*$/, "")}${ending}.png`);
-}
-
-async function saveCanvas(app, canvas, name) {
-  const blob = await new Promise((done) => canvas.toBlob(done, "image/png")), link = document.createElement("a");
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-  app.tell(`Saved ${link.download}`);
-}
-
 async function copyLink(app) {
   app.writeLink();
   try { await navigator.clipboard.writeText(location.href); app.tell("Link copied."); } catch { app.tell("The address bar holds the link."); }
@@ -204,16 +154,17 @@ async function fullScreen(app) {
 
 function wire(app) {
   const actions = {
-    s: () => savePicture(app), 0: () => app.set({ zoom: 1, at: null }), "?": () => document.getElementById("keys").showModal(),
+    s: () => savePicture(app), v: () => { if (filmsOf(app.main.model, app.state).length) app.film.open(); }, r: () => app.set({ turn: (app.state.turn + 1) % 4 }), 0: () => app.set({ zoom: 1, at: null }), "?": () => document.getElementById("keys").showModal(),
     f: () => fullScreen(app), "+": () => zoom(1.25), "=": () => zoom(1.25), "-": () => zoom(0.8),
   };
   const zoom = (factor) => { const box = app.main.stage.getBoundingClientRect(); app.main.zoomAt([box.width / 2, box.height / 2], factor); };
   const on = (id, act) => document.getElementById(id).addEventListener("click", act);
-  on("quilt", () => saveQuilt(app));
+  on("quilt", () => saveQuilt(app)); on("save-film", actions.v); on("turn", actions.r);
   on("save", actions.s); on("fit", actions[0]); on("help", actions["?"]); on("full", actions.f); on("link", () => copyLink(app));
   on("reset", () => { app.state = { ...app.base, mode: app.state.mode, renderer: app.state.renderer }; app.touched(); });
   on("pixel", () => zoom(1 / ((app.main.scale[0] / app.main.image.detail / app.main.model.factor) / app.main.ratio)));
   app.player = new Player(app);
+  app.film = new FilmDialog(app);
   listenToKeys(app, actions);
 }
 

@@ -2,6 +2,7 @@
 
 import { isAlone, middleView, viewWeights } from "./aperture.js";
 import { Finer, PlaneWindow, used, ViewsWindow } from "./finer.js";
+import { RayCaster, RAYS } from "./rays.js";
 import { Refocuser } from "./refocus.js";
 import { loadArray } from "./source.js";
 import { cachedMap } from "./tone.js";
@@ -144,7 +145,8 @@ export class Model {
   }
 
   picture(state, device, settled) {
-    const { views } = this;
+    const { views } = this, sharp = state.sharp && views ? this.need("sharp") : null;
+    if (sharp) return this.seen({ nx: views.shape[3], ny: views.shape[2], ...coding(sharp), numbers: sharp.numbers, exact: true });
     if (!views) return this.plane(state.focus);
     const poster = this.complete ? null : this.poster(state);
     if (poster || !views.numbers) return poster;
@@ -195,18 +197,25 @@ export class Model {
     return { nx, ny, channels: array.shape[2] ?? 1, numbers: array.numbers, ...coding(array), white: this.about.raw.white, base: [ny, nx], aspect: 1, detail: 1, unit: this.about.raw.pitch };
   }
 
-  volumeImage(state) {
+  /** Whether a volume is shown by rays, from any side. */
+  spins(state) {
+    return Boolean(this.about.volume) && RAYS.includes(state.projection);
+  }
+
+  volumeImage(state, device, settled) {
     const array = this.need("volume"), { volume } = this.about;
     if (!array) return null;
     const [nz, ny, nx] = array.shape, channels = array.shape[3] ?? 1, [dz, dy, dx] = volume.spacing;
+    if (this.spins(state) && device.kind === "webgl") return (this.caster ??= new RayCaster(device, array, volume)).image(state, settled);
     const common = { channels, ...coding(array), white: volume.white, detail: 1 };
     if (state.projection === "plane") {
       const k = Math.min(nz - 1, state.plane ?? Math.floor(nz / 2));
       return { ...slice(array, k, [ny, nx, channels]), ...common, base: [ny, nx], aspect: dy / dx, unit: dx };
     }
     array.projections ??= {};
-    const image = (array.projections[state.projection] ??= projection(array.numbers, [nz, ny, nx, channels], state.projection));
-    const sizes = { "max-z": [dy, dx], "max-y": [dz || dx, dx], "max-x": [dy, dz || dy] }[state.projection];
+    const axis = this.spins(state) ? "max-z" : state.projection; // without WebGL
+    const image = (array.projections[axis] ??= projection(array.numbers, [nz, ny, nx, channels], axis));
+    const sizes = { "max-z": [dy, dx], "max-y": [dz || dx, dx], "max-x": [dy, dz || dy] }[axis];
     return { ...image, ...common, base: [image.ny, image.nx], aspect: sizes[0] / sizes[1], unit: sizes[1] };
   }
 

@@ -1,5 +1,7 @@
 // What is drawn over a picture: lattice, pointer lines, the last click, a scale bar.
 
+import { turned } from "./turning.js";
+
 const KINDS = ["#ff5a36", "#2fd27a", "#47a3ff"];
 
 /** Prepares a canvas over the stage, in CSS pixels. */
@@ -11,7 +13,7 @@ export function clearOverlay(canvas, ratio) {
 }
 
 /** Outlines of lenslets on the picture, coloured by kind, with their centres where they are large enough. */
-export function drawLattice(context, lattice, { toScreen, scale, width, height, bounds, picture: [ny, nx] }) {
+export function drawLattice(context, lattice, { toScreen, scale, width, height, bounds, turn, picture: [ny, nx] }) {
   const [[y0, x0], [y1, x1]] = lattice.basis, [oy, ox] = lattice.origin, area = y1 * x0 - y0 * x1;
   const radius = (lattice.pitch * scale) / 2;
   if (radius < 2.5) return false;
@@ -19,7 +21,7 @@ export function drawLattice(context, lattice, { toScreen, scale, width, height, 
   const corners = [[bounds.top, bounds.left], [bounds.top, bounds.right], [bounds.bottom, bounds.left], [bounds.bottom, bounds.right]]
     .map(([y, x]) => inverse(y, x));
   const range = (k) => [Math.floor(Math.min(...corners.map((c) => c[k]))) - 1, Math.ceil(Math.max(...corners.map((c) => c[k]))) + 1];
-  const [i0, i1] = range(0), [j0, j1] = range(1), cell = outline(lattice, scale * (lattice.kinds > 1 ? 0.94 : 1));
+  const [i0, i1] = range(0), [j0, j1] = range(1), cell = outline(lattice, scale * (lattice.kinds > 1 ? 0.94 : 1)).map((step) => turned(step, turn));
   context.lineWidth = 1.25;
   const paths = Array.from({ length: lattice.kinds }, () => new Path2D());
   if (lattice.centers) lattice.centers.forEach(([y, x], k) => add(toScreen(y, x), lattice.kindOf[k]));

@@ -5,8 +5,11 @@ import { CanvasDevice } from "./canvas.js";
 import { openDevice } from "./device.js";
 import { drawEpis } from "./epi.js";
 import { sharpestAlpha, sharpestPlane } from "./focusing.js";
+import { drawMeasures, regionText, samplesOf } from "./measures.js";
 import { clearOverlay, depthTexts, drawCross, drawLattice, drawMark, drawScaleBar } from "./overlay.js";
+import { drawAxes } from "./rays.js";
 import { toneOf } from "./tone.js";
+import { turned } from "./turning.js";
 
 const STILL = 4; // CSS px that a click may move
 const SETTLED = 250; // ms without a change, after which a slow machine draws the exact picture
@@ -44,12 +47,24 @@ export class Pane {
   }
 
   layout({ base, aspect, detail }) {
-    const [ny, nx] = base, { width, height } = this.canvas;
-    const fit = Math.min(width / nx, height / (ny * aspect)), across = fit * this.app.state.zoom;
-    const scale = [across, across * aspect], [y, x] = this.middle(base);
-    const origin = [width / 2 - x * scale[0], height / 2 - y * scale[1]];
-    Object.assign(this, { base, scale, origin });
-    return { origin, scale: scale.map((s) => s / detail) };
+    const [ny, nx] = base, { width, height } = this.canvas, { zoom, turn } = this.app.state;
+    const [wide, tall] = turned([nx, ny * aspect], turn).map(Math.abs), across = Math.min(width / wide, height / tall) * zoom;
+    const scale = [across, across * aspect], [y, x] = this.middle(base), step = turned([x * scale[0], y * scale[1]], turn);
+    const origin = [width / 2 - step[0], height / 2 - step[1]];
+    Object.assign(this, { base, scale, origin, turn, aspect });
+    return { origin, scale: scale.map((s) => s / detail), turn };
+  }
+
+  /** A place of the picture on the canvas. */
+  onCanvas([y, x]) {
+    const step = turned([x * this.scale[0], y * this.scale[1]], this.turn);
+    return this.origin.map((o, k) => o + step[k]);
+  }
+
+  /** What of the picture is on the screen: its least and largest places [y, x]. */
+  corners() {
+    const { width, height } = this.canvas, found = [[0, 0], [width, height]].map(([x, y]) => this.toPicture(x / this.ratio, y / this.ratio));
+    return [Math.min, Math.max].map((end) => [0, 1].map((k) => end(found[0][k], found[1][k])));
   }
 
   draw(now) {
@@ -66,7 +81,7 @@ export class Pane {
     if (!image) return this.blank();
     if (this.device && !this.device.fits(image)) return this.app.tell(`${image.nx} × ${image.ny} pixels are too many for this graphics processor.`, true);
     const view = { ...this.layout(image), smooth: state.smooth && !image.sharp && this.scale[0] / image.detail < 24, ground: this.app.ground };
-    this.tone = image.plain ? { gain: 1 / 255, lift: 0, power: 1, map: "grey", channel: "colour" } : toneOf(state, image);
+    this.tone = this.toneFor(state, image);
     const device = this.deviceFor(image, settled);
     device.show(image, view, this.tone);
     if (device === this.device) {
@@ -79,15 +94,20 @@ export class Pane {
     return true;
   }
 
+  /** Colours of a map stay as they are. */
+  toneFor(state, image) {
+    return image.plain ? { gain: 1 / 255, lift: 0, power: 1, map: "grey", channel: "colour" } : toneOf(state, image);
+  }
+
   /** Over the picture, what is finer of it, in the part where that is exact. */
   drawFine(state, view, settled) {
-    const { origin: [left, top], scale: [across, down], canvas: { width, height }, base: [ny, nx] } = this;
-    const place = ([y, x]) => [left + x * across, top + y * down];
-    const low = [Math.max(0, -top / down), Math.max(0, -left / across)], high = [Math.min(ny - 1, (height - top) / down), Math.min(nx - 1, (width - left) / across)];
+    const { scale: [across, down], base } = this, [first, last] = this.corners();
+    const low = first.map((n) => Math.max(0, n)), high = last.map((n, k) => Math.min(base[k] - 1, n));
     this.finest = this.model.fine(state, this.device, { low, high, scale: across }, settled);
     if (!this.finest) return;
-    const { image, origin, factor } = this.finest, clip = [...place(this.finest.low), ...place(this.finest.high)];
-    this.device.show(image, { ...view, origin: place(origin), scale: [across * factor, down * factor], clip }, toneOf(state, image));
+    const { image, origin, factor } = this.finest, ends = [this.onCanvas(this.finest.low), this.onCanvas(this.finest.high)];
+    const clip = [Math.min, Math.max].flatMap((end) => [0, 1].map((k) => end(ends[0][k], ends[1][k])));
+    this.device.show(image, { ...view, origin: this.onCanvas(origin), scale: [across * factor, down * factor], clip }, toneOf(state, image));
   }
 
   /** Where WebGL is software, the browser's own canvas shows the planes of a stack twice as fast; and the first picture. */
@@ -118,7 +138,7 @@ export class Pane {
   }
 
   over(state, image) {
-    const lattice = this.model.about.raw?.lattice, drawn = image.unit || (state.mode === "raw" ? lattice && state.lattice : state.point) || this.root.classList.contains("epi");
+    const lattice = this.model.about.raw?.lattice, drawn = image.unit || state.ruler || state.region || (state.mode === "raw" ? lattice && state.lattice : state.point) || this.root.classList.contains("epi");
     this.overlay.hidden = !drawn;
     this.tellPlace(image);
     const label = this.describe(state);
@@ -126,15 +146,17 @@ export class Pane {
     if (!drawn) return;
     const context = clearOverlay(this.overlay, this.ratio), size = { width: this.overlay.width / this.ratio, height: this.overlay.height / this.ratio };
     if (state.mode === "raw" && lattice && state.lattice) {
-      const [top, left] = this.toPicture(0, 0), [bottom, right] = this.toPicture(size.width, size.height);
-      drawLattice(context, lattice, { ...size, scale: this.scale[0] / this.ratio, toScreen: (y, x) => this.toScreen(y, x), bounds: { top, left, bottom, right }, picture: image.base });
+      const [[top, left], [bottom, right]] = this.corners();
+      drawLattice(context, lattice, { ...size, scale: this.scale[0] / this.ratio, turn: state.turn, toScreen: (y, x) => this.toScreen(y, x), bounds: { top, left, bottom, right }, picture: image.base });
     }
     const place = this.hover ?? state.point ?? image.base.map((n) => (n - 1) / 2);
     if (this.root.classList.contains("epi") && this.model.complete) {
       drawCross(context, this.toScreen(...place), size, this.app.line);
-      drawEpis(this.strips, this.model, state, place, { origin: this.origin, scale: this.scale, ratio: this.ratio, tone: this.tone, colour: this.app.line });
+      drawEpis(this.strips, this.model, state, place, { origin: this.origin, scale: this.scale, turn: state.turn, ratio: this.ratio, tone: this.tone, colour: this.app.line });
     }
     if (state.point && state.mode !== "raw" && state.mode !== "volume") drawMark(context, this.toScreen(...state.point));
+    drawMeasures(context, state, (y, x) => this.toScreen(y, x), image.unit, image.aspect, this.model.factor);
+    if (image.rays) drawAxes(context, state.orbit, (step) => turned(step, state.turn), size.height);
     if (image.unit) drawScaleBar(context, image.unit / (this.scale[0] / this.ratio), size);
   }
 
@@ -146,7 +168,7 @@ export class Pane {
   /** Position and value under the pointer. */
   tellPlace(image) {
     if (!this.hover) { if (this.readout.textContent) this.readout.textContent = ""; return; }
-    const [y, x] = this.hover, { factor } = this.model, parts = [`y ${(factor * y).toFixed(1)}  x ${(factor * x).toFixed(1)} px`];
+    const [y, x] = this.hover, { factor } = this.model, parts = image.rays ? [] : [`y ${(factor * y).toFixed(1)}  x ${(factor * x).toFixed(1)} px`];
     const row = Math.round(y * image.detail), column = Math.round(x * image.detail);
     if (row < 0 || column < 0 || row >= image.ny || column >= image.nx) { this.readout.textContent = ""; return; }
     if (this.app.state.mode === "depth") {
@@ -162,11 +184,12 @@ export class Pane {
   }
 
   toScreen(y, x) {
-    return [(this.origin[0] + x * this.scale[0]) / this.ratio, (this.origin[1] + y * this.scale[1]) / this.ratio];
+    return this.onCanvas([y, x]).map((at) => at / this.ratio);
   }
 
   toPicture(left, top) {
-    return [(top * this.ratio - this.origin[1]) / this.scale[1], (left * this.ratio - this.origin[0]) / this.scale[0]];
+    const [x, y] = turned([left * this.ratio - this.origin[0], top * this.ratio - this.origin[1]], -this.turn);
+    return [y / this.scale[1], x / this.scale[0]];
   }
 
   inStage(event) {
@@ -188,7 +211,22 @@ export class Pane {
     return sharpestPlane({ nx, ny, count, channels: array.shape[3] ?? 1, numbers: array.numbers, positions: model.about.stack.positions }, place);
   }
 
+  /** Turns a volume by a movement [CSS px]: what is in front follows. */
+  orbit(dx, dy) {
+    const { orbit: [yaw, pitch], turn } = this.app.state, [x, y] = turned([dx, dy], -turn);
+    this.app.set({ orbit: [((((yaw + 0.5 * x + 180) % 360) + 360) % 360) - 180, Math.min(90, Math.max(-90, pitch + 0.5 * y))] });
+  }
+
+  /** A click with a tool sets one end, then the other. */
+  mark(place) {
+    const { drag } = this.app.state;
+    this.app.set({ [drag]: this.marked ? [...this.marked, ...place] : [...place, ...place] });
+    this.marked = this.marked ? null : place;
+  }
+
   click(place) {
+    if (this.app.state.drag !== "move") { this.mark(place); return; }
+    if (this.app.state.sharp) { this.app.tell("Everything is in focus. Uncheck “All in focus” to choose."); return; }
     const focus = this.focusAt(place);
     if (focus !== null) this.app.set({ focus, point: place });
   }
@@ -197,9 +235,8 @@ export class Pane {
     if (!this.base) return;
     const { state } = this.app, place = this.toPicture(left, top), zoom = Math.min(400, Math.max(0.25, state.zoom * factor));
     const grown = this.scale.map((s) => (s * zoom) / state.zoom), { width, height } = this.canvas;
-    const at = [
-      place[0] - ((top + moved[1]) * this.ratio - height / 2) / grown[1], place[1] - ((left + moved[0]) * this.ratio - width / 2) / grown[0],
-    ];
+    const step = turned([(left + moved[0]) * this.ratio - width / 2, (top + moved[1]) * this.ratio - height / 2], -this.turn);
+    const at = [place[0] - step[1] / grown[1], place[1] - step[0] / grown[0]];
     const first = this.app.panes[0].base;
     this.app.set({ zoom, at: zoom === 1 && factor < 1 ? null : at.map((a, k) => (a * first[k]) / this.base[k]) });
   }
@@ -212,8 +249,8 @@ export class Pane {
       aperture = 0.001;
       this.app.tell("Aperture closed to one view: drag moves the viewpoint. “Full” opens it again.");
     }
-    const range = freedom(views, aperture), view = middleView(views, aperture, state.view);
-    const moved = [dy, dx].map((d, k) => Math.min(range[k][1], Math.max(range[k][0], view[k] + 1.4 * d * views.shape[k])));
+    const range = freedom(views, aperture), view = middleView(views, aperture, state.view), step = turned([dx, dy], -state.turn);
+    const moved = [step[1], step[0]].map((d, k) => Math.min(range[k][1], Math.max(range[k][0], view[k] + 1.4 * d * views.shape[k])));
     set({ aperture, view: moved });
   }
 
@@ -229,7 +266,7 @@ export class Pane {
       const pointer = pointers.get(event.pointerId);
       pointers.delete(event.pointerId);
       stage.classList.remove("held");
-      if (pointer && !pointer.moved && event.button === 0) this.click(this.toPicture(...this.inStage(event)));
+      if (pointer && !pointer.moved && event.button === 0 && this.base) this.click(this.toPicture(...this.inStage(event)));
       else this.app.touched();
     });
     stage.addEventListener("pointercancel", (event) => { pointers.delete(event.pointerId); stage.classList.remove("held"); });
@@ -250,8 +287,11 @@ export class Pane {
     if (Math.hypot(...here.map((h, k) => h - pointer.start[k])) > STILL) pointer.moved = true;
     if (!pointer.moved) return;
     this.stage.classList.add("held");
+    const { state } = this.app, plain = !event.shiftKey && event.buttons !== 4;
     if (this.pointers.size === 2) this.pinch(event.pointerId, here);
-    else if (this.model.views && this.app.state.mode === "picture" && !event.shiftKey && event.buttons !== 4) {
+    else if (state.drag !== "move" && plain && this.base) this.app.set({ [state.drag]: [...this.toPicture(...pointer.start), ...this.hover] });
+    else if (state.mode === "volume" && this.model.spins(state) && plain) this.orbit(...step);
+    else if (this.model.views && state.mode === "picture" && plain) {
       const box = this.stage.getBoundingClientRect();
       this.moveView(step[0] / box.width, step[1] / box.height);
     } else this.zoomAt(pointer.last, 1, step);
@@ -265,11 +305,28 @@ export class Pane {
     this.zoomAt(before, far(here) / far(last), after.map((x, k) => x - before[k]));
   }
 
-  /** The picture in its own size, as bytes. */
-  pixels() {
-    if (this.finest) return this.finePixels(this.finest);
-    const image = this.model.image(this.app.state, this.device, true);
-    return image && { width: image.nx, height: image.ny, data: this.device.pixels(image, this.tone ?? toneOf(this.app.state, image)), aspect: image.aspect, unit: image.unit && image.unit / image.detail };
+  /** What a region of the picture holds; of several channels, their mean. */
+  regionText({ region, mode, trust }) {
+    const { image, model } = this, found = region && image && samplesOf(mode === "depth" || !image ? region : region.map((x) => x * image.detail), mode === "depth" ? image.base : [image.ny, image.nx]);
+    if (!found) return "";
+    const { rows: [top, bottom], columns: [left, right] } = found, wide = right - left + 1, values = [];
+    const { depth, confidence } = model.arrays, { channels } = image;
+    const numbers = image.texture ? this.device.sample(image, left, top, wide, bottom - top + 1) : null;
+    for (let y = top; y <= bottom; y++) for (let x = left; x <= right; x++) {
+      const at = y * image.nx + x, own = numbers ? 4 * ((y - top) * wide + x - left) : at * channels, from = numbers ?? image.numbers;
+      if (mode !== "depth") { let sum = 0; for (let c = 0; c < channels; c++) sum += from[own + c]; values.push(image.offset + (image.scale * sum) / channels); }
+      else if (confidence.numbers[at] >= 255 * trust) values.push(depth.offset + depth.scale * depth.numbers[at]);
+    }
+    return `${wide} × ${bottom - top + 1} px: ${regionText(values)}`;
+  }
+
+  /** The picture that settings ask for in its own size: bytes, and where places of the exhibit lie in it. */
+  pixels(state = this.app.state) {
+    if (this.finest && state === this.app.state) return this.finePixels(this.finest);
+    const image = this.model.image(state, this.device, true);
+    if (!image) return image;
+    const { nx: width, ny: height, aspect, unit, detail } = image, place = Object.assign((y, x) => [y * detail, x * detail], { step: detail });
+    return { width, height, data: this.device.pixels(image, this.toneFor(state, image)), aspect, unit: unit && unit / detail, place };
   }
 
   /** What is finer than the picture in its own size, cut to where it is exact. */
@@ -278,7 +335,8 @@ export class Pane {
     const [height, width] = high.map((h, k) => Math.min(k ? image.nx : image.ny, Math.floor((h - origin[k]) / factor) + 1) - start[k]);
     const whole = new ImageData(this.device.pixels(image, toneOf(this.app.state, image)), image.nx, image.ny), sheet = new OffscreenCanvas(image.nx, image.ny).getContext("2d");
     sheet.putImageData(whole, 0, 0);
-    return { width, height, data: sheet.getImageData(start[1], start[0], width, height).data, aspect, unit: unit && unit * factor };
+    const place = Object.assign((y, x) => [y, x].map((n, k) => (n - origin[k]) / factor - start[k]), { step: 1 / factor });
+    return { width, height, data: sheet.getImageData(start[1], start[0], width, height).data, aspect, unit: unit && unit * factor, place };
   }
 
   /** How many views are kept (v, u). */

@@ -81,7 +81,7 @@ export const SHOW = (whole) => `#version 300 es
 precision highp float; precision highp int;
 ${whole ? "precision highp usampler2DArray; uniform usampler2DArray source;" : "uniform sampler2D source;"}
 uniform sampler2D colours;
-uniform ivec2 size;        // of the picture
+uniform ivec2 size, turn;  // of the picture; cosine and sine by which it is turned
 uniform int layer;
 uniform vec2 origin, scale; // of the picture's first sample on the target [px], and target px per sample
 uniform float height;      // of the target, to turn it over; 0 leaves it
@@ -110,7 +110,8 @@ vec3 value(vec2 place) {
 }
 void main() {
   vec2 target = vec2(gl_FragCoord.x, height > 0.0 ? height - gl_FragCoord.y : gl_FragCoord.y);
-  vec2 place = (target - origin) / scale;
+  vec2 off = target - origin;
+  vec2 place = vec2(float(turn.x) * off.x + float(turn.y) * off.y, float(turn.x) * off.y - float(turn.y) * off.x) / scale;
   if (any(lessThan(place, vec2(-0.5))) || any(greaterThanEqual(place, vec2(size) - 0.5))) {
     colour = vec4(ground, 1.0);
     return;

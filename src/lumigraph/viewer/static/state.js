@@ -1,6 +1,7 @@
 // What is shown, as a link can say it: #mode=picture&focus=0.952&aperture=60%25 ...
 
 import { MAPS } from "./colours.js";
+import { TOOLS } from "./measures.js";
 import { CHANNELS } from "./tone.js";
 
 const number = (low, high) => (text) => {
@@ -9,10 +10,11 @@ const number = (low, high) => (text) => {
 };
 const choice = (...words) => (text) => (words.includes(text) ? text : undefined);
 const toggle = (text) => ({ on: true, off: false })[text];
-const pair = (low, high) => (text) => {
+const several = (count) => (low, high) => (text) => {
   const values = text.split(",").map((word) => number(low, high)(word));
-  return values.length === 2 && values.every((value) => value !== undefined) ? values : undefined;
+  return values.length === count && values.every((value) => value !== undefined) ? values : undefined;
 };
+const pair = several(2), four = several(4);
 
 const plain = (digits) => (value) => String(Number(value.toFixed(digits)));
 const switched = (value) => (value ? "on" : "off");
@@ -27,7 +29,7 @@ const FIELDS = {
   view: [null, pair(-1e4, 1e4), both(2)],
   detail: [null, (text) => [1, 2, 4, 8].find((n) => String(n) === text), String],
   plane: [null, number(0, 1e6), plain(0)],
-  projection: ["plane", choice("plane", "max-z", "max-y", "max-x"), String],
+  projection: ["plane", choice("plane", "max-z", "max-y", "max-x", "brightest", "fog"), String],
   trust: [0.1, number(0, 1), plain(2)],
   ev: [0, number(-12, 12), plain(2)],
   black: [0, number(-2, 0.98), plain(3)],
@@ -37,6 +39,13 @@ const FIELDS = {
   lattice: [true, toggle, switched],
   epi: [false, toggle, switched],
   smooth: [true, toggle, switched],
+  turn: [0, (text) => ({ 0: 0, 90: 1, 180: 2, 270: 3 })[text], (v) => String(90 * v)],
+  sharp: [false, toggle, switched],
+  drag: ["move", choice("move", ...TOOLS), String],
+  ruler: [null, four(-1e6, 1e6), both(2)],
+  region: [null, four(-1e6, 1e6), both(2)],
+  orbit: [[30, 20], pair(-180, 180), both(1)],
+  density: [30, number(0.1, 1000), plain(1)],
   at: [null, pair(-1e6, 1e6), both(2)],
   zoom: [1, number(0.05, 400), plain(3)],
   point: [null, pair(-1e6, 1e6), both(1)],
