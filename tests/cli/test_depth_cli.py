@@ -64,8 +64,9 @@ def test_the_focal_stack_of_fused_suits_views_far_apart(lumigraph, views, tmp_pa
         assert lumigraph("depth", "far.zarr", "--method", "fused", "-o", "map.pfm", *words).code == 0
         return float(np.abs(lg.open(tmp_path / "map.pfm").data - NEAR).mean())
 
-    assert error() < 0.006
-    assert error("--alphas", "0.9:1.1:21") > 0.007  # planes a pixel per view apart
+    suited = error()
+    assert suited < 0.006
+    assert error("--alphas", "0.9:1.1:21") > 1.1 * suited  # planes a pixel per view apart
 
 
 @pytest.mark.parametrize(("method", "shape"), [("correlation", (8, 9)), ("dense", (31, 35))])

@@ -63,8 +63,8 @@ def test_noise_costs_confidence_and_little_else(paint, rng):
     views, truth = views_of([(paint[0], lambda y, x: 0.4 + 0.01 * x, None)])
     clear, rough = epi(views), epi(noisy(views, 0.1, rng))
     assert np.abs(rough.values - truth).mean() < 0.01
-    assert np.median(rough.confidence) < np.median(clear.confidence) - 0.02
-    assert np.median(rough.error) > 1.5 * np.median(clear.error)
+    assert np.median(rough.confidence) < np.median(clear.confidence)
+    assert np.median(rough.error) > max(1.5 * np.median(clear.error), np.median(clear.error) + 0.004)
 
 
 def test_sure_places_have_smaller_errors(paint, rng):
@@ -76,7 +76,7 @@ def test_sure_places_have_smaller_errors(paint, rng):
     error, trust = np.abs(found.values - truth), np.asarray(found.confidence)
     sure = trust > np.median(trust)
     assert error[sure].mean() < 0.5 * error[~sure].mean()
-    assert trust[:, :8].max() < 0.9 < trust[:, 34:38].min()
+    assert found.error[:, :8].min() > 0.021 > found.error[:, 34:38].max()
     # The expected error is that of the whole scene to a factor of two, though it was never seen.
     assert 0.5 < np.mean(found.error) / error.mean() < 2
 
@@ -286,7 +286,7 @@ def test_a_surface_is_not_bent_across_a_tear():
 
 def test_beside_an_edge_of_depth_a_place_is_less_sure(bar):
     views, _ = bar
-    trust = np.asarray(epi(views, (-1, 3)).confidence)[4:-4]
-    beside, away = trust[:, [27, 28, 43, 44]], trust[:, 32:40]  # the bar's edges are at 28.5 and 43.5
-    # Both have the same texture: noise and contrast alone gave both the same confidence.
-    assert np.median(beside) < 0.2 * np.median(away)
+    error = np.asarray(epi(views, (-1, 3)).error)[4:-4]
+    beside, away = error[:, [27, 28, 43, 44]], error[:, 32:40]  # the bar's edges are at 28.5 and 43.5
+    # Both have the same texture: noise and contrast alone gave both the same error.
+    assert np.median(beside) > 10 * np.median(away)

@@ -14,7 +14,7 @@ from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.progress import Progress, silent, within
 from lumigraph.core.raw import RawImage
 from lumigraph.depth.correlation import WIDEST, correlation
-from lumigraph.depth.expected import expected
+from lumigraph.depth.expected import Evidence, contrast, expected
 from lumigraph.depth.flat import Flat
 from lumigraph.depth.pictures import noise_of
 from lumigraph.depth.sightings import Sightings
@@ -33,6 +33,7 @@ _ROUNDS = (2.0, 1.2)  # px: second difference that counts as an edge, round by r
 _TEAR = 2.0  # px between neighbours that are not of one surface
 _KINK, _STIFFNESS = 4e-3, 3e4  # px; per variance of the noise
 _FARTHEST = 1.2  # px that a round may move a place
+_SHARED = 0.3  # of the deviation of one sample alone: neighbours see the same pixels
 _DOUBT = 0.8  # px: expected error with a confidence of 1/e
 
 
@@ -107,8 +108,8 @@ def dense(
     moves = _labels(np.abs(sizes.values), to_numpy(lenslets.confidence), reach, calibration.lattice.pitch)
     guide = _joined(sights, lambda part, rows: part.picture(sizes.between(*part.fractional)))
     first = _swept(sights, moves, (sign, guide), within(progress, 0.3, 0.8))
-    found, deviation = _refined(sights, first, sign, within(progress, 0.8, 1))
-    error = expected(found, np.minimum(deviation, reach))
+    found, evidence = _refined(sights, first, (sign, guide), within(progress, 0.8, 1))
+    error = np.minimum(np.maximum(expected(found, evidence), expected(-found, evidence)), reach)
     values = sign * np.exp(found / reach)
     trust, error = np.exp(-error / _DOUBT), error * np.abs(values) / reach
     values, trust, error = (like(part, raw.data) for part in (values, trust, error))
@@ -148,20 +149,23 @@ def _swept(
 
 
 def _refined(
-    sights: Sightings, moves: np.ndarray, sign: float, progress: Progress
-) -> tuple[np.ndarray, np.ndarray]:
-    """Labels (y, x) refined on all micro-images by least squares, and their standard deviation."""
-    noise, information = noise_of(sights.flat.image), np.zeros_like(moves)
+    sights: Sightings, moves: np.ndarray, how: tuple[float, np.ndarray], progress: Progress
+) -> tuple[np.ndarray, Evidence]:
+    """Labels (y, x) refined on all micro-images by least squares, and what they rest on."""
+    (sign, guide), noise = how, noise_of(sights.flat.image)
+    information = variance = disputed = np.zeros_like(moves)
     for k, jump in enumerate(_ROUNDS):
         sizes = sign * np.exp(moves / sights.flat.even)
         asked = _joined(sights, partial(_asked, sizes=sizes, noise=noise))
-        pull, information, variance = np.moveaxis(asked, 1, 0)
+        pull, information, variance, disputed = np.moveaxis(asked, 1, 0)
         noise = max(noise, float(np.sqrt(np.median(variance))))
-        how = Stiffness(_STIFFNESS * noise**2, _KINK, jump)
-        change = update(moves, information, pull, how, None, tears(moves, _TEAR)) - moves
+        held = Stiffness(_STIFFNESS * noise**2, _KINK, jump)
+        change = update(moves, information, pull, held, None, tears(moves, _TEAR)) - moves
         moves = moves + np.clip(change, -_FARTHEST, _FARTHEST)
         progress((k + 1) / len(_ROUNDS))
-    return moves, noise / np.sqrt(box(information, 3) + 1e-12)
+    residual = np.sqrt(np.maximum(box(variance, 2), noise_of(sights.flat.image) ** 2))
+    deviation = _SHARED * residual / np.sqrt(box(information, 3) + 1e-12)
+    return moves, Evidence(deviation, box(disputed, 1), contrast(guide))
 
 
 def _asked(part: Sightings, rows: slice, sizes: np.ndarray, noise: float) -> np.ndarray:

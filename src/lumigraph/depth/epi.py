@@ -14,7 +14,7 @@ from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.sweep import labels, span, swept
 from lumigraph.errors import GeometryError
 
-_DOUBT = 0.2
+_DOUBT = 0.65
 """Expected error [px per view, or in the outermost view if that is less] with a confidence of 1/e."""
 
 
@@ -43,7 +43,7 @@ def epi(
     DepthMap
         Disparities (t, s): positive is nearer than the plane in focus. `error` is the mean distance from
         the truth to expect, by what noise and contrast allow in a 7 x 7 window and what is at stake beside an
-        edge of depth, where the map may be on the wrong side. Confidence is exp(-error/0.2 px).
+        edge of depth, where the map may be on the wrong side. Confidence is exp(-error/0.65 px).
 
     Raises
     ------
@@ -77,8 +77,8 @@ def epi(
     share = len(moves) / (len(moves) + 20)
     first = swept(pictures, moves, shading, within(progress, 0, share))
     first = np.clip(median_filter(first, 5), moves[0], moves[-1])
-    found, deviation = refined(pictures, first, shading, within(progress, share, 1))
-    found, error = found / pictures.reach, expected(found / pictures.reach, deviation / pictures.reach)
+    found, evidence = refined(pictures, first, shading, within(progress, share, 1))
+    found, error = found / pictures.reach, expected(found, evidence) / pictures.reach
     trust = np.exp(-error / min(_DOUBT, _DOUBT * 4 / pictures.reach))
     found, trust, error = (like(part, views.data) for part in (found, trust, error))
     return DepthMap(found, trust, "disparity", error)

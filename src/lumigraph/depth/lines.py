@@ -1,12 +1,14 @@
 """Slopes of the lines of all epipolar-plane images at once, by least squares about a first estimate."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.ndimage import map_coordinates, maximum_filter, spline_filter
 
 from lumigraph.core.progress import Progress
+from lumigraph.depth.expected import Evidence, contrast
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import WINDOW, Fit, Shading
 from lumigraph.depth.smooth import Stiffness, tears, update
@@ -14,14 +16,16 @@ from lumigraph.depth.volume import box
 
 _spline: Any = spline_filter
 
-_ROUNDS = (2.0, 1.2)
+_JUMPS = (2.0, 1.2)
 """Second difference that counts as an edge, round by round [px in the outermost view]."""
 
 _KINK = 4e-3  # px in the outermost view
-_STIFFNESS = 3e5
+_STIFFNESS = 4000.0  # per variance of the noise, and per `_lever`
 _EDGE = 0.003  # contrast between neighbours [of a picture from 0 to 1] where a surface may end
 _USUAL, _AROUND = 1.3, 8  # times the mean contrast within so many px, which is texture
 _LOOSEST = 0.1  # part of its stiffness that a surface keeps at the sharpest edge
+_LEAST_SAID = 0.15  # of what gradients seem to say
+_MOST_LEFT = 0.2  # of a picture from 0 to 1: more says only that a place is wrong
 _BEFORE = 1.2  # how much nearer an occluder is [px in the outermost view]
 _TEAR = 2.0  # px in the outermost view between neighbours that are not of one surface
 _BESIDE = 2  # px beside an occluder whose differences show its edge
@@ -29,8 +33,8 @@ _BESIDE = 2  # px beside an occluder whose differences show its edge
 
 def refined(
     pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Progress
-) -> tuple[np.ndarray, np.ndarray]:
-    """Movements (y, x) in the outermost view [px], refined on all views, and their standard deviation.
+) -> tuple[np.ndarray, Evidence]:
+    """Movements (y, x) in the outermost view [px], refined on all views, and what they rest on.
 
     Each round asks every view that sees a place by how much it should move there, r = g Δ: the residual r
     against the middle view, and the gradient g along the view's own direction. The answers, weighted by what
@@ -39,52 +43,82 @@ def refined(
     grey = pictures.data.mean(2)
     lines = np.stack([[_spline(view, 3, output=np.float32) for view in row] for row in grey])
     moves = moves.astype(np.float32)
-    information = np.zeros_like(moves)
-    edges = _edges(grey[pictures.middle])
-    for k, jump in enumerate(_ROUNDS):
-        pull, information, shading = _asked(pictures, lines, moves, shading)
-        how = Stiffness(_STIFFNESS * pictures.noise**2 * _share(pictures), _KINK, jump)
-        change = update(moves, information, pull, how, edges, tears(moves, _TEAR)) - moves
+    edged = contrast(grey[pictures.middle])
+    edges, asked = _edges(edged), _asked(pictures, lines, moves, shading)
+    stiffness = _STIFFNESS * pictures.noise**2 * _lever(pictures)
+    for k, jump in enumerate(_JUMPS):
+        if k:
+            asked = _asked(pictures, lines, moves, asked.shading)
+        how = Stiffness(stiffness, _KINK, jump)
+        change = update(moves, asked.information, asked.pull, how, edges, tears(moves, _TEAR)) - moves
         moves = moves + np.clip(change, -_BEFORE, _BEFORE)
-        progress((k + 1) / len(_ROUNDS))
-    return moves, pictures.noise / np.sqrt(box(information, 3) + 1e-12)
+        progress((k + 1) / len(_JUMPS))
+    return moves, Evidence(_deviation(pictures, asked), box(asked.disputed, 1), edged)
 
 
-def _edges(picture: np.ndarray) -> np.ndarray:
-    """Part (y, x) of the stiffness that a surface keeps at each place of its picture (y, x)."""
-    contrast = np.hypot(*np.gradient(picture))
-    usual = box(contrast, _AROUND)
-    above = np.maximum(contrast - _USUAL * usual, 0)
+def _deviation(pictures: Pictures, asked: "_Asked") -> np.ndarray:
+    """Standard deviation (y, x) [px in the outermost view] by the residuals that are left.
+
+    Noise has gradients of its own, which say nothing.
+    """
+    information = box(asked.information, 3)
+    nothing = 0.25 * pictures.noise**2 * _lever(pictures)
+    information = np.maximum(information - nothing, _LEAST_SAID * information)
+    return np.maximum(box(asked.residual, 2), pictures.noise) / np.sqrt(information + 1e-12)
+
+
+def _edges(edged: np.ndarray) -> np.ndarray:
+    """Part (y, x) of the stiffness that a surface keeps where its picture has a contrast (y, x)."""
+    usual = box(edged, _AROUND)
+    above = np.maximum(edged - _USUAL * usual, 0)
     return np.maximum(np.exp(-above / (_EDGE + usual)), _LOOSEST)
 
 
-def _share(pictures: Pictures) -> float:
-    """Part of 80 views that there are."""
-    return float(pictures.lit.sum()) / 80
+def _lever(pictures: Pictures) -> float:
+    """Sum of the squares of the views' distances from the middle one: what a texture says grows as it does."""
+    squares = np.square(pictures.down)[:, None] + np.square(pictures.right)
+    return float(squares[pictures.lit].sum())
 
 
-def _asked(
-    pictures: Pictures, lines: np.ndarray, moves: np.ndarray, shading: Shading
-) -> tuple[np.ndarray, np.ndarray, Shading]:
-    """What the views pull at each place (y, x), their information about it, and the shading that is left."""
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What the views pull at each place (y, x), their information about it, and the shading that is left.
+
+    `residual` is how much the views that see a place differ from the middle one, `disputed` the part of them
+    that does by more than noise.
+    """
+
+    pull: np.ndarray
+    information: np.ndarray
+    shading: Shading
+    residual: np.ndarray
+    disputed: np.ndarray
+
+
+def _asked(pictures: Pictures, lines: np.ndarray, moves: np.ndarray, shading: Shading) -> _Asked:
     center = pictures.center.mean(0)
     slope = np.gradient(center)
-    pull, information, down, right = (np.zeros_like(moves) for _ in range(4))
+    pull, information, down, right, agreed, off, count = (np.zeros_like(moves) for _ in range(7))
     fit, usual = Fit(moves.shape, pictures.noise), 2.5 * pictures.noise
     for (y, x), seen, view in _warped(pictures, lines, moves):
         residual, along = view - center, np.gradient(view)
         gradient = 0.5 * y * (along[0] + slope[0]) + 0.5 * x * (along[1] + slope[1])
-        weight = seen / (1 + (box(np.abs(residual - shading.at(y, x)), 1) / usual) ** 2)
+        left = np.abs(residual - shading.at(y, x))
+        weight = seen / (1 + (box(left, 1) / usual) ** 2)
         fit.add(residual, weight, gradient, y, x)
         pulled = weight * gradient
         pull -= pulled * residual
         information += pulled * gradient
         down += y * pulled
         right += x * pulled
+        agreed += weight
+        off += seen * np.minimum(left, _MOST_LEFT)
+        count += seen
     shading = fit.solved(WINDOW)
     pull += shading.down * down + shading.right * right
     clear = maximum_filter(moves, 2 * _BESIDE + 1) - moves < _BEFORE
-    return pull * clear, information * clear, shading
+    count = np.maximum(count, 1)
+    return _Asked(pull * clear, information * clear, shading, off / count, 1 - agreed / count)
 
 
 def _warped(

@@ -10,12 +10,16 @@ from lumigraph.core import checks, memory
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.lightfield import LightField
 from lumigraph.depth.quantities import disparity_per_alpha
+from lumigraph.depth.volume import box
 from lumigraph.errors import GeometryError
 
 MOST_VIEWS = 9
 """Along one axis: views between these look much the same, and cost as much."""
 
 _LEAST_NOISE = 2e-3  # of a picture from 0 to 1: what rounding to eight bits leaves
+_WINDOW, _SMOOTH = 4, 0.1  # px; part of the windows that show nothing but noise
+_OF_NOISE = 0.81  # of its mean: how rough the smoothest tenth of the windows of noise alone is
+_LIT = 0.1  # of a picture from 0 to 1: what is darker may be cut off
 _DARK = 0.05  # views darker than this part of the middle one lie outside the aperture
 
 
@@ -116,12 +120,14 @@ def _even(data: np.ndarray, middle: tuple[int, int]) -> tuple[np.ndarray, np.nda
 
 
 def noise_of(picture: np.ndarray) -> float:
-    """Standard deviation of the noise of a picture (y, x).
+    """Standard deviation of the noise of a picture (y, x), by its smoothest lit parts: the rest is texture.
 
     References
     ----------
-    Immerkær, "Fast noise variance estimation", Comput. Vis. Image Underst. 64, 300 (1996), with a median.
+    Immerkær, "Fast noise variance estimation", Comput. Vis. Image Underst. 64, 300 (1996), in windows.
     """
     kernel = np.array([[1.0, -2, 1], [-2, 4, -2], [1, -2, 1]])
-    rough = convolve(picture, kernel)
-    return max(float(np.median(np.abs(rough))) / (6 * 0.6745), _LEAST_NOISE)
+    rough = box(np.abs(convolve(picture, kernel)), _WINDOW)
+    lit = rough[box(picture, _WINDOW) > _LIT]
+    smooth = float(np.quantile(lit if lit.size else rough, _SMOOTH)) / _OF_NOISE
+    return max(smooth * math.sqrt(np.pi / 2) / 6, _LEAST_NOISE)

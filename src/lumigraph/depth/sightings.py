@@ -174,10 +174,10 @@ class Sightings:
         return np.minimum(means[0], means[1]) + np.minimum(means[2], means[3])
 
     def asked(self, size: np.ndarray, noise: float) -> np.ndarray:
-        """What lenslets pull at patches (y, x), their information about them, and their variance (3, y, x).
+        """What lenslets pull at patches (y, x), their information, variance, and disputed part (4, y, x).
 
         The first two for a step of the patch by which a detail moves by 1 px where it stands at a
-        micro-image's edge. Values that are off by more than their noise count less.
+        micro-image's edge. Values that are off by more than their noise count less: as the last says.
         """
         step = np.asarray(size / self.calibration.lattice.pitch / self.flat.even, np.float32)
         sights = list(self.around(size))
@@ -190,8 +190,9 @@ class Sightings:
         total = weights.sum(0) + np.float32(1e-9)
         slopes -= (weights * slopes).sum(0) / total
         off = values - (weights * values).sum(0) / total
-        pulled = weights * slopes
-        return np.stack([-(pulled * off).sum(0), (pulled * slopes).sum(0), (weights * off**2).sum(0) / total])
+        pulled, variance = weights * slopes, (weights * off**2).sum(0) / total
+        disputed = 1 - total / (seen.sum(0) + np.float32(1e-9))
+        return np.stack([-(pulled * off).sum(0), (pulled * slopes).sum(0), variance, disputed])
 
     def _slope(self, sight: Sight) -> np.ndarray:
         """How much a lenslet's value changes with the logarithm of the patch, over patch/pitch (y, x)."""
