@@ -75,7 +75,7 @@ def _edges(edged: np.ndarray) -> np.ndarray:
 
 
 def _lever(pictures: Pictures) -> float:
-    """Sum of the squares of the views' distances from the middle one: what a texture says grows as it does."""
+    """Sum of the squares of the views' distances from the middle one, by which what a texture says grows."""
     squares = np.square(pictures.down)[:, None] + np.square(pictures.right)
     return float(squares[pictures.lit].sum())
 
