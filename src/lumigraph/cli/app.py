@@ -14,6 +14,7 @@ from importlib.metadata import version
 from cyclopts import App, Parameter
 from cyclopts.exceptions import CycloptsError, UnknownCommandError
 
+from lumigraph.cli.batch import batch
 from lumigraph.cli.board import board
 from lumigraph.cli.calibrate import calibrate
 from lumigraph.cli.catalogue import catalogue
@@ -39,8 +40,8 @@ FAILED, USAGE, INTERRUPTED = 1, 2, 130
 _LONGEST = 400  # characters of a line on standard error
 
 VERBS = (
-    demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure, board, view,
-    samples, catalogue, reproduce,
+    demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure, batch, board,
+    view, samples, catalogue, reproduce,
 )  # fmt: skip
 """In the order of their use."""
 

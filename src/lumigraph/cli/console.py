@@ -22,7 +22,7 @@ _interrupted = threading.Event()
 def report(common: Common, text: str, values: Mapping[str, Any] | Sequence[Any]) -> None:
     """Print the result of a verb: text for people, or with `--json` one object, or a list of them."""
     if common.json:
-        print(json.dumps(values, default=_plain, ensure_ascii=False))
+        print(json.dumps(values, default=plain, ensure_ascii=False))
     else:
         print(text)
 
@@ -85,14 +85,20 @@ class _Lines:
     def __call__(self, *, description: str = "", completed: float = 0.0, **_: object) -> None:
         """Write what is done, if it is time to."""
         passed = time.monotonic() - self.began
-        if passed >= self.next and completed < 1 and sys.stderr is not None:
+        if passed >= self.next and completed < 1:
             self.next = 2 * passed
-            text = f"lumigraph: {description or self.task}: {completed:.0%} after {passed:.0f} s"
-            with suppress(OSError):
-                print(text, file=sys.stderr, flush=True)
+            line(f"{description or self.task}: {completed:.0%} after {passed:.0f} s")
 
 
-def _plain(value: Any) -> Any:
+def line(text: str) -> None:
+    """One line on standard error, such as what a long run needs."""
+    if sys.stderr is not None:
+        with suppress(OSError):
+            print(f"lumigraph: {text}", file=sys.stderr, flush=True)
+
+
+def plain(value: Any) -> Any:
+    """What JSON can hold instead of a value that it cannot."""
     if hasattr(value, "tolist"):
         return value.tolist()
     return list(value) if isinstance(value, tuple | set) else str(value)

@@ -1,7 +1,8 @@
 """`lumigraph deconvolve`."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from lumigraph.core.linear import Linear
     from lumigraph.core.prepared import PreparedImage
     from lumigraph.core.raw import RawImage
-    from lumigraph.deconvolution import RichardsonLucy, Step
+    from lumigraph.deconvolution import Deconvolver, RichardsonLucy, Step
     from lumigraph.instruments import Instrument
 
 MOST_DEPTHS = 1000
@@ -213,7 +214,8 @@ def deconvolve(
     files.check_output(output, (*files.PICTURES, ".h5", ".hdf5"))
     for options in (common, seen, way):
         options.check()
-    wanted_depths, described = wanted.depths(), load_camera(camera)
+    wanted.depths()  # refused before anything is read
+    described = load_camera(camera)
     frames = seen.frames(raw)
     if len(frames) > 1 and way.checkpoint is not None:
         raise FormatError("--checkpoint keeps one run, not several pages. Give one --page.")
@@ -222,8 +224,7 @@ def deconvolve(
         ready = seen.prepared(frames[0][1], described)
         made = within(shown, 0.0, 1.0, "point images")
         made(0.0)
-        operator = operator_of(described, wanted_depths, wanted.samples, ready.calibration, made)
-        task = _Task(operator, way, way.method(described, operator), output)
+        task = _Task(_engine(_Asked.of(camera, wanted, way, ready.calibration, made)), way, output)
         pages = [(name, replace(ready, data=frame.data)) for name, frame in frames]
         for name, found in task.run(pages, (steps, shown)):
             written.append(_named(output, name))
@@ -235,9 +236,8 @@ def deconvolve(
 class _Task:
     """What the pages of a series share."""
 
-    operator: Any
+    engine: "Deconvolver"
     way: Way
-    method: Any
     output: Path
 
     def run(
@@ -253,28 +253,56 @@ class _Task:
                 "Leave it out and use --iterations."
             )
 
-        def raws() -> "Iterator[PreparedImage]":
-            nonlocal name
-            for title, ready in pages:
-                name = title
-                steps.clear()
-                yield ready
-
         def follow(step: "Step") -> None:
             steps.append(step)
             what = f"{name[1:]} {_reached(step, exposure.gain)}".strip()
             shown(Stage(step.iteration / step.iterations, what))
 
         try:
-            for found in deconvolution.deconvolve_series(
-                raws(), self.operator, deconvolution.Stop(self.way.iterations, self.way.deviance),
-                method=self.method, exposure=exposure, progress=follow, checkpoint=self.way.checkpoint,
-            ):  # fmt: skip
-                yield name, found
+            for name, ready in pages:
+                steps.clear()
+                yield name, self.engine(ready, exposure, progress=follow, checkpoint=self.way.checkpoint)
         except deconvolution.Interrupted as stopped:
             kept = _named(self.output, f"{name}.partial")
             io.save(stopped.partial, kept)
             raise KeyboardInterrupt(f"{stopped.iterations} iterations are in {kept}.") from None
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What a deconvolution is made of; equal where the same comes of it."""
+
+    described: str
+    wanted: Wanted
+    way: Way
+    lattice: str
+    camera: "Instrument" = field(compare=False)
+    calibration: "Calibration | None" = field(compare=False)
+    progress: Progress = field(compare=False)
+
+    @classmethod
+    def of(
+        cls, camera: str, wanted: Wanted, way: Way, calibration: "Calibration | None", progress: Progress
+    ) -> "_Asked":
+        """By the content of the camera's description and of the calibration."""
+        from lumigraph.deconvolution.checkpoint import fingerprint
+        from lumigraph.instruments import load_camera
+
+        found = load_camera(camera)
+        return cls(found.to_toml(), wanted, way, fingerprint(calibration), found, calibration, progress)
+
+
+@lru_cache(1)  # the frames of a batch share it
+def _engine(asked: _Asked) -> "Deconvolver":
+    from lumigraph.deconvolution import Deconvolver, Stop
+
+    operator = operator_of(
+        asked.camera, asked.wanted.depths(), asked.wanted.samples, asked.calibration, asked.progress
+    )
+    way = asked.way
+    return Deconvolver(
+        operator, Stop(way.iterations, way.deviance), method=way.method(asked.camera, operator)
+    )
 
 
 def _named(output: Path, name: str) -> Path:

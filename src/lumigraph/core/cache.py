@@ -147,7 +147,9 @@ def _bytes(thing: Any) -> int:
         return int(told)
     if isinstance(thing, tuple | list):
         return sum(map(_bytes, thing))
-    if not hasattr(thing, "shape"):
+    if hasattr(thing, "data") and not hasattr(thing, "dtype"):  # a picture, a volume
+        return _bytes(thing.data)
+    if not hasattr(thing, "dtype"):
         return sys.getsizeof(thing)
     size = 1
     for n in thing.shape:

@@ -30,6 +30,19 @@ def total() -> int | None:
     return min(sizes, default=None)
 
 
+def told(size: float) -> str:
+    """Bytes as people read them.
+
+    >>> told(512), told(5.5 * 2**20), told(3 * 2**30)
+    ('512 B', '5.5 MiB', '3 GiB')
+    """
+    for unit in ("B", "KiB", "MiB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1024
+    return f"{size:.3g} GiB"
+
+
 def require_plane(shape: tuple[int, int], itemsize: int, what: str) -> None:
     """Refuse to draw one plane (ny, nx) that needs more memory than there is.
 

@@ -1,6 +1,6 @@
 """Objects from raw images: what a camera must have seen, from a model of how it sees, a `core.linear.Linear`.
 
-- `deconvolve`: `deconvolve` and, for time series, `deconvolve_series`; `Step`, `Interrupted`
+- `deconvolve`: `deconvolve`; for time series `deconvolve_series`, `Deconvolver`; `Step`, `Interrupted`
 - `beyond`: objects that reach beyond the picture, as far as light comes from
 - `exposure`: `Exposure`, what is known of the raw image besides its values
 - `problem`: the three put together: model, sensitivity, deviance
@@ -13,7 +13,7 @@
 """
 
 from lumigraph.deconvolution.checkpoint import Checkpoint
-from lumigraph.deconvolution.deconvolve import Interrupted, Step, deconvolve, deconvolve_series
+from lumigraph.deconvolution.deconvolve import Deconvolver, Interrupted, Step, deconvolve, deconvolve_series
 from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.filters import LowPass
 from lumigraph.deconvolution.least_squares import LeastSquares
@@ -24,6 +24,7 @@ from lumigraph.deconvolution.wavelets import Wavelets
 
 __all__ = [
     "Checkpoint",
+    "Deconvolver",
     "Exposure",
     "Interrupted",
     "LeastSquares",

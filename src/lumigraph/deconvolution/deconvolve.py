@@ -207,25 +207,63 @@ def deconvolve_series(
         As in `deconvolve`; the exposure is that of the first frame for all of them, and a checkpoint keeps
         the frame that is being worked on.
     """
-    limits = iterations if isinstance(iterations, Stop) else Stop(iterations)
-    _check(operator, method)
-    wide, inside = beyond(operator)
-    scale: Scale | None = None
+    engine = Deconvolver(operator, iterations, method=method)
     for raw in frames:
-        with single_products():  # threads of small products spin: three times the work on a busy machine
-            if scale is None:
-                exposure = _known(raw, exposure)
-                data = values(raw, operator, exposure)
-                _require(wide, data)
-                scale = Scale.of(wide, exposure, data, least_seen(operator))
-            assert exposure is not None
-            problem = Problem.of(raw, exposure, scale)
-            run = _Run(problem, method, limits, progress, (operator, inside))
-            if checkpoint is not None:
-                run.checkpoint = Checkpoint.of(checkpoint)
-                run.key = fingerprint(values(raw, operator, exposure), exposure, method)
-            found = _finished(run, raw)
-        yield found
+        exposure = _known(raw, exposure)
+        yield engine(raw, exposure, progress=progress, checkpoint=checkpoint)
+
+
+class Deconvolver:
+    """`deconvolve` by one operator and one method for any number of raw images, one after the other.
+
+    What does not depend on the raw image, such as how much light each object sample sends onto the pixels
+    that count, is computed once for each exposure. The result is the same bits as that of `deconvolve`.
+
+    Parameters
+    ----------
+    operator, iterations, method
+        As in `deconvolve`.
+    """
+
+    def __init__(
+        self,
+        operator: Linear,
+        iterations: int | Stop = 30,
+        *,
+        method: Method = RichardsonLucy(),  # noqa: B008 - frozen
+    ) -> None:
+        self.operator, self.method = operator, method
+        self.limits = iterations if isinstance(iterations, Stop) else Stop(iterations)
+        _check(operator, method)
+        self._wide, self._inside = beyond(operator)
+        self._scale: tuple[str, Scale] | None = None
+
+    @single_products()  # threads of small products spin: three times the work on a busy machine
+    def __call__(
+        self,
+        raw: RawImage | Array,
+        exposure: Exposure | None = None,
+        *,
+        progress: Report | None = None,
+        checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
+    ) -> Any:
+        """The result of one raw image; parameters and errors are those of `deconvolve`."""
+        exposure = _known(raw, exposure)
+        data = values(raw, self.operator, exposure)
+        problem = Problem.of(raw, exposure, self._scaled(exposure, data))
+        run = _Run(problem, self.method, self.limits, progress, (self.operator, self._inside))
+        if checkpoint is not None:
+            run.checkpoint = Checkpoint.of(checkpoint)
+            run.key = fingerprint(data, exposure, self.method)
+        return _finished(run, raw)
+
+    def _scaled(self, exposure: Exposure, data: Array) -> Scale:
+        """The scale of an exposure: that of the raw image before, if it is the same."""
+        key = fingerprint(exposure, str(data.dtype), str(arrays.placement(data)))
+        if self._scale is None or self._scale[0] != key:
+            _require(self._wide, data)
+            self._scale = key, Scale.of(self._wide, exposure, data, least_seen(self.operator))
+        return self._scale[1]
 
 
 @dataclass(slots=True)

@@ -4,6 +4,7 @@
 - `tiff`, `tiff_pixels`, `ome`: TIFF of any bit depth; OME-TIFF for stacks and volumes
 - `png`: PNG, 1 to 16 bits; `jpeg`: photos, read only
 - `zarr`, `zarr_chunks`, `ngff`: Zarr v3 stores, a folder or one `.zarr.zip`; OME-Zarr for volumes
+- `series`: results of one shape as one Zarr v3 store, a shard for each, written one by one
 - `hdf5`: HDF5, our own, Heidelberg light fields, arrays by others
 - `lytro`, `lytro_metadata`, `bits`: Lytro containers, packed raw frames, what the camera recorded
 - `views`, `eslf`, `cameras`: folders of views, ESLF mosaics; which camera is which view
@@ -21,7 +22,9 @@ from lumigraph.io.formats import (  # lumigraph.open is meant to read like the b
     Format,
     Part,
     contents,
+    format_of,
     open,  # noqa: A004
+    pages,
     save,
 )
 from lumigraph.io.target import check_target
@@ -32,8 +35,10 @@ __all__ = [
     "Part",
     "check_target",
     "contents",
+    "format_of",
     "load_calibration",
     "open",
+    "pages",
     "save",
     "save_calibration",
 ]

@@ -263,6 +263,24 @@ def contents(path: str | os.PathLike[str]) -> tuple[Part, ...]:
     return (Part("", type(thing).__name__, f"{' x '.join(map(str, data.shape))}, {data.dtype}"),)
 
 
+def pages(path: str | os.PathLike[str]) -> int:
+    """Pictures of one size that a file holds one after the other; 1 where it holds anything else.
+
+    Raises
+    ------
+    FormatError
+        As `open`.
+    """
+    path = source.existing(path)
+    row = format_of(path)
+    counted = getattr(row.imported(), "count", None)
+    if counted is not None:
+        with source.ours(path, row.name):
+            return counted(path)
+    found = open(path)
+    return len(found.data) if isinstance(found, Stack | Volume) else 1
+
+
 def save(
     thing: Any, path: str | os.PathLike[str], *, white: float | None = None, fps: float | None = None
 ) -> None:

@@ -33,8 +33,8 @@ def names(volume: Volume) -> tuple[str, ...]:
     return ("c", "z", "y", "x")[4 - len(volume.data.shape) :]
 
 
-def describe(volume: Volume) -> dict[str, Any]:
-    """The attribute "ome" of a volume; lengths in micrometres."""
+def describe(volume: Volume, *, times: bool = False) -> dict[str, Any]:
+    """The attribute "ome" of a volume, or of a series of them over time; lengths in micrometres."""
     axes = [{"name": name, "type": "space", "unit": "micrometer"} for name in "zyx"]
     dz, dy, dx = volume.spacing
     first = (volume.depths[0], float(volume.grid.y[0]), float(volume.grid.x[0]))
@@ -42,6 +42,8 @@ def describe(volume: Volume) -> dict[str, Any]:
     scale, shift = [sign * (dz or 1e-6) * 1e6, dy * 1e6, dx * 1e6], [value * 1e6 for value in first]
     if len(volume.data.shape) == 4:
         axes, scale, shift = [{"name": "c", "type": "channel"}, *axes], [1.0, *scale], [0.0, *shift]
+    if times:
+        axes, scale, shift = [{"name": "t", "type": "time"}, *axes], [1.0, *scale], [0.0, *shift]
     place = [{"type": "scale", "scale": scale}, {"type": "translation", "translation": shift}]
     level = {"path": LEVEL, "coordinateTransformations": place}
     return {"version": "0.5", "multiscales": [{"name": "volume", "axes": axes, "datasets": [level]}]}

@@ -59,7 +59,8 @@ def load(
         planes = ome.parse(file.pages.first.description)
         if page is None and (count > 1 or (planes is not None and planes.note)):
             return _pages(path, file, count, planes, max_pixels)
-        return _single(path, _page(path, file, page or 0), max_pixels)
+        found = _single(path, _page(path, file, page or 0), max_pixels)
+        return found if page is None or planes is None else _of_stack(found, planes, count)
 
 
 def save(thing: RawImage | Stack | Volume, path: Path) -> None:
@@ -94,6 +95,16 @@ def contents(path: Path) -> list[tuple[str, str, str]]:
         planes = ome.parse(first.description)
         noun = "Volume" if _is_volume(planes, count) else "Stack"
         return [("", noun, f"{count} pages of {size}, {first.dtype}; page=0 ... {count - 1} opens one")]
+
+
+def count(path: Path) -> int:
+    """Pages of a TIFF file that open as a stack; 1 where it is one picture, with or without thumbnails."""
+    path = source.regular_file(path)
+    with path.open("rb") as file:
+        source.check_signature(path, file.read(8), "TIFF")
+    with source.decoding(path, "a TIFF"), tifffile.TiffFile(path) as file:
+        found = _count(path, file)
+        return found if found > 1 and _page(path, file, 1).shape == _page(path, file, 0).shape else 1
 
 
 def _count(path: Path, file: tifffile.TiffFile) -> int:
@@ -145,6 +156,17 @@ def _pages(
         data[k] = plane
     assert data is not None  # count is at least 1
     return _noun(data, planes, first)
+
+
+def _of_stack(page: RawImage, planes: ome.Planes, count: int) -> RawImage:
+    """A page with what the first one says of the whole stack."""
+    found = header.loads(planes.note)
+    if found is not None and found.get("kind") == "Stack":
+        known = header.restore_planes(page.data[None], {**found, "positions": ()})
+        return RawImage(page.data, known.pixel_pitch, known.bit_depth, metadata=known.metadata)
+    if _is_volume(planes, count) or planes.pitch[1] != planes.pitch[2]:
+        return page
+    return RawImage(page.data, planes.pitch[2], page.bit_depth, metadata=page.metadata)
 
 
 def _noun(data: np.ndarray, planes: ome.Planes | None, first: tifffile.TiffPage) -> Stack | Volume:

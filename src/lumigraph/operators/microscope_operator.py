@@ -40,6 +40,9 @@ from lumigraph.operators.microscope_kernels import (
 )
 from lumigraph.operators.microscope_pixels import FRAME
 
+VERSION = 1
+"""Of the kernels' numbers: a change of theirs makes those that are kept useless."""
+
 GATHERED = 2**27
 """Numbers that are gathered for one product."""
 
@@ -380,10 +383,8 @@ def _kept(
     demand: Demand,
     folder: str | PathLike[str] | None,
 ) -> SliceKernel:
-    """The kernel of a depth, mapped from its file if a folder is given."""
-    if folder is None:
-        return slice_kernel(objectives, lenslet, sampling, dz, demand)
-    told = repr((tuple(objectives), lenslet, sampling, dz, demand))
+    """The kernel of a depth, mapped from its file in the folder, or in the user's cache."""
+    told = repr((VERSION, tuple(objectives), lenslet, sampling, dz, demand))
     key = f"slice-{hashlib.sha256(told.encode()).hexdigest()[:20]}"
 
     def built() -> dict[str, np.ndarray]:
@@ -393,7 +394,7 @@ def _kept(
             held |= {f"far_{name}": getattr(kernel.far, name) for name in ("offsets", "weights", "images")}
         return held | {"told": np.array([kernel.error, kernel.passed])}
 
-    found = store.kept(key, built, Path(folder))
+    found = store.kept(key, built, None if folder is None else Path(folder))
     symmetric = all(one.is_round for one in objectives)
     far = (
         Far(found["far_offsets"], found["far_weights"], found["far_images"])

@@ -13,7 +13,7 @@
 from lumigraph.core.prepared import PreparedImage, Reason
 from lumigraph.preparation.agreement import Described, implied
 from lumigraph.preparation.drift import Drift, drift
-from lumigraph.preparation.given import Given, read_calibration, read_pages, read_raw, sharp_kinds
+from lumigraph.preparation.given import Given, pages_of, read_calibration, read_pages, read_raw, sharp_kinds
 from lumigraph.preparation.prepare import decode, of_raw, prepare, render, render_stack, super_resolve
 from lumigraph.preparation.vignetting import vignetting
 
@@ -27,6 +27,7 @@ __all__ = [
     "drift",
     "implied",
     "of_raw",
+    "pages_of",
     "prepare",
     "read_calibration",
     "read_pages",

@@ -1,7 +1,7 @@
 """The files that come with a raw image: `Given`, and their readers."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,7 @@ from lumigraph import io
 from lumigraph.calibration import calibrate
 from lumigraph.core import checks
 from lumigraph.core.brief import called
+from lumigraph.core.cache import remembered
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.raw import RawImage
@@ -43,11 +44,36 @@ class Given:
             As `prepare` takes them.
         """
         place = None if self.calibration is None else read_calibration(self.calibration, raw.shape)
-        white = None if self.white is None else read_raw(self.white, "white image")
-        dark = None if self.dark is None else read_raw(self.dark, "dark image")
-        if not even:
-            place, white = calibrate(white) if place is None and white is not None else place, None
-        return prepare(raw, place, white=white, dark=dark, **options)
+        found = place is None and self.white is not None
+        if place is None and self.white is not None:
+            place = _on_white(self.white, _stamp(self.white))
+        white = (
+            None if self.white is None or not even else _read(self.white, _stamp(self.white), "white image")
+        )
+        dark = None if self.dark is None else _read(self.dark, _stamp(self.dark), "dark image")
+        ready = prepare(raw, place, white=white, dark=dark, **options)
+        if not found or place is None:
+            return ready
+        return replace(
+            ready, notes=("the lattice was found on the white image", *place.notes, *ready.notes[1:])
+        )
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """What changes when a file does."""
+    known = path.stat() if path.exists() else None
+    return (0, 0) if known is None else (known.st_size, known.st_mtime_ns)
+
+
+@remembered
+def _read(path: Path, stamp: tuple[int, int], what: str) -> RawImage:
+    """A white or dark image, which the frames of a series share."""
+    return read_raw(path, what)
+
+
+@remembered
+def _on_white(path: Path, stamp: tuple[int, int]) -> Calibration:
+    return calibrate(_read(path, stamp, "white image"))
 
 
 def read_raw(path: Path, what: str = "raw image") -> RawImage:
@@ -82,21 +108,44 @@ def read_pages(path: Path, pages: str | None = None, *, one: bool = False) -> di
     FormatError
         A stack without pages named, pages that it does not have, something else, or NaN.
     """
+    numbers = pages_of(path, pages, one=one)
+    if numbers == [None]:
+        return {0: read_raw(path)}
+    chosen, read = {}, _reader(path)
+    for k in numbers:
+        assert k is not None  # they are numbers, or one None
+        chosen[k] = read(k)
+        checks.finite_array(f"page {k} of {path}", chosen[k].data, FormatError)
+    return chosen
+
+
+def pages_of(path: Path, pages: str | None = None, *, one: bool = False) -> list[int | None]:
+    """Numbers of the pages that `read_pages` reads; one None for a file of a single picture.
+
+    Raises
+    ------
+    FormatError
+        As `read_pages`.
+    """
+    count = io.pages(path)
+    if count == 1:
+        if pages not in (None, "0", "all"):
+            raise FormatError(f"--page is {pages} but {path} has one page. Leave it out.")
+        return [None]
+    if pages is None:
+        several = "" if one else ", or all"
+        raise FormatError(f"{path} has {count} pages. Give --page 0 to {count - 1}{several}.")
+    return list(_range(pages, count, path, one=one))
+
+
+def _reader(path: Path) -> Callable[[int], RawImage]:
+    """Gives a page of a file; the others are not read where its format allows that."""
+    if "page" in io.format_of(path).options:
+        return lambda k: io.open(path, page=k)
     found = io.open(path)
     if isinstance(found, Volume):
         found = Stack(found.data)
-    if not isinstance(found, Stack):
-        if pages not in (None, "0", "all"):
-            raise FormatError(f"--page is {pages} but {path} has one page. Leave it out.")
-        return {0: read_raw(path)}
-    if pages is None:
-        several = "" if one else ", or all"
-        raise FormatError(f"{path} has {len(found)} pages. Give --page 0 to {len(found) - 1}{several}.")
-    chosen = {}
-    for k in _range(pages, len(found), path, one=one):
-        checks.finite_array(f"page {k} of {path}", found[k], FormatError)
-        chosen[k] = RawImage(found[k], found.pixel_pitch, found.bit_depth, metadata=found.metadata)
-    return chosen
+    return lambda k: RawImage(found[k], found.pixel_pitch, found.bit_depth, metadata=found.metadata)
 
 
 def _range(pages: str, count: int, path: Path, *, one: bool) -> range:

@@ -35,20 +35,28 @@ _PATIENCE = 2.0
 """Longest time between the two steps of a living writer [s]."""
 
 
-def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
+def write_bytes(path: str | os.PathLike[str], content: bytes, *, flush: bool = True) -> None:
     """Write a file atomically.
+
+    Parameters
+    ----------
+    path, content
+        Of the file.
+    flush
+        Whether to wait until the disk has it. Without, a cut of the power may leave a torn file, though a
+        kill does not: for files whose checksum is kept elsewhere.
 
     Raises
     ------
     FormatError
         The disk is full or may not be written to; the old file stays.
     """
-    with replacing(path) as temporary:
+    with replacing(path, flush=flush) as temporary:
         temporary.write_bytes(content)
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+def replacing(path: str | os.PathLike[str], *, flush: bool = True) -> Iterator[Path]:
     """Context that gives a temporary path, which takes the place of `path` at the end.
 
     The temporary path does not exist yet: write a file there, or make a folder. If the block fails it
@@ -67,9 +75,11 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary = place / _NEW
         yield temporary
         _take_over(target, temporary)
-        _flush(temporary)
+        if flush:
+            _flush(temporary)
         _take_place(temporary, target)
-    _flush_entry(target.parent)
+    if flush:
+        _flush_entry(target.parent)
 
 
 def sweep(folder: Path) -> None:

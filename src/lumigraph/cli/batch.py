@@ -1,0 +1,341 @@
+"""`lumigraph batch`: another verb for each of many frames."""
+
+import glob
+import os
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import redirect_stderr
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from lumigraph.cli import files
+from lumigraph.cli.console import line, progress
+from lumigraph.cli.options import COMMAND, COMMON, Common, Output
+from lumigraph.core import memory
+from lumigraph.core.result import Quantity, Result
+from lumigraph.errors import FormatError, LumigraphError
+
+if TYPE_CHECKING:
+    from lumigraph.cluster import Cluster, Report
+
+SERIES, TABLES = (".zarr",), (".csv",)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a verb gives of a frame.
+
+    Parameters
+    ----------
+    ending
+        Of the file that it writes; empty for one that writes none.
+    leading
+        Words before its input.
+    is_table
+        Whether its numbers are wanted.
+    """
+
+    ending: str
+    leading: int = 0
+    is_table: bool = False
+
+
+KINDS = {
+    "simulate": Kind(".tiff"), "decode": Kind(".zarr"), "render": Kind(".tiff"), "refocus": Kind(".tiff"),
+    "depth": Kind(".tiff"), "deconvolve": Kind(".zarr"), "calibrate": Kind(".toml", is_table=True),
+    "measure": Kind("", 1, is_table=True),
+}  # fmt: skip
+"""Verbs that are taken."""
+
+_STATUS = "status"
+_SHOWN = 5
+"""Failures that are told one by one."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Hands:
+    """Who does it.
+
+    Parameters
+    ----------
+    workers
+        Processes on this machine; one for each processor if left out.
+    scheduler
+        Address of a running dask cluster instead, such as tcp://10.0.0.1:8786.
+    slurm
+        Hand it to SLURM instead, as an array of so many jobs.
+    sbatch
+        More options of those jobs, such as "--time=2:00:00 --mem=8G".
+    part
+        Which of how many equal parts of the frames to do, such as 3/10, as the jobs of a queue share them.
+    """
+
+    workers: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
+    scheduler: str | None = None
+    slurm: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
+    sbatch: Annotated[str, Parameter(allow_leading_hyphen=True)] = ""
+    part: str | None = None
+
+    def check(self) -> None:
+        """Refuse what contradicts itself."""
+        if sum(one is not None for one in (self.workers, self.scheduler)) > 1:
+            raise FormatError("--workers and --scheduler both say who works. Give one of them.")
+        if self.slurm is not None and (self.slurm < 1 or self.part or self.scheduler):
+            raise FormatError("--slurm is a number of jobs above 0, without --part and --scheduler.")
+        if self.sbatch and self.slurm is None:
+            raise FormatError("--sbatch is for the jobs of --slurm. Give both.")
+
+    def submitted(self, output: Path) -> Result:
+        """Hand the same command to a queue, a part to each job."""
+        import shlex
+
+        from lumigraph.cluster import slurm
+
+        command = [sys.executable, "-m", "lumigraph", *_without(COMMAND.get(), ("--slurm", "--sbatch"))]
+        jobs = self.slurm or 1
+        number = slurm.submit(
+            slurm.script([*command, "--part"], output, jobs, shlex.split(self.sbatch)), output
+        )
+        values = (Quantity("job", number), Quantity("jobs", jobs))
+        told = f"job {number} of SLURM: {jobs} parts; 'lumigraph batch status {output}' shows how it stands"
+        return Result("Batch", "A job array.", number, (told,), values)
+
+    def cluster(self) -> "Cluster":
+        """Where the workers are found."""
+        from lumigraph import cluster
+        from lumigraph.core.arrays import WORKERS
+
+        if self.workers is not None and self.workers < 1:
+            raise FormatError(f"--workers is {self.workers} but must be at least 1.")
+        if self.scheduler is not None:
+            return cluster.Dask(self.scheduler)
+        return cluster.Local(self.workers or WORKERS)
+
+    def share(self) -> tuple[int, int]:
+        """The part, and of how many."""
+        try:
+            number, parts = map(int, (self.part or "1/1").split("/"))
+        except ValueError:
+            raise FormatError(f"--part is {self.part!r} but must be like 3/10.") from None
+        return number, parts
+
+
+def batch(
+    verb: str,
+    /,
+    *words: Annotated[str, Parameter(allow_leading_hyphen=True)],
+    output: Output | None = None,
+    page: str | None = None,
+    hands: Hands = Hands(),
+    common: Common = COMMON,
+) -> Result:
+    """Run another verb for each of many frames: pages of a stack, or files by a pattern.
+
+    The results become one Zarr store, OME-Zarr of volumes, which napari and others open while it grows; of
+    'measure' and 'calibrate' a table. What is done is noted beside it: kill it at any time, and the same
+    line goes on where it was. A frame that fails is noted and left out, and tried again by the next start.
+
+    Example: `lumigraph batch deconvolve film.tif --white white.tif --camera scope.toml --iterations 8 -o volumes.ome.zarr`
+
+    Example: `lumigraph batch refocus "raws/*.png" --white white.png --alpha 0.95 -o pictures.zarr --workers 2`
+
+    Example: `lumigraph batch status volumes.ome.zarr`
+
+    Parameters
+    ----------
+    verb
+        simulate, decode, render, refocus, depth, deconvolve, calibrate or measure; or status.
+    words
+        The verb's own: files or patterns in quotes first, then its options.
+    output
+        Zarr store (.zarr), or table (.csv).
+    page
+        Of stacks: some, as 'first:last', or one; all if left out.
+    """  # noqa: E501 - an example is one line
+    from lumigraph import cluster
+
+    if verb == _STATUS:
+        return _told(cluster.status(_only(words)), _only(words))
+    if verb not in KINDS:
+        raise FormatError(f"batch takes {', '.join(KINDS)} or {_STATUS}, not {verb!r}.")
+    if output is None:
+        raise FormatError("where the results go is not known. Give --output FILE.")
+    kind = KINDS[verb]
+    hands.check()
+    files.check_output(output, TABLES if kind.is_table else SERIES)
+    paths, options = _split(words, kind.leading)
+    items = list(_items(paths, None if kind.is_table or verb == "simulate" else page or "all"))
+    work = Frames(verb, options, str(Path.cwd()))
+    with tempfile.TemporaryDirectory(prefix="lumigraph-") as place:
+        work.bound(items[0], Path(place))  # refuse a line that is wrong before any worker starts
+    if hands.slurm is not None:
+        return hands.submitted(output)
+    with progress("batch") as shown:
+        found = cluster.batch(
+            work, items, output, what={"verb": verb, "options": list(options)},
+            workers=hands.cluster(), part=hands.share(), progress=shown,
+            estimated=lambda needed: line(str(needed)),
+        )  # fmt: skip
+    if kind.is_table:
+        _save_table(output)
+    if found.failures:
+        raise LumigraphError(f"{_failures(found)} {found.done} of {found.count} are in {output}.")
+    return _told(found, output)
+
+
+@dataclass(frozen=True)
+class Frames:
+    """A verb as the work of a batch.
+
+    Parameters
+    ----------
+    verb
+        Its name.
+    options
+        Its words but for the input, the page and the output.
+    folder
+        That paths among them are relative to.
+    """
+
+    verb: str
+    options: tuple[str, ...]
+    folder: str
+
+    def __call__(self, item: dict[str, Any]) -> Any:
+        """What the verb makes of one frame, as if it had been run for it alone."""
+        from lumigraph.cluster import Values
+
+        os.chdir(self.folder)
+        _check_unchanged(item)
+        with tempfile.TemporaryDirectory(prefix="lumigraph-") as place, redirect_stderr(StringIO()):
+            result = self.bound(item, Path(place))()
+        if KINDS[self.verb].is_table:
+            return Values({"file": item["file"], **_numbers(result)})
+        return result.thing
+
+    def bound(self, item: dict[str, Any], folder: Path) -> Any:
+        """The verb with its arguments, which writes into a folder; called, it gives its `Result`.
+
+        Raises
+        ------
+        CycloptsError
+            Words that the verb does not take.
+        """
+        from lumigraph.cli.app import app
+
+        kind = KINDS[self.verb]
+        words = [self.verb, *self.options[: kind.leading], item["file"], *self.options[kind.leading :]]
+        words += [] if item["page"] is None else ["--page", str(item["page"])]
+        words += ["--output", str(folder / f"frame{kind.ending}")] if kind.ending else []
+        command, bound, _ = app.parse_args(words, exit_on_error=False, print_error=False)
+        return lambda: command.__wrapped__(*bound.args, **bound.kwargs)
+
+
+def _without(words: Sequence[str], names: Sequence[str]) -> Iterator[str]:
+    """Words without some options and the value of each."""
+    rest = iter(words)
+    for word in rest:
+        if word in names:
+            next(rest, None)
+        elif word.partition("=")[0] not in names:
+            yield word
+
+
+def _split(words: Sequence[str], leading: int) -> tuple[list[str], tuple[str, ...]]:
+    """Files and patterns, which stand before the first option, and the verb's other words."""
+    first = next((k for k, word in enumerate(words) if word.startswith("-")), len(words))
+    if first <= leading:
+        raise FormatError("which frames is not known. Give files, or a pattern in quotes, after the verb.")
+    return list(words[leading:first]), (*words[:leading], *words[first:])
+
+
+def _items(paths: Sequence[str], pages: str | None) -> Iterator[dict[str, Any]]:
+    for path in paths:
+        found = [path] if Path(path).exists() else sorted(glob.glob(path, recursive=True))  # noqa: PTH207
+        if not found:
+            raise FormatError(f"{path} is no file, and no file is like it. Check the path.")
+        for name in found:
+            yield from _frames(Path(name), pages)
+
+
+def _frames(path: Path, pages: str | None) -> Iterator[dict[str, Any]]:
+    from lumigraph.preparation import pages_of
+
+    known = path.stat()
+    about = {"file": str(path.absolute()), "size": known.st_size, "modified": known.st_mtime_ns}
+    for number in [None] if pages is None or path.is_dir() else pages_of(path, pages):
+        yield {**about, "page": number}
+
+
+def _check_unchanged(item: dict[str, Any]) -> None:
+    known = Path(item["file"]).stat()
+    if (known.st_size, known.st_mtime_ns) != (item["size"], item["modified"]):
+        raise FormatError(f"{item['file']} has changed since the batch began.")
+
+
+def _numbers(result: Result) -> dict[str, Any]:
+    """What a row of a table holds: numbers and words, lengths in metres."""
+    import json
+
+    from lumigraph.cli.console import plain
+
+    found = {one.name: json.loads(json.dumps(one.value, default=plain)) for one in result.quantities}
+    return {name: value for name, value in found.items() if not isinstance(value, list | dict)}
+
+
+def _save_table(output: Path) -> None:
+    """Write what is in the ledger; jobs that end at once wait for each other."""
+    import csv
+
+    from lumigraph import cluster
+    from lumigraph.store import replacing
+
+    with cluster.rows(output) as rows:
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        with replacing(output) as temporary, temporary.open("w", newline="") as file:
+            table = csv.DictWriter(file, names)
+            table.writeheader()
+            table.writerows(rows)
+
+
+def _only(words: Sequence[str]) -> Path:
+    if len(words) != 1:
+        raise FormatError("status takes the output of a batch, and nothing else.")
+    return Path(words[0])
+
+
+def _failures(found: "Report") -> str:
+    """How many frames failed, and why the first of them did."""
+    named = [f"frame {number}: {why}" for number, why in sorted(found.failures.items())[:_SHOWN]]
+    more = len(found.failures) - len(named)
+    tail = f" ... and {more} more" if more > 0 else ""
+    return f"{len(found.failures)} of {found.count} frames failed. {'; '.join(named)}{tail}."
+
+
+def _told(found: "Report", output: Path) -> Result:
+    entries = list(found.entries.values())
+    failed = len(found.failures)
+    values = [Quantity("frames", found.count), Quantity("done", found.done), Quantity("failed", failed)]
+    lines = [f"{found.done} of {found.count} frames are done"]
+    if entries:
+        middle = sorted(entry.seconds for entry in entries)[len(entries) // 2]
+        size, most = sum(entry.size for entry in entries), max(entry.memory for entry in entries)
+        values += [
+            Quantity("seconds_a_frame", middle, "s"),
+            Quantity("bytes", size),
+            Quantity("memory", most),
+        ]
+        lines.append(f"{middle:.3g} s a frame, {memory.told(size)}, at most {memory.told(most)} a worker")
+    lines += [_failures(found)] if failed else []
+    notes = tuple(dict.fromkeys(note for entry in entries for note in entry.notes))[:_SHOWN]
+    extra = {"failures": {str(number): why for number, why in found.failures.items()}}
+    return Result(
+        "Batch", "Many frames, and what was made of each.", found, tuple(lines), tuple(values), notes=notes,
+        written=(output,), extra=extra,
+    )  # fmt: skip

@@ -1,0 +1,29 @@
+"""Many items through one piece of work, on one machine or many: `batch` and its ledger.
+
+- `run`: `batch`, `status`, what a job needs
+- `task`: what a worker does for one frame
+- `pool`: worker processes of this machine
+- `scheduler`: workers of a dask cluster
+- `slurm`: a job array
+- `ledger`: what is done, on the disk
+"""
+
+from lumigraph.cluster import slurm
+from lumigraph.cluster.ledger import Entry
+from lumigraph.cluster.run import Cluster, Estimate, Local, Report, batch, rows, status
+from lumigraph.cluster.scheduler import Dask
+from lumigraph.cluster.task import Values
+
+__all__ = [
+    "Cluster",
+    "Dask",
+    "Entry",
+    "Estimate",
+    "Local",
+    "Report",
+    "Values",
+    "batch",
+    "rows",
+    "slurm",
+    "status",
+]

@@ -1,0 +1,310 @@
+"""`batch`: one piece of work for each of many items, on one machine or many, resumable at any time."""
+
+import os
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from lumigraph.cluster.ledger import Entry, Ledger
+from lumigraph.cluster.pool import Outcome, Pool
+from lumigraph.cluster.task import BUSY, Task, Work
+from lumigraph.core import checks, memory
+from lumigraph.core.progress import Progress, Stage, silent
+from lumigraph.errors import LumigraphError, SamplingError
+
+_ROUNDS, _PATIENCE = 600, 1.0
+"""How often, and after how many seconds, frames are asked for again that somebody else works on."""
+
+
+class Group(Protocol):
+    """Workers of one task."""
+
+    @property
+    def count(self) -> int:
+        """Of them."""
+        ...
+
+    def each(self, numbers: Iterable[int]) -> Iterator[Outcome]:
+        """How each frame ended, in the order in which they do."""
+        ...
+
+
+class Cluster(Protocol):
+    """Where workers are found."""
+
+    @property
+    def is_here(self) -> bool:
+        """Whether they share this machine's memory."""
+        ...
+
+    def group(self, task: Task) -> AbstractContextManager[Group]:
+        """Context in which they are ready for a task."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Local:
+    """Processes of this machine.
+
+    Parameters
+    ----------
+    count
+        Of them.
+    """
+
+    count: int
+    is_here: bool = field(default=True, init=False)
+
+    def group(self, task: Task) -> Pool:
+        """Context in which they are ready for a task."""
+        return Pool(task, self.count)
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """How a job stands.
+
+    Parameters
+    ----------
+    count
+        Frames in all.
+    entries
+        Of those that are done, by number.
+    failures
+        Why frames failed, by number.
+    seconds
+        That this start took [s].
+    """
+
+    count: int
+    entries: dict[int, Entry] = field(repr=False)
+    failures: dict[int, str] = field(repr=False)
+    seconds: float = 0.0
+
+    @property
+    def done(self) -> int:
+        """Frames that are done."""
+        return len(self.entries)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all frames are done."""
+        return self.done == self.count
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What the rest of a job will need, from the frames that are done.
+
+    Parameters
+    ----------
+    frames
+        Still to do.
+    seconds
+        Of all workers together, side by side [s].
+    memory
+        Of one worker [bytes].
+    size
+        On the disk [bytes].
+    """
+
+    frames: int
+    seconds: float
+    memory: int
+    size: int
+
+    @classmethod
+    def of(cls, entries: Iterable[Entry], frames: int, workers: int) -> "Estimate":
+        """From entries of frames like those to come, of which the first of a worker is the slowest."""
+        known = list(entries)
+        seconds = sorted(entry.seconds for entry in known)[len(known) // 2]
+        size = max(entry.size for entry in known)
+        return cls(frames, frames * seconds / workers, max(entry.memory for entry in known), frames * size)
+
+    def __str__(self) -> str:
+        minutes = f"{self.seconds / 60:.1f} minutes" if self.seconds > 90 else f"{self.seconds:.0f} s"
+        frames = f"{self.frames} frame{'s' * (self.frames != 1)}"
+        return (
+            f"{frames} to do: about {minutes}, {memory.told(self.memory)} a worker, {memory.told(self.size)} "
+            "on the disk"
+        )
+
+    def require(self, workers: int, output: Path) -> None:
+        """Refuse what cannot fit.
+
+        Raises
+        ------
+        SamplingError
+            More memory or disk than there is, and how many workers would fit.
+        """
+        whole = memory.total()
+        if whole is not None and self.memory * workers > whole:
+            fitting = max(whole // max(self.memory, 1), 1)
+            raise SamplingError(
+                f"{workers} workers need {self.memory * workers / 2**30:.3g} GiB but the machine has "
+                f"{whole / 2**30:.3g} GiB. Use at most {fitting}."
+            )
+        memory.require_disk(self.size, output.parent, f"{self.frames} frames", SamplingError)
+
+
+def batch(
+    work: Work,
+    items: Sequence[Any],
+    output: str | os.PathLike[str],
+    *,
+    what: Mapping[str, Any] | None = None,
+    workers: int | Cluster = 1,
+    part: tuple[int, int] = (1, 1),
+    progress: Progress = silent,
+    estimated: Callable[[Estimate], None] | None = None,
+) -> Report:
+    """Do a piece of work for each of many items, and write the results as one series.
+
+    What is done is noted in a ledger beside the output. Kill it at any time: the same call goes on where it
+    was, on this machine or another. The results are the same bits whatever the number of workers and
+    interruptions, if `work` gives the same bits of the same item.
+
+    Parameters
+    ----------
+    work
+        Called with an item in another process: a function of a module, or an object that can be pickled.
+        It gives a picture, several, views, a volume, a depth map or arrays by name, of one shape for all
+        items, which go into shards of a Zarr store; or `Values`, which stay in the ledger.
+    items
+        What JSON can hold: paths, numbers, mappings of them.
+    output
+        A Zarr store, which others can open while it grows.
+    what
+        What the work is, as JSON values: a start with another one is refused.
+    workers
+        Processes on this machine; or a `Dask` cluster.
+    part
+        Which of how many equal parts of the items to do, counted from 1, as the jobs of a queue share them.
+    progress
+        Called with the fraction that is done.
+    estimated
+        Called with what the rest will need, once a frame is done.
+
+    Returns
+    -------
+    Report
+        With the failures: an item whose work raises an error is noted and left out, and tried again at the
+        next start.
+
+    Raises
+    ------
+    FormatError
+        Another job has begun this output, or another start works on it.
+    SamplingError
+        The first frame shows that memory or disk do not suffice.
+
+    Notes
+    -----
+    In a script, call it under ``if __name__ == "__main__":``, as Python's multiprocessing wants it.
+    """
+    began, output = time.perf_counter(), Path(output)
+    cluster = Local(checks.whole("workers", workers)) if isinstance(workers, int) else workers
+    task = Task(work, dict(enumerate(items)), output, len(items))
+    first, last = _share(part, task.count)
+    _ready(output)
+    task.ledger.open(what or {}, items)
+    with task.ledger.started(first, last):
+        left = [number for number in range(first, last) if not _kept(task, number)]
+        with cluster.group(task) as group:
+            if left:
+                _do(group, left[:1], 0, len(left), progress)
+                _check(task, (cluster, group), left, estimated)
+                _do(group, left[1:], 1, len(left), progress)
+    found = status(output)
+    return Report(found.count, found.entries, found.failures, time.perf_counter() - began)
+
+
+@contextmanager
+def rows(output: str | os.PathLike[str]) -> Iterator[list[dict[str, Any]]]:
+    """Context that gives the values of all items that are done, in their order; nobody else is in it.
+
+    Raises
+    ------
+    FormatError
+        No job's output.
+    """
+    ledger = Ledger.beside(Path(output))
+    with ledger.alone():
+        yield [entry.values for _, entry in sorted(ledger.entries().items())]
+
+
+def status(output: str | os.PathLike[str]) -> Report:
+    """How a job stands, by its output or its ledger, while it runs or afterwards.
+
+    Raises
+    ------
+    FormatError
+        Neither.
+    """
+    path = Path(output)
+    ledger = Ledger(path) if (path / "job.json").exists() else Ledger.beside(path)
+    entries = ledger.entries()
+    failures = {number: why for number, why in ledger.failures().items() if number not in entries}
+    return Report(len(ledger.job()["items"]), entries, failures)
+
+
+def _do(group: Group, numbers: list[int], done: int, total: int, progress: Progress) -> None:
+    """Do some frames; those that somebody else works on are asked for until they are done."""
+    before, began = done, time.perf_counter()
+    for _ in range(_ROUNDS):
+        busy = []
+        for number, outcome in group.each(numbers):
+            if outcome == BUSY:
+                busy.append(number)
+                continue
+            done += 1
+            rate = (done - before) / (time.perf_counter() - began)
+            progress(Stage(done / total, f"{done} of {total} frames, {_pace(rate)}"))
+        if not busy:
+            return
+        numbers = busy
+        time.sleep(_PATIENCE)
+
+
+def _check(
+    task: Task, who: tuple[Cluster, Group], left: list[int],
+    estimated: Callable[[Estimate], None] | None,
+) -> None:  # fmt: skip
+    """Tell what the rest needs, by the first frame, and refuse what cannot fit."""
+    first = task.ledger.entry(left[0])
+    if first is None or len(left) == 1:
+        return
+    cluster, group = who
+    needed = Estimate.of([first], len(left) - 1, group.count)
+    if estimated is not None:
+        estimated(needed)
+    needed.require(group.count if cluster.is_here else 1, task.output)
+
+
+def _pace(rate: float) -> str:
+    return f"{rate:.2g} a second" if rate >= 1 else f"{1 / rate:.2g} s each"
+
+
+def _kept(task: Task, number: int) -> bool:
+    """Whether a frame is done and its shards are whole; what was noted of one that is not is forgotten."""
+    if task.is_done(number, content=True):
+        return True
+    task.ledger.forget(number)
+    return False
+
+
+def _share(part: tuple[int, int], count: int) -> tuple[int, int]:
+    number, parts = part
+    if not 1 <= number <= parts:
+        raise LumigraphError(f"part is {number} of {parts} but must be from 1 to {parts}.")
+    return (number - 1) * count // parts, number * count // parts
+
+
+def _ready(output: Path) -> None:
+    if not output.parent.is_dir():
+        raise LumigraphError(f"the folder {output.parent} for {output.name} does not exist. Make it first.")
+    if output.exists() and not Ledger.beside(output).folder.exists():  # it is somebody else's
+        raise LumigraphError(f"{output} exists and has no ledger. Remove it, or give another output.")

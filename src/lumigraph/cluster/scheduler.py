@@ -1,0 +1,109 @@
+"""Workers of a running dask cluster: the only home of dask."""
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from threading import Lock
+from typing import Any
+from uuid import uuid4
+
+from lumigraph.cluster.pool import DEATHS, Outcome
+from lumigraph.cluster.task import FAILED, Task
+from lumigraph.errors import LumigraphError
+
+_WAIT = 20.0
+"""Longest time until the scheduler answers, or has a worker [s]."""
+
+_ONE = Lock()
+"""A worker of several threads takes one frame at a time: what a piece of work keeps is not made for more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dask:
+    """A running dask cluster, whose workers have lumigraph and see the same files.
+
+    Parameters
+    ----------
+    address
+        Of its scheduler, such as "tcp://10.0.0.1:8786".
+    """
+
+    address: str
+    is_here: bool = field(default=False, init=False)
+
+    @contextmanager
+    def group(self, task: Task) -> "Iterator[_Group]":
+        """Context in which its workers are ready for a task.
+
+        Raises
+        ------
+        LumigraphError
+            distributed is not installed, nobody answers, or there are no workers.
+        """
+        try:
+            from distributed import Client
+        except ImportError:
+            raise LumigraphError(
+                "a scheduler needs dask's distributed. Install it: pip install 'lumigraph[cluster]'."
+            ) from None
+        try:
+            client = Client(self.address, timeout=_WAIT, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise LumigraphError(
+                f"no dask scheduler answers at {self.address} ({type(error).__name__}). Check the address."
+            ) from None
+        try:
+            client.wait_for_workers(1, timeout=_WAIT)
+            yield _Group(client, task)
+        except TimeoutError:
+            raise LumigraphError(f"the scheduler at {self.address} has no workers. Start some.") from None
+        finally:
+            client.close(timeout=2)
+
+
+class _Group:
+    def __init__(self, client: Any, task: Task) -> None:
+        self.client, self.task, self.key = client, task, uuid4().hex
+
+    @property
+    def count(self) -> int:
+        """Workers."""
+        return max(len(self.client.scheduler_info(n_workers=-1)["workers"]), 1)
+
+    def each(self, numbers: Iterable[int]) -> Iterator[Outcome]:
+        """How each frame ended, in the order in which they do.
+
+        Raises
+        ------
+        LumigraphError
+            The scheduler has ended.
+        """
+        from distributed import as_completed
+
+        futures = {self._begun(number): number for number in numbers}
+        for future in as_completed(futures, loop=self.client.loop):
+            if future.status == "finished":
+                yield futures[future], future.result()
+            elif future.status == "error":
+                self.task.ledger.fail(futures[future], f"its worker ended: {future.exception()}"[:400])
+                yield futures[future], FAILED
+            else:
+                raise LumigraphError(
+                    f"the scheduler was lost ({future.status}). What is done is kept: start it again."
+                )
+
+    def _begun(self, number: int) -> Any:
+        one = replace(self.task, items={number: self.task.items[number]})  # the other items stay here
+        return self.client.submit(_do, one, number, self.key, pure=False, retries=DEATHS)
+
+
+_WORK: dict[str, Any] = {}
+
+
+def _do(task: Task, number: int, key: str) -> str:
+    """What a worker does; the work is the process' own, as each frame brings a copy that keeps nothing."""
+    with _ONE:
+        if key not in _WORK:
+            _WORK.clear()
+            _WORK[key] = task.work
+        return replace(task, work=_WORK[key]).do(number)

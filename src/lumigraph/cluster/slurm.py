@@ -1,0 +1,63 @@
+"""A job array of SLURM that does a batch, each of its jobs an equal part of the frames."""
+
+import shlex
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from lumigraph import store
+from lumigraph.cluster.ledger import Ledger
+from lumigraph.errors import LumigraphError
+
+
+def script(
+    command: Sequence[str], output: Path, jobs: int, options: Sequence[str] = (), folder: Path | None = None
+) -> str:
+    """What `sbatch` is given.
+
+    Parameters
+    ----------
+    command
+        That does a part, which its last word names: ``K/jobs`` is put behind it.
+    output
+        Of the batch; what jobs print goes beside its ledger.
+    jobs
+        Of the array.
+    options
+        More of sbatch's, such as ``--time=2:00:00``.
+    folder
+        Where the command runs; the present one if left out.
+    """
+    place = Ledger.beside(output.absolute()).folder
+    heads = [
+        f"--job-name=lumigraph-{output.name}",
+        f"--array=1-{jobs}",
+        f"--output={place}/job-%A-%a.log",
+        *options,
+    ]
+    lines = ["#!/bin/sh", *(f"#SBATCH {head}" for head in heads)]
+    lines += [f"cd {shlex.quote(str(folder or Path.cwd()))} || exit 1"]
+    lines += [f'exec {shlex.join(command)} "$SLURM_ARRAY_TASK_ID/{jobs}"']
+    return "\n".join(lines) + "\n"
+
+
+def submit(text: str, output: Path) -> str:
+    """Hand a script to SLURM; gives the number of the job.
+
+    Raises
+    ------
+    LumigraphError
+        There is no `sbatch` here, or it refuses the script.
+    """
+    if shutil.which("sbatch") is None:
+        raise LumigraphError("there is no sbatch here. Run this on a machine that hands jobs to SLURM.")
+    place = Ledger.beside(output.absolute()).folder
+    place.mkdir(parents=True, exist_ok=True)
+    store.write_bytes(place / "job.sh", text.encode())
+    run = subprocess.run(
+        ["sbatch", "--parsable", str(place / "job.sh")], capture_output=True, text=True, check=False
+    )
+    if run.returncode:
+        raise LumigraphError(f"sbatch refuses the job: {' '.join(run.stderr.split())[:300]}")
+    return run.stdout.strip().partition(";")[0]

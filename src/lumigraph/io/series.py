@@ -1,0 +1,232 @@
+"""A series of results of one shape as one Zarr v3 store: a shard for each frame, written one by one.
+
+Other programs open the store while it grows: frames that are not there yet read as NaN, or 0 of whole
+numbers. Volumes become OME-Zarr with an axis of time.
+"""
+
+import json
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+from zarr.abc.buffer import Buffer
+from zarr.codecs import ZstdCodec
+from zarr.storage import LocalStore, WrapperStore
+
+from lumigraph import store
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.depth_map import DepthMap
+from lumigraph.core.lightfield import LightField
+from lumigraph.core.raw import RawImage
+from lumigraph.core.stack import Stack
+from lumigraph.core.volume import Volume
+from lumigraph.errors import FormatError
+from lumigraph.io import header, ngff
+
+KIND = "Series"
+_SIDE = 256
+"""Samples of a chunk along each of the last two axes."""
+
+Checksums = dict[str, tuple[int, int]]
+"""Size and CRC-32 of each file, by its name inside the store."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One result as arrays.
+
+    Parameters
+    ----------
+    arrays
+        By name; of one shape and type in all frames.
+    axes
+        Names of their axes.
+    attributes
+        What else is known, as JSON values; those of the first frame are kept.
+    """
+
+    arrays: dict[str, np.ndarray]
+    axes: dict[str, tuple[str, ...]]
+    attributes: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, thing: Any) -> "Frame":
+        """A picture, several, views, a volume, a depth map, or arrays by name.
+
+        Raises
+        ------
+        FormatError
+            Something else, or what is no numbers.
+        """
+        found = cls._of(thing)
+        for name, array in found.arrays.items():
+            if array.dtype.kind not in "iufb" or array.size == 0:
+                raise FormatError(f"{name} is {array.dtype} of shape {array.shape}, which no series holds.")
+        return found
+
+    @classmethod
+    def _of(cls, thing: Any) -> "Frame":
+        match thing:
+            case Volume():
+                about = {**header.describe_volume(thing), "ome": ngff.describe(thing, times=True)}
+                return cls(
+                    {ngff.LEVEL: ngff.data(to_numpy(thing.data))}, {ngff.LEVEL: ngff.names(thing)}, about
+                )
+            case LightField():
+                arrays = {"data": to_numpy(thing.data)}
+                if thing.valid is not None:
+                    arrays["valid"] = to_numpy(thing.valid)
+                axes = {name: ("v", "u", "t", "s", "c")[: array.ndim] for name, array in arrays.items()}
+                return cls(arrays, axes, header.describe_views(thing))
+            case DepthMap():
+                given = {"values": thing.values, "confidence": thing.confidence, "error": thing.error}
+                arrays = {name: to_numpy(array) for name, array in given.items() if array is not None}
+                about = {"kind": "DepthMap", "quantity": thing.quantity, "unit": thing.unit}
+                return cls(arrays, dict.fromkeys(arrays, ("y", "x")), about)
+            case RawImage():
+                about = {"kind": "RawImage", **header.describe(thing)}
+                return cls(
+                    {"data": to_numpy(thing.data)}, {"data": ("y", "x", "c")[: len(thing.data.shape)]}, about
+                )
+            case Stack():
+                about = header.describe_stack(thing)
+                return cls(
+                    {"data": to_numpy(thing.data)}, {"data": ("n", "y", "x", "c")[: thing.data.ndim]}, about
+                )
+            case list() | tuple() if thing:
+                return cls._of(
+                    thing[0] if len(thing) == 1 else Stack(np.stack([to_numpy(one) for one in thing]))
+                )
+            case Mapping():
+                arrays = {str(name): np.asarray(to_numpy(array)) for name, array in thing.items()}
+                return cls(arrays, {name: _plain_axes(array.ndim) for name, array in arrays.items()})
+            case _ if hasattr(thing, "shape") and len(thing.shape) >= 2:
+                data = np.asarray(to_numpy(thing))
+                return cls({"data": data}, {"data": _plain_axes(data.ndim)})
+        raise FormatError(f"a {type(thing).__name__} cannot be a frame of a series. Give arrays by name.")
+
+    @property
+    def layout(self) -> dict[str, Any]:
+        """Shape and type of each array, as JSON values."""
+        return {name: [list(array.shape), str(array.dtype)] for name, array in self.arrays.items()}
+
+
+def create(path: Path, first: Frame, count: int) -> None:
+    """An empty store for `count` frames like the first one; complete, or not there at all.
+
+    Raises
+    ------
+    FormatError
+        It cannot be written.
+    """
+    with store.replacing(path) as temporary:
+        about = {"lumigraph": header.FORMAT, **first.attributes, "of": first.attributes.get("kind", "arrays")}
+        about |= {"kind": KIND, "frames": count, "layout": first.layout}
+        group = zarr.create_group(LocalStore(temporary), zarr_format=3, attributes=about)
+        for name, array in first.arrays.items():
+            inner = tuple(min(n, _SIDE) for n in array.shape[-2:])
+            inner = array.shape[:-2] + inner if array.ndim > 1 else array.shape
+            shard = tuple(-(-n // m) * m for n, m in zip(array.shape, inner, strict=True))
+            group.create_array(
+                name, shape=(count, *array.shape), dtype=array.dtype, chunks=(1, *inner), shards=(1, *shard),
+                dimension_names=(_leading(first), *first.axes[name]),
+                compressors=[ZstdCodec(level=3, checksum=True)],
+                fill_value=np.nan if array.dtype.kind == "f" else 0, config={"write_empty_chunks": True},
+            )  # fmt: skip
+
+
+def write(path: Path, number: int, frame: Frame) -> Checksums:
+    """Write one frame into its shards, each in one step.
+
+    Raises
+    ------
+    FormatError
+        Arrays of other names, shapes or types than the store's, or a full disk.
+    """
+    described = _described(path)
+    if frame.layout != described["layout"]:
+        raise FormatError(
+            f"it gives {_told(frame.layout)} where the first frame gave {_told(described['layout'])}."
+        )
+    writer = _Writer(LocalStore(path))
+    group = zarr.open_group(writer, mode="r+", zarr_format=3, use_consolidated=False)
+    for name, values in frame.arrays.items():
+        array = group[name]
+        assert isinstance(array, zarr.Array)
+        array[number] = values
+    return writer.written
+
+
+def is_whole(path: Path, files: Mapping[str, tuple[int, int]], *, content: bool = True) -> bool:
+    """Whether files of a store are there, of the size and, if their content is read, the checksum noted."""
+    for name, (size, checksum) in files.items():
+        try:
+            if (path / name).stat().st_size != size:
+                return False
+            if content and zlib.crc32((path / name).read_bytes()) != checksum:
+                return False
+        except OSError:
+            return False
+    return True
+
+
+def read(path: Path, number: int) -> dict[str, np.ndarray]:
+    """The arrays of one frame, by name.
+
+    Raises
+    ------
+    FormatError
+        No series, or no such frame.
+    """
+    described = _described(path)
+    if not 0 <= number < described["frames"]:
+        raise FormatError(f"{path} has frames 0 to {described['frames'] - 1}, not {number}.")
+    group = zarr.open_group(LocalStore(path, read_only=True), mode="r", zarr_format=3, use_consolidated=False)
+    return {name: np.asarray(group[name][number]) for name in described["layout"]}  # pyright: ignore
+
+
+def _described(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads((path / "zarr.json").read_text())["attributes"]
+        if found["kind"] == KIND:
+            return found
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    raise FormatError(f"{path} is no series of frames. Check the path.")
+
+
+def _leading(frame: Frame) -> str:
+    return "t" if "ome" in frame.attributes else "frame"
+
+
+def _plain_axes(count: int) -> tuple[str, ...]:
+    return (*(f"axis_{k}" for k in range(count - 2)), *("y", "x")[-count:]) if count else ()
+
+
+def _told(layout: Mapping[str, Any]) -> str:
+    return ", ".join(
+        f"{name} {' x '.join(map(str, shape))} {dtype}" for name, (shape, dtype) in layout.items()
+    )
+
+
+class _Writer(WrapperStore[LocalStore]):
+    """A store that writes each file in one step and notes its checksum."""
+
+    def __init__(self, inner: LocalStore) -> None:
+        super().__init__(inner)
+        self.written: Checksums = {}
+
+    async def get(self, key: str, prototype: Any, byte_range: Any = None) -> Buffer | None:
+        """What describes arrays; zarr would keep parts of a shard that is there, be it damaged."""
+        return await super().get(key, prototype, byte_range) if key.endswith("zarr.json") else None
+
+    async def set(self, key: str, value: Buffer) -> None:
+        """Write one file."""
+        content, place = value.to_bytes(), Path(self._store.root) / key
+        place.parent.mkdir(parents=True, exist_ok=True)
+        store.write_bytes(place, content, flush=False)
+        self.written[key] = len(content), zlib.crc32(content)

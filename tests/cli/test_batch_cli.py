@@ -1,0 +1,100 @@
+import csv
+import os
+import stat
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zarr
+
+import lumigraph as lg
+from lumigraph.cli import main
+
+
+@pytest.fixture(scope="module")
+def views(tmp_path_factory):
+    """Three light fields of one size, in files."""
+    folder = tmp_path_factory.mktemp("views")
+    grids = lg.Grid((3, 3), 1e-3), lg.Grid((12, 14), 1e-4)
+    for k in range(3):
+        data = np.random.default_rng(k).random((3, 3, 12, 14), np.float32)
+        lg.save(lg.LightField(data, *grids, 0.02), folder / f"v{k}.zarr")
+    return folder
+
+
+def words(views, output, *more):
+    return ["batch", "refocus", f"{views}/v*.zarr", "--alpha", "0.95", "-o", str(output), *more]
+
+
+def test_each_frame_is_what_the_verb_alone_gives(views, tmp_path, capsys):
+    assert main(words(views, tmp_path / "out.zarr", "--workers", "1")) == 0
+    told = capsys.readouterr()
+    assert "3 of 3 frames are done" in told.out
+    assert "2 frames to do: about" in told.err
+    assert main(["refocus", str(views / "v1.zarr"), "--alpha", "0.95", "-o", str(tmp_path / "one.tiff")]) == 0
+    group = zarr.open_group(tmp_path / "out.zarr", mode="r")
+    np.testing.assert_array_equal(group["data"][1], lg.open(tmp_path / "one.tiff").data)
+    assert main(["batch", "status", str(tmp_path / "out.zarr"), "--json"]) == 0
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell script stands in for sbatch")
+def test_a_queue_gets_a_part_for_each_job(views, tmp_path, monkeypatch):
+    """With a stand-in for sbatch, which runs the jobs one after the other: no SLURM is here."""
+    stand_in = tmp_path / "bin" / "sbatch"
+    stand_in.parent.mkdir()
+    stand_in.write_text(
+        '#!/bin/sh\nfor k in 1 2; do SLURM_ARRAY_TASK_ID=$k sh "$2" > /dev/null || exit 1; done\necho 47'
+    )
+    stand_in.chmod(stand_in.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("PATH", f"{stand_in.parent}{os.pathsep}{os.environ['PATH']}")
+    output = tmp_path / "out.zarr"
+    asked = ("--workers", "1", "--slurm", "2", "--sbatch", "--time=1:00 --mem=2G")
+    assert main(words(views, output, *asked)) == 0
+    script = (tmp_path / "out.zarr.ledger/job.sh").read_text()
+    assert "#SBATCH --array=1-2\n" in script
+    assert "#SBATCH --mem=2G\n" in script
+    assert lg.cluster.status(output).is_whole
+
+
+def test_numbers_become_a_table(views, tmp_path):
+    for k in range(2):
+        lg.save(np.random.default_rng(k).normal(100, 5, (20, 20)).astype(np.float32), tmp_path / f"{k}.tiff")
+    assert main(["batch", "measure", "noise", f"{tmp_path}/*.tiff", "-o", str(tmp_path / "out.csv")]) == 0
+    with (tmp_path / "out.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [Path(row["file"]).name for row in rows] == ["0.tiff", "1.tiff"]
+    assert float(rows[0]["mean"]) == pytest.approx(lg.open(tmp_path / "0.tiff").data.mean(), rel=1e-6)
+
+
+def test_a_frame_that_fails_ends_it_with_an_error(views, tmp_path, capsys):
+    (tmp_path / "a.zarr").symlink_to(views / "v0.zarr")
+    (tmp_path / "b.zarr").mkdir()
+    line = ["batch", "refocus", str(tmp_path / "a.zarr"), str(tmp_path / "b.zarr"), "--alpha", "1"]
+    assert main([*line, "-o", str(tmp_path / "out.zarr"), "--workers", "1"]) == 1
+    said = capsys.readouterr().err
+    assert "1 of 2 frames failed. frame 1:" in said
+    assert "without zarr.json" in said
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("batch refocs v.zarr -o o.zarr", "batch takes simulate"),
+        ("batch refocus --alpha 1 -o o.zarr", "which frames is not known"),
+        ("batch refocus nothing*.zarr --alpha 1 -o o.zarr", "no file is like it"),
+        ("batch refocus {v} --alpha 1", "where the results go"),
+        ("batch refocus {v} --alpha 1 -o o.csv", "ending"),
+        ("batch refocus {v} --alpa 1 -o {o}", "--alpa"),
+        ("batch refocus {v} --alpha 1 -o {o} --workers 0", "--workers is 0"),
+        ("batch refocus {v} --alpha 1 -o {o} --part 3", "--part is '3'"),
+        ("batch refocus {v} --alpha 1 -o {o} --part 3/2", "part is 3 of 2"),
+        ("batch refocus {v} --alpha 1 -o {o} --workers 1 --scheduler tcp://a:1", "Give one of them"),
+        ("batch refocus {v} --alpha 1 -o {o} --sbatch x", "--sbatch is for"),
+        ("batch status", "status takes the output"),
+        ("batch status {v}", "is no ledger"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_told_before_any_work(views, tmp_path, capsys, line, told):
+    filled = line.format(v=views / "v0.zarr", o=tmp_path / "o.zarr")
+    assert main(filled.split()) in (1, 2)
+    assert told in capsys.readouterr().err

@@ -1,0 +1,224 @@
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import cluster_jobs as jobs
+import numpy as np
+import pytest
+import zarr
+
+import lumigraph as lg
+from lumigraph import cluster
+from lumigraph.cluster.ledger import Entry, Ledger
+from lumigraph.io import series
+
+
+def items(count, **more):
+    return [{"seed": seed, **more} for seed in range(count)]
+
+
+def contents(output):
+    return {p.relative_to(output): p.read_bytes() for p in sorted(output.rglob("*")) if p.is_file()}
+
+
+def run(output, count=6, workers=None, what=None, **more):
+    return cluster.batch(
+        jobs.picture, items(count, **more), output, what=what or {"job": 1}, workers=workers or jobs.Here()
+    )
+
+
+def test_results_are_one_store_that_others_open(tmp_path):
+    found = run(tmp_path / "out.zarr")
+    assert found.is_whole
+    group = zarr.open_group(tmp_path / "out.zarr", mode="r")
+    assert group["a"].shape == (6, 3, 40, 50)
+    assert group["a"].shards == (1, 3, 40, 50)
+    np.testing.assert_array_equal(group["a"][4], jobs.picture({"seed": 4})["a"])
+
+
+def test_frames_that_are_not_there_read_as_nan(tmp_path):
+    run(tmp_path / "out.zarr")
+    (tmp_path / "out.zarr" / "a/c/2/0/0/0").unlink()
+    assert np.isnan(zarr.open_group(tmp_path / "out.zarr", mode="r")["a"][2]).all()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="processes are killed by signals")
+def test_workers_that_die_are_replaced_and_bits_do_not_depend_on_them(tmp_path):
+    run(tmp_path / "one.zarr", deadly=str(tmp_path / "not-here"), workers=2)
+    run(tmp_path / "other.zarr")
+    assert contents(tmp_path / "one.zarr") == contents(tmp_path / "other.zarr")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="processes are killed by signals")
+def test_a_frame_that_kills_its_workers_fails_and_the_others_are_done(tmp_path):
+    whole = [*items(2), {"seed": 2, "always_deadly": True}]
+    found = cluster.batch(jobs.picture, whole, tmp_path / "out.zarr", workers=1)
+    assert found.done == 2
+    assert found.failures[2].startswith("its worker ended by signal 9, 3 times")
+
+
+def test_what_is_done_is_not_done_again(tmp_path):
+    log = tmp_path / "log"
+    for _ in range(3):
+        run(tmp_path / "out.zarr", log=str(log))
+    assert sorted(map(int, log.read_text().split())) == list(range(6))
+
+
+@pytest.mark.parametrize("harm", ["shard", "cut", "entry", "torn entry"])
+def test_what_was_damaged_is_done_again(tmp_path, harm):
+    output, log = tmp_path / "out.zarr", tmp_path / "log"
+    run(output, log=str(log))
+    before = contents(output)
+    shard, entry = output / "a/c/3/0/0/0", tmp_path / "out.zarr.ledger/done/000003.json"
+    match harm:
+        case "shard":
+            content = bytearray(shard.read_bytes())
+            content[100] ^= 1
+            shard.write_bytes(content)
+        case "cut":
+            shard.write_bytes(shard.read_bytes()[:-1])
+        case "entry":
+            entry.unlink()
+        case "torn entry":
+            entry.write_bytes(entry.read_bytes()[:40])
+    log.unlink()
+    run(output, log=str(log))
+    assert log.read_text().split() == ["3"]
+    assert contents(output) == before
+
+
+def test_a_frame_that_fails_is_left_out_and_tried_again(tmp_path):
+    whole = [*items(3), {"seed": 3, "bad": True}, {"seed": 4}]
+    for _ in range(2):
+        found = cluster.batch(jobs.picture, whole, tmp_path / "out.zarr", workers=jobs.Here())
+        assert found.failures == {3: "ValueError: this one is bad"}
+        assert found.done == 4
+        assert not found.is_whole
+
+
+def test_frames_of_other_shapes_fail(tmp_path):
+    def work(item):
+        return np.zeros((item, 4), np.float32)
+
+    found = cluster.batch(work, [5, 6, 5], tmp_path / "out.zarr", workers=jobs.Here())
+    assert found.done == 2
+    assert found.failures == {1: "it gives data 6 x 4 float32 where the first frame gave data 5 x 4 float32."}
+
+
+def test_another_job_does_not_go_on_here(tmp_path):
+    run(tmp_path / "out.zarr")
+    with pytest.raises(lg.FormatError, match="its job is 1, now 2"):
+        run(tmp_path / "out.zarr", what={"job": 2})
+    with pytest.raises(lg.FormatError, match="it has 6 items, now 7"):
+        run(tmp_path / "out.zarr", 7)
+    (tmp_path / "foreign.zarr").mkdir()
+    with pytest.raises(lg.LumigraphError, match="exists and has no ledger"):
+        run(tmp_path / "foreign.zarr")
+
+
+def test_two_starts_at_once_do_not_both_work(tmp_path):
+    run(tmp_path / "out.zarr", 2)
+    script = (
+        "from lumigraph.cluster.ledger import Ledger; from pathlib import Path; import sys, time\n"
+        f"with Ledger(Path({str(tmp_path / 'out.zarr.ledger')!r})).started(0, 2):\n"
+        "    print('ready', flush=True); sys.stdin.read()"
+    )
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, "-c", script], **pipes) as other:
+        assert other.stdout.readline() == "ready\n"
+        with pytest.raises(lg.FormatError, match="is being worked on by another start"):
+            run(tmp_path / "out.zarr", 2)
+        other.kill()
+    assert run(tmp_path / "out.zarr", 2).is_whole
+
+
+def test_parts_together_are_the_whole(tmp_path):
+    for part in (2, 1, 3):
+        found = cluster.batch(
+            jobs.picture, items(7), tmp_path / "out.zarr", workers=jobs.Here(), part=(part, 3)
+        )
+    assert found.is_whole
+    with pytest.raises(lg.LumigraphError, match="part is 4 of 3"):
+        cluster.batch(jobs.picture, items(7), tmp_path / "out.zarr", part=(4, 3))
+
+
+def test_tables_stay_in_the_ledger(tmp_path):
+    cluster.batch(jobs.row, items(4), tmp_path / "out.csv", workers=jobs.Here())
+    with cluster.rows(tmp_path / "out.csv") as rows:
+        assert rows == [{"seed": k, "square": k * k} for k in range(4)]
+    assert cluster.status(tmp_path / "out.csv").is_whole
+
+
+def test_volumes_become_a_series_over_time(tmp_path):
+    volume = lg.Volume(np.ones((2, 3, 4), np.float32), lg.Grid((3, 4), 2e-6), (-1e-6, 1e-6))
+    cluster.batch(lambda _: volume, [0, 1], tmp_path / "out.ome.zarr", workers=jobs.Here())
+    about = json.loads((tmp_path / "out.ome.zarr" / "zarr.json").read_text())["attributes"]["ome"]
+    (image,) = about["multiscales"]
+    assert [axis["name"] for axis in image["axes"]] == ["t", "z", "y", "x"]
+    assert image["datasets"][0]["coordinateTransformations"][0]["scale"] == [1.0, 2.0, 2.0, 2.0]
+
+
+@pytest.mark.parametrize("thing", [np.zeros((2, 2), complex), "text", {"a": np.zeros((0, 3))}, 3])
+def test_what_no_series_holds_is_refused(thing):
+    with pytest.raises(lg.FormatError):
+        series.Frame.of(thing)
+
+
+def test_the_estimate_is_told_and_what_cannot_fit_is_refused(tmp_path):
+    told = []
+    cluster.batch(jobs.picture, items(5), tmp_path / "out.zarr", workers=jobs.Here(), estimated=told.append)
+    assert told[0].frames == 4
+    assert told[0].size == 4 * cluster.status(tmp_path / "out.zarr").entries[0].size
+    huge = cluster.Estimate.of([Entry(0, 2.0, 2**50, 2**20)], 100, 4)
+    assert huge.seconds == 50
+    with pytest.raises(lg.SamplingError, match=r"4 workers need .* GiB .* Use at most 1"):
+        huge.require(4, tmp_path / "out.zarr")
+    with pytest.raises(lg.SamplingError, match="the disk of"):
+        cluster.Estimate.of([Entry(0, 2.0, 1, 2**50)], 100, 4).require(4, tmp_path / "out.zarr")
+
+
+def test_a_ledger_that_is_none_is_told(tmp_path):
+    with pytest.raises(lg.FormatError, match="is no ledger of a job"):
+        cluster.status(tmp_path)
+    (tmp_path / "job.json").write_text("[]")
+    with pytest.raises(lg.FormatError, match="is damaged"):
+        Ledger(tmp_path).job()
+
+
+KILLED = """
+import sys; sys.path.insert(0, {tests!r})
+import cluster_jobs as jobs
+from lumigraph import cluster
+if __name__ == "__main__":
+    cluster.batch(jobs.picture, {items!r}, {output!r}, what={{"job": 1}}, workers=2)
+"""
+
+
+@pytest.mark.long  # 40 starts, each killed after a while: a minute
+@pytest.mark.skipif(sys.platform == "win32", reason="processes are killed by signals")
+def test_killed_at_any_time_it_goes_on_to_the_same_bits(tmp_path):
+    output, log, rng = tmp_path / "out.zarr", tmp_path / "log", random.Random(4)
+    script = tmp_path / "job.py"
+    here = str(Path(jobs.__file__).parent)
+    script.write_text(KILLED.format(tests=here, items=items(200, log=str(log)), output=str(output)))
+    for _ in range(40):
+        started = subprocess.Popen([sys.executable, str(script)], start_new_session=True)
+        try:
+            started.wait(rng.uniform(1.0, 3.0))
+        except subprocess.TimeoutExpired:
+            os.killpg(started.pid, signal.SIGKILL)
+        started.wait()
+    time.sleep(1.0)
+    last = subprocess.run([sys.executable, str(script)], check=False)
+    assert last.returncode == 0
+    found = cluster.status(output)
+    assert found.is_whole
+    cluster.batch(
+        jobs.picture, items(200, log=str(log)), tmp_path / "other.zarr", what={"job": 1}, workers=jobs.Here()
+    )
+    assert contents(output) == contents(tmp_path / "other.zarr")

@@ -1,0 +1,45 @@
+"""Pieces of work for the tests of batches: worker processes import them."""
+
+import os
+import signal
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from lumigraph import cluster
+
+
+def picture(item):
+    """Noise by the item's seed; a line in a file of each time that it was made."""
+    if "log" in item:
+        with Path(item["log"]).open("a") as file:
+            file.write(f"{item['seed']}\n")
+    if item.get("bad"):
+        raise ValueError("this one is bad")
+    if item.get("deadly") and not Path(item["deadly"]).exists():
+        Path(item["deadly"]).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    if item.get("always_deadly"):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {"a": np.random.default_rng(item["seed"]).random((3, 40, 50), np.float32), "b": np.arange(4)}
+
+
+def row(item):
+    """Two numbers."""
+    return cluster.Values({"seed": item["seed"], "square": item["seed"] ** 2})
+
+
+class Here:
+    """Works in this process."""
+
+    is_here, count = True, 1
+
+    @contextmanager
+    def group(self, task):
+        self.task = task
+        yield self
+
+    def each(self, numbers):
+        for number in numbers:
+            yield number, self.task.do(number)
