@@ -2,6 +2,7 @@
 
 from . import (
     analysis as analysis,
+    cluster as cluster,
     depth as depth,
     design as design,
     metric as metric,

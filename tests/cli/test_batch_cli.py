@@ -83,7 +83,7 @@ def test_a_frame_that_fails_ends_it_with_an_error(views, tmp_path, capsys):
         ("batch refocus --alpha 1 -o o.zarr", "which frames is not known"),
         ("batch refocus nothing*.zarr --alpha 1 -o o.zarr", "no file is like it"),
         ("batch refocus {v} --alpha 1", "where the results go"),
-        ("batch refocus {v} --alpha 1 -o o.csv", "ending"),
+        ("batch refocus {v} --alpha 1 -o o.csv", "Use one of .zarr"),
         ("batch refocus {v} --alpa 1 -o {o}", "--alpa"),
         ("batch refocus {v} --alpha 1 -o {o} --workers 0", "--workers is 0"),
         ("batch refocus {v} --alpha 1 -o {o} --part 3", "--part is '3'"),

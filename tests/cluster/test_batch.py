@@ -7,11 +7,11 @@ import sys
 import time
 from pathlib import Path
 
-import cluster_jobs as jobs
 import numpy as np
 import pytest
 import zarr
 
+import cluster_jobs as jobs
 import lumigraph as lg
 from lumigraph import cluster
 from lumigraph.cluster.ledger import Entry, Ledger

@@ -11,7 +11,7 @@ from contextlib import suppress
 from difflib import get_close_matches
 from importlib.metadata import version
 
-from cyclopts import App, Parameter
+from cyclopts import App
 from cyclopts.exceptions import CycloptsError, UnknownCommandError
 
 from lumigraph.cli.batch import batch
@@ -24,7 +24,7 @@ from lumigraph.cli.demo import demo
 from lumigraph.cli.depth import depth
 from lumigraph.cli.design import design
 from lumigraph.cli.measure import measure
-from lumigraph.cli.options import COMMAND
+from lumigraph.cli.options import COMMAND, PARAMETER
 from lumigraph.cli.refocus import refocus
 from lumigraph.cli.render import render
 from lumigraph.cli.reporting import telling
@@ -46,11 +46,6 @@ VERBS = (
 """In the order of their use."""
 
 
-def _telling(default: object) -> str | None:
-    """The default as the help shows it, if it is worth showing."""
-    return None if default is False or default is None else str(default)
-
-
 app = App(
     name="lumigraph",
     help="Design, simulate and process light-field (plenoptic) cameras.\n\n"
@@ -59,7 +54,7 @@ app = App(
     help_format="markdown",
     suppress_keyboard_interrupt=False,
     result_action="return_value",
-    default_parameter=Parameter(negative=(), show_default=_telling),
+    default_parameter=PARAMETER,
 )
 for _number, _verb in enumerate(VERBS):
     app.command(telling(_verb), sort_key=_number)

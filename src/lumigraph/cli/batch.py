@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import redirect_stderr
 from dataclasses import dataclass
+from importlib import import_module
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +16,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import line, progress
-from lumigraph.cli.options import COMMAND, COMMON, Common, Output
+from lumigraph.cli.options import COMMAND, COMMON, PARAMETER, Common, Output
 from lumigraph.core import memory
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
@@ -227,14 +228,15 @@ class Frames:
         CycloptsError
             Words that the verb does not take.
         """
-        from lumigraph.cli.app import app
+        from cyclopts import App
 
-        kind = KINDS[self.verb]
+        app, kind = App(default_parameter=PARAMETER), KINDS[self.verb]
+        app.command(getattr(import_module(f"lumigraph.cli.{self.verb}"), self.verb))
         words = [self.verb, *self.options[: kind.leading], item["file"], *self.options[kind.leading :]]
         words += [] if item["page"] is None else ["--page", str(item["page"])]
         words += ["--output", str(folder / f"frame{kind.ending}")] if kind.ending else []
         command, bound, _ = app.parse_args(words, exit_on_error=False, print_error=False)
-        return lambda: command.__wrapped__(*bound.args, **bound.kwargs)
+        return lambda: command(*bound.args, **bound.kwargs)
 
 
 def _without(words: Sequence[str], names: Sequence[str]) -> Iterator[str]:

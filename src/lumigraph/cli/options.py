@@ -33,6 +33,15 @@ class Common:
 
 
 COMMON = Common()
+
+
+def _telling(default: object) -> str | None:
+    """The default as the help shows it, if it is worth showing."""
+    return None if default is False or default is None else str(default)
+
+
+PARAMETER = Parameter(negative=(), show_default=_telling)
+"""How all verbs' options are read and shown."""
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
 
 

@@ -246,7 +246,7 @@ class Deconvolver:
         *,
         progress: Report | None = None,
         checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
-    ) -> Any:
+    ) -> Result:
         """The result of one raw image; parameters and errors are those of `deconvolve`."""
         exposure = _known(raw, exposure)
         data = values(raw, self.operator, exposure)
