@@ -93,7 +93,7 @@ def test_a_run_goes_on_from_its_checkpoint(focused, tmp_path):
 def test_ctrl_c_keeps_what_was_reached(focused, tmp_path, monkeypatch):
     from lumigraph import deconvolution
 
-    real = deconvolution.deconvolve_series
+    real = deconvolution.Deconvolver.__call__
 
     def interrupted(*arguments, progress, **options):
         def stop(step):
@@ -102,7 +102,7 @@ def test_ctrl_c_keeps_what_was_reached(focused, tmp_path, monkeypatch):
 
         return real(*arguments, progress=stop, **options)
 
-    monkeypatch.setattr(deconvolution, "deconvolve_series", interrupted)
+    monkeypatch.setattr(deconvolution.Deconvolver, "__call__", interrupted)
     found = focused("deconvolve", "raw.tiff", "--camera", "camera.toml", "-o", "picture.tiff")
     assert found.code == 130
     assert "2 iterations are in picture.partial.tiff" in found.err

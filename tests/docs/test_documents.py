@@ -121,6 +121,7 @@ def test_every_public_name_has_a_page():
     listed = set(re.findall(r"^   (\w+)$", (ROOT / "docs/api.md").read_text(), re.M))
     assert set(lg.__all__) <= listed
     assert set(lg.metric.__all__) <= listed
+    assert set(lg.cluster.__all__) <= listed
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
