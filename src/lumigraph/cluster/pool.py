@@ -41,11 +41,11 @@ class Pool:
 
     def __exit__(self, *_: object) -> None:
         """Stop all workers; what they had not noted is not done."""
-        for pipe, (process, _) in self._workers.items():
-            process.kill()
+        for pipe, work in self._workers.items():
+            work[0].kill()
             pipe.close()
-        for process, _ in self._workers.values():
-            process.join()
+        for work in self._workers.values():
+            work[0].join()
         self._workers.clear()
 
     def each(self, numbers: Iterable[int]) -> Iterator[Outcome]:

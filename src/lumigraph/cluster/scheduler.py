@@ -41,7 +41,7 @@ class Dask:
             distributed is not installed, nobody answers, or there are no workers.
         """
         try:
-            from distributed import Client
+            from distributed import Client  # pyright: ignore[reportMissingImports] - an extra
         except ImportError:
             raise LumigraphError(
                 "a scheduler needs dask's distributed. Install it: pip install 'lumigraph[cluster]'."
@@ -78,7 +78,7 @@ class _Group:
         LumigraphError
             The scheduler has ended.
         """
-        from distributed import as_completed
+        from distributed import as_completed  # pyright: ignore[reportMissingImports] - an extra
 
         futures = {self._begun(number): number for number in numbers}
         for future in as_completed(futures, loop=self.client.loop):

@@ -163,6 +163,7 @@ def _of_stack(page: RawImage, planes: ome.Planes, count: int) -> RawImage:
     found = header.loads(planes.note)
     if found is not None and found.get("kind") == "Stack":
         known = header.restore_planes(page.data[None], {**found, "positions": ()})
+        assert isinstance(known, Stack)  # restore_planes goes by the kind
         return RawImage(page.data, known.pixel_pitch, known.bit_depth, metadata=known.metadata)
     if _is_volume(planes, count) or planes.pitch[1] != planes.pitch[2]:
         return page

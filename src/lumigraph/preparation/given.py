@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from lumigraph import io
 from lumigraph.calibration import calibrate
@@ -19,6 +19,8 @@ from lumigraph.errors import FormatError
 from lumigraph.io.raytrix import lens_types
 from lumigraph.preparation.prepare import prepare
 from lumigraph.rendering import sharp_patches
+
+Kind = TypeVar("Kind")
 
 _MAKERS = (".xml", ".ini")  # which do not say how large their raw images are
 
@@ -141,11 +143,18 @@ def pages_of(path: Path, pages: str | None = None, *, one: bool = False) -> list
 def _reader(path: Path) -> Callable[[int], RawImage]:
     """Gives a page of a file; the others are not read where its format allows that."""
     if "page" in io.format_of(path).options:
-        return lambda k: io.open(path, page=k)
+        return lambda k: _instance(path, io.open(path, page=k), RawImage)
     found = io.open(path)
     if isinstance(found, Volume):
         found = Stack(found.data)
-    return lambda k: RawImage(found[k], found.pixel_pitch, found.bit_depth, metadata=found.metadata)
+    stack = _instance(path, found, Stack)
+    return lambda k: RawImage(stack[k], stack.pixel_pitch, stack.bit_depth, metadata=stack.metadata)
+
+
+def _instance(path: Path, thing: object, kind: type[Kind]) -> Kind:
+    if not isinstance(thing, kind):
+        raise FormatError(f"{path} holds a {called(thing)} where a raw image is needed.")
+    return thing
 
 
 def _range(pages: str, count: int, path: Path, *, one: bool) -> range:
