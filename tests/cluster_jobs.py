@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,6 +16,7 @@ def picture(item):
     if "log" in item:
         with Path(item["log"]).open("a") as file:
             file.write(f"{item['seed']}\n")
+    time.sleep(item.get("pause", 0))
     if item.get("bad"):
         raise ValueError("this one is bad")
     if item.get("deadly") and not Path(item["deadly"]).exists():
