@@ -7,6 +7,7 @@ import lumigraph as lg
 from lumigraph import viewer
 from lumigraph.cli import main
 from lumigraph.viewer.exhibit import detail, focal_stack
+from viewer_pages import served
 
 
 @pytest.fixture(scope="module")
@@ -93,3 +94,30 @@ def test_depths_of_a_camera_2_agree_in_metres(tmp_path, monkeypatch):
     assert np.abs(np.median(found.values)) < 1e-3
     for other in (lg.open("map.tiff").data, shown.depth().values):
         np.testing.assert_allclose(np.asarray(other), found.values, atol=1e-6)
+
+
+def test_depths_of_a_camera_1_are_shown_in_metres_from_the_focused_plane(open_page):
+    camera = lg.load_camera("thesis-plenoptic-1")
+    focal_length = camera.main_lens.focal_length
+    rng = np.random.default_rng(1)
+    views = lg.LightField(
+        rng.random((5, 5, 16, 20)), lg.Grid((5, 5), 1e-3), lg.Grid((16, 20), 1e-4), 2 * focal_length
+    )
+    alphas = np.linspace(0.9, 1.1, 320).reshape(16, 20)
+    depth = lg.DepthMap(alphas, np.ones(alphas.shape), "alpha", error=np.full(alphas.shape, 1e-3))
+    shown = viewer.Exhibit("views", views=views, depth=lambda: depth, focal_length=focal_length)
+    expected = lg.depth.metric(depth, views, focal_length=focal_length).values
+    with served(shown) as address:
+        page = open_page(f"{address}#mode=depth")
+        page.wait("Boolean(lumigraph.app.main.model.arrays.error)")
+        page.set(mode="depth")
+        for y, x in ((0, 0), (7, 3), (15, 19)):
+            page.page.mouse.move(*page.window_place(y, x))
+            page.wait("lumigraph.app.main.readout.textContent.includes('depth ')")
+            words = page.page.inner_text(".readout")
+            found, unit = words.split("depth ")[1].split()[:2]
+            assert float(found) * {"mm": 1e-3, "µm": 1e-6}[unit] == pytest.approx(expected[y, x], abs=5e-5)
+            assert "lenslets" in words
+        ends = [page.page.inner_text(f"#legend-{end}") for end in ("low", "high")]
+        assert [end[0] for end in ends] == ["-", "+"] if expected[0, 0] < 0 else ["+", "-"]
+        assert page.page.inner_text("#legend-label") == "from the focused plane"

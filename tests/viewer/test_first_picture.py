@@ -91,9 +91,8 @@ def test_a_page_of_a_server_has_no_poster_and_opens_on_the_same_focus(open_page,
 def test_a_drag_of_the_focus_does_not_blur_the_subject_first(open_page, views, slow):
     with served(of_views("views", views)) as address:
         page = open_page(address)
-        if slow:
-            page.page.evaluate(f"{MODEL}.slow = true; {MODEL}.need('stack')")
-            page.wait(f"Boolean({MODEL}.arrays.stack)")
+        page.page.evaluate(f"slow => {{ {MODEL}.slow = slow; {MODEL}.need('stack'); }}", slow)
+        page.wait(f"Boolean({MODEL}.arrays.stack)")
         low, high = page.page.evaluate(f"{MODEL}.focus")
         start, place = page.state("focus"), list(subject(views))
         details = []

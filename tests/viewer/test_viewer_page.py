@@ -72,12 +72,14 @@ def test_the_black_point_moves_the_dark_end(open_page, views):
             assert np.abs(page.pixels() - levels).max() <= 2 * LEVELS
 
 
-def test_every_control_has_a_name(open_page, views):
+def test_every_control_has_a_name_and_a_tooltip(open_page, views):
     with served(of_views("two planes", views)) as address:
         page = open_page(address)
         for slider in page.page.locator("input, select").all():
             name = slider.evaluate("e => e.ariaLabel || [...e.labels].map(l => l.textContent).join(' ')")
             assert name.strip(), slider.get_attribute("id")
+        for control in page.page.locator("button, input, select, [role=slider], summary").all():
+            assert control.evaluate("e => e.closest('[title]')?.title"), control.evaluate("e => e.outerHTML")
 
 
 def test_samples_that_are_not_valid_are_left_out(open_page, views, rng):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lumigraph.core import checks
-from lumigraph.core.arrays import Array
+from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.grid import Grid
@@ -75,6 +75,8 @@ class Exhibit:
         (what, value) to tell about the file.
     relative
         Whether the refocus factors have no meaning but the shift per view; see `comfortable`.
+    focal_length
+        Of the main lens [m], where it is known: depths are then distances from the focused plane.
     """
 
     name: str
@@ -87,6 +89,7 @@ class Exhibit:
     volume: Volume | None = None
     facts: tuple[tuple[str, str], ...] = ()
     relative: bool = False
+    focal_length: float | None = None
 
     def __post_init__(self) -> None:
         if all(part is None for part in (self.views, self.raw, self.planes, self.volume)):
@@ -144,6 +147,22 @@ def depth_map(views: LightField) -> DepthMap:
     from lumigraph.depth import alpha_of, epi
 
     return alpha_of(epi(grey_or_colour(views)), views)
+
+
+def object_depths(
+    views: LightField, focal_length: float, count: int = 129
+) -> tuple[list[float], list[float]]:
+    """Refocus factors through the whole range that have an object, and its depths from the focused plane [m].
+
+    As `lumigraph.depth.metric` gives them.
+    """
+    from lumigraph.depth import metric
+
+    alphas = np.linspace(*focus_range(views), count)[None]
+    table = DepthMap(alphas, np.ones(alphas.shape), "alpha")
+    depths = to_numpy(metric(table, views, focal_length=focal_length).values)
+    known = np.isfinite(depths)
+    return alphas[known].tolist(), depths[known].tolist()
 
 
 def depth_of_pixels(

@@ -240,7 +240,10 @@ def _coarser_views(
         LightField(data.reshape(shape), views.aperture, lenslets, views.separation, valid)
     )
     depth = exhibit.depth and (lambda: depth_map(small))
-    return dataclasses.replace(exhibit, views=small, depth=depth, relative=exhibit.relative or changed)
+    lens = None if changed else exhibit.focal_length
+    return dataclasses.replace(
+        exhibit, views=small, depth=depth, relative=exhibit.relative or changed, focal_length=lens
+    )
 
 
 def _coarser_volume(volume: Volume, step: int, data: np.ndarray) -> Volume:

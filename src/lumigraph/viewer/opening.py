@@ -176,8 +176,17 @@ def of_raw(
         views, relative = comfortable(decode(raw, calibration))
     return Exhibit(
         name, views=views, raw=raw, calibration=calibration, depth=lambda: depth_map(views),
-        facts=(*facts, *_about_views(views)), relative=relative,
+        facts=(*facts, *_about_views(views)), relative=relative, focal_length=_lens(origin, views, relative),
     )  # fmt: skip
+
+
+def _lens(origin: Origin, views: LightField, relative: bool) -> float | None:
+    """Focal length of the main lens, where it and the lengths of the light field are known."""
+    camera = origin.camera
+    if relative or not isinstance(camera, WithMainLens) or isinstance(camera, Rendered):
+        return None
+    focal_length = camera.main_lens.focal_length
+    return focal_length if views.separation > focal_length else None
 
 
 def rendered(raw: RawImage, calibration: Calibration, patch: float, count: int = _PATCHES) -> Planes:

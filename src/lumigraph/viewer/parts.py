@@ -14,7 +14,15 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.rendering import all_in_focus
 from lumigraph.rendering.geometry import lit
 from lumigraph.viewer.encoding import Coded, white_level
-from lumigraph.viewer.exhibit import Exhibit, Planes, detail, focal_stack, focus_range, grey_or_colour
+from lumigraph.viewer.exhibit import (
+    Exhibit,
+    Planes,
+    detail,
+    focal_stack,
+    focus_range,
+    grey_or_colour,
+    object_depths,
+)
 from lumigraph.viewer.start import poster, subject_focus
 
 CHUNK = 8 << 20
@@ -153,6 +161,8 @@ class Parts:
             self.arrays["error"] = lambda: Coded.of(_expected(once()))
         if (views := exhibit.views) is not None:
             self.about["sharp"] = True
+            if exhibit.focal_length is not None:
+                self.about["depth"]["metres"] = object_depths(views, exhibit.focal_length)
             self.arrays["sharp"] = lambda: Coded.of(_sharp(views, once()))
         self.arrays["depth"] = lambda: Coded.of(_finite(to_numpy(once().values)))
         self.arrays["confidence"] = lambda: Coded.of(

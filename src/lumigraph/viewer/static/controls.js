@@ -142,7 +142,7 @@ export class Controls {
     if (model.views) {
       const shift = model.factor * viewShifts(model.views, state.focus, 1).step, plane = model.views.metric ? ` · image at ${lengthText(model.views.separation / state.focus)}` : "";
       const factor = model.views.relative ? "" : `${state.focus.toFixed(4)} · `;
-      tell("focus-out", `${factor}${shift >= 0 ? "+" : "−"}${Math.abs(shift).toFixed(2)} px per view${plane}`);
+      tell("focus-out", `${factor}${shift >= 0 ? "+" : "−"}${Math.abs(shift).toFixed(2)} ${model.samples(state).word} per view${plane}`);
     } else tell("focus-out", `${Number((this.app.main.image?.position ?? state.focus).toPrecision(5))} ${stack?.unit ?? ""}`);
     input.setAttribute("aria-valuetext", by("focus-out").value);
   }
@@ -177,18 +177,18 @@ export class Controls {
     const range = model.depthRange(), map = cachedMap(depthMap(state));
     const colours = Array.from({ length: 17 }, (_, k) => { const i = 4 * Math.round((k * 255) / 16); return `rgb(${map[i]} ${map[i + 1]} ${map[i + 2]})`; });
     by("legend-bar").style.background = `linear-gradient(to right, ${colours.join(", ")})`;
-    const metric = model.views?.metric && model.about.depth.label.startsWith("Focus"), place = (x) => lengthText(model.views.separation / x);
+    const { metres } = model.about.depth, metric = !metres && model.views?.metric && model.about.depth.label.startsWith("Focus"), place = (x) => lengthText(model.views.separation / x);
     const shown = (x) => (metric ? place(x) : depthText(model.about.depth, x));
     by("legend-low").textContent = range ? shown(range[0]) : "";
     by("legend-high").textContent = range ? shown(range[1]) : "";
-    by("legend-label").textContent = metric ? "image distance" : model.about.depth.label;
+    by("legend-label").textContent = metres ? "from the focused plane" : metric ? "image distance" : model.about.depth.label;
   }
 
   measures(state) {
     const { main } = this.app, { image, model } = main, { ruler } = state;
     by("clear").hidden = !ruler && !state.region;
     if (!image) return;
-    tell("ruler-out", ruler ? `Length ${rulerText(ruler, image.unit, image.aspect, model.factor)}` : "");
+    tell("ruler-out", ruler ? `Length ${rulerText(ruler, image.unit, image.aspect, model.samples(state))}` : "");
     const key = JSON.stringify([state.region, state.mode, state.focus, state.view, state.aperture, state.plane, state.projection, state.trust, image.nx, image.exact]);
     if (key !== this.regionKey && !main.pointers.size) { this.regionKey = key; tell("region-out", state.region && main.device ? `Region ${main.regionText(state)}` : ""); }
   }

@@ -5,8 +5,8 @@ import { lengthText } from "./overlay.js";
 export const TOOLS = ["ruler", "region"];
 
 /** Length of a line [y, x, y, x] in samples, and where the samples are known in metres (`unit` across). */
-export function rulerText([y0, x0, y1, x1], unit, aspect, factor = 1) {
-  const samples = `${(factor * Math.hypot(y1 - y0, x1 - x0)).toFixed(1)} px`;
+export function rulerText([y0, x0, y1, x1], unit, aspect, { word, factor }) {
+  const samples = `${(factor * Math.hypot(y1 - y0, x1 - x0)).toFixed(1)} ${word}`;
   return unit ? `${lengthText(unit * Math.hypot((y1 - y0) * aspect, x1 - x0))} (${samples})` : samples;
 }
 
@@ -28,7 +28,7 @@ export function regionText(values) {
 }
 
 /** Draws both; `place` turns (y, x) of the picture into a place of the context. */
-export function drawMeasures(context, { ruler, region }, place, unit, aspect, factor = 1) {
+export function drawMeasures(context, { ruler, region }, place, unit, aspect, samples) {
   if (region) {
     const [y0, x0, y1, x1] = region, corners = [[y0, x0], [y0, x1], [y1, x1], [y1, x0]].map(([y, x]) => place(y, x));
     stroked(context, () => { corners.forEach(([x, y], k) => context[k ? "lineTo" : "moveTo"](x, y)); context.closePath(); });
@@ -40,7 +40,7 @@ export function drawMeasures(context, { ruler, region }, place, unit, aspect, fa
     context.moveTo(x0, y0); context.lineTo(x1, y1);
     for (const [x, y] of ends) { context.moveTo(x - across[0], y - across[1]); context.lineTo(x + across[0], y + across[1]); }
   });
-  const words = rulerText(ruler, unit, aspect, factor);
+  const words = rulerText(ruler, unit, aspect, samples);
   context.font = "600 12px system-ui, sans-serif";
   context.textAlign = "center";
   const wide = context.measureText(words).width / 2 + 6, { width, height } = context.canvas, ratio = context.getTransform().a;

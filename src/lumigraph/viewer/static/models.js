@@ -22,6 +22,12 @@ export class Model {
     return (this.finer.views ?? this.finer.volume)?.coarsest ?? 1;
   }
 
+  /** What the samples of a mode's picture are, lenslets of a decoded raw image or pixels, and how many of the file one stands for. */
+  samples({ mode }) {
+    const lenslets = this.views && (this.about.raw || this.views.metric) && (mode === "picture" || mode === "depth");
+    return { word: lenslets ? "lenslets" : "px", factor: this.factor };
+  }
+
   get modes() {
     const { views, stack, raw, depth, volume } = this.about;
     return { picture: Boolean(views || stack), raw: Boolean(raw), depth: Boolean(depth), volume: Boolean(volume) };

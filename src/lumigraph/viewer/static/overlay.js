@@ -96,14 +96,28 @@ export function lengthText(metres) {
   return `${Number((metres * value).toPrecision(4))} ${unit}`;
 }
 
-/** A depth as its map counts it. */
-export function depthText({ unit }, value, digits = 3) {
+/** Depth from the focused plane [m] of a refocus factor, from the table of a camera; null beyond infinity. */
+export function metresOf({ metres: [alphas, depths] }, alpha) {
+  const k = Math.max(1, Math.min(alphas.length - 1, alphas.findIndex((a) => a >= alpha))), part = (alpha - alphas[k - 1]) / (alphas[k] - alphas[k - 1]);
+  return alphas.length < 2 || alpha < alphas[0] || alpha > alphas.at(-1) ? null : depths[k - 1] + part * (depths[k] - depths[k - 1]);
+}
+
+/** A depth as its map counts it; in metres where the camera is known. */
+export function depthText(about, value, digits = 3) {
+  const { unit, metres } = about, depth = metres ? metresOf(about, value) : null;
+  if (metres) return depth === null ? "beyond" : `${depth > 0 ? "+" : ""}${lengthText(depth)}`;
   return unit === "m" ? lengthText(value) : `${value.toFixed(digits)} ${unit}`.trim();
+}
+
+/** An error of a refocus factor as one of the depth. */
+function errorText(about, value, error) {
+  const ends = [-1, 1].map((sign) => metresOf(about, value + sign * error));
+  return ends.includes(null) ? "?" : lengthText(Math.abs(ends[1] - ends[0]) / 2);
 }
 
 /** What a place of a depth map says: value, the error to expect, confidence. */
 export function depthTexts(about, { value, error, confidence }) {
-  const label = about.label === "Focus α′" ? "α′" : about.label.toLowerCase();
-  const spread = error === null ? "" : ` ± ${depthText(about, error)}`;
+  const label = about.metres ? "depth" : about.label === "Focus α′" ? "α′" : about.label.toLowerCase();
+  const spread = error === null ? "" : ` ± ${about.metres ? errorText(about, value, error) : depthText(about, error)}`;
   return [`${label} ${depthText(about, value, 4)}${spread}`, `confidence ${confidence.toFixed(2)}`];
 }

@@ -155,7 +155,7 @@ export class Pane {
       drawEpis(this.strips, this.model, state, place, { origin: this.origin, scale: this.scale, turn: state.turn, ratio: this.ratio, tone: this.tone, colour: this.app.line });
     }
     if (state.point && state.mode !== "raw" && state.mode !== "volume") drawMark(context, this.toScreen(...state.point));
-    drawMeasures(context, state, (y, x) => this.toScreen(y, x), image.unit, image.aspect, this.model.factor);
+    drawMeasures(context, state, (y, x) => this.toScreen(y, x), image.unit, image.aspect, this.model.samples(state));
     if (image.rays) drawAxes(context, state.orbit, (step) => turned(step, state.turn), size.height);
     if (image.unit) drawScaleBar(context, image.unit / (this.scale[0] / this.ratio), size);
   }
@@ -168,7 +168,7 @@ export class Pane {
   /** Position and value under the pointer. */
   tellPlace(image) {
     if (!this.hover) { if (this.readout.textContent) this.readout.textContent = ""; return; }
-    const [y, x] = this.hover, { factor } = this.model, parts = image.rays ? [] : [`y ${(factor * y).toFixed(1)}  x ${(factor * x).toFixed(1)} px`];
+    const [y, x] = this.hover, { factor, word } = this.model.samples(this.app.state), parts = image.rays ? [] : [`y ${(factor * y).toFixed(1)}  x ${(factor * x).toFixed(1)} ${word}`];
     const row = Math.round(y * image.detail), column = Math.round(x * image.detail);
     if (row < 0 || column < 0 || row >= image.ny || column >= image.nx) { this.readout.textContent = ""; return; }
     if (this.app.state.mode === "depth") {
@@ -326,7 +326,7 @@ export class Pane {
     const image = this.model.image(state, this.device, true);
     if (!image) return image;
     const { nx: width, ny: height, aspect, unit, detail } = image, place = Object.assign((y, x) => [y * detail, x * detail], { step: detail });
-    return { width, height, data: this.device.pixels(image, this.toneFor(state, image)), aspect, unit: unit && unit / detail, place };
+    return { width, height, data: this.device.pixels(image, this.toneFor(state, image)), aspect, unit: unit && unit / detail, place, samples: this.model.samples(state) };
   }
 
   /** What is finer than the picture in its own size, cut to where it is exact. */
@@ -336,7 +336,7 @@ export class Pane {
     const whole = new ImageData(this.device.pixels(image, toneOf(this.app.state, image)), image.nx, image.ny), sheet = new OffscreenCanvas(image.nx, image.ny).getContext("2d");
     sheet.putImageData(whole, 0, 0);
     const place = Object.assign((y, x) => [y, x].map((n, k) => (n - origin[k]) / factor - start[k]), { step: 1 / factor });
-    return { width, height, data: sheet.getImageData(start[1], start[0], width, height).data, aspect, unit: unit && unit * factor, place };
+    return { width, height, data: sheet.getImageData(start[1], start[0], width, height).data, aspect, unit: unit && unit * factor, place, samples: this.model.samples(this.app.state) };
   }
 
   /** How many views are kept (v, u). */

@@ -18,7 +18,7 @@ function fileName(app) {
 }
 
 /** One pane's picture in a canvas, with square pixels, turned as it is shown. */
-function partCanvas({ width, height, data, aspect, unit, place }, state) {
+function partCanvas({ width, height, data, aspect, unit, place, samples }, state) {
   const one = document.createElement("canvas"), sheet = document.createElement("canvas"), odd = state.turn % 2;
   Object.assign(one, { width, height });
   one.getContext("2d").putImageData(new ImageData(data, width, height), 0, 0);
@@ -33,7 +33,7 @@ function partCanvas({ width, height, data, aspect, unit, place }, state) {
   drawMeasures(context, state, (y, x) => {
     const [row, column] = place(y, x), { x: left, y: top } = matrix.transformPoint({ x: column + 0.5, y: (row + 0.5) * aspect });
     return [left, top];
-  }, unit && unit * place.step, aspect);
+  }, unit && unit * place.step, aspect, samples);
   if (unit && sheet.width >= LEAST_BAR) drawScaleBar(context, unit, sheet);
   return sheet;
 }
