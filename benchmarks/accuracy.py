@@ -9,10 +9,12 @@ in a file as they come; a run that was stopped goes on. `--write` puts the table
 
 import argparse
 import json
+import math
 import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,8 +31,8 @@ DEPTHS = (-3 * mm, 0.0, 3 * mm)
 PLACES = ("middle", "border", "outside")
 DOCUMENT = Path(__file__).parents[1] / "docs" / "operator.md"
 MARKS = "<!-- accuracy: python -m benchmarks.accuracy --write -->", "<!-- end of accuracy -->"
-SQUARE, LINES = references.Fineness(72, 4, 900, 64), references.Fineness(32, 4, 900, 64)
-"""Converged to 1e-6 and better; lines of hexagons and discs cost more."""
+SQUARE = references.Fineness(72, 4, 900, 64)
+"""Converged to 1e-6 and better."""
 
 Place = tuple[float, float]
 
@@ -49,6 +51,7 @@ CAMERAS |= {
         main_lens={"focal_length": 60 * mm, "diameter": 3.75 * mm},
         sensor={"pixel_pitch": 6 * um, "shape": (97, 97)},
     ),
+    "2.0, square, gaps": lambda: camera(fill_factor=0.9, count=(7, 7)),
     "2.0, round": lambda: camera(shape="round", fill_factor=0.9, count=(5, 5)),
     "2.0, hexagonal": _small("2.0, hexagonal"),
     "2.0, three kinds": _small("2.0, three kinds"),
@@ -188,8 +191,20 @@ def _truth(found: Any, dz: float, at: Sequence[Place]) -> list[np.ndarray]:
     """Raw images for 1 of light on the lenslets, or on the sensor of a camera without."""
     if found.lattice is None:
         return references.focused(found, dz, at)
-    straight = found.lenslets.layout == "square" and found.lenslets.shape == "square"
-    return references.points(found, dz, at, SQUARE if straight else LINES)
+    return references.points(found, dz, at, fineness(found))
+
+
+def fineness(found: Any) -> references.Fineness:
+    """Two nodes across a lenslet for each turn of the phase from the farthest, and some.
+
+    Lines across a disc stand π/2 times as far apart in the middle.
+    """
+    across = max(found.lenslets.extent) / found.lenslet_distance
+    turns = found.lenslets.pitch * across / found.wavelength
+    if found.lenslets.layout == "square" and found.lenslets.shape == "square":
+        return replace(SQUARE, lenslet=max(SQUARE.lenslet, 10 + math.ceil(2 * turns)))
+    nodes = (math.pi if found.lenslets.shape == "round" else 2) * turns
+    return replace(SQUARE, lenslet=10 + math.ceil(nodes))
 
 
 def run(only: Sequence[str], rows: Path, *, until: float = float("inf")) -> dict[str, dict[str, str]]:

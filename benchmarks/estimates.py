@@ -67,9 +67,7 @@ def _summed(found: Any, part: Any, coherent: bool) -> np.ndarray:
     samples = ((p, v**0.5) for p, v in zip(at, values, strict=True) if v)
     if found.lattice is None:
         return references.coherent_focused(found, dz, samples, area) * share / area
-    straight = found.lenslets.shape == "square"
-    fineness = accuracy.SQUARE if straight else accuracy.LINES
-    return references.coherent(found, dz, samples, area, fineness) * share / area
+    return references.coherent(found, dz, samples, area, accuracy.fineness(found)) * share / area
 
 
 def _many(found: Any, method: str, pattern: str, dz: float, rng: np.random.Generator) -> tuple[Any, Any]:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -25,6 +25,10 @@ COARSEST, FINEST = 1e-2, 1e-5
 """Accuracies that can be asked for."""
 
 Offset = tuple[int, int]
+
+Edges = Literal["meet", "straight", "other"]
+"""Of lenslets: those that meet, and opaque rims, which send light farther aside. Straight ones send it along
+two lines, and so farthest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,11 +154,11 @@ class Fineness:
                 f"accuracy is {accuracy:g} but must lie between {FINEST:g} and {COARSEST:g}, relative rms."
             )
 
-    def samples(self, fresnel_number: float, blur: float) -> float:
+    def samples(self, fresnel_number: float, blur: float, edges: Edges = "meet") -> float:
         """Samples of the image along a lenslet's pitch p.
 
         Light of the lenslet and of those beside it has frequencies up to some p/(λb); less of it comes from
-        farther ones the larger p²/(λb), and more the wider the point's image.
+        farther ones the larger p²/(λb), and more the wider the point's image and where edges do not meet.
 
         Parameters
         ----------
@@ -162,15 +166,20 @@ class Fineness:
             p²/(λb).
         blur
             Radius of a point's geometric image [p].
+        edges
+            Of the lenslets.
         """
-        return (6 * fresnel_number + 6 + 2 * blur) * (1e-3 / self.accuracy) ** 0.2
+        farther = 0.0 if edges == "meet" else 1.4 * (1e-3 / self.accuracy) ** 0.15 - 1
+        return (
+            (1 + farther * _tail(fresnel_number))
+            * (6 * fresnel_number + 6 + 2 * blur)
+            * (1e-3 / self.accuracy) ** 0.2
+        )
 
-    def neighbours(self, fresnel_number: float, *, gaps: bool = False) -> int:
-        """Lenslets on each side of an image's cell whose light is followed into it.
-
-        Between discs there are gaps: what their edges send aside goes farther than that of edges that meet.
-        """
-        return math.ceil((6 if gaps else 5) * (1e-3 / self.accuracy) ** 0.23 * _tail(fresnel_number))
+    def neighbours(self, fresnel_number: float, edges: Edges = "meet") -> int:
+        """Lenslets on each side of an image's cell whose light is followed into it."""
+        pitches = {"meet": 5, "straight": 9, "other": 6}[edges]
+        return math.ceil(pitches * (1e-3 / self.accuracy) ** 0.23 * _tail(fresnel_number))
 
     @property
     def rank(self) -> float:
@@ -181,9 +190,15 @@ class Fineness:
         """Lenslets that are missing farther than this from a cell [pitches] are not missed."""
         return 4 * (1e-3 / self.accuracy) ** 0.25 * _tail(fresnel_number)
 
-    def corner(self, fresnel_number: float) -> float:
-        """The same for what is missing on two sides of a corner: farther, each counts by itself."""
-        return 1.5 * (1e-3 / self.accuracy) ** 0.3 * _tail(fresnel_number)
+    def corner(self, fresnel_number: float, edges: Edges = "meet") -> float:
+        """The same for what is missing on two sides of a corner: farther, each counts by itself.
+
+        Of a cell's distances from both borders [pitches]: their sum behind square lenslets, whose axes are
+        apart, else the distance from the corner. What is left out then is 0.2 to 0.7 times the accuracy
+        (`benchmarks.corners`).
+        """
+        pitches = {"meet": 3.5, "straight": 4.5, "other": 5}[edges]
+        return max(1.2, pitches * (1e-3 / self.accuracy) ** 0.3 * _tail(fresnel_number))
 
     @property
     def ring(self) -> float:
@@ -289,10 +304,12 @@ def _sampled(camera: CameraOptics, fineness: Fineness, cells: Cells) -> Cells:
     """The cells with as many points and samples, and as wide a ring, as the accuracy asks for."""
     finest = airy(camera) / 2 / OVERSAMPLING
     assert camera.lattice is not None  # asked by `lenslet_array`
+    assert camera.array is not None
     pitch = camera.lattice.pitch
     widest, beyond = blur(camera, camera.object_distance) / pitch, spill(camera)
     # Where micro-images overlap, light of more lenslets interferes.
-    image = pitch / fineness.samples(fresnel_number(camera) * (1 + 2 / 3 * beyond / pitch), widest)
+    number = fresnel_number(camera) * (1 + 2 / 3 * beyond / pitch)
+    image = pitch / fineness.samples(number, widest, edges(camera.array))
     points = tuple(2 * math.ceil(s / finest / 2) for s in cells.size)
     samples = [math.ceil(s / image) for s in cells.size]
     if cells.staggered:
@@ -341,6 +358,13 @@ def fresnel_number(camera: CameraOptics) -> float:
 def airy(camera: CameraOptics) -> float:
     """λL/D in the lenslet plane [m]: the finest period that the main lens' light has there."""
     return camera.wavelength * camera.separation / camera.pupil_diameter
+
+
+def edges(array: LensletArray) -> Edges:
+    """Of an array's lenslets."""
+    if array.shape == "round":
+        return "other"
+    return "meet" if array.fill_factor == 1 else "straight" if array.lattice.layout == "square" else "other"
 
 
 def lens(camera: CameraOptics) -> Train:

@@ -12,7 +12,7 @@ from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.cell_response import SLACK, Axis
 from lumigraph.operators.cells import Cells, Fineness
 
-VERSION = 10
+VERSION = 11
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 
@@ -76,8 +76,7 @@ class Optics:
     def axes(self) -> tuple[Axis, Axis]:
         """Sampling of a cell along y and along x."""
         band = SLACK / 2 / _cells.airy(self.camera)
-        gaps = self.array.shape == "round"
-        neighbours = self.fineness.neighbours(_cells.fresnel_number(self.camera), gaps=gaps)
+        neighbours = self.fineness.neighbours(_cells.fresnel_number(self.camera), _cells.edges(self.array))
         neighbourhood = neighbours * self.array.lattice.pitch + self.spill
         y, x = (
             Axis(size, points, samples, neighbourhood, band)
@@ -90,10 +89,7 @@ class Optics:
     @property
     def reach(self) -> tuple[int, int]:
         """Cells along y and x to which a point's light is followed in full."""
-        far, pitch = self.fineness.reach(*self._spread), self.array.lattice.pitch
-        lenslets = max(1, math.ceil(far / pitch)) + 0.5
-        y, x = (math.ceil(lenslets * pitch / size - 0.5 - 1e-6) for size in self.cells.size)
-        return y, x
+        return self._cells(math.ceil(self.fineness.reach(*self._spread) / self.array.lattice.pitch))
 
     @property
     def lit(self) -> float:
@@ -103,9 +99,14 @@ class Optics:
     @property
     def near(self) -> tuple[int, int]:
         """Cells to which a point's light is followed at the border of the array."""
-        far = self.fineness.near(*self._spread)
-        y, x = (max(1, round(far / size)) for size in self.cells.size)
+        y, x = self._cells(round(self.fineness.near(*self._spread) / self.array.lattice.pitch))
         return min(y, self.reach[0]), min(x, self.reach[1])
+
+    def _cells(self, lenslets: int) -> tuple[int, int]:
+        """Cells along y and x that so many lenslets on each side lie in, one at least."""
+        far = (max(1, lenslets) + 0.5) * self.array.lattice.pitch
+        y, x = (math.ceil(far / size - 0.5 - 1e-6) for size in self.cells.size)
+        return y, x
 
     def margin(self, reach: tuple[int, int]) -> tuple[int, int]:
         """Cells on each side that hold those `reach` away: one more where rows are staggered."""

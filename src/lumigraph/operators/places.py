@@ -38,14 +38,16 @@ class Band:
         Of the lenslets' centres, from a cell's centre [m]; infinite where the border is far.
     ring
         Whether it is of a ring.
-    close
-        Whether what is missing counts in corners too.
     """
 
     cells: tuple[int, int]
     limits: Limits
     ring: bool = False
-    close: bool = False
+
+    @property
+    def border(self) -> float:
+        """How far the nearest border is from a cell's centre [m]."""
+        return min(map(abs, self.limits))
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +87,8 @@ def bands(optics: Optics, axis: int, parity: int = 0) -> list[Band]:
     result = [Band((first, first + n), INFINITE)]
     if extent is None:
         return result
-    fineness, fresnel = optics.fineness, _cells.fresnel_number(optics.camera)
-    far, close = (
-        size / 2 + border * pitch * (1 + 1e-9) + optics.spill
-        for border in (fineness.border(fresnel), fineness.corner(fresnel))
-    )
-    close += cells.staggered * size / 2  # half of the neighbours in the next row stand as much farther
+    far = optics.fineness.border(_cells.fresnel_number(optics.camera))
+    far = size / 2 + far * pitch * (1 + 1e-9) + optics.spill
     for row in range(cells.image[axis]):
         middle = cells.edge[axis] + (row - first + 0.5 + axis * parity / 2) * size
         low, high = -extent[axis] / 2 - middle, extent[axis] / 2 - middle
@@ -98,7 +96,7 @@ def bands(optics: Optics, axis: int, parity: int = 0) -> list[Band]:
         limits = _near(low, far), _near(high, far)
         if limits == INFINITE and not ring:
             continue
-        result.append(Band((row, row + 1), limits, ring, ring or min(abs(low), abs(high)) < close))
+        result.append(Band((row, row + 1), limits, ring))
     return result
 
 
@@ -129,9 +127,17 @@ def places(optics: Optics) -> list[Place]:
         for y in along_y[1:]
         for parity in parities
         for x in along_x[parity][1:]
-        if y.close and x.close
+        if _in_corner(optics, y, x)
     ]
     return _of(optics, edges + corners)
+
+
+def _in_corner(optics: Optics, y: Band, x: Band) -> bool:
+    """Whether what is missing on two sides is not the sum of what is missing on each."""
+    far = optics.fineness.corner(_cells.fresnel_number(optics.camera), _cells.edges(optics.array))
+    # What is missing is a product of both behind square lenslets, and round about the corner behind others.
+    away = y.border + x.border if optics.straight else math.hypot(y.border, x.border)
+    return (y.ring and x.ring) or away < far * optics.array.lattice.pitch + optics.spill
 
 
 def _of(optics: Optics, wanted: Sequence[tuple[Band, int, Band]]) -> list[Place]:
