@@ -86,6 +86,16 @@ def test_patches_of_a_raw_image(lumigraph, tmp_path, method, shape):
     assert tuple(json.loads(found.out)["shape"]) == shape
 
 
+@pytest.mark.parametrize("which", ["star", "cross", "row"])
+def test_views_are_chosen_by_name(lumigraph, views, tmp_path, which):
+    found = lumigraph("depth", "views.zarr", "--views", which, "-o", "map.pfm")
+    assert found.code == 0, found.err
+    some = lg.rendering.arranged(views, which)
+    assert np.asarray(some.data != 0).any((2, 3)).sum() == {"star": 17, "cross": 9, "row": 5}[which]
+    np.testing.assert_allclose(lg.open(tmp_path / "map.pfm").data, lg.depth.epi(some).values, atol=1e-5)
+    assert np.median(lg.open(tmp_path / "map.pfm").data) == pytest.approx(NEAR, abs=0.01)
+
+
 def test_wrong_words_are_told_in_one_line(lumigraph, views):
     for words, told in (
         (("-o", "map.obj"), "wrong extension"),

@@ -17,7 +17,7 @@ from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import Fit
 from lumigraph.depth.smooth import Stiffness, tears, update
 from lumigraph.depth.sweep import costs, span
-from lumigraph.errors import GeometryError
+from lumigraph.errors import GeometryError, SamplingWarning
 
 
 def flat(disparity):
@@ -292,3 +292,21 @@ def test_beside_an_edge_of_depth_a_place_is_less_sure(bar):
     beside, away = error[:, [27, 28, 43, 44]], error[:, 32:40]  # the bar's edges are at 28.5 and 43.5
     # Both have the same texture: noise and contrast alone gave both the same error.
     assert np.median(beside) > 10 * np.median(away)
+
+
+def test_what_the_middle_view_does_not_show_is_unknown(paint):
+    views, _ = views_of([(paint[0], flat(0.4), None)])
+    valid = np.ones(views.data.shape[:4], bool)
+    valid[:, :, :6, :6] = False
+    found = epi(LightField(views.data, views.aperture, views.lenslets, 20.0, valid))
+    assert np.isnan(found.values[:6, :6]).all()
+    assert np.isnan(found.error[:6, :6]).all()
+    assert (found.confidence[:6, :6] == 0).all()
+    assert np.isfinite(found.values[6:, 6:]).all()
+    assert alpha_of(found, views).quantiles(0.0, 1.0) == pytest.approx((0.6, 0.6), abs=0.02)
+
+
+def test_places_beyond_the_range_asked_for_are_told(paint):
+    views, _ = views_of([(paint[0], flat(0.4), None)])
+    with pytest.warns(SamplingWarning, match=r"places lie beyond the disparities asked for, -1 to 0 px"):
+        epi(views, (-1, 0))

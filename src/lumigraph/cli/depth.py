@@ -55,6 +55,9 @@ class Search:
         camera of --camera, a plenoptic 1.0; takes half a minute.
     smooth
         Smooth the map where it is not sure, along the picture's edges; 1 is usual.
+    views
+        Of a light field those that are used: all; star: the middle row, column and diagonals; cross: the
+        middle row and column; row: the middle row. Fewer take less time.
     """
 
     method: Literal["auto", "epi", "focus", "fused", "dense", "correlation"] = "auto"
@@ -62,6 +65,7 @@ class Search:
     alphas: str | None = None
     correct: bool = False
     smooth: float = 0.0
+    views: Literal["all", "star", "cross", "row"] = "all"
 
     def ends(self) -> tuple[float, float] | None:
         """The least and the most."""
@@ -77,11 +81,12 @@ class Search:
 
     def of_views(self, views: "LightField", shown: Progress) -> "DepthMap":
         """Disparities or refocus factors of the middle view."""
-        from lumigraph import depth
+        from lumigraph import depth, rendering
 
         if self.method in _OF_RAW:
             raise FormatError(f"--method {self.method} is for raw images of cameras 2.0. Use --method epi.")
         found: list[DepthMap] = []
+        views = rendering.arranged(views, self.views)
         if self.method != "focus":
             found.append(depth.epi(views, self.ends(), progress=shown))
         if self.method in ("focus", "fused"):
@@ -114,6 +119,8 @@ class Search:
         """Patches of the lenslets, or of the samples of the picture."""
         from lumigraph import depth, preparation, rendering
 
+        if self.views != "all":
+            raise FormatError(f"--views {self.views} is for views, and cameras 1.0. Leave it out.")
         share = 1.0 if self.method == "correlation" else 0.3
         found = depth.correlation(raw, calibration, self.ends(), progress=within(shown, 0, share))
         if self.method == "correlation":
@@ -320,8 +327,7 @@ def _save(made: _Measured, output: Path, points: tuple[float | None, float]) -> 
 def _result(found: "DepthMap", picture: Any, notes: tuple[str, ...], written: tuple[Path, ...]) -> Result:
     import numpy as np
 
-    values, trust = np.asarray(found.values, float), np.asarray(found.confidence, float)
-    ends = np.nanquantile(values, (0.01, 0.5, 0.99)) if np.isfinite(values).any() else np.full(3, np.nan)
+    trust, ends = np.asarray(found.confidence, float), found.quantiles(0.01, 0.5, 0.99)
     unit, (rows, columns) = "" if found.unit == "1" else found.unit, found.shape
     low, middle, high = (Quantity(name, float(v), unit) for name, v in zip(_ENDS, ends, strict=True))
     text = (
@@ -330,6 +336,10 @@ def _result(found: "DepthMap", picture: Any, notes: tuple[str, ...], written: tu
     )
     usual = found.usual_error
     expected = [] if usual is None else [Quantity("expected_error", usual, unit)]
+    unknown = int((~np.isfinite(np.asarray(found.values))).sum())
+    notes = (
+        (*notes, f"{unknown} places are unknown: the middle view does not show them") if unknown else notes
+    )
     text += f" and an expected error below {expected[0]}" if expected else ""
     values = (
         Quantity("quantity", found.quantity), Quantity("unit", found.unit), Quantity("shape", found.shape),

@@ -323,6 +323,6 @@ def _from_views(views: "LightField", look: Look, output: Path, shown: Progress) 
         made = rendering.all_in_focus(views, depth=extra.values)
     io.save(made.picture, output)
     rows, columns = made.picture.shape[:2]
-    ends = [float(made.alpha.min()), float(made.alpha.max())]
+    ends = list(extra.quantiles(0.01, 0.99))
     text = f"{rows} x {columns} px, refocus factors from {ends[0]:.4g} to {ends[1]:.4g}"
     return _Made([made.picture], text, (Quantity("alpha", ends),), extra)

@@ -1,5 +1,6 @@
 """A depth for each place of a picture, in the quantity that was measured."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -105,6 +106,17 @@ class DepthMap(Noun[A]):
         known = np.zeros(0) if self.error is None else to_numpy(self.error)
         known = known[np.isfinite(known)]
         return float(np.median(known)) if known.size else None
+
+    def quantiles(self, *parts: float) -> tuple[float, ...]:
+        """Values below which these parts of the map lie, places counted by their confidence; NaN of none."""
+        values, trust = to_numpy(self.values).ravel(), to_numpy(self.confidence).ravel()
+        known = np.isfinite(values) & (trust > 0)
+        if not known.any():
+            return (math.nan,) * len(parts)
+        order = np.argsort(values[known])
+        sums = np.cumsum(trust[known][order], dtype=float)
+        places = np.searchsorted(sums, np.array(parts) * sums[-1])
+        return tuple(float(v) for v in values[known][order][np.clip(places, 0, len(order) - 1)])
 
     def _repr_html_(self) -> str:
         values, trust = to_numpy(self.values), to_numpy(self.confidence)

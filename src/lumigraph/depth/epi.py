@@ -1,10 +1,12 @@
 """Depth from the lines of epipolar-plane images."""
 
+import warnings
+
 import numpy as np
 from scipy.ndimage import median_filter
 
 from lumigraph.core import checks
-from lumigraph.core.arrays import like
+from lumigraph.core.arrays import like, to_numpy
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Progress, silent, within
@@ -12,8 +14,10 @@ from lumigraph.depth.expected import expected
 from lumigraph.depth.lines import refined
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.sweep import labels, span, swept
-from lumigraph.errors import GeometryError
+from lumigraph.errors import GeometryError, SamplingWarning
 
+_BEYOND = 0.01  # part of the places that may lie beyond the range without a warning
+_STEP = 0.5  # px in the outermost view
 _DOUBT = 0.65
 """Expected error [px per view, or in the outermost view if that is less] with a confidence of 1/e."""
 
@@ -41,7 +45,8 @@ def epi(
     Returns
     -------
     DepthMap
-        Disparities (t, s): positive is nearer than the plane in focus. `error` is the mean distance from
+        Disparities (t, s): positive is nearer than the plane in focus; NaN where the middle view is not
+        `valid`, such as in vignetted corners. `error` is the mean distance from
         the truth to expect, by what noise and contrast allow in a 7 x 7 window and what is at stake beside an
         edge of depth, where the map may be on the wrong side. Confidence is exp(-error/0.65 px).
 
@@ -51,6 +56,11 @@ def epi(
         One view, pictures of less than 8 x 8, NaN, a range that is empty or takes too many labels.
     LumigraphError
         It would not fit in memory.
+
+    Warns
+    -----
+    SamplingWarning
+        Places lie beyond the disparities asked for.
 
     References
     ----------
@@ -79,9 +89,33 @@ def epi(
     first = np.clip(median_filter(first, 5), moves[0], moves[-1])
     found, evidence = refined(pictures, first, shading, within(progress, share, 1))
     found, error = found / pictures.reach, expected(found, evidence) / pictures.reach
-    trust = np.exp(-error / min(_DOUBT, _DOUBT * 4 / pictures.reach))
+    if disparities is not None:
+        _check_ends(found, error, disparities, _STEP / pictures.reach)
+    known = _known(views)
+    found, error = np.where(known, found, np.nan), np.where(known, error, np.nan)
+    trust = known * np.exp(-np.nan_to_num(error) / min(_DOUBT, _DOUBT * 4 / pictures.reach))
     found, trust, error = (like(part, views.data) for part in (found, trust, error))
     return DepthMap(found, trust, "disparity", error)
+
+
+def _known(views: LightField) -> np.ndarray:
+    """Whether the middle view shows a place (t, s): where it is not valid, nothing can be said."""
+    if views.valid is None:
+        return np.ones(views.lenslets.shape, bool)
+    v, u = (n // 2 for n in views.aperture.shape)
+    return to_numpy(views.valid)[v, u].astype(bool)
+
+
+def _check_ends(found: np.ndarray, error: np.ndarray, given: tuple[float, float], step: float) -> None:
+    beyond = (found < given[0] - step) | (found > given[1] + step)
+    share = float((beyond & (error < step)).mean())
+    if share > _BEYOND:
+        warnings.warn(
+            f"{share:.1%} of the places lie beyond the disparities asked for, {given[0]:g} to "
+            f"{given[1]:g} px: theirs are those at the end of the search. Give a wider range, or none.",
+            SamplingWarning,
+            stacklevel=3,
+        )
 
 
 def _range(disparities: tuple[float, float], reach: float) -> tuple[float, float]:

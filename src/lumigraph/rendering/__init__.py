@@ -27,6 +27,7 @@ from lumigraph.rendering.refocus import refocus, refocus_stack
 from lumigraph.rendering.sharp import AllInFocus, all_in_focus
 from lumigraph.rendering.super_resolution import super_resolve
 from lumigraph.rendering.views import (
+    arranged,
     lenslet_mosaic,
     point_of_view,
     reduce_aperture,
@@ -38,6 +39,7 @@ from lumigraph.rendering.views import (
 __all__ = [
     "AllInFocus",
     "all_in_focus",
+    "arranged",
     "decode",
     "encode",
     "focus_range",

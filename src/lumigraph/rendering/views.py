@@ -30,6 +30,39 @@ def view(views: LightField[A], v: int, u: int) -> A:
     return views.data[v, u, ...]
 
 
+def arranged(views: LightField[A], which: Literal["all", "star", "cross", "row"] = "all") -> LightField[A]:
+    """Some of the views: the middle row; that and the middle column, a cross; these and diagonals, a star.
+
+    The rest is black and not `valid`, as in a folder that lacks it; of a row the other rows are left out.
+
+    Raises
+    ------
+    GeometryError
+        Another arrangement.
+    """
+    checks.choice("which", which, ("all", "star", "cross", "row"))
+    if which == "all":
+        return views
+    (nv, nu), own = views.aperture.shape, views.aperture
+    if which == "row":
+        row, grid = (
+            slice(nv // 2, nv // 2 + 1),
+            Grid((1, nu), own.pitch, (float(own.y[nv // 2]), own.center[1])),
+        )
+        valid = None if views.valid is None else views.valid[row]
+        return LightField(views.data[row], grid, views.lenslets, views.separation, valid)
+    down, right = np.abs(np.arange(nv) - nv // 2)[:, None], np.abs(np.arange(nu) - nu // 2)
+    there = (down == 0) | (right == 0) | ((which == "star") & (down == right))
+    xp = namespace(views.data)
+    data: Any = views.data
+    seen = xp.asarray(there.reshape(there.shape + (1,) * (data.ndim - 2)), device=data.device)
+    data = xp.where(seen, data, xp.asarray(0, dtype=data.dtype, device=data.device))
+    valid = np.broadcast_to(there[:, :, None, None], data.shape[:4])
+    valid = valid if views.valid is None else valid & to_numpy(views.valid)
+    valid = xp.asarray(valid.copy(), device=data.device)
+    return LightField(data, own, views.lenslets, views.separation, valid)
+
+
 def point_of_view(views: LightField[A], y: float, x: float) -> A:
     """Picture (t, s[, c]) seen from a place on the main lens (y, x) [m], between the views linearly.
 
