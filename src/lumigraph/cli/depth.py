@@ -338,7 +338,9 @@ def _result(found: "DepthMap", picture: Any, notes: tuple[str, ...], written: tu
     expected = [] if usual is None else [Quantity("expected_error", usual, unit)]
     unknown = int((~np.isfinite(np.asarray(found.values))).sum())
     notes = (
-        (*notes, f"{unknown} places are unknown: the middle view does not show them") if unknown else notes
+        (*notes, f"{unknown} places are unknown: not in the middle view, or beyond infinity")
+        if unknown
+        else notes
     )
     text += f" and an expected error below {expected[0]}" if expected else ""
     values = (
