@@ -62,7 +62,7 @@ audit: $(READY)  ## known holes in the locked dependencies; fails where no advis
 		{ echo "audit: holes are listed above; if none are, the advisory service of PyPI did not answer"; exit 1; }
 
 docs: $(READY)  ## the site, with its gallery: site/index.html; strict, without a network once its tools are there
-	@$(BIN)/python -c "import furo, myst_parser, sphinx_gallery" 2>/dev/null || \
+	@$(BIN)/python -c "import furo, myst_nb, sphinx_gallery" 2>/dev/null || \
 		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r docs/requirements.lock
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html docs site
 
@@ -78,4 +78,4 @@ lock:  ## compile the three locks again (needs uv); nothing is installed
 	$(COMPILE) --extra docs --constraint requirements-dev.lock -o docs/requirements.lock
 
 clean:
-	rm -rf .venv demo reproduce build dist site docs/gallery docs/api
+	rm -rf .venv demo reproduce build dist site jupyter_execute docs/gallery docs/api

@@ -1,17 +1,22 @@
 """The site: `make docs` builds it into site/, strictly and without a network."""
 
 import shutil
+from importlib import import_module
 from importlib.metadata import version as _version
+from inspect import ismodule
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
+from sphinx.errors import ExtensionError
+
+import lumigraph
 
 project = "lumigraph"
 author = "The lumigraph developers"
 release = version = _version("lumigraph")
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
@@ -32,13 +37,33 @@ templates_path = ["_templates"]
 default_role = "code"
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300  # s; each takes some 20
+nb_merge_streams = True
 autosummary_generate = True
+autosummary_ignore_module_all = False
+EVERYDAY = {id(thing) for name in lumigraph.__all__ if not ismodule(thing := getattr(lumigraph, name))}
+
+
+def _own(module: str) -> list[str]:
+    """The public names of a module that have no page as everyday names."""
+    found = import_module(module)
+    return [name for name in getattr(found, "__all__", ()) if id(getattr(found, name)) not in EVERYDAY]
+
+
+autosummary_context = {"own": _own}
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_default_options = {"members": True, "show-inheritance": False}
 napoleon_google_docstring = False
 napoleon_use_rtype = False
-suppress_warnings = ["config.cache"]
+suppress_warnings = [
+    "config.cache",
+    "mystnb.unknown_mime_type",
+    "ref.python",  # everyday names stand in `lumigraph` and in their module
+]
 
 
 def _figures(block: Any, variables: dict[str, Any], gallery: dict[str, Any]) -> str:
@@ -58,6 +83,23 @@ def _figures(block: Any, variables: dict[str, Any], gallery: dict[str, Any]) -> 
             shutil.copy(thing, path)
             found.append(str(path))
     return figure_rst(found, gallery["src_dir"])
+
+
+def _every_name_has_a_page(app: Any, error: Exception | None) -> None:
+    """Fail where a public name of the package or of a module that the Python page lists has no entry."""
+    if error is not None:
+        return
+    there = app.env.get_domain("py").objects
+    modules = [name for name, entry in there.items() if entry.objtype == "module"]
+    wanted = [f"lumigraph.{name}" for name in lumigraph.__all__ if name != "targets"]
+    wanted += [f"{module}.{name}" for module in modules for name in _own(module)]
+    if missing := [name for name in wanted if name not in there]:
+        raise ExtensionError(f"no page of the site has {', '.join(sorted(missing))}.")
+
+
+def setup(app: Any) -> None:
+    """Sphinx calls this."""
+    app.connect("build-finished", _every_name_has_a_page)
 
 
 sphinx_gallery_conf = {

@@ -154,3 +154,16 @@ def test_large_images_are_drawn_at_no_more_than_can_be_seen():
 def test_no_window_and_no_global_figure():
     plots.show(np.ones((2, 2)))
     assert not Gcf.figs
+
+
+def test_notebooks_show_every_drawing():
+    indices = np.argwhere(np.ones((3, 3)))
+    calibration = Calibration(Lattice.square(20.0), (60, 60), indices, 20.0 * indices, 0.0)
+    views = LightField(np.ones((3, 3, 4, 4)), Grid.square(3, 1.0), Grid.square(4, 1.0), 1.0)
+    drawings = (
+        plots.show(np.eye(3)), plots.curves([0, 1], {"a": [0, 1]}), plots.images([(np.eye(3), "a")]),
+        plots.lattice(np.eye(60), calibration), views.plot(),
+    )  # fmt: skip
+    for figure in drawings:
+        assert figure._repr_png_().startswith(b"\x89PNG")
+    assert not Gcf.figs

@@ -34,7 +34,7 @@ class TotalVariation:
     Parameters
     ----------
     strength
-        λ, without unit: the weight of |∇o|, per sample, over that of a sample's light. The noise of n photons
+        λ, without unit: the weight of `|∇o|` per sample, over that of a sample's light. The noise of n photons
         per sample is flattened from about 1/√n on: 0.002 for bright images, 0.05 for dim ones.
     spacing
         Distances between samples (y, x) or (z, y, x) [any unit]: differences along z count by the slope that
@@ -67,7 +67,7 @@ class TotalVariation:
     def smoothed(
         self, problem: Problem, image: Array, metric: Array, dual: Array | None
     ) -> tuple[Array, dict[str, Array]]:
-        """Minimum of ½ Σ (o - image)²/metric + λ Σ |∇o| for o ≥ 0, and its dual variable."""
+        """Minimum of ½ Σ (o - image)²/metric + λ Σ `|∇o|` for o ≥ 0, and its dual variable."""
         weights = self.axis_weights(problem)
         scaled = self.strength * metric
         steps = _dual_steps(scaled, weights)
@@ -95,7 +95,7 @@ class TotalVariation:
         return tuple(lateral / step if n > 1 else 0.0 for n, step in zip(shape, spacing, strict=True))
 
     def penalty(self, problem: Problem, estimate: Array) -> float:
-        """λ s̄ Σ |∇o|, to be compared with half of the deviance's sum over the gain."""
+        """λ s̄ Σ `|∇o|`, to be compared with half of the deviance's sum over the gain."""
         slopes = gradient(estimate, self.axis_weights(problem))
         xp = arrays.namespace(estimate)
         total = float(xp.sum(xp.sqrt(xp.sum(slopes**2, axis=0))))

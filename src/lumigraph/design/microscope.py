@@ -220,11 +220,11 @@ def refocus_range(wavelength: float, numerical_aperture: float, index: float, di
 
 
 def band_limit(wavelength: float, magnification: float, pitch: float, dz: float) -> float:
-    """Highest lateral frequency of an object at depth dz that a lenslet passes, d / (0.94 λ M |dz|) [1/m].
+    """Highest lateral frequency of an object at depth dz that a lenslet passes, `d / (0.94 λ M |dz|)` [1/m].
 
-    A lenslet's image in object space is an aperture of width d/M at distance |dz|. Its period is twice
+    A lenslet's image in object space is an aperture of width d/M at distance `|dz|`. Its period is twice
     Sparrow's distance 0.47 λ/NA for that aperture. It holds where a point lights more than its own lenslet,
-    |dz| ≥ d² / (2 M² λ) (`near_field`). The objective's own cut-off 2 NA/λ bounds it.
+    `|dz| ≥ d² / (2 M² λ)` (`near_field`). The objective's own cut-off 2 NA/λ bounds it.
 
     References
     ----------

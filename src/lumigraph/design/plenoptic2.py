@@ -156,7 +156,7 @@ def magnification_at(
 
 
 def views_per_axis(magnification: float) -> float:
-    """Lenslets per axis that see the same point, 1 / |m|, for a matched main lens.
+    """Lenslets per axis that see the same point, `1 / |m|`, for a matched main lens.
 
     References
     ----------
@@ -175,7 +175,7 @@ def views_per_axis(magnification: float) -> float:
 
 
 def rendered_cutoff(wavelength: float, pitch: float, magnification: float, lenslet_distance: float) -> float:
-    """Highest frequency that a lenslet lets into the rendered picture, |m| p / (λ b) [1/m].
+    """Highest frequency that a lenslet lets into the rendered picture, `|m| p / (λ b)` [1/m].
 
     Measured on the main-lens image; the lenslet's own cut-off p / (λ b), seen through its magnification.
 
@@ -195,7 +195,7 @@ def rendered_cutoff(wavelength: float, pitch: float, magnification: float, lensl
 
 
 def rendered_lobe(wavelength: float, pitch: float, relay_distance: float) -> float:
-    """Width of a point's central lobe in the rendered picture, 2.44 λ |a| / p [m], on the main-lens image.
+    """Width of a point's central lobe in the rendered picture, `2.44 λ |a| / p` [m], on the main-lens image.
 
     References
     ----------

@@ -1,5 +1,6 @@
 """What every drawing shares: a figure without a window, axes with lengths in a readable unit, colour bars."""
 
+from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -16,11 +17,20 @@ _MOST = 1600  # samples drawn along an axis; more cannot be seen and only cost t
 _UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 
 
+class Drawing(Figure):
+    """A figure that notebooks show, without pyplot and its global state."""
+
+    def _repr_png_(self) -> bytes:
+        file = BytesIO()
+        self.savefig(file, format="png", dpi=90)
+        return file.getvalue()
+
+
 def canvas(
     rows: int, columns: int, *, width: float = PANEL, height: float = PANEL
 ) -> tuple[Figure, list[Axes]]:
     """A figure of panels and its axes, row by row; no window is opened and no global state is touched."""
-    figure = Figure(figsize=(width * columns, height * rows), layout="compressed")
+    figure = Drawing(figsize=(width * columns, height * rows), layout="compressed")
     return figure, list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
 
 

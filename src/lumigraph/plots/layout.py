@@ -12,6 +12,7 @@ from matplotlib.patches import Ellipse, Rectangle
 from lumigraph.design.layout import Layout, LensletLayout, MicroscopeLayout
 from lumigraph.errors import GeometryError
 from lumigraph.plots import microscope_layout
+from lumigraph.plots.axes import Drawing
 
 MM = 1e3
 AXIS_COLOUR, GLASS, DARK = "#8a8a8a", "#9ec9e2", "#333333"
@@ -58,10 +59,10 @@ def layout(camera: Camera) -> Figure:
             f"{drawn.focal_length * MM:.6g} mm: there is no image to draw. Move it farther away."
         )
     if drawn.lenslets is None:
-        figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+        figure = Drawing(figsize=(9.0, 3.6), layout="constrained")
         _whole(figure.subplots(), drawn)
         return figure
-    figure = Figure(figsize=(9.0, 7.4), layout="constrained")
+    figure = Drawing(figsize=(9.0, 7.4), layout="constrained")
     upper, lower = figure.subplots(2, 1, height_ratios=(1.0, 1.15))
     _whole(upper, drawn)
     _enlarged(lower, drawn, drawn.lenslets)
@@ -71,10 +72,10 @@ def layout(camera: Camera) -> Figure:
 def _microscope(drawn: MicroscopeLayout) -> Figure:
     """Objective to sensor, and the lenslets of one that stands near the native image."""
     if drawn.fourier_lens is not None:
-        figure = Figure(figsize=(9.0, 3.8), layout="constrained")
+        figure = Drawing(figsize=(9.0, 3.8), layout="constrained")
         microscope_layout.whole(figure.subplots(), drawn)
         return figure
-    figure = Figure(figsize=(9.0, 7.4), layout="constrained")
+    figure = Drawing(figsize=(9.0, 7.4), layout="constrained")
     upper, lower = figure.subplots(2, 1, height_ratios=(1.0, 1.15))
     microscope_layout.whole(upper, drawn)
     _enlarged(lower, drawn.behind, drawn.lenslets, "native image")

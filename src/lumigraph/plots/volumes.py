@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.volume import Volume
 from lumigraph.errors import LumigraphError
-from lumigraph.plots.axes import PANEL, length_unit
+from lumigraph.plots.axes import PANEL, Drawing, length_unit
 
 _MOST = 1600  # samples drawn along an axis
 
@@ -76,7 +76,7 @@ def _three(volume: Volume, views: tuple[np.ndarray, ...], titles: list[str], cma
     deep = float(np.ptp(depths)) + step
     unit, name = length_unit(max(height, width, deep))
     shown = np.clip(deep / max(height, width), 0.15, 1.5) * max(height, width)
-    figure = Figure(
+    figure = Drawing(
         figsize=(1.6 * PANEL, 1.6 * PANEL * (height + shown) / (width + shown)), layout="constrained"
     )
     panels = figure.subplots(

@@ -26,7 +26,7 @@ def match_kinds(
 
     A maker's file says at which depths three kinds of lenslets are sharp, but not which of them stands first
     in a picture that was cropped or turned. Where the patches are known, the kind that shows more detail than
-    its neighbours shows it: of all orders, the one whose blur, |patch - focus|, fits it best is
+    its neighbours shows it: of all orders, the one whose blur, `|patch - focus|`, fits it best is
     returned, or the given one where the picture has too little detail.
 
     Parameters

@@ -130,7 +130,7 @@ def sharp_patches(
     """Patches [px] at which three kinds of lenslets are sharp, for ``render(focus=...)``.
 
     Virtual depth v is the distance of a Galilean camera's main-lens image behind the lenslets over b, so that
-    the patch is -P/v. Ranges that meet are those of equal blur, |patch - sharp patch| of both kinds.
+    the patch is -P/v. Ranges that meet are those of equal blur, `|patch - sharp patch|` of both kinds.
 
     Parameters
     ----------
