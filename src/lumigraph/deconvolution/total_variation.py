@@ -34,8 +34,8 @@ class TotalVariation:
     Parameters
     ----------
     strength
-        λ, without unit: the weight of `|∇o|` per sample, over that of a sample's light. The noise of n photons
-        per sample is flattened from about 1/√n on: 0.002 for bright images, 0.05 for dim ones.
+        λ, without unit: the weight of `|∇o|` per sample, over that of a sample's light. The noise of n
+        photons per sample is flattened from about 1/√n on: 0.002 for bright images, 0.05 for dim ones.
     spacing
         Distances between samples (y, x) or (z, y, x) [any unit]: differences along z count by the slope that
         they mean, over the mean lateral pitch. None takes those that the operator knows, else equal ones.
