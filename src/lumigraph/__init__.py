@@ -9,11 +9,23 @@ The everyday names, listed in `__init__.pyi`; each is imported when it is first 
 7.8
 """
 
-import lazy_loader
-
 from lumigraph.core import drawing
 
 __version__ = "0.1.0"
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> object:
+    """Read `__init__.pyi` at the first name: until then nothing slow is imported, and Ctrl-C is quiet."""
+    import lazy_loader
+
+    names = ("__getattr__", "__dir__", "__all__")
+    found = dict(zip(names, lazy_loader.attach_stub(__name__, __file__), strict=True))
+    globals().update(found)
+    return found[name] if name in found else found["__getattr__"](name)
+
+
+def __dir__() -> object:
+    return __getattr__("__all__")
+
 
 drawing.done_by(lambda: __getattr__("plots"))

@@ -1,5 +1,7 @@
 """A raw image that does not fit its calibration, on the command line: one line with both numbers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -65,3 +67,14 @@ def test_deconvolve_refuses_a_calibration_that_drifted(lumigraph, tmp_path):
     assert "repeats every 12.400 px" in refused.err
     assert "has a pitch of 13.400 px" in refused.err
     assert "12.4" not in lumigraph(*words, "--calibration", "fits.toml").err
+
+
+@pytest.mark.usefixtures("drawn")
+def test_views_without_the_cameras_lengths_say_what_their_refocus_factors_mean(lumigraph):
+    words = ("decode", "drawn.tiff", "-o", "views.zarr", "--calibration")
+    assert (
+        "the camera's lengths are not known: refocus factors are those" in lumigraph(*words, "fits.toml").out
+    )
+    known = io.open("fits.toml", Calibration)
+    io.save(replace(known, separation=0.2, lenslet_distance=0.004), "known.toml")
+    assert "not known" not in lumigraph(*words, "known.toml").out

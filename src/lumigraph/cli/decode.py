@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from lumigraph.cli import files, pictures
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output
-from lumigraph.cli.origin import NO_ORIGIN, Origin
+from lumigraph.cli.origin import NO_ORIGIN, Origin, notes_of
 from lumigraph.cli.reporting import REPORTED, Reported, enlarged
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
@@ -112,7 +112,7 @@ def decode(
         values += (Quantity("hot_pixels", int(bad.sum())), Quantity("invalid", lost))
     return Result(
         "Decode", "A raw image of a plenoptic camera 1.0, and its views.", views, tuple(lines), values,
-        lambda: _figures(picture, views), ready.notes, (output,),
+        lambda: _figures(picture, views), notes_of(ready), (output,),
     )  # fmt: skip
 
 

@@ -111,7 +111,7 @@ class Wanted:
     ----------
     z
         Depths from the focused plane, positive farther: '-20 um:20 um:2 um' (first, last, step), or some,
-        parted by commas; the focused plane if left out.
+        separated by commas; the focused plane if left out.
     samples
         Object samples along each lenslet.
     """
@@ -318,7 +318,7 @@ def _reached(step: "Step", gain: float | None) -> str:
 
 
 def depths(option: str, text: str) -> tuple[float, ...]:
-    """Depths [m] written as 'first:last:step' or parted by commas.
+    """Depths [m] written as 'first:last:step' or separated by commas.
 
     Raises
     ------

@@ -129,4 +129,16 @@ class Origin:
         )
 
 
+def notes_of(ready: "PreparedImage") -> tuple[str, ...]:
+    """What was done to a raw image, and what its views do not know."""
+    known = ready.calibration
+    if known is None or (known.separation and known.lenslet_distance):
+        return ready.notes
+    return (
+        *ready.notes,
+        "the camera's lengths are not known: refocus factors are those of a main lens 20 times as far from "
+        "the lenslets as the sensor. For a camera's own, give --camera",
+    )
+
+
 NO_ORIGIN = Origin()

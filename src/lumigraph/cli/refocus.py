@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, length
-from lumigraph.cli.origin import NO_ORIGIN, Origin
+from lumigraph.cli.origin import NO_ORIGIN, Origin, notes_of
 from lumigraph.cli.reporting import REPORTED, Reported, enlarged
 from lumigraph.core.progress import Progress
 from lumigraph.core.result import Figure, Quantity, Result
@@ -197,7 +197,7 @@ def _light_field(path: Path, origin: Origin) -> "tuple[LightField, tuple[str, ..
     if isinstance(found, LightField):
         return found, ()
     ready = origin.prepared(found, use="decode")
-    return preparation.decode(ready), ready.notes
+    return preparation.decode(ready), notes_of(ready)
 
 
 def _check_output(output: Path, count: int) -> None:
