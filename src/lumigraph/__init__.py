@@ -13,18 +13,22 @@ from lumigraph.core import drawing
 
 __version__ = "0.1.0"
 
+TYPE_CHECKING = False  # `typing` takes ten times as long as all of this
+if TYPE_CHECKING:
+    from typing import Any
 
-def __getattr__(name: str) -> object:
+
+def __getattr__(name: str) -> "Any":
     """Read `__init__.pyi` at the first name: until then nothing slow is imported, and Ctrl-C is quiet."""
     import lazy_loader
 
     names = ("__getattr__", "__dir__", "__all__")
-    found = dict(zip(names, lazy_loader.attach_stub(__name__, __file__), strict=True))
+    found: dict[str, Any] = dict(zip(names, lazy_loader.attach_stub(__name__, __file__), strict=True))
     globals().update(found)
     return found[name] if name in found else found["__getattr__"](name)
 
 
-def __dir__() -> object:
+def __dir__() -> list[str]:
     return __getattr__("__all__")
 
 
