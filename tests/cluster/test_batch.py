@@ -222,3 +222,44 @@ def test_killed_at_any_time_it_goes_on_to_the_same_bits(tmp_path):
         jobs.picture, items(200, log=str(log)), tmp_path / "other.zarr", what={"job": 1}, workers=jobs.Here()
     )
     assert contents(output) == contents(tmp_path / "other.zarr")
+
+
+THINGS = {
+    "volume": lg.Volume(np.arange(24.0).reshape(2, 3, 4), lg.Grid((3, 4), 2e-6), (-1e-6, 1e-6)),
+    "views": lg.LightField(
+        np.random.default_rng(0).random((2, 3, 4, 5)), lg.Grid((2, 3), 1.0), lg.Grid((4, 5), 1.0), 1.0
+    ),
+    "raw": lg.RawImage(np.arange(12, dtype=np.uint16).reshape(3, 4), 2e-6, 12, metadata={"a": 1}),
+    "stack": lg.Stack(np.arange(24.0).reshape(2, 3, 4), (0.9, 1.1), "alpha"),
+    "map": lg.DepthMap(np.ones((3, 4)), np.full((3, 4), 0.5), "disparity", np.full((3, 4), 0.1)),
+}
+
+
+@pytest.mark.parametrize("name", THINGS)
+def test_frames_are_read_back_as_they_were(tmp_path, name):
+    thing, output = THINGS[name], tmp_path / "o.zarr"
+    cluster.batch(lambda _: thing, [0, 1], output, workers=jobs.Here())
+    found = lg.open(output, page=1)
+    assert type(found) is type(thing)
+    for field in type(thing).__slots__:
+        one, other = getattr(thing, field), getattr(found, field)
+        np.testing.assert_array_equal(other, one) if hasattr(one, "dtype") else None
+        assert hasattr(one, "dtype") or other == one
+    with pytest.raises(lg.FormatError, match="it has 2 frames"):
+        lg.open(output)
+    with pytest.raises(lg.FormatError, match=r"Choose 0 \.\.\. 1"):
+        lg.open(output, page=2)
+
+
+def test_frames_that_are_missing_or_damaged_are_refused(tmp_path):
+    output = tmp_path / "o.zarr"
+    cluster.batch(lambda _: THINGS["raw"], [0, 1], output, workers=jobs.Here())
+    shard = output / "data/c/1/0/0"
+    whole = shard.read_bytes()
+    for harmed in (whole[:-1], whole[:3], b"", whole + b"\0", b"\0" * len(whole), whole * 2000):
+        shard.write_bytes(harmed)
+        with pytest.raises(lg.FormatError):
+            lg.open(output, page=1)
+    shard.unlink()
+    with pytest.raises(lg.FormatError, match=r"frame 1 of .* is not there yet"):
+        lg.open(output, page=1)

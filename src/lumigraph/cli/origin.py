@@ -1,6 +1,6 @@
 """What a raw image comes with: calibration, white and dark image, camera file."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -72,13 +72,14 @@ class Origin:
         from lumigraph.core.stack import Stack
         from lumigraph.core.volume import Volume
 
-        found = io.open(path)
-        if isinstance(found, Stack | Volume | RawImage):
+        one = self.page if io.opens_pages(path) else None
+        found = io.open(path, page=one)
+        if isinstance(found, RawImage) or (one is None and isinstance(found, Stack | Volume)):
             return self.read(path)
         if not isinstance(found, LightField):
             raise FormatError(f"{path} holds a {called(found)} where views or a raw image are needed.")
         checks.finite_array(str(path), found.data, FormatError)
-        if self.is_given:
+        if (self if one is None else replace(self, page=None)).is_given:
             raise FormatError(
                 f"{path} holds views, which need no --calibration, --white, --dark or --page. Leave them out."
             )

@@ -22,8 +22,8 @@ from lumigraph.io.formats import (  # lumigraph.open is meant to read like the b
     Format,
     Part,
     contents,
-    format_of,
     open,  # noqa: A004
+    opens_pages,
     pages,
     save,
 )
@@ -35,9 +35,9 @@ __all__ = [
     "Part",
     "check_target",
     "contents",
-    "format_of",
     "load_calibration",
     "open",
+    "opens_pages",
     "pages",
     "save",
     "save_calibration",

@@ -80,7 +80,7 @@ FORMATS = (
     Format("Lytro ESLF", ("_eslf.png",), "eslf", ("LightField",), ("LightField",), ("views",)),
     Format("PNG", (".png",), "png", ("RawImage",), ("RawImage",), ("views",)),
     Format("JPEG", (".jpg", ".jpeg"), "jpeg", (), ("RawImage",)),
-    Format("Zarr", (".zarr", ".zarr.zip"), "zarr", _ALL, _ALL),
+    Format("Zarr", (".zarr", ".zarr.zip"), "zarr", _ALL, _ALL, ("page",)),
     Format("HDF5", (".h5", ".hdf5"), "hdf5", _ALL, (*_ALL, "Stack"), ("what",)),
     Format("PFM", (".pfm",), "pfm", ("RawImage",), ("RawImage",)),
     Format("PLY", (".ply",), "ply", ("PointCloud",), ("PointCloud",)),
@@ -181,8 +181,8 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     what
         Which part, where a file holds several (Lytro, HDF5): `contents` lists them.
     page
-        Which page of a TIFF stack; without it several pages open as a `Stack`, or as a `Volume` where
-        they were saved as one.
+        Which page of a TIFF stack, or which frame of a series in Zarr; without it the pages of a TIFF file
+        open as a `Stack`, or as a `Volume` where they were saved as one.
     views
         Views (v, u) of an ESLF mosaic; one number for both.
     shape
@@ -271,14 +271,25 @@ def pages(path: str | os.PathLike[str]) -> int:
     FormatError
         As `open`.
     """
-    path = source.existing(path)
-    row = format_of(path)
-    counted = getattr(row.imported(), "count", None)
+    counted = _counted(source.existing(path))
     if counted is not None:
-        with source.ours(path, row.name):
-            return counted(path)
+        return counted
     found = open(path)
     return len(found.data) if isinstance(found, Stack | Volume) else 1
+
+
+def opens_pages(path: str | os.PathLike[str]) -> bool:
+    """Whether `open` takes ``page=`` for a file: a page is read without the others."""
+    return _counted(source.existing(path)) is not None
+
+
+def _counted(path: Any) -> int | None:
+    row = format_of(path)
+    count = getattr(row.imported(), "count", None)
+    if count is None:
+        return None
+    with source.ours(path, row.name):
+        return count(path)
 
 
 def save(

@@ -25,11 +25,14 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
-from lumigraph.io import header, ngff
+from lumigraph.io import header, ngff, source, zarr_chunks
 
 KIND = "Series"
 _SIDE = 256
 """Samples of a chunk along each of the last two axes."""
+
+_DESCRIBED = 1 << 24
+"""Bytes of a description that are read at most."""
 
 Checksums = dict[str, tuple[int, int]]
 """Size and CRC-32 of each file, by its name inside the store."""
@@ -174,23 +177,67 @@ def is_whole(path: Path, files: Mapping[str, tuple[int, int]], *, content: bool 
     return True
 
 
-def read(path: Path, number: int) -> dict[str, np.ndarray]:
-    """The arrays of one frame, by name.
+def count(path: Path) -> int | None:
+    """Frames of a series; None where a path holds none."""
+    try:
+        found = _described(path)["frames"]
+    except FormatError:
+        return None
+    return found if isinstance(found, int) and found > 0 else None
+
+
+def load(path: Path, number: int, max_pixels: int = source.MAX_PIXELS) -> Any:
+    """What one frame was: a picture, several, views, a volume or a depth map.
 
     Raises
     ------
     FormatError
-        No series, or no such frame.
+        No series, no such frame, one that is not there yet, or a damaged one.
     """
-    described = _described(path)
-    if not 0 <= number < described["frames"]:
-        raise FormatError(f"{path} has frames 0 to {described['frames'] - 1}, not {number}.")
+    found, frames = _described(path), count(path)
+    if frames is None or isinstance(number, bool) or not 0 <= number < frames:
+        raise FormatError(
+            f"page is {number!r} but {path} has {frames} frames. Choose 0 ... {(frames or 1) - 1}."
+        )
     group = zarr.open_group(LocalStore(path, read_only=True), mode="r", zarr_format=3, use_consolidated=False)
-    return {name: np.asarray(group[name][number]) for name in described["layout"]}  # pyright: ignore
+    read = {str(name): _read(path, group, (str(name), number), max_pixels) for name in found["layout"]}
+    match found.get("of"):
+        case "Volume":
+            data = read[ngff.LEVEL]
+            data = np.moveaxis(data, 0, -1) if data.ndim == 4 else data
+            return header.restore_planes(data, {**found, "kind": "Volume"})
+        case "Stack":
+            return header.restore_planes(read["data"], {**found, "kind": "Stack"})
+        case "RawImage":
+            return header.restore(read["data"], found, None)
+        case "LightField":
+            grids = header.grid(found.get("aperture")), header.grid(found.get("lenslets"))
+            return LightField(read["data"], *grids, found["separation"], read.get("valid"))
+        case "DepthMap":
+            return DepthMap(read["values"], read["confidence"], found["quantity"], read.get("error"))
+    if list(read) == ["data"] and read["data"].ndim in (2, 3):
+        return RawImage(read["data"])
+    raise FormatError(f"{path} holds arrays named {', '.join(read)}, which are read by zarr alone.")
+
+
+def _read(path: Path, group: zarr.Group, which: tuple[str, int], max_pixels: int) -> np.ndarray:
+    name, number = which
+    array = group.get(name)
+    if not isinstance(array, zarr.Array) or array.dtype.kind not in "iufb" or array.ndim < 2:
+        raise FormatError(f"{path} has no series of numbers named {name[:40]}. Make it again.")
+    source.check_size(path, array.shape[1:], max_pixels)
+    source.check_size(path, array.chunks, max(max_pixels, 1 << 24))
+    file = path / name / "c" / str(number) / "/".join(["0"] * (array.ndim - 1))
+    if not file.is_file():
+        raise FormatError(f"frame {number} of {path} is not there yet. See 'lumigraph batch status {path}'.")
+    zarr_chunks.check_shard(path, file, array)
+    return np.asarray(array[number])
 
 
 def _described(path: Path) -> dict[str, Any]:
     try:
+        if (path / "zarr.json").stat().st_size > _DESCRIBED:
+            raise ValueError
         found = json.loads((path / "zarr.json").read_text())["attributes"]
         if found["kind"] == KIND:
             return found

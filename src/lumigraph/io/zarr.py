@@ -22,15 +22,24 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
-from lumigraph.io import header, ngff, source, target, zarr_chunks
+from lumigraph.io import header, ngff, series, source, target, zarr_chunks
 
 _SIDE = 1024  # pixels of a chunk along each axis of a raw image
 _SIDES = (16, 256, 256)  # voxels of a chunk of a volume
 Names = tuple[str, ...]
 
 
-def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> RawImage | LightField | Volume:
+def count(path: Path) -> int | None:
+    """Frames of a series; None of a store that holds one thing."""
+    return series.count(path)
+
+
+def load(
+    path: Path, *, page: int | None = None, max_pixels: int = source.MAX_PIXELS
+) -> RawImage | LightField | Volume:
     """The raw image, light field or volume in a Zarr store by lumigraph, or the volume in any OME-Zarr.
+
+    Of a series `page` chooses the frame, which may be a `Stack` or a `DepthMap`, too.
 
     Raises
     ------
@@ -44,7 +53,14 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> RawImage | Light
         source.regular_file(path)
         with path.open("rb") as file:
             source.check_signature(path, file.read(8), "ZIP")
+    frames = series.count(path)
+    if (frames is None) != (page is None):
+        ask = "page= means nothing for a store of one thing. Leave it out."
+        ask = ask if frames is None else f"it has {frames} frames. Choose one by page=0 ... {frames - 1}."
+        raise FormatError(f"{path}: {ask}")
     with source.decoding(path, "a Zarr v3 store"):
+        if page is not None:
+            return series.load(path, page, max_pixels)
         zarr_chunks.check_entries(path, 16 * max_pixels)
         with _reading(path) as group:
             return _noun(path, group, max_pixels)

@@ -89,6 +89,36 @@ def check_chunks(path: Path, array: zarr.Array[Any], name: str) -> int:
     return stored
 
 
+def check_shard(path: Path, file: Path, array: zarr.Array[Any]) -> None:
+    """Refuse a shard whose chunks are not all there, or become more than declared.
+
+    Raises
+    ------
+    FormatError
+        Another packing than `lumigraph.io.series` writes, or damage.
+    """
+    found = array.metadata.to_dict().get("codecs", ())
+    inner = found[0]["configuration"] if len(found) == 1 and "configuration" in found[0] else {}  # pyright: ignore
+    names = [[codec["name"] for codec in inner.get(part, ())] for part in ("codecs", "index_codecs")]  # pyright: ignore
+    if (
+        array.shards is None
+        or names != [["bytes", "zstd"], ["bytes", "crc32c"]]
+        or inner["index_location"] != "end"
+    ):  # pyright: ignore
+        raise FormatError(f"{path} is packed in another way than lumigraph packs series. Save it again.")
+    count = prod(whole // part for whole, part in zip(array.shards, array.chunks, strict=True))
+    limit, index = prod(array.chunks) * array.dtype.itemsize, 16 * count + 4
+    _check_chunk(path, file.name, file.stat().st_size, count * (limit + limit // 100 + 1024) + index)
+    content = file.read_bytes()
+    places = (
+        struct.unpack(f"<{2 * count}Q", content[-index:-4]) if len(content) >= index else (0,) * 2 * count
+    )
+    for start, size in zip(places[::2], places[1::2], strict=True):
+        whole = start + size <= len(content) - index
+        if not whole or (_declared(content[start : start + size]) or limit + 1) > limit:
+            raise FormatError(f"{path} is damaged: {file.name} of it is not whole. Make that frame again.")
+
+
 def _contents(path: Path, name: str, most: int) -> Iterator[bytes]:
     """Bytes of every chunk of an array; one of more than `most` is refused before it is read."""
     if path.is_dir():

@@ -142,7 +142,7 @@ def pages_of(path: Path, pages: str | None = None, *, one: bool = False) -> list
 
 def _reader(path: Path) -> Callable[[int], RawImage]:
     """Gives a page of a file; the others are not read where its format allows that."""
-    if "page" in io.format_of(path).options:
+    if io.opens_pages(path):
         return lambda k: _instance(path, io.open(path, page=k), RawImage)
     found = io.open(path)
     if isinstance(found, Volume):

@@ -2,7 +2,7 @@
 
 import tomllib
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +85,10 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
     if is_camera(path):
         return _simulated(path, tell)
     tell(Stage(0.0, "reading"))
-    found = io.open(path)
+    one = origin.page if origin is not None and io.opens_pages(path) else None
+    found = io.open(path, page=one)
+    if origin is not None and one is not None and not isinstance(found, RawImage):
+        origin = replace(origin, page=None)
     if origin is not None and (
         origin.page is not None or (isinstance(found, Stack | Volume) and origin.is_known)
     ):
