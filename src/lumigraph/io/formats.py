@@ -279,8 +279,9 @@ def pages(path: str | os.PathLike[str]) -> int:
 
 
 def opens_pages(path: str | os.PathLike[str]) -> bool:
-    """Whether `open` takes ``page=`` for a file: a page is read without the others."""
-    return _counted(source.existing(path)) is not None
+    """Whether a file holds pages or frames that `open` reads one by one: a TIFF stack, a series in Zarr."""
+    counted = _counted(source.existing(path))
+    return counted is not None and (counted > 1 or format_of(path).module == "zarr")
 
 
 def _counted(path: Any) -> int | None:

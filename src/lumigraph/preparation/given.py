@@ -130,7 +130,7 @@ def pages_of(path: Path, pages: str | None = None, *, one: bool = False) -> list
         As `read_pages`.
     """
     count = io.pages(path)
-    if count == 1:
+    if count == 1 and not io.opens_pages(path):
         if pages not in (None, "0", "all"):
             raise FormatError(f"--page is {pages} but {path} has one page. Leave it out.")
         return [None]
