@@ -97,14 +97,11 @@ def check_shard(path: Path, file: Path, array: zarr.Array[Any]) -> None:
     FormatError
         Another packing than `lumigraph.io.series` writes, or damage.
     """
-    found = array.metadata.to_dict().get("codecs", ())
-    inner = found[0]["configuration"] if len(found) == 1 and "configuration" in found[0] else {}  # pyright: ignore
-    names = [[codec["name"] for codec in inner.get(part, ())] for part in ("codecs", "index_codecs")]  # pyright: ignore
-    if (
-        array.shards is None
-        or names != [["bytes", "zstd"], ["bytes", "crc32c"]]
-        or inner["index_location"] != "end"
-    ):  # pyright: ignore
+    found: Any = array.metadata.to_dict().get("codecs", ())
+    inner = found[0].get("configuration", {}) if len(found) == 1 else {}
+    packed = [[codec["name"] for codec in inner.get(part, ())] for part in ("codecs", "index_codecs")]
+    ours = packed == [["bytes", "zstd"], ["bytes", "crc32c"]] and inner.get("index_location") == "end"
+    if array.shards is None or not ours:
         raise FormatError(f"{path} is packed in another way than lumigraph packs series. Save it again.")
     count = prod(whole // part for whole, part in zip(array.shards, array.chunks, strict=True))
     limit, index = prod(array.chunks) * array.dtype.itemsize, 16 * count + 4
