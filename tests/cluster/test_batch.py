@@ -263,3 +263,12 @@ def test_frames_that_are_missing_or_damaged_are_refused(tmp_path):
     shard.unlink()
     with pytest.raises(lg.FormatError, match=r"frame 1 of .* is not there yet"):
         lg.open(output, page=1)
+
+
+def test_a_frame_that_is_asked_for_twice_is_done_once(tmp_path):
+    log, here = tmp_path / "log", jobs.Here()
+    cluster.batch(jobs.picture, items(2, log=str(log)), tmp_path / "o.zarr", workers=here)
+    assert here.task.do(1) == "done"
+    assert log.read_text().split() == ["0", "1"]
+    with here.task.ledger.claimed(1):
+        assert here.task.do(1) == "busy"
