@@ -1,4 +1,4 @@
-"""Speed against plain SciPy, as ratios within one run: `python -m benchmarks` runs every module here.
+"""Speed against plain SciPy, as ratios within one run, and other measurements: `python -m benchmarks`.
 
-Each module has `run() -> list[dict]`, the rows of its table, and prints them when it is run by itself.
+A module that `make bench` runs has `run()`, the rows of its table, and `show()`, which prints them.
 """

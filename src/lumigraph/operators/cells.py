@@ -195,7 +195,7 @@ class Fineness:
 
         Of a cell's distances from both borders [pitches]: their sum behind square lenslets, whose axes are
         apart, else the distance from the corner. What is left out then is 0.2 to 0.7 times the accuracy
-        (`benchmarks.corners`).
+        (measured on 13 arrays and fill factors).
         """
         pitches = {"meet": 3.5, "straight": 4.5, "other": 5}[edges]
         return max(1.2, pitches * (1e-3 / self.accuracy) ** 0.3 * _tail(fresnel_number))
