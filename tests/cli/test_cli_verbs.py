@@ -36,6 +36,7 @@ VERBS = (
         "depth",
         "deconvolve",
         "measure",
+        "batch",
         "board",
         "view",
         "samples",
