@@ -8,6 +8,7 @@ import pytest
 import zarr
 
 import lumigraph as lg
+from cluster_jobs import Here
 from lumigraph.cli import main
 
 
@@ -74,6 +75,17 @@ def test_a_frame_that_fails_ends_it_with_an_error(views, tmp_path, capsys):
     said = capsys.readouterr().err
     assert "1 of 2 frames failed. frame 1:" in said
     assert "without zarr.json" in said
+
+
+def test_ctrl_c_says_what_is_done(views, tmp_path, capsys, monkeypatch):
+    def interrupted(*_, **options):
+        real(lambda item: np.ones((4, 5)), [0, 1, 2], tmp_path / "o.zarr", workers=Here(), part=(1, 3))
+        raise KeyboardInterrupt
+
+    real = lg.cluster.batch
+    monkeypatch.setattr(lg.cluster, "batch", interrupted)
+    assert main(words(views, tmp_path / "o.zarr")) == 130
+    assert "interrupted; 1 of 3 frames are in" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

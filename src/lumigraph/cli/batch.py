@@ -5,7 +5,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import redirect_stderr
+from contextlib import contextmanager, redirect_stderr
 from dataclasses import dataclass
 from importlib import import_module
 from io import StringIO
@@ -177,7 +177,7 @@ def batch(
         work.bound(items[0], Path(place))  # refuse a line that is wrong before any worker starts
     if hands.slurm is not None:
         return hands.submitted(output)
-    with progress("batch") as shown:
+    with progress("batch") as shown, _kept(output):
         found = cluster.batch(
             work, items, output, what={"verb": verb, "options": list(options)},
             workers=hands.cluster(), part=hands.share(), progress=shown,
@@ -188,6 +188,22 @@ def batch(
     if found.failures:
         raise LumigraphError(f"{_failures(found)} {found.done} of {found.count} are in {output}.")
     return _told(found, output)
+
+
+@contextmanager
+def _kept(output: Path) -> Iterator[None]:
+    """Context in which Ctrl-C says what is done already."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        from lumigraph import cluster
+
+        try:
+            found = cluster.status(output)
+        except FormatError:  # it had not begun
+            raise KeyboardInterrupt from None
+        told = f"{found.done} of {found.count} frames are in {output}. The same line goes on."
+        raise KeyboardInterrupt(told) from None
 
 
 @dataclass(frozen=True)
