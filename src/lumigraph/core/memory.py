@@ -8,8 +8,16 @@ from pathlib import Path
 from lumigraph.errors import LumigraphError, SamplingError
 
 
+_GROUP = Path("/sys/fs/cgroup")
+"""Of this process' control group, version 2: a container's bounds."""
+
+
 def available() -> int | None:
-    """Memory that can be allocated now [bytes]; None where the system does not say."""
+    """Memory that can be allocated now [bytes], in this control group; None where the system does not say."""
+    return min((size for size in (_free(), _free_of_group()) if size is not None), default=None)
+
+
+def _free() -> int | None:
     try:
         with open("/proc/meminfo", encoding="ascii") as lines:  # noqa: PTH123 - not a file of the user's
             for line in lines:
@@ -20,13 +28,25 @@ def available() -> int | None:
         return None
 
 
+def _free_of_group() -> int | None:
+    """What the control group may still take: pages of files that nobody uses are given back."""
+    try:
+        most, used = (
+            int((_GROUP / f"memory.{name}").read_text(encoding="ascii")) for name in ("max", "current")
+        )
+        counted = dict(line.split() for line in (_GROUP / "memory.stat").read_text("ascii").splitlines())
+        return max(most - used + int(counted.get("inactive_file", 0)), 0)
+    except (OSError, ValueError):  # "max" where there is no bound
+        return None
+
+
 def total() -> int | None:
     """Memory of the machine or of this control group [bytes]; None where the system does not say."""
     sizes = []
     with suppress(OSError, ValueError, AttributeError):
         sizes.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     with suppress(OSError, ValueError):  # "max" where there is no bound
-        sizes.append(int(Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii")))
+        sizes.append(int((_GROUP / "memory.max").read_text(encoding="ascii")))
     return min(sizes, default=None)
 
 
