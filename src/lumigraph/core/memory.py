@@ -7,7 +7,6 @@ from pathlib import Path
 
 from lumigraph.errors import LumigraphError, SamplingError
 
-
 _GROUP = Path("/sys/fs/cgroup")
 """Of this process' control group, version 2: a container's bounds."""
 
