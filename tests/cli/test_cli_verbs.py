@@ -37,6 +37,7 @@ VERBS = (
         "deconvolve",
         "measure",
         "batch",
+        "sweep",
         "board",
         "view",
         "samples",

@@ -31,6 +31,7 @@ from lumigraph.cli.reporting import telling
 from lumigraph.cli.reproduce import reproduce
 from lumigraph.cli.samples import samples
 from lumigraph.cli.simulate import simulate
+from lumigraph.cli.sweep import sweep
 from lumigraph.cli.view import view
 from lumigraph.errors import LumigraphError
 
@@ -40,8 +41,8 @@ FAILED, USAGE, INTERRUPTED = 1, 2, 130
 _LONGEST = 400  # characters of a line on standard error
 
 VERBS = (
-    demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure, batch, board,
-    view, samples, catalogue, reproduce,
+    demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure, batch, sweep,
+    board, view, samples, catalogue, reproduce,
 )  # fmt: skip
 """In the order of their use."""
 

@@ -177,21 +177,21 @@ def batch(
         work.bound(items[0], Path(place))  # refuse a line that is wrong before any worker starts
     if hands.slurm is not None:
         return hands.submitted(output)
-    with progress("batch") as shown, _kept(output):
+    with progress("batch") as shown, kept(output):
         found = cluster.batch(
             work, items, output, what={"verb": verb, "options": list(options)},
             workers=hands.cluster(), part=hands.share(), progress=shown,
             estimated=lambda needed: line(str(needed)),
         )  # fmt: skip
     if kind.is_table:
-        _save_table(output)
+        save_table(output)
     if found.failures:
         raise LumigraphError(f"{_failures(found)} {found.done} of {found.count} are in {output}.")
     return _told(found, output)
 
 
 @contextmanager
-def _kept(output: Path) -> Iterator[None]:
+def kept(output: Path) -> Iterator[None]:
     """Context in which Ctrl-C says what is done already."""
     try:
         yield
@@ -307,7 +307,7 @@ def _numbers(result: Result) -> dict[str, Any]:
     return {name: value for name, value in found.items() if not isinstance(value, list | dict)}
 
 
-def _save_table(output: Path) -> None:
+def save_table(output: Path) -> None:
     """Write what is in the ledger; jobs that end at once wait for each other."""
     import csv
 

@@ -1,0 +1,234 @@
+"""`lumigraph sweep`: what follows from a camera's description, for every combination of some values."""
+
+import itertools
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from lumigraph.cli import files
+from lumigraph.cli.batch import TABLES, kept, save_table
+from lumigraph.cli.console import progress
+from lumigraph.cli.options import Output
+from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.core.result import Figure, Quantity, Result
+from lumigraph.errors import FormatError, LumigraphError
+
+if TYPE_CHECKING:
+    from lumigraph.cluster import Values
+    from lumigraph.instruments import Instrument
+
+MOST = 100_000
+"""Combinations."""
+
+_CURVES = 6
+"""Quantities that a report draws at most."""
+
+_ERROR = "error"
+
+
+def sweep(
+    camera: str,
+    /,
+    *,
+    vary: Annotated[list[str], Parameter(allow_leading_hyphen=True)],
+    measure: str | None = None,
+    output: Output,
+    workers: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None,
+    common: Reported = REPORTED,
+) -> Result:
+    """Vary a camera's values and write what follows from each combination into a table.
+
+    What follows are the closed forms that 'lumigraph design' prints; nothing is simulated. A combination that
+    no camera can have is a row with the reason. Killed at any time, the same line goes on where it was.
+
+    Example: `lumigraph sweep thesis-plenoptic-2-m050 --vary "lenslets.focal_length=4 mm:6 mm:9" --vary "lenslets.magnification=0.3,0.5" --measure "views per axis, lateral resolution" -o table.csv`
+
+    Parameters
+    ----------
+    camera
+        Camera file (TOML), or the name of a bundled one.
+    vary
+        A key of the camera file and its values: 'first:last:count', or some, parted by commas. May be
+        repeated: every combination is taken.
+    measure
+        Names of quantities, parted by commas, as 'lumigraph design' prints them; all if left out.
+    output
+        Table (.csv); lengths in metres.
+    workers
+        Processes on this machine; one for each processor if left out.
+    """  # noqa: E501 - an example is one line
+    from lumigraph import cluster
+    from lumigraph.core.arrays import WORKERS
+    from lumigraph.instruments import load_camera
+
+    common.check()
+    files.check_output(output, TABLES)
+    given, values = load_camera(camera), dict(map(_values, vary))
+    if len(values) < len(vary):
+        raise FormatError("--vary names a key twice. Give all its values at once.")
+    items = _combinations(values)
+    _changed(given, items[0])  # an unknown key is refused before any work
+    names = _names(measure, [row.name for row in given.quantities()])
+    source = str(Path(camera).absolute()) if Path(camera).exists() else camera
+    with progress("sweep") as shown, kept(output):
+        found = cluster.batch(
+            Designs(source, tuple(names)), items, output, what={"camera": given.to_toml(), "measure": names},
+            workers=workers or WORKERS, progress=shown,
+        )  # fmt: skip
+    save_table(output)
+    if found.failures:
+        raise LumigraphError(f"{len(found.failures)} of {found.count} failed: {min(found.failures.items())}.")
+    rows = [entry.values for _, entry in sorted(found.entries.items())]
+    return _result(rows, list(values), names, output)
+
+
+@dataclass(frozen=True)
+class Designs:
+    """What follows from a camera with other values.
+
+    Parameters
+    ----------
+    camera
+        File, or a name of the catalogue.
+    names
+        Of the quantities.
+    """
+
+    camera: str
+    names: tuple[str, ...]
+
+    def __call__(self, item: Mapping[str, Any]) -> "Values":
+        """The values, and the quantities or why no camera has those values."""
+        from lumigraph.cluster import Values
+        from lumigraph.instruments import load_camera
+
+        try:
+            rows = _changed(load_camera(self.camera), item).quantities()
+        except LumigraphError as error:
+            return Values({**item, _ERROR: " ".join(str(error).split())})
+        known = {row.name: row for row in rows}
+        return Values(
+            {
+                **item,
+                **{_column(known[name]): _plain(known[name].value) for name in self.names if name in known},
+            }
+        )
+
+
+def _values(text: str) -> tuple[str, list[Any]]:
+    """A key of the camera file and the values after it.
+
+    >>> _values("lenslets.focal_length=4 mm:6 mm:3")
+    ('lenslets.focal_length', ['4 mm', '5 mm', '6 mm'])
+    >>> _values("lenslets.layout=square, hex")[1], _values("lenslets.magnification=0.3,0.5")[1]
+    (['square', 'hex'], [0.3, 0.5])
+    """
+    name, equals, words = text.partition("=")
+    parts = [word.strip() for word in words.split(":")]
+    if not (equals and name.strip() and all(parts)):
+        raise FormatError(f"--vary is {text!r} but must be like 'lenslets.focal_length=4 mm:6 mm:9'.")
+    if len(parts) == 1:
+        return name.strip(), [_number(word.strip()) for word in words.split(",")]
+    ends = [re.fullmatch(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\D*)", part) for part in parts[:2]]
+    if len(parts) != 3 or None in ends or not parts[2].isdecimal() or not 2 <= int(parts[2]) <= MOST:
+        raise FormatError(f"--vary {text!r} must be 'first:last:count', with a count from 2 to {MOST}.")
+    (first, unit), (last, other) = (end.groups() for end in ends if end)
+    if unit != other:
+        raise FormatError(f"--vary {text!r} has two units. Give first and last in the same one.")
+    steps = int(parts[2]) - 1
+    numbers = (float(first) + (float(last) - float(first)) * k / steps for k in range(steps + 1))
+    return name.strip(), [
+        f"{number:.10g} {unit}" if unit else _number(f"{number:.10g}") for number in numbers
+    ]
+
+
+def _number(word: str) -> Any:
+    for kind in (int, float):
+        try:
+            return kind(word)
+        except ValueError:
+            continue
+    return word
+
+
+def _combinations(values: Mapping[str, list[Any]]) -> list[dict[str, Any]]:
+    count = 1
+    for some in values.values():
+        count *= len(some)
+    if count > MOST:
+        raise FormatError(f"--vary asks for {count} combinations; at most {MOST} are taken.")
+    return [dict(zip(values, one, strict=True)) for one in itertools.product(*values.values())]
+
+
+def _changed(camera: "Instrument", item: Mapping[str, Any]) -> "Instrument":
+    """The camera whose file has other values, by dotted keys; lengths carry a unit as in the file."""
+    table = tomllib.loads(camera.to_toml())
+    for name, value in item.items():
+        *path, last = name.split(".")
+        place: Any = table
+        for part in path:
+            place = place.setdefault(part, {})
+            if not isinstance(place, dict):
+                raise FormatError(f"--vary {name}: {part} is a value, which has no parts. Check the key.")
+        place[last] = value
+    return type(camera).from_table(table, "--vary")
+
+
+def _names(measure: str | None, known: Sequence[str]) -> list[str]:
+    """The quantities that are asked for."""
+    if measure is None:
+        return list(known)
+    names = [name.strip() for name in measure.split(",")]
+    for name in names:
+        if name not in known:
+            near = get_close_matches(name, known, 3, 0.4)
+            hint = f" Did you mean {', '.join(map(repr, near))}?" if near else ""
+            raise FormatError(f"--measure names {name!r}, which 'lumigraph design' does not print.{hint}")
+    return names
+
+
+def _column(row: Any) -> str:
+    return f"{row.name} [{row.unit}]" if row.unit else row.name
+
+
+def _plain(value: Any) -> Any:
+    return " x ".join(map(str, value)) if isinstance(value, tuple | list) else value
+
+
+def _result(rows: list[dict[str, Any]], varied: list[str], names: list[str], output: Path) -> Result:
+    bad = [row for row in rows if _ERROR in row]
+    lines = [f"{len(rows)} combinations of {', '.join(varied)}"]
+    lines += [f"{len(bad)} of them no camera can have, such as: {bad[0][_ERROR]}"] if bad else []
+    counts = (Quantity("combinations", len(rows)), Quantity("impossible", len(bad)))
+    return Result(
+        "Sweep", "What follows from a camera's description as its values vary.", rows, tuple(lines), counts,
+        lambda: _figures(rows, varied, names), written=(output,),
+    )  # fmt: skip
+
+
+def _figures(rows: list[dict[str, Any]], varied: list[str], names: list[str]) -> "Iterator[Figure]":
+    """A curve of each quantity over the first value, one for each combination of the others."""
+    from lumigraph import plots
+
+    good = [row for row in rows if _ERROR not in row]
+    columns = [name for name in (good[0] if good else {}) if name.partition(" [")[0] in names][:_CURVES]
+    for column in columns:
+        curves: dict[str, tuple[list[float], list[float]]] = {}
+        unit = ""
+        for row in good:
+            place = re.fullmatch(r"([-+\d.eE]+)\s*(.*)", str(row[varied[0]]))
+            if place is not None and isinstance(row.get(column), int | float):
+                label = ", ".join(f"{name} {row[name]}" for name in varied[1:])
+                xs, ys = curves.setdefault(label, ([], []))
+                xs.append(float(place[1]))
+                ys.append(float(row[column]))
+                unit = f" [{place[2]}]" if place[2] else ""
+        if any(len(xs) > 1 for xs, _ in curves.values()):
+            drawn = plots.curves([], curves, xlabel=f"{varied[0]}{unit}", ylabel=column)
+            yield Figure(drawn, f"{column} over {varied[0]}.", "Curves")

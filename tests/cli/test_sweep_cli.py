@@ -1,0 +1,71 @@
+import csv
+
+import pytest
+
+import lumigraph as lg
+from lumigraph.cli import main
+
+CAMERA = "thesis-plenoptic-2-m050"
+FOCAL = "lenslets.focal_length=4 mm:6 mm:3"
+
+
+def table(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_each_row_is_what_the_camera_of_its_values_says(tmp_path):
+    out, page = tmp_path / "t.csv", tmp_path / "t.html"
+    said = [
+        "sweep",
+        CAMERA,
+        "--vary",
+        FOCAL,
+        "--vary",
+        "lenslets.magnification=0.3,0.5",
+        "--measure",
+        "patch",
+    ]
+    said += ["--measure", "patch", "-o", str(out), "--workers", "1", "--report", str(page)]
+    assert main(said) == 0
+    rows = table(out)
+    assert [(row["lenslets.focal_length"], row["lenslets.magnification"]) for row in rows] == [
+        (focal, part) for focal in ("4 mm", "5 mm", "6 mm") for part in ("0.3", "0.5")
+    ]
+    camera = lg.FocusedPlenopticCamera.from_catalogue(CAMERA)
+    other = camera.replace(lenslets={"focal_length": "6 mm", "magnification": 0.3})
+    assert float(rows[4]["patch [px]"]) == pytest.approx(other.patch, rel=1e-12)
+    assert "<svg" in page.read_text() or "<img" in page.read_text()
+    assert lg.cluster.status(out).is_whole
+
+
+def test_what_no_camera_can_have_is_a_row_with_the_reason(tmp_path, capsys):
+    out = tmp_path / "t.csv"
+    said = ["sweep", CAMERA, "--vary", "lenslets.magnification=0.5,0", "--workers", "1", "-o", str(out)]
+    assert main(said) == 0
+    good, bad = table(out)
+    assert not good["error"]
+    assert "lenslets.magnification is 0" in bad["error"]
+    assert "1 of them no camera can have" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--vary", "lenslets.focal=4 mm:6 mm:3"], "Did you mean 'lenslets.focal_length'"),
+        (["--vary", "lenslets.focal_length=4,5"], "has no unit"),
+        (["--vary", "lenslets.focal_length=4 mm:6 um:3"], "has two units"),
+        (["--vary", "lenslets.focal_length=4 mm:6 mm"], "first:last:count"),
+        (["--vary", "lenslets.focal_length=4 mm:6 mm:1"], "a count from 2"),
+        (["--vary", "lenslets.focal_length"], "must be like"),
+        (["--vary", "wavelength.a=1"], "which has no parts"),
+        (["--vary", FOCAL, "--vary", FOCAL], "names a key twice"),
+        (["--vary", FOCAL, "--measure", "view per axis"], "Did you mean 'views per axis'"),
+        (["--vary", "a=0:1:1000", "--vary", "b=0:1:1000"], "1000000 combinations"),
+        ([], "--vary"),
+    ],
+)
+def test_what_is_wrong_is_told_before_any_work(tmp_path, capsys, words, told):
+    assert main(["sweep", CAMERA, *words, "-o", str(tmp_path / "t.csv")]) in (1, 2)
+    assert told in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
