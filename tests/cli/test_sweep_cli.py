@@ -16,16 +16,7 @@ def table(path):
 
 def test_each_row_is_what_the_camera_of_its_values_says(tmp_path):
     out, page = tmp_path / "t.csv", tmp_path / "t.html"
-    said = [
-        "sweep",
-        CAMERA,
-        "--vary",
-        FOCAL,
-        "--vary",
-        "lenslets.magnification=0.3,0.5",
-        "--measure",
-        "patch",
-    ]
+    said = ["sweep", CAMERA, "--vary", FOCAL, "--vary", "lenslets.magnification=0.3,0.5"]
     said += ["--measure", "patch", "-o", str(out), "--workers", "1", "--report", str(page)]
     assert main(said) == 0
     rows = table(out)
