@@ -172,8 +172,8 @@ def test_what_no_series_holds_is_refused(thing):
 def test_the_estimate_is_told_and_what_cannot_fit_is_refused(tmp_path):
     told = []
     cluster.batch(jobs.picture, items(5), tmp_path / "out.zarr", workers=jobs.Here(), estimated=told.append)
-    assert told[0].frames == 4
-    assert told[0].size == 4 * cluster.status(tmp_path / "out.zarr").entries[0].size
+    assert told[0].frames == 3
+    assert told[0].size == 3 * cluster.status(tmp_path / "out.zarr").entries[0].size
     huge = cluster.Estimate.of([Entry(0, 2.0, 2**50, 2**20)], 100, 4)
     assert huge.seconds == 50
     with pytest.raises(lg.SamplingError, match=r"4 workers need .* GiB .* Use at most 1"):

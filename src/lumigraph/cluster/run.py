@@ -15,6 +15,9 @@ from lumigraph.core import checks, memory
 from lumigraph.core.progress import Progress, Stage, silent
 from lumigraph.errors import LumigraphError, SamplingError
 
+_FIRST = 2
+"""Frames that are done before the others are estimated: the first one makes what they share."""
+
 _ROUNDS, _PATIENCE = 600, 1.0
 """How often, and after how many seconds, frames are asked for again that somebody else works on."""
 
@@ -118,9 +121,9 @@ class Estimate:
 
     @classmethod
     def of(cls, entries: Iterable[Entry], frames: int, workers: int) -> "Estimate":
-        """From entries of frames like those to come, of which the first of a worker is the slowest."""
+        """From entries of frames like those to come; the slower ones made what all of them share."""
         known = list(entries)
-        seconds = sorted(entry.seconds for entry in known)[len(known) // 2]
+        seconds = min(entry.seconds for entry in known)
         size = max(entry.size for entry in known)
         return cls(frames, frames * seconds / workers, max(entry.memory for entry in known), frames * size)
 
@@ -199,7 +202,7 @@ def batch(
     FormatError
         Another job has begun this output, or another start works on it.
     SamplingError
-        The first frame shows that memory or disk do not suffice.
+        The first frames show that memory or disk do not suffice.
 
     Notes
     -----
@@ -215,9 +218,10 @@ def batch(
         left = [number for number in range(first, last) if not _kept(task, number)]
         with cluster.group(task) as group:
             if left:
-                _do(group, left[:1], 0, len(left), progress)
+                for done in range(min(_FIRST, len(left))):
+                    _do(group, left[done : done + 1], done, len(left), progress)
                 _check(task, (cluster, group), left, estimated)
-                _do(group, left[1:], 1, len(left), progress)
+                _do(group, left[_FIRST:], _FIRST, len(left), progress)
     found = status(output)
     return Report(found.count, found.entries, found.failures, time.perf_counter() - began)
 
@@ -273,12 +277,12 @@ def _check(
     task: Task, who: tuple[Cluster, Group], left: list[int],
     estimated: Callable[[Estimate], None] | None,
 ) -> None:  # fmt: skip
-    """Tell what the rest needs, by the first frame, and refuse what cannot fit."""
-    first = task.ledger.entry(left[0])
-    if first is None or len(left) == 1:
+    """Tell what the rest needs, by the first frames, and refuse what cannot fit."""
+    first = [entry for number in left[:_FIRST] if (entry := task.ledger.entry(number)) is not None]
+    if not first or len(left) <= _FIRST:
         return
     cluster, group = who
-    needed = Estimate.of([first], len(left) - 1, group.count)
+    needed = Estimate.of(first, len(left) - _FIRST, group.count)
     if estimated is not None:
         estimated(needed)
     needed.require(group.count if cluster.is_here else 1, task.output)
