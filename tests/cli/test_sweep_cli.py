@@ -53,6 +53,7 @@ def test_what_no_camera_can_have_is_a_row_with_the_reason(tmp_path, capsys):
         (["--vary", FOCAL, "--vary", FOCAL], "names a key twice"),
         (["--vary", FOCAL, "--measure", "view per axis"], "Did you mean 'views per axis'"),
         (["--vary", "a=0:1:1000", "--vary", "b=0:1:1000"], "1000000 combinations"),
+        (["--vary", FOCAL, "--workers", "0"], "--workers is 0"),
         ([], "--vary"),
     ],
 )

@@ -185,6 +185,8 @@ def test_the_estimate_is_told_and_what_cannot_fit_is_refused(tmp_path):
 def test_a_ledger_that_is_none_is_told(tmp_path):
     with pytest.raises(lg.FormatError, match="is no ledger of a job"):
         cluster.status(tmp_path)
+    with pytest.raises(lg.FormatError, match="is no ledger of a job"), cluster.rows(tmp_path / "o.csv"):
+        pass
     (tmp_path / "job.json").write_text("[]")
     with pytest.raises(lg.FormatError, match="is damaged"):
         Ledger(tmp_path).job()
@@ -272,3 +274,17 @@ def test_a_frame_that_is_asked_for_twice_is_done_once(tmp_path):
     assert log.read_text().split() == ["0", "1"]
     with here.task.ledger.claimed(1):
         assert here.task.do(1) == "busy"
+
+
+def test_frames_that_others_keep_are_no_success(tmp_path, monkeypatch):
+    from lumigraph.cluster import run as module
+
+    monkeypatch.setattr(module, "_ROUNDS", 2)
+    monkeypatch.setattr(module, "_PATIENCE", 0.0)
+    run(tmp_path / "o.zarr", 3)
+    (tmp_path / "o.zarr.ledger/done/000001.json").unlink()
+    with (
+        Ledger.beside(tmp_path / "o.zarr").claimed(1),
+        pytest.raises(lg.LumigraphError, match="1 frames are"),
+    ):
+        run(tmp_path / "o.zarr", 3)

@@ -275,7 +275,7 @@ def _split(words: Sequence[str], leading: int) -> tuple[list[str], tuple[str, ..
 
 def _items(paths: Sequence[str], pages: str | None) -> Iterator[dict[str, Any]]:
     for path in paths:
-        found = [path] if Path(path).exists() else sorted(glob.glob(path, recursive=True))  # noqa: PTH207
+        found = [path] if Path(path).exists() else sorted(glob.glob(path, recursive=True))  # noqa: PTH207 - absolute too
         if not found:
             raise FormatError(f"{path} is no file, and no file is like it. Check the path.")
         for name in found:

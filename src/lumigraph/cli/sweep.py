@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.batch import TABLES, kept, save_table
+from lumigraph.cli.batch import TABLES, Hands, kept, save_table
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output
 from lumigraph.cli.reporting import REPORTED, Reported
@@ -64,7 +64,6 @@ def sweep(
         Processes on this machine; one for each processor if left out.
     """  # noqa: E501 - an example is one line
     from lumigraph import cluster
-    from lumigraph.core.arrays import WORKERS
     from lumigraph.instruments import load_camera
 
     common.check()
@@ -79,7 +78,7 @@ def sweep(
     with progress("sweep") as shown, kept(output):
         found = cluster.batch(
             Designs(source, tuple(names)), items, output, what={"camera": given.to_toml(), "measure": names},
-            workers=workers or WORKERS, progress=shown,
+            workers=Hands(workers).cluster(), progress=shown,
         )  # fmt: skip
     save_table(output)
     if found.failures:

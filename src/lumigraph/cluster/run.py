@@ -236,6 +236,7 @@ def rows(output: str | os.PathLike[str]) -> Iterator[list[dict[str, Any]]]:
         No job's output.
     """
     ledger = Ledger.beside(Path(output))
+    ledger.job()  # refused where there is none
     with ledger.alone():
         yield [entry.values for _, entry in sorted(ledger.entries().items())]
 
@@ -271,6 +272,7 @@ def _do(group: Group, numbers: list[int], done: int, total: int, progress: Progr
             return
         numbers = busy
         time.sleep(_PATIENCE)
+    raise LumigraphError(f"{len(numbers)} frames are still worked on by others. Start again when they end.")
 
 
 def _check(

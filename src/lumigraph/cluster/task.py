@@ -13,7 +13,7 @@ from typing import Any
 
 from lumigraph.cluster.ledger import Entry, Ledger
 from lumigraph.core.threads import single_products
-from lumigraph.errors import FormatError, LumigraphError
+from lumigraph.errors import LumigraphError
 from lumigraph.io import series
 
 Work = Callable[[Any], Any]
@@ -117,6 +117,6 @@ def _line(error: BaseException) -> str:
     text = " ".join(str(error).split())
     if isinstance(error, LumigraphError):
         return text[:_LONGEST]
-    if isinstance(error, OSError) and not isinstance(error, FormatError):
+    if isinstance(error, OSError):
         return f"{error.filename or ''}: {error.strerror or text}"[:_LONGEST].lstrip(": ")
     return f"{type(error).__name__}: {text}"[:_LONGEST]

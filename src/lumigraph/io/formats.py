@@ -132,7 +132,7 @@ def format_of(path: str | os.PathLike[str]) -> Format:
 
 
 @overload
-def open(  # noqa: A001
+def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     path: str | os.PathLike[str],
     noun: type[N],
     *,
@@ -145,7 +145,7 @@ def open(  # noqa: A001
 
 
 @overload
-def open(  # noqa: A001
+def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     path: str | os.PathLike[str],
     noun: None = None,
     *,
