@@ -91,6 +91,22 @@ def test_samples_that_are_not_valid_are_left_out(open_page, views, rng):
         assert np.abs(page.pixels() - shown(lg.refocus(holed, 0.93))).max() <= LEVELS
 
 
+def test_places_that_few_valid_samples_show_take_the_nearest_known_as_in_the_library(open_page, views):
+    valid = np.ones(views.data.shape[:4], bool)
+    valid[..., 10:19, 30:39] = False  # more than any disparity between the views moves it
+    valid[..., 25:, 50:53] = valid[..., 33:36, 5:9] = False
+    valid[2, 2, 20:25, 12:17] = False
+    holed = lg.LightField(views.data, views.aperture, views.lenslets, views.separation, valid)
+    with served(of_views("holed", holed)) as address:
+        page = open_page(address)
+        for alpha, detail in ((1.0, 1), (0.93, 1), (0.93, 2), (1.1, 2)):
+            page.set(focus=alpha, detail=detail)
+            assert np.abs(page.pixels() - shown(lg.refocus(holed, alpha, oversample=detail))).max() <= LEVELS
+        page.set(focus=0.95, detail=1, aperture=0.6, shape="round")
+        small = lg.reduce_aperture(holed, 0.6, shape="round")
+        assert np.abs(page.pixels() - shown(lg.refocus(small, 0.95))).max() <= LEVELS
+
+
 def test_light_and_colour_follow_their_formula(open_page, views):
     with served(of_views("two planes", views)) as address:
         page = open_page(address)

@@ -25,6 +25,7 @@ from lumigraph.depth.epi import epi
 from lumigraph.depth.from_focus import BiasCurve, from_focus, point_alpha, sharpness
 from lumigraph.depth.fuse import fuse
 from lumigraph.depth.metric import cloud, defocus, metric, virtual_depth
+from lumigraph.depth.pictures import measurable
 from lumigraph.depth.quantities import alpha_of, disparity_of
 
 __all__ = [
@@ -39,6 +40,7 @@ __all__ = [
     "epi",
     "from_focus",
     "fuse",
+    "measurable",
     "metric",
     "point_alpha",
     "sharpness",

@@ -17,10 +17,18 @@ MOST_VIEWS = 9
 """Along one axis: views between these look much the same, and cost as much."""
 
 _LEAST_NOISE = 2e-3  # of a picture from 0 to 1: what rounding to eight bits leaves
+FEWEST_VIEWS, LEAST_SIDE = 2, 8
+"""Along one axis, and lenslets across a view: fewer show no lines."""
+
 _WINDOW, _SMOOTH = 4, 0.1  # px; part of the windows that show nothing but noise
 _OF_NOISE = 0.81  # of its mean: how rough the smoothest tenth of the windows of noise alone is
 _LIT = 0.1  # of a picture from 0 to 1: what is darker may be cut off
 _DARK = 0.05  # views darker than this part of the middle one lie outside the aperture
+
+
+def measurable(views: LightField) -> bool:
+    """Whether a light field has the two views of 8 x 8 lenslets or more that `epi` needs."""
+    return min(views.lenslets.shape) >= LEAST_SIDE and max(views.aperture.shape) >= FEWEST_VIEWS
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +78,11 @@ class Pictures:
         """
         checks.instance("views", views, LightField)
         shape = views.lenslets.shape
-        if min(shape) < 8 or max(views.aperture.shape) < 2:
+        if not measurable(views):
             raise GeometryError(
                 f"the light field has {views.aperture.shape[0]} x {views.aperture.shape[1]} views of "
-                f"{shape[0]} x {shape[1]} lenslets but depth needs two views of 8 x 8 at least."
+                f"{shape[0]} x {shape[1]} lenslets but depth needs two views of {LEAST_SIDE} x {LEAST_SIDE} "
+                "at least."
             )
         chosen = [_chosen(n) for n in views.aperture.shape]
         channels = views.data.shape[4] if views.data.ndim == 5 else 1

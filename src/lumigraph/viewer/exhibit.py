@@ -142,11 +142,14 @@ def focal_stack(views: LightField, count: int = 33) -> Planes:
     return Planes(data, tuple(float(alpha) for alpha in alphas))
 
 
-def depth_map(views: LightField) -> DepthMap:
-    """Refocus factors of the middle view by `lumigraph.depth.epi`, as `lumigraph depth` measures them."""
-    from lumigraph.depth import alpha_of, epi
+def depth_of(views: LightField) -> Callable[[], DepthMap] | None:
+    """Refocus factors of the middle view, measured when somebody wants to see them as `lumigraph depth` does.
 
-    return alpha_of(epi(grey_or_colour(views)), views)
+    None where there is nothing to measure: one view, or views that are too small.
+    """
+    from lumigraph.depth import alpha_of, epi, measurable
+
+    return (lambda: alpha_of(epi(grey_or_colour(views)), views)) if measurable(views) else None
 
 
 def object_depths(

@@ -18,7 +18,7 @@ from lumigraph.errors import FormatError
 from lumigraph.io.target import check_target
 from lumigraph.viewer import safety
 from lumigraph.viewer.encoding import Coded, white_level
-from lumigraph.viewer.exhibit import Exhibit, comfortable, depth_map, grey_or_colour
+from lumigraph.viewer.exhibit import Exhibit, comfortable, depth_of, grey_or_colour
 from lumigraph.viewer.packing import LOSSLESS, check_quality, packed
 from lumigraph.viewer.page import MEDIA, site_of
 from lumigraph.viewer.parts import Parts
@@ -239,7 +239,7 @@ def _coarser_views(
     small, changed = comfortable(
         LightField(data.reshape(shape), views.aperture, lenslets, views.separation, valid)
     )
-    depth = exhibit.depth and (lambda: depth_map(small))
+    depth = exhibit.depth and depth_of(small)
     lens = None if changed else exhibit.focal_length
     return dataclasses.replace(
         exhibit, views=small, depth=depth, relative=exhibit.relative or changed, focal_length=lens

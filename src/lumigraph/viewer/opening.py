@@ -22,7 +22,7 @@ from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError, SamplingWarning
 from lumigraph.instruments.capabilities import Rendered, WithMainLens
 from lumigraph.preparation import Described, Given, prepare, read_pages, sharp_kinds
-from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_map, depth_of_pixels
+from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_of, depth_of_pixels
 
 _CAMERA_FILE = 1 << 20  # bytes; camera files have some hundred
 _PATCHES = 25
@@ -115,7 +115,7 @@ def of_views(name: str, views: LightField) -> Exhibit:
     checks.finite_array(name, views.data, FormatError)
     views, relative = comfortable(views)
     return Exhibit(
-        name, views=views, depth=lambda: depth_map(views), facts=_about_views(views), relative=relative
+        name, views=views, depth=depth_of(views), facts=_about_views(views), relative=relative
     )  # fmt: skip
 
 
@@ -178,7 +178,7 @@ def of_raw(
         warnings.simplefilter("ignore", SamplingWarning)  # of cameras 2.0, which have been looked for
         views, relative = comfortable(decode(raw, calibration))
     return Exhibit(
-        name, views=views, raw=raw, calibration=calibration, depth=lambda: depth_map(views),
+        name, views=views, raw=raw, calibration=calibration, depth=depth_of(views),
         facts=(*facts, *_about_views(views)), relative=relative, focal_length=_lens(origin, views, relative),
     )  # fmt: skip
 

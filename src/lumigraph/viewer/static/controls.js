@@ -27,6 +27,11 @@ export class Controls {
     this.app = app;
     for (const name of MAPS) by("map").append(new Option(name[0].toUpperCase() + name.slice(1), name));
     for (const id of RANGES) by(id).addEventListener("input", (e) => app.set({ [id]: id === "density" ? 10 ** Number(e.target.value) : Number(e.target.value) }));
+    ["cross-y", "cross-x"].forEach((id, k) => by(id).addEventListener("input", (e) => {
+      const [, ...cross] = app.volumeModel.cross(app.state);
+      cross[k] = Number(e.target.value);
+      app.set({ cross });
+    }));
     for (const [id, read] of Object.entries(SELECTS)) by(id).addEventListener("change", (e) => app.set({ [id]: read(e.target.value) }));
     for (const id of CHECKS) by(id).addEventListener("change", (e) => app.set({ [id]: e.target.checked }));
     by("aperture").addEventListener("input", (e) => app.set({ aperture: Math.max(0.001, Number(e.target.value) / 100) }));
@@ -118,7 +123,7 @@ export class Controls {
     for (const part of document.querySelectorAll('[data-part="lattice"]')) part.hidden = !about.raw?.lattice;
     this.focus(model, state);
     if (model.views) this.aperture(model, state);
-    if (about.volume) this.volume(about.volume, state);
+    if (this.app.volumeModel) this.volume(this.app.volumeModel.about.volume, state);
     if (state.mode === "depth") this.depth(model, state);
     this.measures(state);
     const channels = this.app.main.image?.plain ? 3 : this.app.main.image?.channels ?? 1;
@@ -157,13 +162,18 @@ export class Controls {
   }
 
   volume(volume, state) {
-    const input = by("plane"), last = volume.depths.length - 1, k = Math.min(last, state.plane ?? Math.floor((last + 1) / 2));
-    Object.assign(input, { max: last, value: k });
-    tell("plane-out", `${k + 1} of ${last + 1} · z ${lengthText(volume.depths[k])}`);
-    input.setAttribute("aria-valuetext", by("plane-out").value);
-    input.disabled = state.projection !== "plane";
+    const { volumeModel: model } = this.app, cross = model.cross(state), sections = state.projection === "sections";
+    const places = model.placeOf(cross), shape = [volume.depths.length, ...volume.grid.shape];
+    ["plane", "cross-y", "cross-x"].forEach((id, k) => {
+      Object.assign(by(id), { max: shape[k] - 1, value: cross[k] });
+      tell(`${id}-out`, `${cross[k] + 1} of ${shape[k]} · ${"zyx"[k]} ${lengthText(places[k])}`);
+      by(id).setAttribute("aria-valuetext", by(`${id}-out`).value);
+    });
+    by("plane").disabled = state.projection !== "plane" && !sections;
+    document.querySelector('[data-part="cross"]').hidden = !sections;
     const spins = this.app.main.model.spins(state);
     for (const part of document.querySelectorAll('[data-part="rays"]')) part.hidden = !spins;
+    tell("flat", !spins && this.app.main.model.wantsRays(state) ? "3-D needs WebGL 2, which this browser does not offer here. Shown instead: the largest value along z." : "");
     by("density").value = Math.log10(state.density);
     by("density").disabled = state.projection !== "fog";
     tell("density-out", state.density.toFixed(1));
@@ -189,7 +199,7 @@ export class Controls {
     by("clear").hidden = !ruler && !state.region;
     if (!image) return;
     tell("ruler-out", ruler ? `Length ${rulerText(ruler, image.unit, image.aspect, model.samples(state))}` : "");
-    const key = JSON.stringify([state.region, state.mode, state.focus, state.view, state.aperture, state.plane, state.projection, state.trust, image.nx, image.exact]);
+    const key = JSON.stringify([state.region, state.mode, state.focus, state.view, state.aperture, state.plane, state.cross, state.projection, state.trust, image.nx, image.exact]);
     if (key !== this.regionKey && !main.pointers.size) { this.regionKey = key; tell("region-out", state.region && main.device ? `Region ${main.regionText(state)}` : ""); }
   }
 

@@ -15,7 +15,7 @@ function counted(array, white) {
 
 /** The values that stand behind the picture of a mode. */
 function behind(model, state) {
-  if (state.mode === "picture" && model.views) return model.complete ? { numbers: model.views.numbers } : null;
+  if (state.mode === "picture" && model.views) return model.complete ? model.views : null;
   return model.arrays[{ picture: "stack", raw: "raw", volume: "volume" }[state.mode]] ?? null;
 }
 
@@ -30,8 +30,7 @@ export class Histogram {
     if (!known) return;
     const white = image.white || 1;
     if (this.array !== array.numbers || this.white !== white) {
-      const coded = { numbers: array.numbers, offset: image.offset, scale: image.scale };
-      [this.array, this.white, this.found, this.key] = [array.numbers, white, counted(coded, white), ""];
+      [this.array, this.white, this.found, this.key] = [array.numbers, white, counted(array, white), ""];
     }
     const ratio = Math.min(devicePixelRatio, 2), box = this.canvas.getBoundingClientRect();
     const key = [state.ev, state.black, state.gamma, box.width, ratio, matchMedia("(prefers-color-scheme: dark)").matches].join();

@@ -14,6 +14,11 @@ export function listenToKeys(app, actions) {
 function act(app, actions, event) {
   const { state, main } = app, { key, shiftKey } = event, step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[key];
   if (step && shiftKey && state.mode === "volume" && main.model.spins(state)) { main.orbit(10 * step[0], 10 * step[1]); return true; }
+  if (step && shiftKey && state.mode === "volume" && state.projection === "sections") {
+    const { volumeModel: model } = app, [z, y, x] = model.cross(state), { shape } = model.about.volume.grid;
+    app.set({ plane: z, cross: [y + step[1], x + step[0]].map((at, k) => Math.min(shape[k] - 1, Math.max(0, at))) });
+    return true;
+  }
   if (step && (shiftKey || event.target.id === "pad")) {
     if (!main.model.views || state.mode !== "picture") return false;
     main.moveView((0.5 * step[0]) / 1.4 / main.model.views.shape[1], (0.5 * step[1]) / 1.4 / main.model.views.shape[0]);
@@ -36,8 +41,8 @@ function act(app, actions, event) {
 function walk(app, direction) {
   const { state, main: { model } } = app;
   if (state.mode === "volume") {
-    const last = model.about.volume.depths.length - 1, k = state.plane ?? Math.floor((last + 1) / 2);
-    app.set({ plane: Math.min(last, Math.max(0, k + direction)) });
+    const last = app.volumeModel.about.volume.depths.length - 1, [z] = app.volumeModel.cross(state);
+    app.set({ plane: Math.min(last, Math.max(0, z + direction)) });
     return true;
   }
   if (state.mode !== "picture") return false;

@@ -36,6 +36,11 @@ class App {
     document.getElementById("title").textContent = models.map((model) => model.about.name).join(" and ");
   }
 
+  /** The first exhibit with a volume, whose planes the sliders count. */
+  get volumeModel() {
+    return this.panes.find(({ model }) => model.about.volume)?.model;
+  }
+
   /** Shows what a written page opens with, before the graphics processor has anything to do. */
   async preview() {
     await Promise.all(this.panes.map(({ model }) => model.loadPoster()));

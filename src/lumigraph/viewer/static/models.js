@@ -4,6 +4,7 @@ import { isAlone, middleView, viewWeights } from "./aperture.js";
 import { Finer, PlaneWindow, used, ViewsWindow } from "./finer.js";
 import { RayCaster, RAYS } from "./rays.js";
 import { Refocuser } from "./refocus.js";
+import { layoutOf, sectionNumbers } from "./sections.js";
 import { loadArray } from "./source.js";
 import { cachedMap } from "./tone.js";
 
@@ -12,7 +13,7 @@ const SLOW = 45; // ms for one refocused picture, above which a focal stack is s
 
 export class Model {
   constructor(number, about, changed) {
-    Object.assign(this, { number, about, changed, arrays: {}, finer: {}, wanted: new Set(), errors: {}, slow: false, complete: false });
+    Object.assign(this, { number, about, changed, arrays: {}, finer: {}, wanted: new Set(), errors: {}, turns: true, slow: false, complete: false });
     this.views = about.views ? { ...about.views } : null;
     for (const what of ["views", "volume"]) if (about[what]?.finer) this.finer[what] = new Finer(`${number}/${what}-tiles`, about[what].finer, bytesOf(about, what), changed);
   }
@@ -23,9 +24,10 @@ export class Model {
   }
 
   /** What the samples of a mode's picture are, lenslets of a decoded raw image or pixels, and how many of the file one stands for. */
-  samples({ mode }) {
-    const lenslets = this.views && (this.about.raw || this.views.metric) && (mode === "picture" || mode === "depth");
-    return { word: lenslets ? "lenslets" : "px", factor: this.factor };
+  samples(state) {
+    const { mode } = state, lenslets = this.views && (this.about.raw || this.views.metric) && (mode === "picture" || mode === "depth");
+    const grown = this.showsSections(state) && this.layout ? this.layout.pixel / this.about.volume.spacing[2] : 1;
+    return { word: lenslets ? "lenslets" : "px", factor: this.factor * grown };
   }
 
   get modes() {
@@ -138,7 +140,7 @@ export class Model {
   finePlane(state, device, seen, settled) {
     const { finer: { volume: finer }, about: { volume } } = this, array = this.arrays.volume;
     if (!finer || !array || state.projection !== "plane") return null;
-    const k = Math.min(volume.depths.length - 1, state.plane ?? Math.floor(volume.depths.length / 2)), plan = finer.plan(seen, [k]);
+    const [k] = this.cross(state), plan = finer.plan(seen, [k]);
     if (settled && plan) finer.want(plan, (found) => new PlaneWindow(device, found, array.shape[3] ?? 1, volume.white));
     return plan && finer.window?.kept.has(k) ? { ...finer.place(finer.window), image: finer.window.image } : null;
   }
@@ -205,21 +207,56 @@ export class Model {
 
   /** Whether a volume is shown by rays, from any side. */
   spins(state) {
+    return this.turns && this.wantsRays(state);
+  }
+
+  /** Whether rays are asked for, which need WebGL 2. */
+  wantsRays(state) {
     return Boolean(this.about.volume) && RAYS.includes(state.projection);
+  }
+
+  showsSections({ mode, projection }) {
+    return mode === "volume" && projection === "sections" && Boolean(this.about.volume);
+  }
+
+  /** Samples (z, y, x) of the plane that is shown and of the place where sections cross. */
+  cross({ plane, cross }) {
+    const { depths, grid } = this.about.volume, shape = [depths.length, ...grid.shape];
+    return [plane, ...(cross ?? [null, null])].map((at, k) => Math.min(shape[k] - 1, Math.max(0, Math.round(at ?? Math.floor(shape[k] / 2)))));
+  }
+
+  /** Where samples (z, y, x) of a volume stand [m]. */
+  placeOf([z, y, x]) {
+    const { depths, grid: { pitch, center, shape } } = this.about.volume;
+    return [depths[z], ...[y, x].map((at, k) => center[k] + (at - Math.floor(shape[k] / 2)) * pitch[k])];
+  }
+
+  sections(state, array, device) {
+    const { about: { volume } } = this, cross = this.cross(state), channels = array.shape[3] ?? 1, key = [...cross, state.smooth].join();
+    this.layout ??= layoutOf(array.shape.slice(0, 3), volume.spacing);
+    const { pixel, size: [ny, nx] } = this.layout;
+    if (this.sectionsKey !== key) {
+      device.forget(this.drawnSections);
+      this.sectionsKey = key;
+      this.drawnSections = { numbers: sectionNumbers(array.numbers, channels, this.layout, cross, state.smooth) };
+    }
+    const common = { channels, ...coding(array), white: volume.white, base: [ny, nx], aspect: 1, detail: 1 };
+    return { nx, ny, ...this.drawnSections, ...common, unit: pixel, sections: { layout: this.layout, cross } };
   }
 
   volumeImage(state, device, settled) {
     const array = this.need("volume"), { volume } = this.about;
     if (!array) return null;
     const [nz, ny, nx] = array.shape, channels = array.shape[3] ?? 1, [dz, dy, dx] = volume.spacing;
-    if (this.spins(state) && device.kind === "webgl") return (this.caster ??= new RayCaster(device, array, volume)).image(state, settled);
+    if (this.spins(state)) return (this.caster ??= new RayCaster(device, array, volume)).image(state, settled);
     const common = { channels, ...coding(array), white: volume.white, detail: 1 };
+    if (state.projection === "sections") return this.sections(state, array, device);
     if (state.projection === "plane") {
-      const k = Math.min(nz - 1, state.plane ?? Math.floor(nz / 2));
+      const [k] = this.cross(state);
       return { ...slice(array, k, [ny, nx, channels]), ...common, base: [ny, nx], aspect: dy / dx, unit: dx };
     }
     array.projections ??= {};
-    const axis = this.spins(state) ? "max-z" : state.projection; // without WebGL
+    const axis = this.wantsRays(state) ? "max-z" : state.projection; // without WebGL: the page says so
     const image = (array.projections[axis] ??= projection(array.numbers, [nz, ny, nx, channels], axis));
     const sizes = { "max-z": [dy, dx], "max-y": [dz || dx, dx], "max-x": [dy, dz || dy] }[axis];
     return { ...image, ...common, base: [image.ny, image.nx], aspect: sizes[0] / sizes[1], unit: sizes[1] };

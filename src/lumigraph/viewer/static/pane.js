@@ -6,8 +6,9 @@ import { openDevice } from "./device.js";
 import { drawEpis } from "./epi.js";
 import { sharpestAlpha, sharpestPlane } from "./focusing.js";
 import { drawMeasures, regionText, samplesOf } from "./measures.js";
-import { clearOverlay, depthTexts, drawCross, drawLattice, drawMark, drawScaleBar } from "./overlay.js";
+import { clearOverlay, depthTexts, lengthText, drawCross, drawLattice, drawMark, drawScaleBar } from "./overlay.js";
 import { drawAxes } from "./rays.js";
+import { drawSections, panelAt, samplesAt } from "./sections.js";
 import { toneOf } from "./tone.js";
 import { turned } from "./turning.js";
 
@@ -37,6 +38,7 @@ export class Pane {
   open() {
     const { app, canvas } = this;
     this.device = (app.state.renderer === "canvas" ? null : openDevice(canvas)) ?? new CanvasDevice(canvas);
+    this.model.turns = this.device.kind === "webgl";
     canvas.addEventListener("webglcontextlost", () => app.tell("The graphics processor was lost. Load the page again.", true));
   }
 
@@ -156,8 +158,31 @@ export class Pane {
     }
     if (state.point && state.mode !== "raw" && state.mode !== "volume") drawMark(context, this.toScreen(...state.point));
     drawMeasures(context, state, (y, x) => this.toScreen(y, x), image.unit, image.aspect, this.model.samples(state));
+    if (image.sections) this.drawCross(context, image, (y, x) => this.toScreen(y, x));
     if (image.rays) drawAxes(context, state.orbit, (step) => turned(step, state.turn), size.height);
     if (image.unit) drawScaleBar(context, image.unit / (this.scale[0] / this.ratio), size);
+  }
+
+  /** Where sections cross, on the screen or in what is saved. */
+  drawCross(context, { sections: { layout, cross } }, place) {
+    const { ground, line, state } = this.app;
+    drawSections(context, layout, cross, state.turn, place, { ground: `rgb(${ground.map((x) => 255 * x).join(" ")})`, line });
+  }
+
+  /** Sections cross at a place of one of them. */
+  cut(place, from = place) {
+    const { layout, cross } = this.image.sections, panel = panelAt(layout, from);
+    if (!panel) return;
+    const [plane, ...rest] = samplesAt(layout, panel, place, cross);
+    this.app.set({ plane, cross: rest });
+  }
+
+  /** Where a place of a section is in the volume. */
+  placeText({ sections: { layout, cross } }, place) {
+    const panel = panelAt(layout, place);
+    if (!panel) return "";
+    const found = this.model.placeOf(samplesAt(layout, panel, place, cross));
+    return [2, 1, 0].map((k) => `${"zyx"[k]} ${lengthText(found[k])}`).join("  ");
   }
 
   describe(state) {
@@ -168,9 +193,9 @@ export class Pane {
   /** Position and value under the pointer. */
   tellPlace(image) {
     if (!this.hover) { if (this.readout.textContent) this.readout.textContent = ""; return; }
-    const [y, x] = this.hover, { factor, word } = this.model.samples(this.app.state), parts = image.rays ? [] : [`y ${(factor * y).toFixed(1)}  x ${(factor * x).toFixed(1)} ${word}`];
+    const [y, x] = this.hover, { factor, word } = this.model.samples(this.app.state), parts = image.rays ? [] : image.sections ? [this.placeText(image, this.hover)] : [`y ${(factor * y).toFixed(1)}  x ${(factor * x).toFixed(1)} ${word}`];
     const row = Math.round(y * image.detail), column = Math.round(x * image.detail);
-    if (row < 0 || column < 0 || row >= image.ny || column >= image.nx) { this.readout.textContent = ""; return; }
+    if (row < 0 || column < 0 || row >= image.ny || column >= image.nx || parts[0] === "") { this.readout.textContent = ""; return; }
     if (this.app.state.mode === "depth") {
       const found = this.model.depthAt(y, x);
       if (found) parts.push(...depthTexts(this.model.about.depth, found));
@@ -226,6 +251,7 @@ export class Pane {
 
   click(place) {
     if (this.app.state.drag !== "move") { this.mark(place); return; }
+    if (this.image?.sections) { this.cut(place); return; }
     if (this.app.state.sharp) { this.app.tell("Everything is in focus. Uncheck “All in focus” to choose."); return; }
     const focus = this.focusAt(place);
     if (focus !== null) this.app.set({ focus, point: place });
@@ -291,6 +317,7 @@ export class Pane {
     if (this.pointers.size === 2) this.pinch(event.pointerId, here);
     else if (state.drag !== "move" && plain && this.base) this.app.set({ [state.drag]: [...this.toPicture(...pointer.start), ...this.hover] });
     else if (state.mode === "volume" && this.model.spins(state) && plain) this.orbit(...step);
+    else if (this.image?.sections && plain) this.cut(this.hover, this.toPicture(...pointer.start));
     else if (this.model.views && state.mode === "picture" && plain) {
       const box = this.stage.getBoundingClientRect();
       this.moveView(step[0] / box.width, step[1] / box.height);
@@ -326,7 +353,8 @@ export class Pane {
     const image = this.model.image(state, this.device, true);
     if (!image) return image;
     const { nx: width, ny: height, aspect, unit, detail } = image, place = Object.assign((y, x) => [y * detail, x * detail], { step: detail });
-    return { width, height, data: this.device.pixels(image, this.toneFor(state, image)), aspect, unit: unit && unit / detail, place, samples: this.model.samples(state) };
+    const over = image.sections && ((context, where) => this.drawCross(context, image, where));
+    return { width, height, data: this.device.pixels(image, this.toneFor(state, image)), aspect, unit: unit && unit / detail, place, samples: this.model.samples(state), over };
   }
 
   /** What is finer than the picture in its own size, cut to where it is exact. */

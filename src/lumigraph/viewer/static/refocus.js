@@ -1,7 +1,7 @@
 // Refocused pictures by WebGL: views moved and summed along u, then along v, as lumigraph.refocus does.
 
 import { viewShifts } from "./aperture.js";
-import { SHEAR_COLUMN, SHEAR_ROW } from "./shaders.js";
+import { CLOSE, NEAREST_ROW, SHEAR_COLUMN, SHEAR_ROW } from "./shaders.js";
 
 /** Views in one layer of the texture (across, down): one, where there are layers enough. */
 function tiling(views, most) {
@@ -10,6 +10,22 @@ function tiling(views, most) {
   const down = Math.ceil(needed / Math.max(across, 1));
   if (across < 1 || down * nt > most.side) throw new Error(`${nv} × ${nu} views of ${nt} × ${ns} are too many`);
   return [across, down];
+}
+
+/** Keys' cubic convolution, as in the shaders. */
+function cubic(f) {
+  return [((2 - f) * f - 1) * f, (3 * f - 5) * f * f + 2, ((4 - 3 * f) * f + 1) * f, (f - 1) * f * f].map((k) => k / 2);
+}
+
+/** How much of the views of each row v of the aperture falls on each column of a picture (v, x). */
+function rowShares(weights, [nv, nu, nx, ns], { first, step }, detail, alone) {
+  const shares = new Float32Array(nv * nx);
+  for (let u = 0; u < nu; u++) for (let x = 0; x < nx; x++) {
+    const at = x / detail + first + u * step, below = Math.floor(at);
+    const seen = cubic(at - below).reduce((sum, k, i) => sum + (alone || (below + i >= 1 && below + i <= ns) ? k : 0), 0);
+    for (let v = 0; v < nv; v++) shares[v * nx + x] += weights[v * nu + u] * seen;
+  }
+  return shares;
 }
 
 export class Refocuser {
@@ -39,7 +55,7 @@ export class Refocuser {
   }
 
   release() {
-    for (const texture of [this.array.texture, this.mask.texture, this.rows, this.target]) if (texture) this.device.gl.deleteTexture(texture);
+    for (const texture of [this.array.texture, this.mask.texture, this.rows, this.target, this.nearest, this.whole]) if (texture) this.device.gl.deleteTexture(texture);
   }
 
   /** The picture focused on alpha: {nx, ny, channels, texture}; `alone`: of one view, which has no black edge. */
@@ -66,9 +82,12 @@ export class Refocuser {
       gl.uniform1f(at.step_, across.step);
       gl.uniform1f(at.detail, detail);
     }, v);
+    const shares = views.masked ? this.weights(rowShares(weights, [nv, nu, nx, ns], across, detail, alone), nx, nv) : rows;
     device.draw(device.program("shear-column", SHEAR_COLUMN), [nx, ny], this.target, (at, gl) => {
       device.bind(0, gl.TEXTURE_2D_ARRAY, this.rows, at.rows);
       device.bind(1, gl.TEXTURE_2D, rows, at.weights);
+      device.bind(2, gl.TEXTURE_2D, shares, at.shares);
+      gl.uniform1i(at.masked, views.masked ? 1 : 0);
       gl.uniform1i(at.count, nv);
       gl.uniform1i(at.alone, alone ? 1 : 0);
       gl.uniform1i(at.height, nt);
@@ -76,18 +95,33 @@ export class Refocuser {
       gl.uniform1f(at.step_, along.step);
       gl.uniform1f(at.detail, detail);
     });
-    device.gl.deleteTexture(all);
-    device.gl.deleteTexture(rows);
-    return { nx, ny, channels: views.channels, texture: this.target };
+    for (const texture of new Set([all, rows, shares])) device.gl.deleteTexture(texture);
+    return { nx, ny, channels: views.channels, texture: views.masked ? this.closed(nx, ny) : this.target };
+  }
+
+  /** The picture with its unknown places filled. */
+  closed(nx, ny) {
+    const { device } = this;
+    device.draw(device.program("nearest-row", NEAREST_ROW), [nx, ny], this.nearest, (at, gl) => {
+      device.bind(0, gl.TEXTURE_2D, this.target, at.source);
+      gl.uniform1i(at.height, ny);
+    });
+    device.draw(device.program("close", CLOSE), [nx, ny], this.whole, (at, gl) => {
+      device.bind(0, gl.TEXTURE_2D, this.target, at.source);
+      device.bind(1, gl.TEXTURE_2D, this.nearest, at.nearest);
+      gl.uniform1i(at.width, nx);
+    });
+    return this.whole;
   }
 
   prepare(nx, ny) {
     if (this.width === nx && this.height === ny) return;
     const { gl } = this.device, [nv, , nt] = this.views.shape;
-    for (const texture of [this.rows, this.target]) if (texture) gl.deleteTexture(texture);
+    for (const texture of [this.rows, this.target, this.nearest, this.whole]) if (texture) gl.deleteTexture(texture);
     Object.assign(this, { width: nx, height: ny });
     this.rows = this.device.floats(nx, nt, nv);
     this.target = this.device.floats(nx, ny);
+    if (this.views.masked) [this.nearest, this.whole] = [this.device.floats(nx, ny), this.device.floats(nx, ny)];
   }
 
   weights(values, nx, ny) {

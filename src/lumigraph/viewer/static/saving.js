@@ -12,13 +12,12 @@ export function nameOf(app) {
 }
 
 function fileName(app) {
-  const { state } = app;
-  const what = { picture: state.sharp ? "all-in-focus" : `focus-${state.focus.toFixed(4)}`, raw: "raw", depth: "depth", volume: state.projection === "plane" ? `plane-${(state.plane ?? 0) + 1}` : state.projection }[state.mode];
+  const { state } = app, what = { picture: state.sharp ? "all-in-focus" : `focus-${state.focus.toFixed(4)}`, raw: "raw", depth: "depth", volume: state.mode === "volume" && state.projection === "plane" ? `plane-${app.main.model.cross(state)[0] + 1}` : state.projection }[state.mode];
   return `${nameOf(app)}-${what}.png`;
 }
 
 /** One pane's picture in a canvas, with square pixels, turned as it is shown. */
-function partCanvas({ width, height, data, aspect, unit, place, samples }, state) {
+function partCanvas({ width, height, data, aspect, unit, place, samples, over }, state) {
   const one = document.createElement("canvas"), sheet = document.createElement("canvas"), odd = state.turn % 2;
   Object.assign(one, { width, height });
   one.getContext("2d").putImageData(new ImageData(data, width, height), 0, 0);
@@ -30,10 +29,12 @@ function partCanvas({ width, height, data, aspect, unit, place, samples }, state
   context.drawImage(one, 0, 0, width, tall);
   const matrix = context.getTransform();
   context.resetTransform();
-  drawMeasures(context, state, (y, x) => {
+  const where = (y, x) => {
     const [row, column] = place(y, x), { x: left, y: top } = matrix.transformPoint({ x: column + 0.5, y: (row + 0.5) * aspect });
     return [left, top];
-  }, unit && unit * place.step, aspect, samples);
+  };
+  over?.(context, where);
+  drawMeasures(context, state, where, unit && unit * place.step, aspect, samples);
   if (unit && sheet.width >= LEAST_BAR) drawScaleBar(context, unit, sheet);
   return sheet;
 }

@@ -51,8 +51,8 @@ void main() {
 export const SHEAR_COLUMN = `#version 300 es
 precision highp float; precision highp int; precision highp sampler2DArray;
 uniform sampler2DArray rows;
-uniform sampler2D weights;
-uniform bool alone;
+uniform sampler2D weights, shares; // of rows v; light that row v would give column x if all samples were valid
+uniform bool alone, masked;
 uniform int count;
 uniform int height;
 uniform float first, step_, detail;
@@ -62,8 +62,10 @@ void main() {
   ivec2 place = ivec2(gl_FragCoord.xy);
   float at = float(place.y) / detail + first;
   vec4 total = vec4(0.0);
+  float whole = 0.0;
   for (int v = 0; v < count; v++) {
     if (texelFetch(weights, ivec2(v, 0), 0).r == 0.0) continue;
+    float share = masked ? texelFetch(shares, ivec2(place.x, v), 0).r : 0.0;
     float y = at + float(v) * step_, below = floor(y);
     vec4 k = cubic(y - below);
     int top = int(below) - 1;
@@ -71,9 +73,50 @@ void main() {
       int line = alone ? clamp(top + i, 0, height - 1) : top + i;
       if (line < 0 || line >= height) continue;
       total += k[i] * texelFetch(rows, ivec3(place.x, line, v), 0);
+      whole += k[i] * share;
     }
   }
-  picture = total.a > 0.05 ? vec4(total.rgb / total.a, 1.0) : vec4(0.0);
+  // _LEAST_SEEN and _LEAST_VALID of lumigraph.rendering.refocus
+  picture = vec4(total.a > 0.05 ? total.rgb / total.a : vec3(0.0), total.a > 0.3 * whole ? 1.0 : 0.0);
+}`;
+
+// Places that too few valid samples show take the nearest that is known, as lumigraph.refocus does; of several as near, the
+// leftmost, then the uppermost. Two passes: the nearest of the own column, then of those.
+
+/** How far off the nearest known sample of the own column is: (rows down, 1), or (0, 0) where there is none. */
+export const NEAREST_ROW = `#version 300 es
+precision highp float; precision highp int;
+uniform sampler2D source;
+uniform int height;
+out vec4 found;
+void main() {
+  ivec2 place = ivec2(gl_FragCoord.xy);
+  found = vec4(0.0);
+  for (int step = 0; step < height; step++) {
+    bool above = place.y - step >= 0 && texelFetch(source, place - ivec2(0, step), 0).a > 0.0;
+    bool below = place.y + step < height && texelFetch(source, place + ivec2(0, step), 0).a > 0.0;
+    if (above || below) { found = vec4(above ? -step : step, 1.0, 0.0, 0.0); return; }
+  }
+}`;
+
+export const CLOSE = `#version 300 es
+precision highp float; precision highp int;
+uniform sampler2D source, nearest;
+uniform int width;
+out vec4 picture;
+void main() {
+  ivec2 place = ivec2(gl_FragCoord.xy), from = place;
+  picture = texelFetch(source, place, 0);
+  if (picture.a > 0.0) return;
+  float least = 1e18;
+  for (int step = 0; step < width && float(step) * float(step) <= least; step++) for (int side = -1; side <= 1; side += 2) {
+    int x = place.x + side * step;
+    if (x < 0 || x >= width || (step == 0 && side > 0)) continue;
+    vec2 off = texelFetch(nearest, ivec2(x, place.y), 0).rg;
+    float far = float(step) * float(step) + off.x * off.x;
+    if (off.y > 0.0 && (far < least || (far == least && x < from.x))) { least = far; from = ivec2(x, place.y + int(off.x)); }
+  }
+  picture = vec4(texelFetch(source, from, 0).rgb, 1.0);
 }`;
 
 /** A picture on the screen: zoomed, exposed, coloured. */
