@@ -1,7 +1,7 @@
 """CPU seconds of a microscope's point images and Richardson-Lucy iterations, beside pyolaf where it is.
 
 lfm-guv at 15 pixels and 5 samples per lenslet, -4 to 4 um in steps of 2 um; with SLICES=13, -6 to 6 um in
-steps of 1 um. Iterations are medians; point images include the matrices of their frequencies. pyolaf (GPL) is
+steps of 1 um. Iterations are medians; point images include the matrices of their frequencies. pyolaf is
 run as a black box in an environment of its own: PYOLAF names its interpreter, LUMIGRAPH_DATA the folder with
 lfm_guv.
 """
@@ -80,3 +80,7 @@ def show(found: dict[str, dict[str, float]]) -> None:
     if "pyolaf" in found:
         ratios = {key: found["pyolaf"][key] / found["lumigraph"][key] for key in ("images", "iteration")}
         print(f"ratio      point images {ratios['images']:6.1f}     iteration {ratios['iteration']:7.1f}")
+
+
+if __name__ == "__main__":
+    show(run())

@@ -5,8 +5,6 @@ Depth in metres
 Of a camera whose lengths are known, disparities become distances, and every pixel a point in space.
 """
 
-import numpy as np
-
 import lumigraph as lg
 
 sample = lg.samples.scene((128, 170))
@@ -14,14 +12,8 @@ found = lg.depth.epi(sample.views)
 depth = lg.depth.metric(found, sample.views, focal_length=0.045)
 points = lg.depth.cloud(depth, sample.views, object_distance=0.18, colours=sample.views.view(4, 4))
 lg.save(points, "points.ply")
-figure = lg.plots.images(
-    [
-        (np.clip(sample.views.view(4, 4), 0, 1) ** (1 / 2.2), "the middle view"),
-        (np.clip(1e3 * np.asarray(depth.values), -60, 60), "depth [mm]"),
-        (found.confidence, "confidence"),
-    ],
-    columns=3, label="",
-)  # fmt: skip
+distances = lg.plots.show(depth, title="depth, farther is above 0")
+confidence = lg.plots.show(found.confidence, title="confidence")
 print(f"{len(points)} points in points.ply")
 
 # %%

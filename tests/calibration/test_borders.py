@@ -49,7 +49,7 @@ def test_what_is_far_off_or_shows_no_borders_stays_where_it_is(rng):
         assert aligned(far, picture) is far
     stretched = replace(far, lattice=Lattice.hex(22.0, 0.01, (203.4, 214.8)))
     assert aligned(stretched, gapless(lattice, rng)) is stretched
-    with pytest.raises(CalibrationError, match="10 x 10 pixels but the calibration was made on 420 x 460"):
+    with pytest.raises(CalibrationError, match="10 x 10 pixels but its calibration is for 420 x 460"):
         aligned(far, np.ones((10, 10)))
 
 

@@ -131,7 +131,7 @@ def test_two_starts_at_once_do_not_both_work(tmp_path):
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     with subprocess.Popen([sys.executable, "-c", script], **pipes) as other:
         assert other.stdout.readline() == "ready\n"
-        with pytest.raises(lg.FormatError, match="is being worked on by another start"):
+        with pytest.raises(lg.FormatError, match="is in use by another run"):
             run(tmp_path / "out.zarr", 2)
         other.kill()
     assert run(tmp_path / "out.zarr", 2).is_whole
@@ -183,9 +183,9 @@ def test_the_estimate_is_told_and_what_cannot_fit_is_refused(tmp_path):
 
 
 def test_a_ledger_that_is_none_is_told(tmp_path):
-    with pytest.raises(lg.FormatError, match="is no ledger of a job"):
+    with pytest.raises(lg.FormatError, match="is not the ledger of a job"):
         cluster.status(tmp_path)
-    with pytest.raises(lg.FormatError, match="is no ledger of a job"), cluster.rows(tmp_path / "o.csv"):
+    with pytest.raises(lg.FormatError, match="is not the ledger of a job"), cluster.rows(tmp_path / "o.csv"):
         pass
     (tmp_path / "job.json").write_text("[]")
     with pytest.raises(lg.FormatError, match="is damaged"):

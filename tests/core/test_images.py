@@ -70,7 +70,7 @@ def test_residuals_are_measured_centre_minus_lattice_point():
 
 def test_a_calibration_refuses_raw_images_of_another_size():
     calibration().check_fits((41, 61))
-    with pytest.raises(CalibrationError, match="has 40 x 61 pixels but the calibration was made on 41 x 61"):
+    with pytest.raises(CalibrationError, match="has 40 x 61 pixels but its calibration is for 41 x 61"):
         calibration().check_fits((40, 61))
 
 

@@ -115,7 +115,7 @@ def test_what_cannot_be_compared_is_refused(monkeypatch):
             GeometryError, match="must ascend, have one sign, and be no larger than the pitch"
         ):
             correlation(raw, calibration, patches)
-    with pytest.raises(CalibrationError, match="pixels but the calibration was made on"):
+    with pytest.raises(CalibrationError, match="pixels but its calibration is for"):
         correlation(raw[:-1], calibration)
     small = focused_raw(Lattice.square(5.0), (40, 40), lambda y, x: 1 + 0 * y, lambda y, x: 2 + 0 * y)
     with pytest.raises(CalibrationError, match="5 px wide but correlation needs 6 px"):

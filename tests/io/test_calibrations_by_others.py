@@ -22,9 +22,7 @@ def test_a_raytrix_lattice_stands_where_the_file_says(tmp_path):
     assert len(found.notes) == 1
     assert raytrix.lens_types(tmp_path / "a.xml") == ((1.0, 3.0), (2.8, 4.0), (3.8, 100.0))
     assert io.contents(tmp_path / "a.xml")[0].about == "hexagonal, 3 lens types; open it with shape="
-    with pytest.raises(
-        FormatError, match=r"does not tell how large the raw image is. Call .*shape=raw.shape"
-    ):
+    with pytest.raises(FormatError, match=r"does not say how large the raw image is. Call .*shape=raw.shape"):
         io.open(tmp_path / "a.xml")
 
 
@@ -52,7 +50,7 @@ def test_the_lens_types_of_the_real_camera_differ_in_sharpness():
         (b">9.5<", b">900<", "lenslets 900 px wide on 60 x 70 px"),
         (b"<y>-0.8660254</y>", b"<y>0.0</y>", "parallel"),
         (b"</RayCalibData>", b"", "damaged XML"),
-        (b"RayCalibData", b"Other", "no Raytrix calibration: it begins with <Other>"),
+        (b"RayCalibData", b"Other", "not a Raytrix calibration: it begins with <Other>"),
         (b"<RayCalib", b"<!DOCTYPE x [<!ENTITY a 'b'>]><RayCalib", "damaged XML"),
     ],
 )  # fmt: skip

@@ -70,7 +70,7 @@ def test_a_bare_frame_of_known_size_needs_no_metadata(tmp_path):
     raw = io.open(tmp_path / "a.raw")
     assert (raw.data.shape, raw.bit_depth, raw.bayer) == ((3280, 3280), 12, "BGGR")
     (tmp_path / "a.raw").write_bytes(bytes(1000))
-    with pytest.raises(FormatError, match=r"its 1000 bytes are no frame of a Lytro F01 \(16137600\)"):
+    with pytest.raises(FormatError, match=r"its 1000 bytes are not a frame of a Lytro F01 \(16137600\)"):
         io.open(tmp_path / "a.raw")
     with pytest.raises(FormatError, match="bare raw frame: what='stack' is not in it"):
         io.open(tmp_path / "a.raw", what="stack")
@@ -168,7 +168,7 @@ def _packing(bits, order):
         ),
         (
             seeds.raw_container(bytes(288), {"image": {"height": 1, "width": 1}}),
-            "does not tell how the pixels",
+            "does not say how the pixels",
         ),
         (
             seeds.raw_container(bytes(288), METADATA).replace(bytes(100), bytes(99) + b"1"),
@@ -176,8 +176,8 @@ def _packing(bits, order):
         ),
         (seeds.container({}, []), "holds nothing that is read here"),
         (b"\x89LFP\r\n\x1a\n" + bytes(88), "no table of contents"),
-        (seeds.section(b"M", b"[1]"), "no JSON object"),
-        (seeds.section(b"M", b"{"), "is no JSON"),
+        (seeds.section(b"M", b"[1]"), "not a JSON object"),
+        (seeds.section(b"M", b"{"), "is not JSON"),
     ],
 )
 def test_damage_is_named(tmp_path, content, message):

@@ -267,7 +267,7 @@ def test_several_arrays_and_links_out_of_an_hdf5_file(tmp_path):
         io.open(tmp_path / "a.h5")
     assert isinstance(io.open(tmp_path / "a.h5", what="g/two"), Stack)
     for name in ("out", "text", "g"):
-        with pytest.raises(FormatError, match=r"has no dataset 'out'|is no array of numbers"):
+        with pytest.raises(FormatError, match=r"has no dataset 'out'|is not an array of numbers"):
             io.open(tmp_path / "a.h5", what=name)
     with h5py.File(tmp_path / "b.h5", "w") as file:
         file.create_dataset("a", (4, 4), "u1", external=[("/etc/hostname", 0, 16)])

@@ -122,7 +122,7 @@ def test_a_computed_calibration_has_no_arrows():
     indices = lattice.indices((0, 39), (0, 39))
     calibration = Calibration(lattice, (40, 40), indices, lattice.position(indices), 0.0)
     assert not plots.lattice(RawImage(np.ones((40, 40))), calibration).axes[0].collections
-    with pytest.raises(CalibrationError, match="40 x 41 pixels but the calibration was made on 40 x 40"):
+    with pytest.raises(CalibrationError, match="40 x 41 pixels but its calibration is for 40 x 40"):
         plots.lattice(np.ones((40, 41)), calibration)
     with pytest.raises(CalibrationError, match="cells is 0"):
         plots.lattice(np.ones((40, 40)), calibration, cells=0)

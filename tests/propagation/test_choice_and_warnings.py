@@ -51,7 +51,7 @@ def test_auto_says_which_method_and_why(distance, output, method, reason):
     [
         ({"distance": 1.0, "method": "huygens"}, SamplingError, "method is 'huygens' but must be 'auto'"),
         ({"distance": 1.0, "method": "zoom"}, SamplingError, "zoom needs the output's grid"),
-        ({"distance": 0.0, "method": "fresnel"}, SamplingError, "fresnel cannot go 0 m"),
+        ({"distance": 0.0, "method": "fresnel"}, SamplingError, "fresnel cannot propagate over 0 m"),
         ({"distance": float("nan")}, GeometryError, "distance is nan"),
         ({"distance": 1.0, "pad": -1}, GeometryError, "pad is -1 but must be 0 or more"),
         ({"distance": 1.0, "grid": Grid.square(8, 1.5e-5)}, GeometryError, "different pitches"),

@@ -91,7 +91,7 @@ MISTAKES = {
     ),
     "decode without calibration": (
         lambda: lg.decode(RAW, None),
-        "where the micro-images stand is not known",
+        "the positions of the micro-images are not known",
     ),
     "decode complex": (
         lambda: lg.decode(RAW + 0j, CALIBRATION),

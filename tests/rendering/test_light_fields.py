@@ -253,7 +253,7 @@ def bad_raw():
 @pytest.mark.parametrize("read", [decode, lambda raw, calibration: render(raw, calibration, 3.0)])
 def test_raw_images_that_do_not_belong_are_refused(read):
     with pytest.raises(
-        CalibrationError, match="raw image has 35 x 35 pixels but the calibration was made on 35 x 42"
+        CalibrationError, match="picture has 35 x 35 pixels but its calibration is for 35 x 42"
     ):
         read(np.ones((35, 35)), CALIBRATION)
     with pytest.raises(

@@ -82,7 +82,7 @@ def test_what_a_spectrum_cannot_be(camera):
         simulate(camera, picture(camera, 3), ROUGH, spectrum=Spectrum.band(500 * nm, 600 * nm, 1))
     with pytest.raises(GeometryError, match="whose wavelength cannot be replaced"):
         simulate(object(), picture(camera, 3), ROUGH, spectrum=Spectrum.rgb())
-    with pytest.raises(GeometryError, match="an operator is of one channel but the spectrum has three"):
+    with pytest.raises(GeometryError, match="the operator has one channel but the spectrum has three"):
         camera.operator(spectrum=Spectrum.rgb())
     with pytest.raises(GeometryError, match=r"Give spectrum=Spectrum.rgb\(\) for a coloured scene"):
         simulate(camera, picture(camera, 3), ROUGH)

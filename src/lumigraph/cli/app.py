@@ -24,7 +24,7 @@ from lumigraph.cli.demo import demo
 from lumigraph.cli.depth import depth
 from lumigraph.cli.design import design
 from lumigraph.cli.measure import measure
-from lumigraph.cli.options import COMMAND, PARAMETER
+from lumigraph.cli.options import COMMAND, PARAMETER, WARNED
 from lumigraph.cli.refocus import refocus
 from lumigraph.cli.render import render
 from lumigraph.cli.reporting import telling
@@ -75,6 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
     COMMAND.set(tuple(words))
+    WARNED.set([])
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:
@@ -144,6 +145,7 @@ def _unknown(word: str) -> str:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    WARNED.get([]).append(str(message))
     _say(f"warning: {message}")
 
 

@@ -86,7 +86,7 @@ class Hands:
     def check(self) -> None:
         """Refuse what contradicts itself."""
         if sum(one is not None for one in (self.workers, self.scheduler)) > 1:
-            raise FormatError("--workers and --scheduler both say who works. Give one of them.")
+            raise FormatError("--workers and --scheduler exclude each other. Give one of them.")
         if self.slurm is not None and (self.slurm < 1 or self.part or self.scheduler):
             raise FormatError("--slurm is a number of jobs above 0, without --part and --scheduler.")
         if self.sbatch and self.slurm is None:
@@ -157,7 +157,7 @@ def batch(
     output
         Zarr store (.zarr), or table (.csv).
     page
-        Of stacks: some, as 'first:last', or one; all if left out.
+        Pages of a stack, 'first:last' or one number, counted from 0; all if left out.
     """  # noqa: E501 - an example is one line
     from lumigraph import cluster
 
@@ -166,7 +166,7 @@ def batch(
     if verb not in KINDS:
         raise FormatError(f"batch takes {', '.join(KINDS)} or {_STATUS}, not {verb!r}.")
     if output is None:
-        raise FormatError("where the results go is not known. Give --output FILE.")
+        raise FormatError("no output is given. Add --output FILE.")
     kind = KINDS[verb]
     hands.check()
     files.check_output(output, TABLES if kind.is_table else SERIES)
@@ -269,7 +269,7 @@ def _split(words: Sequence[str], leading: int) -> tuple[list[str], tuple[str, ..
     """Files and patterns, which stand before the first option, and the verb's other words."""
     first = next((k for k, word in enumerate(words) if word.startswith("-")), len(words))
     if first <= leading:
-        raise FormatError("which frames is not known. Give files, or a pattern in quotes, after the verb.")
+        raise FormatError("no frames are given. Name files, or a pattern in quotes, after the verb.")
     return list(words[leading:first]), (*words[:leading], *words[first:])
 
 
@@ -277,7 +277,7 @@ def _items(paths: Sequence[str], pages: str | None) -> Iterator[dict[str, Any]]:
     for path in paths:
         found = [path] if Path(path).exists() else sorted(glob.glob(path, recursive=True))  # noqa: PTH207 - absolute too
         if not found:
-            raise FormatError(f"{path} is no file, and no file is like it. Check the path.")
+            raise FormatError(f"{path} is not a file, and no file matches it. Check the path.")
         for name in found:
             yield from _frames(Path(name), pages)
 

@@ -29,11 +29,11 @@ class Known:
     Parameters
     ----------
     focal_length
-        Of the main lens, such as '50 mm'; that of --camera if left out.
+        Focal length of the main lens, such as '50 mm'; that of --camera if left out.
     focal_length_error
         How well it is known, such as '1 mm'; 2 % if left out.
     pixel_pitch
-        Of the sensor, such as '5.5 um'; what the raw images or --camera say if left out.
+        Pixel pitch of the sensor, such as '5.5 um'; that of the raw images or of --camera if left out.
     shape
         Rows and columns of the raw images, for a table of corners.
     """
@@ -99,7 +99,7 @@ def board(
     table
         Where to write the corners that were found on raw images (.csv).
     pictures
-        To plan.
+        How many pictures to plan.
     output
         File for the camera (.json), which lumigraph.metric.load reads.
     """

@@ -29,7 +29,7 @@ class Bench:
     Parameters
     ----------
     pixel_pitch
-        Of the sensor, such as '6.45 um'; the white image's own if left out.
+        Pixel pitch of the sensor, such as '6.45 um'; that of the white image's file if left out.
     separation
         Main lens to lenslets, such as '400 mm'.
     lenslet_distance
@@ -93,13 +93,13 @@ def calibrate(
     output
         Calibration file (.toml).
     layout
-        Found by itself if left out.
+        Arrangement of the lenslets; found automatically if left out.
     pitch
-        Distance of micro-images in pixels, if it is not found by itself.
+        Distance between micro-images in pixels, where the search needs it.
     rotation
-        Of the rows of lenslets from +x towards +y in degrees, if it is not found by itself.
+        Angle of the rows of lenslets from +x towards +y [degrees], where the search needs it.
     exact
-        Of a rectified picture: the pitch is --pitch, not nearly so, and the rotation --rotation, or none.
+        For a rectified picture: take --pitch and --rotation (0 if left out) as exact.
     explain
         Say what to turn on the bench: rotation, shift, distance, tilt and aperture, against --camera.
     overlay
@@ -119,7 +119,7 @@ def calibrate(
         )
     above_zero("--pitch", pitch, "px")
     if explain and bench.camera is None:
-        raise CalibrationError("--explain compares with what was meant: give the camera file, --camera FILE.")
+        raise CalibrationError("--explain compares with the design: give the camera file, --camera FILE.")
     if exact and pitch is None:
         raise CalibrationError("--exact takes the pitch as it is given: add --pitch, such as --pitch 19.")
     known = bench.lengths()

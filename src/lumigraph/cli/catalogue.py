@@ -9,9 +9,11 @@ if TYPE_CHECKING:
     from lumigraph.instruments import Instrument
 
 _FIGURES = {
-    "kind": (), "wavelength": ("wavelength",), "lenslets": ("lenslets",), "pitch": ("lenslet pitch",),
+    "kind": (), "wavelength": ("wavelength",), "lenslets": ("lenslets",),
+    "lenslet pitch": ("lenslet pitch",),
     "aperture": ("numerical aperture", "f-number"), "views": ("views per axis", "directions per axis"),
-    "resolves": ("finest period", "lateral resolution"), "pixels": ("pixels",), "of": ("pixel pitch",),
+    "resolves": ("finest period", "lateral resolution"), "pixels": ("pixels",),
+    "pixel pitch": ("pixel pitch",),
 }  # fmt: skip
 """Columns of the table, and the quantities of a camera that they take: the first that it has."""
 

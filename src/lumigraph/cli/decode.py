@@ -112,7 +112,7 @@ def decode(
         values += (Quantity("hot_pixels", int(bad.sum())), Quantity("invalid", lost))
     return Result(
         "Decode", "A raw image of a plenoptic camera 1.0, and its views.", views, tuple(lines), values,
-        lambda: _figures(picture, views), notes_of(ready), (output,),
+        lambda: _figures(picture, views), notes_of(ready, origin.camera), (output,),
     )  # fmt: skip
 
 

@@ -51,7 +51,7 @@ class Seen:
         Part of the raw image that counts, 'rows:columns' in pixels, such as '100-500:80-640'; the rest is
         neither fitted nor cut off.
     page
-        Of a stack: one, such as 3, some as 'first:last', or 'all'; counted from 0.
+        Pages of a stack, counted from 0: one, such as 3, several as 'first:last', or 'all'.
     """
 
     white: Path | None = None
@@ -64,7 +64,7 @@ class Seen:
     def check(self) -> None:
         """Refuse what can be seen to be wrong before anything is read."""
         if self.dark is not None and self.background is not None:
-            raise FormatError("--dark and --background say the same. Give one of them.")
+            raise FormatError("--dark and --background both give the dark level. Give one of them.")
         if self.background is not None and not (math.isfinite(self.background) and self.background >= 0):
             raise FormatError(f"--background is {self.background:g} but must be at least 0.")
 
@@ -134,11 +134,11 @@ class Way:
     Parameters
     ----------
     iterations
-        Of Richardson-Lucy, at most.
+        Most iterations of Richardson-Lucy.
     prior
         none; tv: even but for edges (total variation); wavelets: few coefficients that are not noise.
     strength
-        Of the prior: from 0.001 for bright images to 0.1 for dim ones.
+        Strength of the prior, from 0.001 for bright images to 0.1 for dim ones.
     accelerated
         Momentum: as likely in a third of the iterations.
     deviance
@@ -163,7 +163,7 @@ class Way:
         if self.iterations < 1:
             raise FormatError(f"--iterations is {self.iterations} but must be at least 1.")
         if self.strength is not None and self.prior == "none":
-            raise FormatError("--strength is that of a prior. Give --prior tv or --prior wavelets.")
+            raise FormatError("--strength needs a prior. Give --prior tv or --prior wavelets.")
         above_zero("--strength", self.strength)
         above_zero("--deviance", self.deviance)
 
@@ -394,7 +394,7 @@ def _figures(found: Any, raw: "PreparedImage", steps: "list[Step]") -> "Iterator
         yield Figure(plots.slices(found), "Planes through the brightest sample.")
     else:
         yield Figure(found.data[0] if isinstance(found, Volume) else found, "Reconstructed picture.")
-    yield Figure(raw, "Raw image.")
+    yield Figure(raw, "Raw image; white is its brightest pixel.", options={"white": float(raw.data.max())})
     if len(steps) > 1:
         numbers = [step.iteration for step in steps]
         drawn = plots.curves(

@@ -56,7 +56,7 @@ class Search:
     smooth
         Smooth the map where it is not sure, along the picture's edges; 1 is usual.
     views
-        Of a light field those that are used: all; star: the middle row, column and diagonals; cross: the
+        Views of a light field to use: all; star: the middle row, column and diagonals; cross: the
         middle row and column; row: the middle row. Fewer take less time.
     """
 
@@ -154,7 +154,7 @@ class Lengths:
     Parameters
     ----------
     focal_length
-        Of the main lens, such as '200 mm'.
+        Focal length of the main lens, such as '200 mm'.
     object_distance
         From the main lens to the plane in focus, such as '400 mm'; views of a camera 1.0 know it.
     """
@@ -331,8 +331,8 @@ def _result(found: "DepthMap", picture: Any, notes: tuple[str, ...], written: tu
     unit, (rows, columns) = "" if found.unit == "1" else found.unit, found.shape
     low, middle, high = (Quantity(name, float(v), unit) for name, v in zip(_ENDS, ends, strict=True))
     text = (
-        f"{found.quantity} of {rows} x {columns} places: {low} to {high}, median {middle}; half of them "
-        f"with a confidence above {np.median(trust):.2f}"
+        f"{found.quantity} of {rows} x {columns} places: {low} to {high}, median {middle}"
+        f"{_SIGN.get(found.quantity, '')}; half of them with a confidence above {np.median(trust):.2f}"
     )
     usual = found.usual_error
     expected = [] if usual is None else [Quantity("expected_error", usual, unit)]
@@ -355,12 +355,13 @@ def _result(found: "DepthMap", picture: Any, notes: tuple[str, ...], written: tu
 
 
 _ENDS = ("low", "median", "high")
+_SIGN = {"depth": ", above 0 behind the focused plane"}
 
 
 def _figures(found: "DepthMap", picture: Any) -> "Iterator[Figure]":
     from lumigraph import plots
 
-    yield Figure(plots.show(found.values), f"{found.quantity.capitalize()} [{found.unit}].", "Map")
+    yield Figure(plots.show(found), f"{found.quantity.capitalize()}, without the outermost 1 %.", "Map")
     yield Figure(plots.show(found.confidence), "Confidence, 0 to 1.", "Map")
     if found.error is not None:
         yield Figure(plots.show(found.error), f"Expected error [{found.unit}].", "Map")

@@ -28,7 +28,7 @@ class Web:
     web
         Open the designer in the browser: sliders, layout, trade-offs, the image of a point, at once.
     port
-        Of this computer, for its own browser only; any free one if left out.
+        Port of this computer, which only its own browser can reach; 0: any free one.
     no_open
         Do not open a browser.
     """

@@ -29,7 +29,7 @@ class Looked:
     region
         Rows and columns, such as '100:180, 40:120'; the whole picture if left out.
     pitch
-        Of the pixels, such as '5 um'; what the file says if left out, or frequencies in cycles per pixel.
+        Pixel pitch, such as '5 um'; the file's if left out. Without one, frequencies are in cycles per pixel.
     """
 
     region: str | None = None
@@ -70,7 +70,7 @@ class Dark:
     dark
         Pictures without light, two of each exposure time; the first two have the flats' own.
     exposure_time
-        Of each pair of darks, such as '10 ms': separates dark current from black level.
+        Exposure time of each pair of darks, such as '10 ms': separates dark current from black level.
     highest
         Largest number that the sensor reads; by the file's bit depth if left out.
     """

@@ -14,6 +14,9 @@ from lumigraph.units import parse
 COMMAND: ContextVar[tuple[str, ...]] = ContextVar("COMMAND", default=())
 """Words after "lumigraph" of the command that runs."""
 
+WARNED: ContextVar[list[str]] = ContextVar("WARNED")
+"""Warnings that it has printed."""
+
 
 @Parameter(name="*")
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ class Origin:
     camera
         Camera file, or a name of the catalogue: gives the calibration if no other is given, and depths.
     page
-        Of a stack of raw images: which one, counted from 0.
+        Page of a stack of raw images, counted from 0.
     """
 
     calibration: Path | None = None
@@ -121,7 +121,7 @@ class Origin:
         camera = self.described(use)
         if camera is None and self.calibration is None and self.white is None:
             raise CalibrationError(
-                "where the micro-images stand is not known. Give --calibration FILE or --white FILE."
+                "the positions of the micro-images are not known. Give --calibration FILE or --white FILE."
             )
         if devignette and self.white is None:
             raise CalibrationError("--devignette needs the white image. Give --white FILE.")
@@ -130,15 +130,17 @@ class Origin:
         )
 
 
-def notes_of(ready: "PreparedImage") -> tuple[str, ...]:
-    """What was done to a raw image, and what its views do not know."""
+def notes_of(ready: "PreparedImage", camera: str | None = None) -> tuple[str, ...]:
+    """What was done to a raw image, and what its views do not know; `camera` as it was given."""
     known = ready.calibration
     if known is None or (known.separation and known.lenslet_distance):
         return ready.notes
+    factors = "refocus factors are those of a main lens 20 times as far from the lenslets as the sensor"
+    if camera is None:
+        return (*ready.notes, f"the camera's lengths are not known: {factors}. Give --camera for its own")
     return (
         *ready.notes,
-        "the camera's lengths are not known: refocus factors are those of a main lens 20 times as far from "
-        "the lenslets as the sensor. For a camera's own, give --camera",
+        f"{camera} has no main lens: {factors}. For depths, give --camera to refocus and depth",
     )
 
 

@@ -37,12 +37,12 @@ class Focus:
     Parameters
     ----------
     alpha
-        One or more numbers.
+        Refocus factor α'; may be repeated.
     alphas
-        A range 'first:last:count', such as 0.9:1.1:9.
+        A range of refocus factors 'first:last:count', such as 0.9:1.1:9.
     depth
-        From the focused plane, such as '5 mm' (farther) or '-5 um'; may be repeated; needs --camera, which
-        may be a microscope.
+        Depth to focus on, from the focused plane, such as '5 mm' (farther) or '-5 um'; may be repeated; needs
+        --camera, which may be a microscope.
     """
 
     alpha: Annotated[list[float] | None, Parameter(consume_multiple=True)] = None
@@ -52,7 +52,7 @@ class Focus:
     def check(self, camera: "Decoded | None") -> None:
         """Refuse what can be seen to be wrong before anything is read."""
         if not (self.alpha or self.alphas or self.depth):
-            raise FormatError("where to focus is not known. Give --alpha 0.95 or --alphas 0.9:1.1:9.")
+            raise FormatError("no focus is given. Give --alpha 0.95 or --alphas 0.9:1.1:9.")
         if self.depth and camera is None:
             raise FormatError("--depth needs the camera's geometry. Give --camera FILE, or --alpha.")
         for alpha in self.alpha or []:
@@ -92,11 +92,11 @@ class Quality:
     aperture
         Part of the aperture's width that is used: smaller is sharper in depth, and noisier.
     shape
-        Of the aperture: all views, those inside a circle, or those in a ring.
+        Shape of the aperture: all views, those inside a circle, or those in a ring.
     oversample
-        Pixels per lenslet: out of the lenslets' plane, views fill in between; for shear.
+        Pixels per lenslet, for shear; away from the focused plane the views fill in the detail.
     interpolation
-        Between lenslets; for shear.
+        Interpolation between lenslets, for shear.
     """
 
     method: Literal["shear", "fourier"] = "shear"
@@ -145,7 +145,7 @@ def refocus(
     quality: Quality = Quality(),
     common: Reported = REPORTED,
 ) -> Result:
-    """Focus afresh on one or more depths.
+    """Refocus on one or more depths.
 
     Example: `lumigraph refocus views.zarr --alpha 0.95 -o near.png`
 
@@ -176,7 +176,7 @@ def refocus(
         Quantity("aperture", quality.aperture), Quantity("aperture_shape", quality.shape),
     )  # fmt: skip
     return Result(
-        "Refocus", "Pictures focused afresh; α' above 1 is farther.", images,
+        "Refocus", "Pictures refocused; α' above 1 is farther.", images,
         tuple(f"alpha {alpha:g}: {shape[0]} x {shape[1]} px" for alpha in alphas), values,
         lambda: _figures(images, alphas), notes, tuple(_write(images, alphas, output)),
     )  # fmt: skip
@@ -197,7 +197,7 @@ def _light_field(path: Path, origin: Origin) -> "tuple[LightField, tuple[str, ..
     if isinstance(found, LightField):
         return found, ()
     ready = origin.prepared(found, use="decode")
-    return preparation.decode(ready), notes_of(ready)
+    return preparation.decode(ready), notes_of(ready) if origin.camera is None else ready.notes
 
 
 def _check_output(output: Path, count: int) -> None:

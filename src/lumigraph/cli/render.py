@@ -41,17 +41,17 @@ class Tiles:
     patches
         A range 'first:last:count' of sizes: one picture focused on each plane.
     depth
-        Of what shall be seamless, from the focused plane of --camera, such as '5 mm' (farther) or
-        '-5 mm' (nearer); or 'auto': found for each lenslet, so that everything is sharp.
+        Depth to render without seams, from the focused plane of --camera, such as '5 mm' (farther) or
+        '-5 mm' (nearer); or 'auto': measured for each lenslet, so that everything is sharp.
     blend
         Mix all micro-images that show a place: no seams, and what is at another depth is blurred.
     samples
         Samples of the picture per lenslet; the size of the patch if left out.
     finer
-        Times as fine as the pixels of a patch, from all micro-images that show a place: 2 or more.
+        Finer sampling than the pixels of a patch, 2 times or more, from all micro-images that show a place.
     smoothness
-        With --finer: 0.02 resolves most; 0.1 to 0.3 where a noisy raw image or three kinds of lenslets
-        leave a mesh.
+        Smoothness for --finer: 0.02 resolves most; 0.1 to 0.3 removes the mesh that a noisy raw image or
+        three kinds of lenslets leave.
     focus
         For three kinds of lenslets without --camera: the patch at which each is sharp, in pixels,
         such as '-13.5,-10.5,-7.5'.
@@ -86,9 +86,13 @@ class Tiles:
                     "the patches' size is not known. Give --patch PIXELS, --camera FILE or --depth auto."
                 )
             if self.depth is not None and (camera is None or self.patch is not None):
-                raise FormatError("--depth says the patch of a camera. Give --camera FILE, and no --patch.")
+                raise FormatError(
+                    "--depth needs a camera, whose patch follows from it. Give --camera FILE, and no --patch."
+                )
         if sum(x is not None for x in (self.patch, self.patches, self.depth)) > 1:
-            raise FormatError("--patch, --patches and --depth say the same. Give one of them.")
+            raise FormatError(
+                "--patch, --patches and --depth all set the size of the patches. Give one of them."
+            )
         self.chosen_focus()
         if self.patches is not None:
             range_of("--patches", self.patches)
@@ -139,15 +143,15 @@ class Look:
     Parameters
     ----------
     all_in_focus
-        Sharp at every depth; of a raw image of a camera 2.0 it is the same as --depth auto.
+        Make everything sharp; for a raw image of a camera 2.0 the same as --depth auto.
     alphas
-        Refocus factors 'first:last:count' that are tried; found by the views' disparities if left out.
+        Refocus factors to try, 'first:last:count'; taken from the views' disparities if left out.
     path
         Pictures from a point of view that moves over the aperture.
     frames
-        Pictures of the path.
+        Number of pictures along the path.
     radius
-        Of the path, over that of the aperture.
+        Radius of the path, relative to the aperture's.
     still
         Refocus factor of the plane that does not move.
     """
@@ -162,7 +166,7 @@ class Look:
     def check(self) -> None:
         """Refuse options that contradict each other."""
         if self.all_in_focus == (self.path is not None):
-            raise FormatError("of views, give --all-in-focus or --path circle, or use 'lumigraph refocus'.")
+            raise FormatError("for views, give --all-in-focus or --path circle, or use 'lumigraph refocus'.")
         if not 1 <= self.frames <= _MOST_FRAMES:
             raise FormatError(f"--frames is {self.frames} but must be from 1 to {_MOST_FRAMES}.")
         if not 0 < self.radius <= 1:
@@ -206,7 +210,9 @@ def render(
     if depth_map is not None:
         files.check_output(depth_map, (".tif", ".tiff", ".pfm", ".zarr"))
         if not (tiles.is_auto or look.all_in_focus):
-            raise FormatError("--map needs a map that is found. Give --depth auto or --all-in-focus.")
+            raise FormatError(
+                "--map writes a map, but none is computed. Give --depth auto or --all-in-focus."
+            )
     if look.all_in_focus and not tiles.is_given:
         tiles = Tiles(depth="auto")
     if not look.all_in_focus and look.path is None:

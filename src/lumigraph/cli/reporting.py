@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cyclopts import Parameter
 
 from lumigraph.cli import console, files
-from lumigraph.cli.options import COMMAND, Common
+from lumigraph.cli.options import COMMAND, WARNED, Common
 from lumigraph.core.result import Result
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def telling(verb: Verb) -> Verb:
 
 def tell(common: Common, result: Result) -> None:
     """Print a result as text or as JSON, and write its report where one is asked for."""
-    text, values = result.text(), result.values()
+    text, values = result.text(WARNED.get([])), result.values()
     if isinstance(common, Reported) and common.report is not None:
         _page(result).write(common.report)
         text, values = f"{text}\nwritten {common.report}", {**values, "report": str(common.report)}

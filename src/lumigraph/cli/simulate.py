@@ -48,15 +48,15 @@ class Light:
         incoherent: like every lit scene; coherent: one plane wave; snapshots: random phases, many
         times; tilted: plane waves from many directions.
     accuracy
-        Relative rms error of incoherent light that is asked for, 0.01 to 0.00001; 0.001 if left out. The raw
-        image says what was reached, and a warning where that is more.
+        Relative rms error to reach with incoherent light, 0.01 to 0.00001; 0.001 if left out. The raw image
+        records the error reached; a warning says when that is more.
     count
         Snapshots (100 if left out) or tilted waves (64) to add up: more of them, less speckle.
     na
         Numerical aperture of the tilted waves; all directions if left out.
     wavelength
-        In the place of the camera's own, such as '550 nm'; may be given several times, which the sensor
-        sees as one; three with --colours are red, green and blue.
+        Wavelength instead of the camera's own, such as '550 nm'. May be repeated: the sensor sees the sum;
+        with --colours three are red, green and blue.
     colours
         rgb: a colour raw image; or a Bayer pattern, such as RGGB. The scene's pictures keep their colours.
     """
@@ -116,7 +116,7 @@ class Stage:
         white, usaf1951, siemens_star, gratings, slanted_edge, edge, pinhole, chessboard, photo, or a picture
         file; may be given several times.
     depth
-        Of each scene from the focused plane, such as '10 mm' (farther) or '-10 mm' (nearer).
+        Depth of each scene from the focused plane, such as '10 mm' (farther) or '-10 mm' (nearer).
     point
         A point of light at 'y, x' or 'y, x, depth' in object space, such as '0 mm, 1 mm, 5 mm'; may be
         given several times.
@@ -175,7 +175,7 @@ def simulate(
     output
         Raw image (.tiff, .png, .zarr, .zarr.zip).
     seed
-        Of the random numbers: the same seed gives the same raw image.
+        Seed of the random numbers: the same seed gives the same raw image.
     noise
         Expose the sensor: photon noise, read noise, whole numbers of its bits.
     """

@@ -54,10 +54,10 @@ def sweep(
     camera
         Camera file (TOML), or the name of a bundled one.
     vary
-        A key of the camera file and its values: 'first:last:count', or some, parted by commas. May be
-        repeated: every combination is taken.
+        A key of the camera file and its values: 'first:last:count', or several, separated by commas.
+        May be repeated: every combination is computed.
     measure
-        Names of quantities, parted by commas, as 'lumigraph design' prints them; all if left out.
+        Names of quantities as 'lumigraph design' prints them, separated by commas; all if left out.
     output
         Table (.csv); lengths in metres.
     workers

@@ -31,7 +31,7 @@ class Shown(Origin):
     camera
         Camera file, or a name of the catalogue, of the raw image.
     patch
-        Of a camera 2.0 [px]: pictures with patches about this size. Found in the raw image if left out.
+        For a camera 2.0: size of the patches [px]; found in the raw image if left out.
     """
 
     patch: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
@@ -45,14 +45,14 @@ class Page:
     Parameters
     ----------
     port
-        Of this computer, for its own browser only; any free one if left out.
+        Port of this computer, which only its own browser can reach; 0: any free one.
     no_open
         Do not open a browser.
     export
         Write the page instead: into one file (.html), which works from disk and can be sent to others, or
         into a folder for any web server, in tiles, so that things of many gigabytes open at once.
     quality
-        Of the exported views, 1 to 99; 100 keeps every number, in files several times as large.
+        Quality of the exported views, 1 to 99; 100 is lossless, in files several times as large.
     serve_folder
         FILE is a folder that --export wrote: serve its files.
     """

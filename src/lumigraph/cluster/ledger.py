@@ -118,7 +118,7 @@ class Ledger:
             found = json.loads(path.read_bytes())
             return {name: found[name] for name in ("format", "what", "items")}
         except OSError:
-            raise FormatError(f"{self.folder} is no ledger of a job. Check the path.") from None
+            raise FormatError(f"{self.folder} is not the ledger of a job. Check the path.") from None
         except (ValueError, KeyError, TypeError) as error:
             raise FormatError(f"{path} is damaged ({error}). Remove the ledger and the output.") from None
 
@@ -175,9 +175,7 @@ class Ledger:
         """
         with _locked(self.folder / "starts", first, max(last - first, 1)) as mine:
             if not mine:
-                raise FormatError(
-                    f"{self.folder} is being worked on by another start. Wait for it, or stop it first."
-                )
+                raise FormatError(f"{self.folder} is in use by another run. Wait for it, or stop it first.")
             yield
 
     @contextmanager

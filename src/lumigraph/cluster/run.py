@@ -272,7 +272,9 @@ def _do(group: Group, numbers: list[int], done: int, total: int, progress: Progr
             return
         numbers = busy
         time.sleep(_PATIENCE)
-    raise LumigraphError(f"{len(numbers)} frames are still worked on by others. Start again when they end.")
+    raise LumigraphError(
+        f"{len(numbers)} frames are still being computed by other runs. Start again when they have ended."
+    )
 
 
 def _check(

@@ -187,7 +187,7 @@ class Calibration:
         )
 
     def check_fits(self, shape: tuple[int, int]) -> None:
-        """Refuse a raw image of another size.
+        """Refuse a picture of another size.
 
         Raises
         ------
@@ -196,8 +196,9 @@ class Calibration:
         """
         if tuple(shape) != self.shape:
             raise CalibrationError(
-                f"the raw image has {shape[0]} x {shape[1]} pixels but the calibration was made on "
-                f"{self.shape[0]} x {self.shape[1]}. Use the white image taken with the same camera settings."
+                f"the picture has {shape[0]} x {shape[1]} pixels but its calibration is for "
+                f"{self.shape[0]} x {self.shape[1]}. Calibrate on a white image with the same settings; "
+                "if it is a camera file's, correct its [sensor] shape."
             )
 
     def plot(self, white: Any, **options: Any) -> Any:

@@ -42,7 +42,8 @@ class RawImage(Noun[A]):
     GeometryError
         The data's shape is not (y, x) or (y, x, c), or is empty.
     FormatError
-        Data that is no array of numbers; a bit depth, Bayer pattern or metadata that a raw image cannot have.
+        Data that is not an array of numbers; a bit depth, Bayer pattern or metadata that no raw image can
+        have.
     """
 
     axes: ClassVar[str] = "yx"

@@ -1,6 +1,6 @@
 """What a verb found: `Result`, which text, JSON, reports and notebooks read."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,8 @@ class Quantity:
     ('6.5 µm', 'spacing')
     >>> str(Quantity("slope", 2.0, "px", (1.9, 2.2))), str(Quantity("distance", 0.05, "m", (0.049, 0.052)))
     ('2 px (1.9 to 2.2)', '50 mm (49 mm to 52 mm)')
+    >>> str(Quantity("shape", (5, 150, 150), "px")), str(Quantity("spacing", (5e-6, 3e-7, 3e-7), "m"))
+    ('5 x 150 x 150 px', '5 µm, 300 nm, 300 nm')
     """
 
     name: str
@@ -40,10 +42,16 @@ class Quantity:
         return self.name.removesuffix("_px").replace("_", " ")
 
     def __str__(self) -> str:
-        several = isinstance(self.value, tuple | list)
         shown = self._one if self.unit == "m" else self._bare
-        text = " to ".join(map(self._one, _ends(self.value))) if several else self._one(self.value)
+        text = self._several() if isinstance(self.value, tuple | list) else self._one(self.value)
         return text if self.interval is None else f"{text} ({' to '.join(map(shown, self.interval))})"
+
+    def _several(self) -> str:
+        if self.name == "shape":
+            return f"{' x '.join(map(str, self.value))} {self.unit}".rstrip()
+        if len(self.value) > 3:
+            return f"{self._one(self.value[0])} to {self._one(self.value[-1])}"
+        return ", ".join(map(self._one, self.value))
 
     def _one(self, value: Any) -> str:
         if self.unit == "m" and (value is None or isinstance(value, float)):
@@ -55,10 +63,6 @@ class Quantity:
     @staticmethod
     def _bare(value: Any) -> str:
         return f"{value:.5g}" if isinstance(value, float) else str(value)
-
-
-def _ends(values: Any) -> list[Any]:
-    return list(values) if len(values) < 3 else [values[0], values[-1]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,9 +122,9 @@ class Result:
     written: tuple[Path, ...] = ()
     extra: Mapping[str, Any] = field(default_factory=dict)
 
-    def text(self) -> str:
-        """What people read on a terminal."""
-        notes = (f"note: {note}" for note in self.notes)
+    def text(self, known: Sequence[str] = ()) -> str:
+        """What people read on a terminal, without the notes that they have read already."""
+        notes = (f"note: {note}" for note in self.notes if note not in known)
         return "\n".join((*self.headline, *notes, *(f"written {path}" for path in self.written)))
 
     def values(self) -> dict[str, Any]:

@@ -159,9 +159,9 @@ def _read(path: Path) -> dict[str, np.ndarray] | None:
         )
         return None
     except (FormatError, OSError) as error:
-        raise FormatError(f"{path} is no checkpoint of a deconvolution. Give another name.") from error
+        raise FormatError(f"{path} is not a checkpoint of a deconvolution. Give another name.") from error
     if not _sound(content):
-        raise FormatError(f"{path} is no checkpoint of a deconvolution. Give another name.")
+        raise FormatError(f"{path} is not a checkpoint of a deconvolution. Give another name.")
     return content
 
 

@@ -78,7 +78,7 @@ def metric(
         image, image_per_value = _image_of_patches(found, _calibration(source))
         focused = object_distance
         if focused is None:
-            raise GeometryError("patches do not tell where the camera is focused. Give object_distance= [m].")
+            raise GeometryError("patches do not say where the camera is focused. Give object_distance= [m].")
     else:
         views = _views(source)
         found = alpha_of(found, views)

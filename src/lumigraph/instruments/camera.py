@@ -255,7 +255,7 @@ class Camera(Instrument):
         if spectrum is None:
             return self._planes(optics, planes, samples_per_lenslet, making)
         if len(spectrum.weights[0]) != 1:
-            raise GeometryError("an operator is of one channel but the spectrum has three. Take one of them.")
+            raise GeometryError("the operator has one channel but the spectrum has three. Take one of them.")
         maps, count = [], len(spectrum.wavelengths)
         for number, wavelength in enumerate(spectrum.wavelengths):
             told = replace(making, progress=part(progress, number, count))

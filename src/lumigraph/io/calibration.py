@@ -117,7 +117,7 @@ def _check_kind(path: Path, found: dict[str, Any]) -> None:
             "is asked for; from Python, lumigraph.instruments.load_camera(path)."
         )
     raise FormatError(
-        f'{path} is not a calibration: it has no kind = "{KIND}". Make one by `lumigraph calibrate`.'
+        f'{path} is not a calibration: it has no kind = "{KIND}". Make one with `lumigraph calibrate`.'
     )
 
 

@@ -194,7 +194,7 @@ def _dataset(path: Path, file: h5py.File, name: str) -> h5py.Dataset:
             raise FormatError(f"{path} has no dataset {name!r}. It holds {near}.")
         node = node[part]
     if not isinstance(node, h5py.Dataset) or node.dtype.kind not in "iufb" or not 2 <= node.ndim <= 5:
-        raise FormatError(f"{path}: {name} is no array of numbers with 2 to 5 axes.")
+        raise FormatError(f"{path}: {name} is not an array of numbers with 2 to 5 axes.")
     return node
 
 
@@ -206,7 +206,7 @@ def _values(path: Path, dataset: h5py.Dataset, max_pixels: int) -> np.ndarray:
     plist, needed = dataset.id.get_create_plist(), prod(dataset.shape) * dataset.dtype.itemsize
     filters = {plist.get_filter(k)[0] for k in range(plist.get_nfilters())}
     if not filters <= _FILTERS:
-        raise FormatError(f"{path} is packed by filters {sorted(filters)}; only Deflate is read.")
+        raise FormatError(f"{path} is packed with filters {sorted(filters)}; only Deflate is read.")
     stored = min(dataset.id.get_storage_size(), path.stat().st_size)
     source.check_stored(path, needed, stored, 1 if not filters else source.MOST_INFLATED)
     source.check_held(path, needed, stored, max_pixels)

@@ -225,8 +225,8 @@ def _bare(path: Path, max_pixels: int) -> RawImage:
         (shape, depth, order, bayer), pitch = _BARE[size], None
     else:
         raise FormatError(
-            f"it is no container, and its {size} bytes are no frame of a Lytro F01 ({min(_BARE)}) or Illum "
-            f"({max(_BARE)}). Put its metadata beside it, as {path.stem}.txt."
+            f"it is not a container, and its {size} bytes are not a frame of a Lytro F01 ({min(_BARE)}) or "
+            f"Illum ({max(_BARE)}). Put its metadata beside it, as {path.stem}.txt."
         )
     source.check_size(path, shape, max_pixels)
     count = shape[0] * shape[1]

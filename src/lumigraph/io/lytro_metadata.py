@@ -72,9 +72,9 @@ def parse(content: bytes) -> dict[str, Any]:
     try:
         found = json.loads(content.rstrip(b"\0").decode("utf-8"))
     except (ValueError, RecursionError) as error:
-        raise FormatError(f"its metadata is no JSON: {str(error)[:80]}.") from error
+        raise FormatError(f"its metadata is not JSON: {str(error)[:80]}.") from error
     if not isinstance(found, dict):
-        raise FormatError("its metadata is no JSON object.")
+        raise FormatError("its metadata is not a JSON object.")
     return found
 
 
@@ -89,7 +89,7 @@ def frame(found: dict[str, Any]) -> Frame:
     shape = whole(found, "image.height"), whole(found, "image.width")
     packing = field(found, "image.rawDetails.pixelPacking") or field(found, "image.pixelPacking")
     if not isinstance(packing, dict):
-        raise FormatError("its metadata does not tell how the pixels are packed (pixelPacking).")
+        raise FormatError("its metadata does not say how the pixels are packed (pixelPacking).")
     order = packing.get("endianness", "little")
     mosaic = field(found, "image.rawDetails.mosaic") or field(found, "image.mosaic")
     first = mosaic.get("upperLeftPixel") if isinstance(mosaic, dict) else None

@@ -78,7 +78,7 @@ def level(ome: Any) -> tuple[str, tuple[str, ...], dict[str, tuple[float, float]
         }
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         raise FormatError(
-            f"its OME-Zarr metadata is no multiscales image of version 0.5: {error!r}."
+            f"its OME-Zarr metadata is not a multiscales image of version 0.5: {error!r}."
         ) from error
     if not re.fullmatch(r"[A-Za-z0-9_\-]+(/[A-Za-z0-9_\-]+)*", place) or axes[-3:] != ("z", "y", "x"):
         raise FormatError(f"its OME-Zarr axes are {axes} at {place[:40]!r}; only [t, c,] z, y, x are read.")

@@ -45,7 +45,7 @@ def load(
     path = source.regular_file(path)
     if shape is None:
         raise FormatError(
-            f"{path} does not tell how large the raw image is. Call lumigraph.open(path, shape=raw.shape)."
+            f"{path} does not say how large the raw image is. Call lumigraph.open(path, shape=raw.shape)."
         )
     shape = checks.shape("shape", shape)
     source.check_size(path, shape, max_pixels)
@@ -91,7 +91,7 @@ def _root(path: Path) -> Any:
     except (ElementTree.ParseError, DefusedXmlException, ValueError, LookupError) as error:
         raise FormatError(f"{path} is damaged XML: {error}. Copy it again.") from error
     if root.tag != "RayCalibData":
-        raise FormatError(f"{path} is no Raytrix calibration: it begins with <{str(root.tag)[:40]}>.")
+        raise FormatError(f"{path} is not a Raytrix calibration: it begins with <{str(root.tag)[:40]}>.")
     return root
 
 

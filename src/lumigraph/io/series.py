@@ -243,7 +243,7 @@ def _described(path: Path) -> dict[str, Any]:
             return found
     except (OSError, ValueError, KeyError, TypeError):
         pass
-    raise FormatError(f"{path} is no series of frames. Check the path.")
+    raise FormatError(f"{path} is not a series of frames. Check the path.")
 
 
 def _leading(frame: Frame) -> str:

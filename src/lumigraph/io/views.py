@@ -174,7 +174,7 @@ def _files(path: Path) -> tuple[Files, tuple[float, float]]:
     """Picture of each camera (row, column), and the spacing of the cameras (down, right)."""
     path = source.existing(path)
     if not path.is_dir():
-        raise FormatError(f"{path} is no folder of views, and has no extension that says what it is.")
+        raise FormatError(f"{path} is not a folder of views, and has no extension that says what it is.")
     names = sorted(child.name for child in path.iterdir())
     if len(names) > 10 * _MOST:
         raise FormatError(f"{path} holds {len(names)} files, too many for views. Check the path.")

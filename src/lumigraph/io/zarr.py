@@ -153,7 +153,7 @@ def _noun(path: Path, group: zarr.Group, max_pixels: int) -> RawImage | LightFie
     if "lumigraph" not in found:
         if "ome" not in found:
             raise FormatError(
-                f"{path} was not written by lumigraph and is no OME-Zarr 0.5. Only those stores are read."
+                f"{path} was not written by lumigraph and is not OME-Zarr 0.5. Only those stores are read."
             )
         name, axes, scales = ngff.level(found["ome"])
         return ngff.volume(_values(path, group, name, max_pixels), axes, scales)

@@ -113,7 +113,7 @@ def check_shard(path: Path, file: Path, array: zarr.Array[Any]) -> None:
     for start, size in zip(places[::2], places[1::2], strict=True):
         whole = start + size <= len(content) - index
         if not whole or (_declared(content[start : start + size]) or limit + 1) > limit:
-            raise FormatError(f"{path} is damaged: {file.name} of it is not whole. Make that frame again.")
+            raise FormatError(f"{path} is damaged: {file.name} in it is incomplete. Make that frame again.")
 
 
 def _contents(path: Path, name: str, most: int) -> Iterator[bytes]:

@@ -194,7 +194,9 @@ def _again(first: Problem, misfit: np.ndarray) -> tuple[Problem, np.ndarray]:
     kept = np.abs(misfit).max(axis=1) < _WILD * 1.48 * typical[kind]
     corners = first.corners[kept]
     if len(np.unique(first.frame[kept])) != first.frames:
-        raise CalibrationError("the corners of a picture fit nothing. Leave it out, or number them again.")
+        raise CalibrationError(
+            "the corners of a picture fit no position of the board. Leave it out, or number them again."
+        )
     sight = corners.sights()
     noise = Noise.of(misfit[kept], sight, corners.kind)
     return replace(first, corners=corners, frame=first.frame[kept], noise=noise, sight=sight), kept
@@ -206,7 +208,9 @@ def _covariance(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
     jacobian = problem.jacobian(unknowns)
     scale = np.linalg.norm(jacobian, axis=0)
     if not scale.all():
-        raise CalibrationError("a number of the camera changes nothing that was seen. Use more pictures.")
+        raise CalibrationError(
+            "one of the camera's numbers has no effect on these corners. Use more pictures."
+        )
     inner = np.linalg.inv((jacobian / scale).T @ (jacobian / scale))
     inner /= np.outer(scale, scale)
     out = np.zeros((len(problem.camera.numbers) + len(unknowns) - camera, len(unknowns)))

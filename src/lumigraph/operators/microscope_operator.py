@@ -354,9 +354,7 @@ def _check_order(depths: tuple[float, ...]) -> None:
         raise GeometryError("there are no depths. Give at least one, such as 0.0 for the focused plane.")
     steps = np.diff(depths)
     if len(steps) and not ((steps > 0).all() or (steps < 0).all()):
-        raise GeometryError(
-            "depths must ascend or descend, and differ. Sort them, and leave out what is double."
-        )
+        raise GeometryError("depths must ascend or descend, and differ. Sort them, and leave out duplicates.")
 
 
 def _suits_frequencies(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> bool:

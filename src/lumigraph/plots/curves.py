@@ -63,8 +63,8 @@ def curves(
     for name, where in (marks or {}).items():
         axes.axvline(where, color=MARK_COLOUR, lw=1.0, ls="--", zorder=0)
         axes.annotate(
-            name, (where, 0.99), xycoords=("data", "axes fraction"), rotation=90, fontsize=8,
-            ha="right", va="top", color=MARK_COLOUR,
+            name, (where, 0.99), (-3, 0), xycoords=("data", "axes fraction"), textcoords="offset points",
+            rotation=90, fontsize=8, ha="right", va="top", color=MARK_COLOUR,
         )  # fmt: skip
     if len(values) > 1 or any(values):
         axes.legend(fontsize=9, framealpha=0.9)

@@ -115,7 +115,7 @@ def _placed(
     elif told is not None:
         found, notes = told, ["the lattice is that of the camera file"]
     else:
-        return None, ["where the micro-images stand is not known"]
+        return None, ["the positions of the micro-images are not known"]
     found.check_fits(raw.shape)
     if found.by_maker:
         found = aligned(found, raw)
@@ -219,7 +219,8 @@ def of_raw(function: Callable[Concatenate[RawImage, Calibration, Options], Made]
         place = calibration or raw.calibration
         if place is None:
             raise CalibrationError(
-                "where the micro-images stand is not known. Give a calibration, or prepare(raw, white=...)."
+                "the positions of the micro-images are not known. Give a calibration, or use "
+                "prepare(raw, white=...)."
             )
         return function(raw, place, *args, **options)
 

@@ -40,7 +40,9 @@ def fresnel(field: Field, distance: float | Array, pad: float, grid: Grid | None
         return _differentiable(field, distance, grid)
     distance = arrays.number(distance)
     if distance == 0:
-        raise SamplingError("fresnel cannot go 0 m: its output pitch would be 0 m. Use another method.")
+        raise SamplingError(
+            "fresnel cannot propagate over 0 m: its output pitch would be 0 m. Use another method."
+        )
     step = _onto_grid if grid is not None else _onto_own_grid
     return step(field, distance, grid or one_step_grid(field.grid, distance, field.wavelength))
 

@@ -90,7 +90,7 @@ def read(path: str | os.PathLike[str], *, mapped: bool = False) -> dict[str, np.
         end = bytes(whole[-len(_WORD) - _DIGITS :])
         if end != _WORD + b"%08x" % _checksum(whole[:-_DIGITS]):
             if end.startswith(_WORD) or _WORD in bytes(whole[:256]):  # one damage spares one of the two
-                raise DamagedError(f"{path} is damaged: its checksum is another one. Remove it.")
+                raise DamagedError(f"{path} is damaged: its checksum does not match. Remove it.")
             raise FormatError(f"{path} is not a sealed file of arrays. Give another name.")
         try:
             with zipfile.ZipFile(file) as archive:
