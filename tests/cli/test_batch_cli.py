@@ -92,8 +92,8 @@ def test_ctrl_c_says_what_is_done(views, tmp_path, capsys, monkeypatch):
     ("line", "told"),
     [
         ("batch refocs v.zarr -o o.zarr", "batch takes simulate"),
-        ("batch refocus --alpha 1 -o o.zarr", "which frames is not known"),
-        ("batch refocus nothing*.zarr --alpha 1 -o o.zarr", "no file is like it"),
+        ("batch refocus --alpha 1 -o o.zarr", "no frames are given"),
+        ("batch refocus nothing*.zarr --alpha 1 -o o.zarr", "no file matches it"),
         ("batch refocus {v} --alpha 1", "where the results go"),
         ("batch refocus {v} --alpha 1 -o o.csv", "Use one of .zarr"),
         ("batch refocus {v} --alpa 1 -o {o}", "--alpa"),
@@ -103,7 +103,7 @@ def test_ctrl_c_says_what_is_done(views, tmp_path, capsys, monkeypatch):
         ("batch refocus {v} --alpha 1 -o {o} --workers 1 --scheduler tcp://a:1", "Give one of them"),
         ("batch refocus {v} --alpha 1 -o {o} --sbatch x", "--sbatch is for"),
         ("batch status", "status takes the output"),
-        ("batch status {v}", "is no ledger"),
+        ("batch status {v}", "is not the ledger"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_before_any_work(views, tmp_path, capsys, line, told):

@@ -146,7 +146,7 @@ def test_a_checkpoint_of_the_wrong_types_is_refused(name, value, raw, tmp_path):
     path = tmp_path / "state.npz"
     lg.deconvolve(raw, OPERATOR, 2, checkpoint=path)
     store.write(path, {**store.read(path), name: value})
-    with pytest.raises(lg.FormatError, match="no checkpoint of a deconvolution"):
+    with pytest.raises(lg.FormatError, match="not a checkpoint of a deconvolution"):
         lg.deconvolve(raw, OPERATOR, 2, checkpoint=path)
 
 

@@ -172,7 +172,9 @@ def test_a_folder_and_a_pipe_are_not_files(tmp_path):
 def test_an_unknown_extension_lists_the_known_ones(tmp_path):
     (tmp_path / "a.bmp").write_bytes(b"BM")
     for act in (io.open, lambda path: io.save(np.ones((2, 2)), path)):
-        with pytest.raises(FormatError, match=r"Known extensions are .gif, .h5, .hdf5, .ini, .jpeg, .jpg, .json, .lfp"):
+        with pytest.raises(
+            FormatError, match=r"Known extensions are .gif, .h5, .hdf5, .ini, .jpeg, .jpg, .json, .lfp"
+        ):
             act(tmp_path / "a.bmp")
 
 

@@ -208,7 +208,7 @@ def test_an_ome_zarr_by_another_program_is_a_volume(tmp_path):
     with pytest.raises(FormatError, match=r"at '../a.zarr/s0'; only"):
         io.open(tmp_path / "p.zarr")
     foreign(tmp_path / "n.zarr", AXES, (3, 4, 5), [1, 1, 0])
-    with pytest.raises(FormatError, match=r"x is 0 m but must be above 0|no multiscales image"):
+    with pytest.raises(FormatError, match=r"x is 0 m but must be above 0|not a multiscales image"):
         io.open(tmp_path / "n.zarr")
 
 
