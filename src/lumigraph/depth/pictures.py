@@ -113,7 +113,7 @@ def _chosen(count: int) -> np.ndarray:
 
 def _even(data: np.ndarray, middle: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
     """Square roots of the views (v, u, c, y, x), each as bright as the middle one; and which are lit."""
-    data = np.maximum(data, 0)
+    np.maximum(data, 0, out=data)
     white = float(np.quantile(data[middle], 0.999)) or 1.0
     level = data.mean((2, 3, 4))
     lit = level > _DARK * level[middle]
@@ -125,7 +125,9 @@ def _even(data: np.ndarray, middle: tuple[int, int]) -> tuple[np.ndarray, np.nda
             "the middle, or decode a lit raw image."
         )
     gain = np.where(lit, level[middle] / np.where(lit, level, 1), 0) / white
-    return np.sqrt(data * gain[:, :, None, None, None].astype(np.float32)), lit
+    for v, u in np.ndindex(lit.shape):
+        data[v, u] = np.sqrt(data[v, u] * np.float32(gain[v, u])) if lit[v, u] else 0
+    return data, lit
 
 
 def noise_of(picture: np.ndarray) -> float:
