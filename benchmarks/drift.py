@@ -237,7 +237,7 @@ def wrong(right: Calibration) -> dict[str, Calibration]:
 
 SOURCES: dict[str, tuple[Callable[[int], Pair], int]] = {
     "drawn": (drawn, 400),
-    "simulated": (simulated, 120),
+    "simulated": (simulated, 240),
     "real": (real, len(REAL)),
 }
 """Pairs by number, and how many are looked at unless told."""

@@ -203,6 +203,7 @@ def test_drawn_pairs_are_right_or_wrong_as_they_were_drawn(number):
     assert [row.said for row in rows] == (["nothing"] * 3 if number == 0 else ["fits", "warned", "warned"])
 
 
-@pytest.mark.parametrize("number", [0, 3])  # points, a grating
+# Points, a grating, a chart that repeats more strongly than the lattice, a texture behind hardly any gaps.
+@pytest.mark.parametrize("number", [0, 3, 68, 69])
 def test_simulated_pairs_are_right_or_wrong_as_they_were_made(number):
     assert not [row for row in judged("simulated", number) if is_bad(row)]

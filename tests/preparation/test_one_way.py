@@ -122,12 +122,12 @@ def test_a_raw_image_alone_says_what_it_implies_about_the_camera_file(bench):
         return scope.replace(sensor={"pixel_pitch": pixel, "shape": raw.shape})
 
     notes = lg.prepare(raw, camera=seen(1.0)).notes
-    assert any("a pitch of 12.398" in note and "they agree" in note for note in notes)
-    with pytest.warns(SamplingWarning, match=r"every 12\.398.*This would be a relay of 1\.02 instead of 1\."):
+    assert any("a pitch of 12.399" in note and "they agree" in note for note in notes)
+    with pytest.warns(SamplingWarning, match=r"every 12\.399.*This would be a relay of 1\.02 instead of 1\."):
         ready = lg.prepare(raw, camera=seen(1.02))
     assert any("The camera's lattice is used" in note for note in ready.notes)
     with pytest.raises(
-        CalibrationError, match=r"every 12\.398.*This would be a relay of 1\.08 instead of 1\."
+        CalibrationError, match=r"every 12\.399.*This would be a relay of 1\.08 instead of 1\."
     ):
         lg.prepare(raw, camera=seen(1.08))
 

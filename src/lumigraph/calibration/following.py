@@ -14,6 +14,8 @@ _RANGE, _TURN = 0.25, math.radians(6)  # of the pitch, and angles, that are sear
 _STEP = 0.35  # lenslets over the picture: steps of the search, below half a line's width
 _EVIDENCE = 12.0  # of a lattice's lines over the median of all tried: 18 and more with gaps, 5 to 10 without
 _LINE = 8.0  # of a single line over that median
+_FINEST = 0.2  # 1/px of the lines that are looked for
+_COARSE, _SECOND = 8.0, 1.9  # px of pitch from which orders up to the second are followed
 _SHARPEST, _HIGHEST = 0.14, 4.0  # 1/px, and orders, of the lines that gaps have after smoothing
 
 
@@ -113,25 +115,46 @@ class _Found(NamedTuple):
 
 
 def _nearest(lines: _Lines, waves: np.ndarray, is_hex: bool, lenslets: float) -> _Found | None:
-    """The lattice around the expected one, stretched and turned, whose first harmonics are strongest."""
+    """The lattice around the expected one, stretched and turned, whose first lines are strongest together.
+
+    A scene's own lattice may have a few of them, and be far stronger there; gaps have all. What is best at
+    the border of the search lies beyond it.
+    """
     stretch, turn = (
         np.arange(-int(reach * lenslets / _STEP), int(reach * lenslets / _STEP) + 1) * _STEP / lenslets
         for reach in (_RANGE, _TURN)
     )
-    first = waves
-    if is_hex:
-        third = min(waves[0] + waves[1], waves[0] - waves[1], key=lambda wave: float(np.hypot(*wave)))
-        first = np.stack([*waves, third])
+    first = _first(waves, is_hex)
     size, angle = 1 / (1 + stretch[:, None]), turn[None, :]
     y, x = (first[:, k, None, None] * np.cos(angle) for k in (0, 1))
     ty, tx = (first[:, k, None, None] * np.sin(angle) for k in (0, 1))
     tried = np.stack([(y + tx) * size, (x - ty) * size], -1)
     score = np.exp(np.log(np.maximum(lines.heights(tried), 1e-30)).mean(0))
-    best = np.unravel_index(int(np.argmax(score)), score.shape)
     around = float(np.median(score))
+    score[~_is_peak(score)] = 0
+    best = np.unravel_index(int(np.argmax(score)), score.shape)
     if around <= 0:
         return None
     return _Found(tried[:2, best[0], best[1]], float(score[best]) / around, around)
+
+
+def _first(waves: np.ndarray, is_hex: bool) -> np.ndarray:
+    """Waves (k, 2) of the two shortest kinds of harmonics; of the first alone where the second is too fine."""
+    i, j = waves
+    if is_hex:
+        j = min(j, -j, key=lambda wave: float(np.hypot(*(i + wave))))  # 120 deg apart
+        shortest, next_ones = [i, j, i + j], [i - j, 2 * i + j, i + 2 * j]
+    else:
+        shortest, next_ones = [i, j], [i + j, i - j]
+    fine = max(float(np.hypot(*wave)) for wave in next_ones) > _FINEST
+    return np.stack(shortest if fine else shortest + next_ones)
+
+
+def _is_peak(score: np.ndarray) -> np.ndarray:
+    """Where a score is the highest of its surroundings, but not at the border."""
+    found = score == ndimage.maximum_filter(score, 3)
+    found[[0, -1]] = found[:, [0, -1]] = False
+    return found
 
 
 def _refined(lines: _Lines, found: _Found, pitch: float) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +162,10 @@ def _refined(lines: _Lines, found: _Found, pitch: float) -> tuple[np.ndarray, np
 
     Their standard errors (2, 2), too.
     """
-    highest, waves = float(np.clip(_SHARPEST * pitch, 1.0, _HIGHEST)), found.waves
+    highest, waves = (
+        float(np.clip(_SHARPEST * pitch, _SECOND if pitch > _COARSE else 1.0, _HIGHEST)),
+        found.waves,
+    )
     errors = np.full((2, 2), np.nan)
     reach = np.arange(-5, 6)
     orders = np.stack(np.meshgrid(reach, reach, indexing="ij"), -1).reshape(-1, 2)

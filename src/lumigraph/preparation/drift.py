@@ -17,11 +17,8 @@ from lumigraph.preparation.agreement import Described
 
 _SIZE = 1024  # px of the middle of the picture that is looked at
 _FEWEST = 8.0  # lenslets across it
-_CERTAIN, _LIKELY = 0.5, 0.2  # pitches between the lattices at the border of the picture
-_CLEAR, _SLIGHT = (
-    18.5,
-    0.1,
-)  # evidence that shows a slip of few pitches; self-made lattices reach 0.08
+_CERTAIN, _SLIGHT = 0.5, 0.1  # pitches between the lattices at the border; right pairs reach 0.06
+_LIKELY = 0.2  # of it where its error is not known
 _SIGMAS = 3.0  # of its standard error from which a slip counts; a specimen pulls at the lines of gaps
 _BLOCKS, _EVERYWHERE = (
     8,
@@ -134,8 +131,8 @@ def check_drift(data: Array, calibration: Calibration, camera: Described | None 
     Warns
     -----
     SamplingWarning
-        The lattices slip by 0.1 (0.2 where lines are faint) to 0.5 of a pitch, or the micro-images are
-        shifted by more than a quarter.
+        The lattices slip by 0.1 to 0.5 of a pitch (from 0.2 on where the error is not known), or the
+        micro-images are shifted by more than a quarter.
 
     Raises
     ------
@@ -153,7 +150,7 @@ def verdict(found: Drift) -> str:
     sure = found.slip >= _SIGMAS * found.error
     if sure and found.slip >= _CERTAIN:
         return "refused"
-    if sure and found.slip >= (_SLIGHT if found.evidence >= _CLEAR else _LIKELY):
+    if sure and found.slip >= (_SLIGHT if found.error > 0 else _LIKELY):
         return "warned"
     if found.shift is not None and max(map(abs, found.shift)) > _SHIFTED * found.pitch:
         return "shifted"
