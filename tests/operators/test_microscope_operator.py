@@ -8,10 +8,11 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.core.linear import Linear
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import FormatError, GeometryError, SamplingError
+from lumigraph.operators import microscope_building as building
 from lumigraph.operators import microscope_operator as module
+from lumigraph.operators.microscope_building import Layout, microscope_operator
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_kernels import Demand, octant, slice_kernel
-from lumigraph.operators.microscope_operator import Layout, microscope_operator
 from lumigraph.operators.microscope_pixels import FRAME, placement
 
 SCOPE = Objective(525e-9, 0.5)
@@ -182,7 +183,7 @@ def test_turned_pixels_see_a_turned_picture(xp):
 def test_kernels_in_a_folder_are_mapped_and_found_again(tmp_path, operator, monkeypatch):
     stored = microscope_operator([SCOPE], LENSLET, LAYOUT, DEPTHS, accuracy=1e-2, folder=tmp_path)
     assert all(isinstance(kernel.blocks, np.memmap) for kernel in stored.kernels)
-    monkeypatch.setattr(module, "slice_kernel", None)  # a second run computes nothing
+    monkeypatch.setattr(building, "slice_kernel", None)  # a second run computes nothing
     again = microscope_operator([SCOPE], LENSLET, LAYOUT, DEPTHS[::-1], accuracy=1e-2, folder=tmp_path)
     volume = np.random.default_rng(2).random(operator.shape[1], np.float32)
     np.testing.assert_array_equal(stored.forward(volume), operator.forward(volume))
@@ -253,7 +254,7 @@ def test_a_disk_without_room_is_refused_before_anything_is_computed(tmp_path, mo
         return SimpleNamespace(total=10**9, used=10**9, free=1000)
 
     monkeypatch.setattr(shutil, "disk_usage", full)
-    monkeypatch.setattr(module, "slice_kernel", None)
+    monkeypatch.setattr(building, "slice_kernel", None)
     with pytest.raises(
         SamplingError, match=r"images of points need up to .* GiB but the disk of .* has .* free"
     ):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from lumigraph.elements.objective import Objective
+from lumigraph.operators.microscope_building import Layout, microscope_operator
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_kernels import slice_kernel
-from lumigraph.operators.microscope_operator import Layout, microscope_operator
 
 RAYS = Objective(500e-9, 1.2, 1.35, "rays")
 LENSLET = Lenslet(104e-6, 2.4375e-3, 2.4375e-3, 60.0, 104e-6)

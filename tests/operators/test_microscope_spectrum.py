@@ -7,8 +7,9 @@ import pytest
 
 from lumigraph.elements.objective import Objective
 from lumigraph.operators import microscope_spectrum as module
+from lumigraph.operators.microscope_building import Layout, microscope_operator
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_operator import Layout, _suits_frequencies, microscope_operator
+from lumigraph.operators.microscope_operator import suits_frequencies
 
 SCOPE = Objective(525e-9, 0.5)
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)
@@ -44,13 +45,54 @@ def test_both_ways_give_the_same_adjoint_and_it_is_the_transpose(pair, xp, rng):
 
 def test_tiles_of_lenslets_give_the_same(monkeypatch, rng):
     by_offsets, by_frequency = operators(CellSampling(2, 4, 1 / 4), (8, 11))
-    monkeypatch.setattr(module, "TILE", 5)
-    tiling = module.tiling(by_frequency.kernels, (8, 11))
-    assert tiling.counts == (2, 3)
-    assert tiling.reach > 2  # tiles light each other
+    monkeypatch.setattr(module, "LEAST", 4)
+    monkeypatch.setattr(module, "MOST", 1)
+    tiling = module.tiling(by_frequency.kernels, (8, 11), 0)
+    assert tiling.count > 2
+    assert tiling.rows.reach > 2  # tiles light each other
+    check_equal(by_offsets, by_frequency, rng)
+
+
+@pytest.mark.parametrize("margin", [-1, 1, 4])
+@pytest.mark.parametrize("least", [3, 8])
+def test_objects_larger_and_smaller_than_the_picture(margin, least, monkeypatch, rng):
+    monkeypatch.setattr(module, "LEAST", least)
+    monkeypatch.setattr(module, "MOST", 1)
+    by_offsets, by_frequency = (
+        dataclasses.replace(one, margin=margin) for one in operators(CellSampling(2, 4, 1 / 4), (8, 11))
+    )
+    check_equal(by_offsets, by_frequency, rng)
+
+
+def check_equal(by_offsets, by_frequency, rng):
     volume, raw = rng.random(by_offsets.shape[1]), rng.random(by_offsets.shape[0])
     assert by_frequency.forward(volume) == pytest.approx(by_offsets.forward(volume), rel=1e-5, abs=1e-5)
     assert by_frequency.adjoint(raw) == pytest.approx(by_offsets.adjoint(raw), rel=1e-5, abs=1e-5)
+
+
+def test_a_widened_operator_sees_of_the_inside_what_its_own_does(rng):
+    """An object that is dark beyond the picture gives the same raw image, by either way."""
+    for one in operators(CellSampling(2, 4, 1 / 4), (6, 7)):
+        wide, (rows, columns) = one.widened(1e-6)
+        inside = rng.random(one.shape[1])
+        whole = np.zeros(wide.shape[1])
+        whole[:, rows, columns] = inside
+        np.testing.assert_allclose(wide.forward(whole), one.forward(inside), rtol=2e-6, atol=2e-6)
+        whole[:, 0, 0] = 1  # farther than a margin less by one lenslet would hold
+        assert wide.forward(whole).sum() > one.forward(inside).sum()
+
+
+def test_what_hardly_sends_light_onto_the_picture_is_not_followed(rng):
+    """The samples that are left out have less than a tenth of the most light: deconvolution skips them."""
+    one = next(operators(CellSampling(2, 4, 1 / 4), (9, 9)))
+    all_of_it, less = (one.widened(least)[0] for least in (1e-6, 0.05))
+    cut = all_of_it.margin - less.margin
+    assert 0 < less.margin < all_of_it.margin
+    even, kept = np.ones(one.shape[0]), (slice(None), *2 * [slice(2 * cut, -2 * cut)])
+    seen, most = all_of_it.adjoint(even), one.adjoint(even).max()
+    np.testing.assert_allclose(less.adjoint(even), seen[kept], rtol=1e-6)
+    seen[kept] = 0
+    assert 0.005 * most < seen.max() < 0.1 * most
 
 
 def test_single_precision_stays_and_a_points_image_has_no_rounding(pair, xp, rng):
@@ -73,6 +115,6 @@ def test_the_way_is_chosen_by_time_memory_and_symmetry(monkeypatch):
     assert not microscope_operator(
         [coma], LENSLET, Layout((9, 9), sampling), (10e-6,), accuracy=2e-2
     ).by_frequency
-    assert _suits_frequencies(deep.kernels, cells)
+    assert suits_frequencies(deep.kernels, cells, 0)
     monkeypatch.setattr("lumigraph.core.memory.available", lambda: 14 * 10**5)
-    assert not _suits_frequencies(deep.kernels, cells)
+    assert not suits_frequencies(deep.kernels, cells, 0)

@@ -193,6 +193,28 @@ def ifft(array: Array, n: int | None = None, axis: int = -1, *, overwrite: bool 
     return namespace(array).fft.ifft(array, n=n, axis=axis)
 
 
+def put_complex(place: Array, real: Array, imaginary: Array) -> None:
+    """Write real and imaginary parts into a complex array of their shape."""
+    if is_numpy_array(place):
+        place.real[...], place.imag[...] = real, imaginary
+    else:
+        place[...] = real + 1j * imaginary
+
+
+def rfft(array: Array, n: int, axis: int = -1) -> Array:
+    """1-D DFT of a real array along one axis, zero-padded to `n`: n // 2 + 1 frequencies."""
+    if is_numpy_array(array):
+        return scipy.fft.rfft(array, n, axis=axis, workers=WORKERS)
+    return namespace(array).fft.rfft(array, n=n, axis=axis)
+
+
+def irfft(array: Array, n: int, axis: int = -1) -> Array:
+    """The real array, `n` along one axis, whose `rfft` this is."""
+    if is_numpy_array(array):
+        return scipy.fft.irfft(array, n, axis=axis, workers=WORKERS)
+    return namespace(array).fft.irfft(array, n=n, axis=axis)
+
+
 def fft2(array: Array, *, overwrite: bool = False) -> Array:
     """2-D DFT of the last two axes."""
     if is_numpy_array(array):

@@ -30,8 +30,8 @@ from lumigraph.instruments.quantities import Displacement, Length, Positive, Wav
 from lumigraph.instruments.row import Row
 from lumigraph.operators.fourier_microscope import Mosaic, fourier_operator
 from lumigraph.operators.microscope_bench import DEGREE, samples_needed
+from lumigraph.operators.microscope_building import Layout, microscope_operator, require_accuracy
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_operator import Layout, microscope_operator, require_accuracy
 from lumigraph.operators.microscope_pixels import narrowed, placement
 from lumigraph.operators.points import OUTSIDE
 from lumigraph.sensor import Sensor

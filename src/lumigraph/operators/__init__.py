@@ -10,7 +10,8 @@
   lenslets, cell by cell; `point_light`, a point's light in their plane
 - `resampling`, `turning`: from an object's samples to points and from the image's samples to pixels
 - `single_lens`: `single_lens_operator`, incoherent planes and points before a camera without lenslets
-- `microscope_operator`: volumes before a light-field microscope; `microscope_cell`, a lenslet and its cell;
+- `microscope_operator`: volumes before a light-field microscope; `microscope_building`, how it is made;
+  `microscope_cell`, a lenslet and its cell; `microscope_tiles`, lenslets in tiles;
   `microscope_kernels`, images of its points; `microscope_rays`, the same by rays; `microscope_spectrum`, the
   lenslets' frequencies; `microscope_pixels`, real pixels; `fourier_microscope`
 - `band`: band-limited samples along an axis, to and from points and pixels

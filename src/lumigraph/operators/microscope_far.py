@@ -31,14 +31,6 @@ class Far:
     weights: np.ndarray
     images: np.ndarray
 
-    def reached(self, cells: tuple[int, int]) -> np.ndarray:
-        """Weights (2 rows - 1, 2 columns - 1, k) of all offsets within an array of lenslets."""
-        found = np.zeros((2 * cells[0] - 1, 2 * cells[1] - 1, len(self.images)))
-        inside = (np.abs(self.offsets) < cells).all(1)
-        at = self.offsets[inside] + np.asarray(cells) - 1
-        found[at[:, 0], at[:, 1]] = self.weights[inside]
-        return found
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FarLight:
@@ -52,29 +44,40 @@ class FarLight:
         (z k, N²).
     lengths
         Of the transforms (y, x).
+    cells, seen
+        Lenslets (rows, columns) whose images are followed, and those before which the object stands.
     """
 
     spectra: Array
     images: Array
     lengths: tuple[int, int]
+    cells: tuple[int, int]
+    seen: tuple[int, int]
 
     @classmethod
-    def of(cls, fars: list[Far], cells: tuple[int, int], like: Array) -> "FarLight":
-        """From the depths' own."""
-        y, x = (int(scipy.fft.next_fast_len(2 * n - 1, real=True) or 2 * n) for n in cells)
+    def of(cls, fars: list[Far], cells: tuple[int, int], margin: int, like: Array) -> "FarLight":
+        """From the depths' own, of objects that reach `margin` lenslets beyond those of the image."""
+        seen = cells[0] + 2 * margin, cells[1] + 2 * margin
+        y, x = (
+            int(scipy.fft.next_fast_len(n + m - 1, real=True) or n + m)
+            for n, m in zip(cells, seen, strict=True)
+        )
         spectra = []
         for far in fars:
+            steps = (
+                far.offsets - margin
+            )  # from an object's lenslet to an image's, each counted from its first
+            inside = (steps > -np.asarray(seen)).all(1) & (steps < cells).all(1)
             wide = np.zeros((y, x, len(far.images)))
-            reached = far.reached(cells)
-            wide[: reached.shape[0], : reached.shape[1]] = reached
-            wide = np.roll(wide, (1 - cells[0], 1 - cells[1]), (0, 1))
+            at = steps[inside] % (y, x)
+            wide[at[:, 0], at[:, 1]] = far.weights[inside]
             spectra.append(np.fft.rfft2(wide, axes=(0, 1)).transpose(2, 0, 1))
         images = np.concatenate([far.images for far in fars])
-        return cls(arrays.like(np.stack(spectra), like), arrays.like(images, like), (y, x))
+        return cls(arrays.like(np.stack(spectra), like), arrays.like(images, like), (y, x), cells, seen)
 
     def forward(self, volume: Array, points: int) -> Array:
         """Light (N², rows, columns) from a volume (z, rows s, columns s)."""
-        xp, (rows, columns) = arrays.namespace(volume), (n // points for n in volume.shape[1:])
+        xp, (rows, columns) = arrays.namespace(volume), self.cells
         cells = xp.sum(arrays.tiled(volume, (points, points)), axis=(3, 4))
         spectrum = arrays.rfft2(cells, self.lengths, axes=(1, 2))[:, None, ...] * self.spectra
         light = arrays.irfft2(spectrum, self.lengths, axes=(2, 3))[..., :rows, :columns]
@@ -83,11 +86,12 @@ class FarLight:
 
     def adjoint(self, light: Array, points: int) -> Array:
         """Transpose of `forward`."""
-        xp, (_, rows, columns) = arrays.namespace(light), light.shape
+        xp, (rows, columns) = arrays.namespace(light), self.cells
         parts = self.images @ xp.reshape(light, (light.shape[0], -1))
         parts = xp.reshape(parts, (*self.spectra.shape[:2], rows, columns))
         spectrum = arrays.rfft2(parts, self.lengths, axes=(2, 3)) * xp.conj(self.spectra)
-        cells = arrays.irfft2(xp.sum(spectrum, axis=1), self.lengths, axes=(1, 2))[:, :rows, :columns]
+        cells = arrays.irfft2(xp.sum(spectrum, axis=1), self.lengths, axes=(1, 2))
+        cells = cells[:, : self.seen[0], : self.seen[1]]
         shape = (math.prod(cells.shape), 1)
         whole = xp.reshape(cells, shape) * xp.ones(
             (1, points**2), dtype=light.dtype, device=arrays.device(light)

@@ -7,41 +7,23 @@ through the lenslets' frequencies instead (`microscope_spectrum`), with the same
 far is added by a few patterns (`microscope_far`).
 """
 
-import hashlib
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from os import PathLike
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
-from lumigraph import store
-from lumigraph.core import arrays, checks, memory
+from lumigraph.core import arrays, memory
 from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear, Shape
 from lumigraph.core.matrix import Matrix
-from lumigraph.core.progress import Progress
-from lumigraph.elements.objective import Objective
-from lumigraph.errors import FormatError, GeometryError, SamplingError
-from lumigraph.operators import microscope_pixels, microscope_spectrum
-from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_far import Far, FarLight
-from lumigraph.operators.microscope_kernels import (
-    Demand,
-    SliceKernel,
-    kernel_bytes,
-    octant,
-    require_window,
-    slice_kernel,
-)
-from lumigraph.operators.microscope_pixels import FRAME
-
-VERSION = 1
-"""Of the kernels' numbers: a change of theirs makes those that are kept useless."""
+from lumigraph.operators import microscope_spectrum
+from lumigraph.operators.microscope_far import FarLight
+from lumigraph.operators.microscope_kernels import SliceKernel
+from lumigraph.operators.microscope_tiles import Tiling
 
 GATHERED = 2**27
 """Numbers that are gathered for one product."""
@@ -61,11 +43,12 @@ class MicroscopeOperator(Linear):
     kernels
         Of each depth.
     cells
-        Lenslets (rows, columns) whose light is followed, with the frame.
+        Lenslets (rows, columns) whose images are followed.
     placement
         From samples to pixels; None where they are the N × N samples of each cell.
-    frame
-        Lenslets around the object: pixels at the border see some of their light.
+    margin
+        Lenslets that the object reaches beyond those on each side; below 0 where they reach beyond it, as
+        pixels at the border see some of their light.
     by_frequency
         Whether `forward` and `adjoint` go through the lenslets' frequencies (`microscope_spectrum`), where
         rounding may leave -1e-6 of the highest value instead of 0; else by products over all offsets.
@@ -74,7 +57,7 @@ class MicroscopeOperator(Linear):
     kernels: tuple[SliceKernel, ...]
     cells: tuple[int, int]
     placement: Matrix | None = None
-    frame: int = 0
+    margin: int = 0
     by_frequency: bool = False
     _spectra: dict = field(default_factory=dict)
 
@@ -92,7 +75,7 @@ class MicroscopeOperator(Linear):
     @property
     def _seen(self) -> tuple[int, int]:
         """Lenslets before which the object stands."""
-        return self.cells[0] - 2 * self.frame, self.cells[1] - 2 * self.frame
+        return self.cells[0] + 2 * self.margin, self.cells[1] + 2 * self.margin
 
     @property
     def error(self) -> float:
@@ -103,8 +86,7 @@ class MicroscopeOperator(Linear):
     def multiply_adds(self) -> int:
         """Of the matrix products of one application of `forward` or `adjoint`."""
         if self.by_frequency:
-            tiles = math.prod(microscope_spectrum.tiling(self.kernels, self.cells).counts)
-            return 4 * tiles * microscope_spectrum.matrix_numbers(self.kernels, self.cells)
+            return 4 * self._tiling.count * microscope_spectrum.matrix_numbers(self.kernels, self._tiling)
         rows = sum(len(kernel.offsets) * kernel.sampling.classes for kernel in self.kernels)
         return rows * self.kernels[0].sampling.pixels ** 2 * math.prod(self.cells)
 
@@ -116,7 +98,7 @@ class MicroscopeOperator(Linear):
     @property
     def memory_bytes(self) -> float:
         """Of the kernels, of the lenslets' frequencies where they are used, and of an image [bytes]."""
-        spectra = microscope_spectrum.matrix_numbers(self.kernels, self.cells) if self.by_frequency else 0
+        spectra = microscope_spectrum.matrix_numbers(self.kernels, self._tiling) if self.by_frequency else 0
         return self.nbytes + 4.0 * (spectra + 3 * sum(math.prod(shape) for shape in self.shape))
 
     @property
@@ -124,49 +106,51 @@ class MicroscopeOperator(Linear):
         """Lenslets that light goes to either side of the one that it is before, at most."""
         return max(map(_reach, self.kernels))
 
-    def widened(self) -> "tuple[MicroscopeOperator, tuple[slice, slice]]":
-        """The same raw image of an object that reaches as far beyond the lenslets as light comes from.
+    def widened(self, least: float) -> "tuple[MicroscopeOperator, tuple[slice, slice]]":
+        """The same raw image of an object that reaches beyond the lenslets, as light comes in from there.
 
-        A picture is a crop of what the lenslets see: light comes in from objects beside it, and a model
-        without them explains it by objects at the border.
+        A picture is a crop of what the lenslets see: a model without what stands beside it explains its
+        light by objects at the border.
+
+        Parameters
+        ----------
+        least
+            Part of the light of a lenslet's samples that must come onto the picture if they are followed.
 
         Returns
         -------
         tuple
             The operator, and where its object (y, x) is that of this one.
         """
-        margin, s = self.reach, self.kernels[0].sampling.points
-        if "wide" not in self._spectra:
-            self._spectra["wide"] = self._with_margin(margin)
-        rows, columns = (slice(margin * s, (margin + n) * s) for n in self._seen)
-        return self._spectra["wide"], (rows, columns)
+        more, s = max(_followed(kernel, least) for kernel in self.kernels), self.kernels[0].sampling.points
+        if ("wide", more) not in self._spectra:
+            self._spectra["wide", more] = self._with_margin(more)
+        rows, columns = (slice(more * s, (more + n) * s) for n in self._seen)
+        return self._spectra["wide", more], (rows, columns)
 
-    def _with_margin(self, margin: int) -> "MicroscopeOperator":
-        sampling, grid = self.kernels[0].sampling, self.object_grid
-        cells = (self.cells[0] + 2 * margin, self.cells[1] + 2 * margin)
+    def _with_margin(self, more: int) -> "MicroscopeOperator":
+        s, grid, margin = self.kernels[0].sampling.points, self.object_grid, self.margin + more
         if grid is not None:
-            ny, nx = (n + 2 * margin * sampling.points for n in grid.shape)
+            ny, nx = (n + 2 * more * s for n in grid.shape)
             grid = Grid((ny, nx), grid.pitch, grid.center)
-        ny, nx = self.shape[0]
-        placement = self.placement or microscope_pixels.every((ny, nx))
         return replace(
-            self, cells=cells, object_grid=grid,
-            placement=microscope_pixels.widened(placement, margin * sampling.pixels),
-            by_frequency=_suits_frequencies(self.kernels, cells), _spectra={},
+            self, margin=margin, object_grid=grid,
+            by_frequency=suits_frequencies(self.kernels, self.cells, margin), _spectra={},
         )  # fmt: skip
 
+    @property
+    def _tiling(self) -> Tiling:
+        if "tiling" not in self._spectra:
+            self._spectra["tiling"] = microscope_spectrum.tiling(self.kernels, self.cells, self.margin)
+        return self._spectra["tiling"]
+
     def _forward(self, intensity: Array) -> Array:
-        volume = self._framed(intensity if self.depths is not None else intensity[None, ...])
+        volume = intensity if self.depths is not None else intensity[None, ...]
         plane = self._light(volume) if self.by_frequency else self._by_offsets(volume)
         if (far := self._far(volume)) is not None:
             N = self.kernels[0].sampling.pixels
             plane = plane + _plane(far.forward(volume, self.kernels[0].sampling.points), N)
         return plane if self.placement is None else self.placement._forward(plane)
-
-    def _framed(self, volume: Array) -> Array:
-        s = self.kernels[0].sampling.points
-        edge, shape = self.frame * s, (self.cells[0] * s, self.cells[1] * s)
-        return arrays.framed(volume, (edge, edge), shape) if edge else volume
 
     def _far(self, like: Array) -> FarLight | None:
         key = "far", arrays.placement(like)
@@ -174,28 +158,27 @@ class MicroscopeOperator(Linear):
         if len(fars) < len(self.kernels):
             return None
         if key not in self._spectra:
-            self._spectra[key] = FarLight.of(fars, self.cells, like)
+            self._spectra[key] = FarLight.of(fars, self.cells, self.margin, like)
         return self._spectra[key]
 
     def _light(self, volume: Array) -> Array:
-        tiling = microscope_spectrum.tiling(self.kernels, self.cells)
         N = self.kernels[0].sampling.pixels
-        return microscope_spectrum.forward(self._matrix(volume), tiling, volume, N)
+        return microscope_spectrum.forward(self._matrix(volume), self._tiling, volume, N)
 
     def _matrix(self, like: Array) -> Array:
         key = arrays.placement(like)
         if key not in self._spectra:
-            found = microscope_spectrum.matrices(self.kernels, self.cells)
+            found = microscope_spectrum.matrices(self.kernels, self._tiling)
             self._spectra[key] = arrays.like(found, like)
         return self._spectra[key]
 
     def _by_offsets(self, volume: Array) -> Array:
         xp, image = arrays.namespace(volume), 0.0
         for k, kernel in enumerate(self.kernels):
-            s, reach = kernel.sampling.points, _reach(kernel)
-            points = _padded(_class_first(volume[k, ...], s), reach)
+            s, edge = kernel.sampling.points, self._edge(kernel)
+            points, first = _padded(_class_first(volume[k, ...], s), edge), self.margin + edge
             for rows, offsets, matrix in _products(kernel, volume, math.prod(self.cells)):
-                parts = [self._window(points, reach - dy, reach - dx) for dy, dx in offsets]
+                parts = [self._window(points, first - dy, first - dx) for dy, dx in offsets]
                 gathered = xp.reshape(xp.stack(parts), (rows, -1))
                 image = image + xp.matrix_transpose(matrix) @ gathered
         N = self.kernels[0].sampling.pixels
@@ -211,196 +194,47 @@ class MicroscopeOperator(Linear):
         s, N = self.kernels[0].sampling.points, self.kernels[0].sampling.pixels
         light = _class_first(plane, N)
         if self.by_frequency:
-            tiling = microscope_spectrum.tiling(self.kernels, self.cells)
-            volume = microscope_spectrum.adjoint(self._matrix(raw), tiling, plane, s)
+            volume = microscope_spectrum.adjoint(self._matrix(raw), self._tiling, plane, s)
         else:
             flat = xp.reshape(light, (N * N, -1))
             volume = xp.stack([self._back(kernel, flat) for kernel in self.kernels])
         if (far := self._far(raw)) is not None:
             volume = volume + far.adjoint(light, s)
-        rows, columns = (slice(self.frame * s, (n - self.frame) * s) for n in self.cells)
-        return volume[:, rows, columns]
+        return volume
 
     def _of_point(self, point: np.ndarray) -> np.ndarray:
-        volume, sampling = self._framed(point.reshape(-1, *point.shape[-2:])), self.kernels[0].sampling
+        volume, sampling = point.reshape(-1, *point.shape[-2:]), self.kernels[0].sampling
         plane = self._by_offsets(volume)  # dark pixels stay 0
         if (far := self._far(volume)) is not None:
             plane += np.maximum(_plane(far.forward(volume, sampling.points), sampling.pixels), 0)
         return plane if self.placement is None else self.placement._forward(plane)
 
     def _back(self, kernel: SliceKernel, flat: Array) -> Array:
-        xp, s, reach = arrays.namespace(flat), kernel.sampling.points, _reach(kernel)
-        shape = (s * s, *(n + 2 * reach for n in self.cells))
+        xp, s, edge = arrays.namespace(flat), kernel.sampling.points, self._edge(kernel)
+        (rows, columns), first = self._seen, self.margin + edge
+        shape = (s * s, rows + 2 * edge, columns + 2 * edge)
         points = xp.zeros(shape, dtype=flat.dtype, device=arrays.device(flat))
         for _, offsets, matrix in _products(kernel, flat, math.prod(self.cells)):
             parts = xp.reshape(matrix @ flat, (len(offsets), s * s, *self.cells))
             for part, (dy, dx) in enumerate(offsets):
-                window = self._window(points, reach - dy, reach - dx)
+                window = self._window(points, first - dy, first - dx)
                 window += parts[part, ...]
-        return _plane(points[:, reach : reach + self.cells[0], reach : reach + self.cells[1]], s)
+        return _plane(points[:, edge : edge + rows, edge : edge + columns], s)
+
+    def _edge(self, kernel: SliceKernel) -> int:
+        """Lenslets around the object that light is taken from, as if something stood there."""
+        return max(_reach(kernel) - self.margin, 0)
 
     def _window(self, points: Array, top: int, left: int) -> Array:
         return points[:, top : top + self.cells[0], left : left + self.cells[1]]
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """Lenslets that see the object, how finely they are sampled, and the pixels behind them.
-
-    Parameters
-    ----------
-    seen
-        Lenslets (rows, columns) before the object.
-    sampling
-        Of a cell.
-    placement
-        From samples, those of the frame too, to real pixels; None for N × N samples per cell.
-    center
-        Of the cells, in the object (y, x) [m].
-    """
-
-    seen: tuple[int, int]
-    sampling: CellSampling
-    placement: Matrix | None = None
-    center: tuple[float, float] = (0.0, 0.0)
-
-    @property
-    def frame(self) -> int:
-        """Lenslets around those that are seen, to each side: pixels at the border see some of their light."""
-        return 0 if self.placement is None else FRAME
-
-    @property
-    def cells(self) -> tuple[int, int]:
-        """Lenslets whose light is followed."""
-        return self.seen[0] + 2 * self.frame, self.seen[1] + 2 * self.frame
-
-
-def microscope_operator(
-    objectives: Sequence[Objective],
-    lenslet: Lenslet,
-    layout: Layout,
-    depths: Sequence[float] | None = None,
-    *,
-    accuracy: float = 1e-3,
-    folder: str | PathLike[str] | None = None,
-    progress: Progress | None = None,
-) -> MicroscopeOperator:
-    """Operator from slices at `depths` to a raw image.
-
-    Parameters
-    ----------
-    objectives
-        One for each wavelength.
-    lenslet, layout
-        The array and the pixels.
-    depths
-        Of the slices from the focused plane [m], positive farther from the objective, for an object
-        (z, y, x); None for the focused plane alone, an object (y, x).
-    accuracy
-        Relative rms of points' images.
-    folder
-        Keeps the kernels in files that are mapped into memory, and finds again those that are there: for
-        volumes whose kernels do not fit in memory, and for the next run.
-    progress
-        Called as ``progress(fraction)`` after each slice.
-
-    Raises
-    ------
-    SamplingError
-        The kernels do not fit in memory and no folder is given, or not on its disk.
-    GeometryError
-        No depths, one that is not finite, or depths that are not in order.
-    FormatError
-        A folder that cannot be made.
-    """
-    planes = (0.0,) if depths is None else tuple(checks.finite("a depth", dz) for dz in depths)
-    _check_order(planes)
-    demand = Demand(require_accuracy(accuracy), math.ceil(1.5 * max(layout.cells)))
-    for one in objectives:
-        require_window(one, lenslet, max(planes, key=abs), demand)
-    sizes = [kernel_bytes(objectives[0], lenslet, layout.sampling, dz, demand) for dz in planes]
-    stored = 1 if folder is None else 0
-    needed = max(sizes) * 2 + stored * sum(sizes) * (0.25 if objectives[0].is_round else 1)
-    remedy = "Use fewer slices or samples, or folder= to keep them on disk."
-    memory.require(needed, f"the images of points at {len(planes)} depths", remedy, SamplingError)
-    if folder is not None:
-        try:
-            Path(folder).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise FormatError(f"folder {folder} cannot be made ({error.strerror}). Give another.") from error
-        share = len(octant(layout.sampling.points)) / layout.sampling.classes if objectives[0].is_round else 1
-        memory.require_disk(sum(sizes) * share, folder, "the images of points", SamplingError)
-    kernels = []
-    for done, dz in enumerate(planes):
-        kernels.append(_kept(objectives, lenslet, layout.sampling, dz, demand, folder))
-        if progress is not None:
-            progress((done + 1) / len(planes))
-    return MicroscopeOperator(
-        tuple(kernels), layout.cells, layout.placement, layout.frame,
-        _suits_frequencies(kernels, layout.cells),
-        object_grid=_object_grid(lenslet, layout), depths=None if depths is None else planes,
-    )  # fmt: skip
-
-
-def require_accuracy(accuracy: float) -> float:
-    """A relative rms that can be asked for, or an error."""
-    if not 1e-5 <= checks.finite("accuracy", accuracy, "1") <= 0.1:
-        raise GeometryError(f"accuracy is {accuracy:g} but must be from 1e-5 to 0.1.")
-    return accuracy
-
-
-def _check_order(depths: tuple[float, ...]) -> None:
-    if not depths:
-        raise GeometryError("there are no depths. Give at least one, such as 0.0 for the focused plane.")
-    steps = np.diff(depths)
-    if len(steps) and not ((steps > 0).all() or (steps < 0).all()):
-        raise GeometryError("depths must ascend or descend, and differ. Sort them, and leave out duplicates.")
-
-
-def _suits_frequencies(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> bool:
+def suits_frequencies(kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int) -> bool:
     """Whether the way through the lenslets' frequencies is faster, and its matrices leave memory free."""
-    needed, free = 4.0 * microscope_spectrum.matrix_numbers(kernels, cells), memory.available()
+    told, free = microscope_spectrum.tiling(kernels, cells, margin), memory.available()
+    needed = 4.0 * microscope_spectrum.matrix_numbers(kernels, told)
     fits = free is None or needed < free * SHARE
-    return fits and microscope_spectrum.is_faster(kernels, cells)
-
-
-def _object_grid(lenslet: Lenslet, layout: Layout) -> Grid:
-    s = layout.sampling.points
-    shape = (layout.seen[0] * s, layout.seen[1] * s)
-    pitch = lenslet.pitch / lenslet.magnification / s
-    # Cells are centred as a whole: with an even number of samples the middle lies between two.
-    center = [c + (0.0 if n % 2 else pitch / 2) for c, n in zip(layout.center, shape, strict=True)]
-    return Grid(shape, (pitch, pitch), (center[0], center[1]))
-
-
-def _kept(
-    objectives: Sequence[Objective],
-    lenslet: Lenslet,
-    sampling: CellSampling,
-    dz: float,
-    demand: Demand,
-    folder: str | PathLike[str] | None,
-) -> SliceKernel:
-    """The kernel of a depth, mapped from its file in the folder, or in the user's cache."""
-    told = repr((VERSION, tuple(objectives), lenslet, sampling, dz, demand))
-    key = f"slice-{hashlib.sha256(told.encode()).hexdigest()[:20]}"
-
-    def built() -> dict[str, np.ndarray]:
-        kernel = slice_kernel(objectives, lenslet, sampling, dz, demand)
-        held = {"offsets": kernel.offsets, "blocks": kernel.blocks}
-        if kernel.far is not None:
-            held |= {f"far_{name}": getattr(kernel.far, name) for name in ("offsets", "weights", "images")}
-        return held | {"told": np.array([kernel.error, kernel.passed])}
-
-    found = store.kept(key, built, None if folder is None else Path(folder))
-    symmetric = all(one.is_round for one in objectives)
-    far = (
-        Far(found["far_offsets"], found["far_weights"], found["far_images"])
-        if "far_images" in found
-        else None
-    )
-    error, passed = (float(value) for value in found["told"])
-    return SliceKernel(found["offsets"], found["blocks"], sampling, symmetric, far, error, passed)
+    return fits and microscope_spectrum.is_faster(kernels, told)
 
 
 def _products(
@@ -417,6 +251,13 @@ def _products(
 
 def _reach(kernel: SliceKernel) -> int:
     return int(np.abs(kernel.offsets).max())
+
+
+def _followed(kernel: SliceKernel, least: float) -> int:
+    """Lenslets beyond a straight border that send at least a part of their light across it."""
+    light = kernel.matrix().reshape(len(kernel.offsets), -1).sum(1, dtype=np.float64)
+    beyond = [float(light[kernel.offsets[:, 0] >= k].sum()) for k in range(_reach(kernel) + 1)]
+    return sum(part >= least * light.sum() for part in beyond[1:])
 
 
 def _class_first(plane: Array, n: int) -> Array:

@@ -51,23 +51,6 @@ def placement(
     return Matrix(_interpolation(at, samples, degree), (ny, nx), samples), cells, middle
 
 
-def every(shape: tuple[int, int]) -> Matrix:
-    """Of pixels (ny, nx) that are the samples themselves."""
-    count = math.prod(shape)
-    ones, start = np.ones(count, np.float32), np.arange(count + 1)
-    return Matrix(csr_array((ones, start[:-1], start), shape=(count, count)), shape, shape)
-
-
-def widened(pixels: Matrix, margin: int) -> Matrix:
-    """The same pixels among samples that reach `margin` farther to each side."""
-    rows, columns = (n + 2 * margin for n in pixels.object_shape)
-    y, x = np.divmod(np.asarray(pixels.matrix.indices, np.int64), pixels.object_shape[1])
-    indices = (y + margin) * columns + x + margin
-    shape = (math.prod(pixels.raw_shape), rows * columns)
-    matrix = csr_array((pixels.matrix.data, indices, pixels.matrix.indptr), shape=shape)
-    return Matrix(matrix, pixels.raw_shape, (rows, columns))
-
-
 def _interpolation(at: np.ndarray, samples: tuple[int, int], degree: int) -> csr_array:
     """Matrix of B-splines at places (pixels, 2) among samples; what lies outside them is dark.
 

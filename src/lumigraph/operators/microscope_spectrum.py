@@ -8,106 +8,84 @@ blocks over the offsets d is real but for a factor, and the four frequencies (±
           R = (-1)^{q \cdot c} \sum_d K_{qc}(d)\, \mathrm{tr}(2\pi f_y d_y)\, \mathrm{tr}(2\pi f_x d_x)
 
 with tr the cosine where q and c have the same parity along that axis, the sine where not. It takes the same
-time however many lenslets a point lights. Large arrays of lenslets are treated in tiles that overlap.
+time however many lenslets a point lights. Large arrays of lenslets are treated in tiles (`microscope_tiles`).
 """
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-import scipy.fft
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 from lumigraph.core.cache import remembered
-from lumigraph.core.threads import single_products
+from lumigraph.core.threads import each, single_products
 from lumigraph.operators.microscope_kernels import SliceKernel
+from lumigraph.operators.microscope_tiles import Span, Tiling, tilings
 
-TILE = 40
-"""Lenslets along each side of a tile, at most."""
+LEAST = 8
+"""Lenslets along each side of a tile, at least, where there are so many."""
 
-WEIGHT = 24
-"""Multiply-adds of a matrix product in the time of reading one number of `R` from memory."""
+MOST = 2**32
+"""Bytes of all matrices, at most; with smaller tiles there are fewer."""
+
+READ, PASSED = 24, 150
+"""Multiply-adds of a matrix product in the time of reading one number of `R` from memory, and of what is done
+to one number of a tile: transforms, parts and copies."""
+
+GROUP = 2**26
+"""Numbers of the transforms of all tiles that are held at a time, at most, if one depth has fewer."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tiling:
-    """How lenslets are parted for transforms.
+def tiling(kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int) -> Tiling:
+    """The fastest whose matrices are at most `MOST`; the fewest matrices where none is.
 
     Parameters
     ----------
+    kernels
+        Of each depth.
     cells
-        Lenslets (rows, columns).
-    reach
-        Lenslets to each side that a point lights.
+        Lenslets (rows, columns) whose images are followed.
+    margin
+        Lenslets that the object reaches beyond them on each side.
     """
-
-    cells: tuple[int, int]
-    reach: int
-
-    @property
-    def counts(self) -> tuple[int, int]:
-        """Tiles along y and x."""
-        return math.ceil(self.cells[0] / TILE), math.ceil(self.cells[1] / TILE)
-
-    @property
-    def sides(self) -> tuple[int, int]:
-        """Lenslets of a tile along y and x."""
-        rows, columns = self.counts
-        return math.ceil(self.cells[0] / rows), math.ceil(self.cells[1] / columns)
-
-    @property
-    def lengths(self) -> tuple[int, int]:
-        """Of the transforms: what is lit beyond the array may fall on itself, what is read may not be met."""
-        y, x = (
-            int(scipy.fft.next_fast_len(side + self.reach * (2 if count > 1 else 1)) or side)
-            for side, count in zip(self.sides, self.counts, strict=True)
-        )
-        return y, x
-
-    @property
-    def frequencies(self) -> int:
-        """With matrices of their own."""
-        return math.prod(length // 2 + 1 for length in self.lengths)
-
-    def tiles(self) -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
-        """Lenslets (rows, columns) of each tile, and those that its points light."""
-        axes = []
-        for count, side, n in zip(self.counts, self.sides, self.cells, strict=True):
-            own = [slice(k * side, min((k + 1) * side, n)) for k in range(count)]
-            lit = [slice(max(0, a.start - self.reach), min(n, a.stop + self.reach)) for a in own]
-            axes.append(list(zip(own, lit, strict=True)))
-        for (y, lit_y), (x, lit_x) in itertools.product(*axes):
-            yield (y, x), (lit_y, lit_x)
+    reach = max(int(np.abs(kernel.offsets).max()) for kernel in kernels)
+    least = min(LEAST, *cells)
+    found = list(tilings(cells, margin, reach, least))
+    fitting = [told for told in found if 4 * matrix_numbers(kernels, told) <= MOST]
+    if not fitting:
+        return min(found, key=lambda told: told.frequencies)
+    return min(fitting, key=lambda told: cost(kernels, told))
 
 
-def tiling(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> Tiling:
-    """For the widest of the kernels."""
-    return Tiling(cells, max(int(np.abs(kernel.offsets).max()) for kernel in kernels))
-
-
-def matrix_numbers(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> int:
+def matrix_numbers(kernels: Sequence[SliceKernel], told: Tiling) -> int:
     """How many `matrices` has."""
     sampling = kernels[0].sampling
-    return tiling(kernels, cells).frequencies * len(kernels) * sampling.classes * sampling.pixels**2
+    return told.frequencies * len(kernels) * sampling.classes * sampling.pixels**2
 
 
-def is_faster(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> bool:
-    """Whether reading the matrices takes less time than the products over all offsets."""
+def cost(kernels: Sequence[SliceKernel], told: Tiling) -> float:
+    """Of one application of the operator or of its transpose [multiply-adds]."""
+    sampling = kernels[0].sampling
+    channels = len(kernels) * sampling.classes + sampling.pixels**2
+    passed = told.count * math.prod(told.lengths) * channels
+    return matrix_numbers(kernels, told) * (READ + 4.0 * told.count) + PASSED * passed
+
+
+def is_faster(kernels: Sequence[SliceKernel], told: Tiling) -> bool:
+    """Whether it takes less time than the products over all offsets."""
     if not all(kernel.symmetric for kernel in kernels):
         return False
     sampling = kernels[0].sampling
-    products = sum(len(kernel.offsets) for kernel in kernels) * math.prod(cells) * sampling.classes
-    tiles = math.prod(tiling(kernels, cells).counts)
-    return products * sampling.pixels**2 > WEIGHT * tiles * matrix_numbers(kernels, cells)
+    products = sum(len(kernel.offsets) for kernel in kernels) * math.prod(told.cells) * sampling.classes
+    return products * sampling.pixels**2 > cost(kernels, told)
 
 
 @single_products()
-def matrices(kernels: Sequence[SliceKernel], cells: tuple[int, int]) -> np.ndarray:
+def matrices(kernels: Sequence[SliceKernel], told: Tiling) -> np.ndarray:
     """R (frequencies, depths s², N²) float32; the parts that are even over a cell come first."""
-    told, sampling = tiling(kernels, cells), kernels[0].sampling
+    sampling = kernels[0].sampling
     s, N = sampling.points, sampling.pixels
     found = np.empty((told.frequencies, len(kernels), s, s, N, N), np.float32)
     for k, kernel in enumerate(kernels):
@@ -166,67 +144,109 @@ def parts(n: int) -> np.ndarray:
 
 def forward(matrix: Array, told: Tiling, volume: Array, pixels: int) -> Array:
     """Samples (rows N, columns N) of a volume (z, rows s, columns s), by `matrices`."""
-    xp, s, N, image = arrays.namespace(volume), volume.shape[1] // told.cells[0], pixels, None
-    for (y, x), (lit_y, lit_x) in told.tiles():
-        part = volume[:, y.start * s : y.stop * s, x.start * s : x.stop * s]
-        spread = _applied(matrix, told.lengths, part, (s, N), back=False)
-        plane = _planes(_window(spread, (y, x), (lit_y, lit_x)), N)[0, ...]
-        if math.prod(told.counts) == 1:
-            return plane
-        if image is None:
-            shape = tuple(n * N for n in told.cells)
-            image = xp.zeros(shape, dtype=volume.dtype, device=arrays.device(volume))
-        place = image[lit_y.start * N : lit_y.stop * N, lit_x.start * N : lit_x.stop * N]
-        place += plane
-    return image
+    s = volume.shape[1] // (told.rows.cells + 2 * told.rows.margin)
+    xp, columns = arrays.namespace(volume), 0.0
+
+    def lit(depths: slice) -> Array:
+        cells = _channels(volume[depths, ...], s)
+        held = _columns(cells, told, s, of_image=False)
+        return held @ matrix[:, depths.start * s * s : depths.stop * s * s, :]
+
+    for part in _all(lit, told, volume.shape[0], s):
+        columns = columns + part
+    image = xp.zeros((*told.cells, pixels**2), dtype=volume.dtype, device=arrays.device(volume))
+    _add_cells(image, columns, told, pixels, of_image=True)
+    return _planes(image, pixels)[0, ...]
 
 
 def adjoint(matrix: Array, told: Tiling, image: Array, points: int) -> Array:
     """Transpose of `forward`: (z, rows s, columns s)."""
-    xp, s, N = arrays.namespace(image), points, image.shape[0] // told.cells[0]
-    rows: dict[int, list[Array]] = {}
-    for (y, x), (lit_y, lit_x) in told.tiles():
-        part = image[None, lit_y.start * N : lit_y.stop * N, lit_x.start * N : lit_x.stop * N]
-        gathered = _applied(matrix, told.lengths, part, (N, s), back=True)
-        rows.setdefault(y.start, []).append(_planes(_window(gathered, (lit_y, lit_x), (y, x)), s))
-    return xp.concat([xp.concat(line, axis=2) for line in rows.values()], axis=1)
+    xp, s, N = arrays.namespace(image), points, image.shape[0] // told.rows.cells
+    columns = _columns(_channels(image[None, ...], N), told, N, of_image=True)
+    shape = tuple(row.cells + 2 * row.margin for row in (told.rows, told.columns))
+
+    def seen(depths: slice) -> Array:
+        rows = slice(depths.start * s * s, depths.stop * s * s)
+        held = columns @ xp.matrix_transpose(matrix[:, rows, :])
+        cells = xp.zeros((*shape, rows.stop - rows.start), dtype=image.dtype, device=arrays.device(image))
+        _add_cells(cells, held, told, s, of_image=False)
+        return _planes(cells, s)
+
+    return xp.concat(list(_all(seen, told, matrix.shape[1] // s**2, s)), axis=0)
 
 
-def _applied(
-    matrix: Array, lengths: tuple[int, int], planes: Array, sides: tuple[int, int], *, back: bool
-) -> Array:
-    """Convolution (Ly, Lx, channels) of planes (z, rows n, columns n) with the blocks, or its transpose.
-
-    `sides` are those of the cells that come in and go out.
-    """
-    xp, axes = arrays.namespace(planes), (2, 1) if back else (1, 2)
-    own, other = (_factors(n, matrix.shape[k] // n**2) for n, k in zip(sides, axes, strict=True))
-    turns = [arrays.like(turn.conj() if back else turn, planes) for turn, _ in (own, other)]
-    signs = [arrays.like(sign, planes) for _, sign in (own, other)]
-    spectrum = arrays.rfft2(_channels(planes, sides[0]), lengths, axes=(0, 1)) * turns[0]
-    columns = _folded(spectrum, signs[0])
-    shape = columns.shape[:2]
-    columns = xp.reshape(columns, (matrix.shape[0], -1, 4))
-    product = (matrix if back else xp.matrix_transpose(matrix)) @ columns
-    spectrum = _unfolded(xp.reshape(product, (*shape, -1, 4)), signs[1], lengths[0]) * turns[1]
-    return arrays.irfft2(spectrum, lengths, axes=(0, 1))
+def _all(function: Callable[[slice], Array], told: Tiling, depths: int, s: int) -> Iterator[Array]:
+    """The function of all depths, of some at a time."""
+    step = max(1, GROUP // (4 * told.frequencies * told.count * s * s))
+    groups = [slice(k, min(k + step, depths)) for k in range(0, depths, step)]
+    return each(function, groups) if len(groups) > 1 else map(function, groups)
 
 
-def _folded(spectrum: Array, signs: Array) -> Array:
-    """Real and imaginary parts at f_y and -f_y (half, frequencies along x, channels, 4)."""
-    xp, length = arrays.namespace(spectrum), spectrum.shape[0]
-    half = length // 2 + 1
-    above = spectrum[:half, ...]
-    below = xp.concat([spectrum[:1, ...], xp.flip(spectrum[length - half + 1 :, ...], axis=0)]) * signs
-    return xp.stack([xp.real(above), xp.imag(above), xp.real(below), xp.imag(below)], axis=-1)
+def _places(spans: tuple[Span, Span], of_image: bool) -> tuple[tuple[slice, slice], tuple[int, int]]:
+    """Cells of a tile, and where the first stands in the transform."""
+    y, x = spans
+    if of_image:
+        return (y.image, x.image), (y.image_at, x.image_at)
+    return (y.points, x.points), (y.points_at, x.points_at)
 
 
-def _unfolded(columns: Array, signs: Array, length: int) -> Array:
-    """Inverse of `_folded` (Ly, frequencies along x, channels)."""
-    xp, mirrored = arrays.namespace(columns), columns[1 : (length + 1) // 2, ...]
-    above = columns[..., 0] + 1j * columns[..., 1]
-    below = (mirrored[..., 2] + 1j * mirrored[..., 3]) * signs
-    return xp.concat([above, xp.flip(below, axis=0)])
+def _columns(cells: Array, told: Tiling, n: int, *, of_image: bool) -> Array:
+    """Real and imaginary parts at f_y and at -f_y of all tiles (frequencies, 4 tiles, channels)."""
+    xp, (ly, lx), channels = arrays.namespace(cells), told.lengths, cells.shape[-1]
+    half, turn, sign = ly // 2 + 1, *_turns(n, channels // n**2, cells, back=of_image)
+    shape = (half, lx // 2 + 1, told.count, 4, channels)
+    found = xp.empty(shape, dtype=cells.dtype, device=arrays.device(cells))
+    for k, spans in told.tiles():
+        (rows, columns), (y, x) = _places(spans, of_image)
+        spectrum = _along_y(_along_x(cells[rows, columns, :], x, lx) * turn, y, ly)
+        below = xp.concat([spectrum[:1, ...], xp.flip(spectrum[ly - half + 1 :, ...], axis=0)])
+        above = spectrum[:half, ...]
+        found[:, :, k, 0, :], found[:, :, k, 1, :] = xp.real(above), xp.imag(above)
+        found[:, :, k, 2, :], found[:, :, k, 3, :] = xp.real(below) * sign, xp.imag(below) * sign
+    return xp.reshape(found, (told.frequencies, 4 * told.count, channels))
+
+
+def _along_x(cells: Array, first: int, length: int) -> Array:
+    """Transform of cells (rows, columns, channels) whose first column stands at `first`."""
+    if first:
+        xp, (rows, columns, channels) = arrays.namespace(cells), cells.shape
+        wide = xp.zeros((rows, first + columns, channels), dtype=cells.dtype, device=arrays.device(cells))
+        wide[:, first:, :] = cells
+        cells = wide
+    return arrays.rfft(cells, length, axis=1)
+
+
+def _along_y(spectrum: Array, first: int, length: int) -> Array:
+    if first:
+        xp, (rows, columns, channels) = arrays.namespace(spectrum), spectrum.shape
+        shape = (length, columns, channels)
+        wide = xp.zeros(shape, dtype=spectrum.dtype, device=arrays.device(spectrum))
+        wide[first : first + rows, ...] = spectrum
+        spectrum = wide
+    return arrays.fft(spectrum, length, axis=0, overwrite=True)
+
+
+def _add_cells(cells: Array, columns: Array, told: Tiling, n: int, *, of_image: bool) -> None:
+    """Add to cells (rows, columns, channels) what `_columns` of all tiles say of them."""
+    xp, (ly, lx), channels = arrays.namespace(cells), told.lengths, cells.shape[-1]
+    half, turn, sign = ly // 2 + 1, *_turns(n, channels // n**2, cells, back=not of_image)
+    columns = xp.reshape(columns, (half, lx // 2 + 1, told.count, 4, channels))
+    for k, spans in told.tiles():
+        (rows, places), (y, x) = _places(spans, of_image)
+        height, width = rows.stop - rows.start, places.stop - places.start
+        spectrum = xp.empty((ly, lx // 2 + 1, channels), dtype=turn.dtype, device=arrays.device(cells))
+        parts = [columns[:, :, k, part, :] for part in range(4)]
+        below = [xp.flip(part[1 : ly - half + 1, ...] * sign, axis=0) for part in parts[2:]]
+        arrays.put_complex(spectrum[:half, ...], *parts[:2])
+        arrays.put_complex(spectrum[half:, ...], *below)
+        spectrum = arrays.ifft(spectrum, axis=0, overwrite=True)[y : y + height, ...] * turn
+        place = cells[rows, places, :]
+        place += arrays.irfft(spectrum, lx, axis=1)[:, x : x + width, :]
+
+
+def _turns(n: int, planes: int, like: Array, *, back: bool) -> tuple[Array, Array]:
+    turn, sign = _factors(n, planes)
+    return arrays.like(turn.conj() if back else turn, like), arrays.like(sign, like)
 
 
 @remembered
@@ -251,11 +271,3 @@ def _planes(cells: Array, n: int) -> Array:
     basis, z = arrays.like(parts(n), cells), channels // n**2
     whole = xp.matrix_transpose(basis) @ xp.reshape(cells, (rows, columns, z, n, n)) @ basis
     return arrays.untiled(xp.permute_dims(whole, (2, 0, 1, 3, 4)))
-
-
-def _window(values: Array, at: tuple[slice, slice], wanted: tuple[slice, slice]) -> Array:
-    """Cells `wanted` of values (Ly, Lx, ...) that begin `at` a cell and are periodic."""
-    xp, first = arrays.namespace(values), tuple(w.start - a.start for w, a in zip(wanted, at, strict=True))
-    if any(first):
-        values = xp.roll(values, (-first[0], -first[1]), axis=(0, 1))
-    return values[: wanted[0].stop - wanted[0].start, : wanted[1].stop - wanted[1].start, ...]

@@ -15,9 +15,10 @@ from lumigraph.core.progress import Progress
 from lumigraph.core.raw import RawImage
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError
+from lumigraph.operators.microscope_building import Layout
 from lumigraph.operators.microscope_cell import Lenslet
 from lumigraph.operators.microscope_kernels import Demand, point_cells, require_window
-from lumigraph.operators.microscope_operator import Layout, MicroscopeOperator
+from lumigraph.operators.microscope_operator import MicroscopeOperator
 from lumigraph.scene import Diffuser, Points, Scene, Slice
 from lumigraph.sensor import Sensor
 from lumigraph.simulation import error

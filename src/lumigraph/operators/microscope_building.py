@@ -1,0 +1,186 @@
+"""A light-field microscope's operator from its description, with kernels that are kept in files."""
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from lumigraph import store
+from lumigraph.core import checks, memory
+from lumigraph.core.grid import Grid
+from lumigraph.core.matrix import Matrix
+from lumigraph.core.progress import Progress
+from lumigraph.elements.objective import Objective
+from lumigraph.errors import FormatError, GeometryError, SamplingError
+from lumigraph.operators.microscope_cell import CellSampling, Lenslet
+from lumigraph.operators.microscope_far import Far
+from lumigraph.operators.microscope_kernels import (
+    Demand,
+    SliceKernel,
+    kernel_bytes,
+    octant,
+    require_window,
+    slice_kernel,
+)
+from lumigraph.operators.microscope_operator import MicroscopeOperator, suits_frequencies
+from lumigraph.operators.microscope_pixels import FRAME
+
+VERSION = 1
+"""Of the kernels' numbers: a change of theirs makes those that are kept useless."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Lenslets that see the object, how finely they are sampled, and the pixels behind them.
+
+    Parameters
+    ----------
+    seen
+        Lenslets (rows, columns) before the object.
+    sampling
+        Of a cell.
+    placement
+        From samples, those of the frame too, to real pixels; None for N × N samples per cell.
+    center
+        Of the cells, in the object (y, x) [m].
+    """
+
+    seen: tuple[int, int]
+    sampling: CellSampling
+    placement: Matrix | None = None
+    center: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def frame(self) -> int:
+        """Lenslets around those that are seen, to each side: pixels at the border see some of their light."""
+        return 0 if self.placement is None else FRAME
+
+    @property
+    def cells(self) -> tuple[int, int]:
+        """Lenslets whose light is followed."""
+        return self.seen[0] + 2 * self.frame, self.seen[1] + 2 * self.frame
+
+
+def microscope_operator(
+    objectives: Sequence[Objective],
+    lenslet: Lenslet,
+    layout: Layout,
+    depths: Sequence[float] | None = None,
+    *,
+    accuracy: float = 1e-3,
+    folder: str | PathLike[str] | None = None,
+    progress: Progress | None = None,
+) -> MicroscopeOperator:
+    """Operator from slices at `depths` to a raw image.
+
+    Parameters
+    ----------
+    objectives
+        One for each wavelength.
+    lenslet, layout
+        The array and the pixels.
+    depths
+        Of the slices from the focused plane [m], positive farther from the objective, for an object
+        (z, y, x); None for the focused plane alone, an object (y, x).
+    accuracy
+        Relative rms of points' images.
+    folder
+        Keeps the kernels in files that are mapped into memory, and finds again those that are there: for
+        volumes whose kernels do not fit in memory, and for the next run.
+    progress
+        Called as ``progress(fraction)`` after each slice.
+
+    Raises
+    ------
+    SamplingError
+        The kernels do not fit in memory and no folder is given, or not on its disk.
+    GeometryError
+        No depths, one that is not finite, or depths that are not in order.
+    FormatError
+        A folder that cannot be made.
+    """
+    planes = (0.0,) if depths is None else tuple(checks.finite("a depth", dz) for dz in depths)
+    _check_order(planes)
+    demand = Demand(require_accuracy(accuracy), math.ceil(1.5 * max(layout.cells)))
+    for one in objectives:
+        require_window(one, lenslet, max(planes, key=abs), demand)
+    sizes = [kernel_bytes(objectives[0], lenslet, layout.sampling, dz, demand) for dz in planes]
+    stored = 1 if folder is None else 0
+    needed = max(sizes) * 2 + stored * sum(sizes) * (0.25 if objectives[0].is_round else 1)
+    remedy = "Use fewer slices or samples, or folder= to keep them on disk."
+    memory.require(needed, f"the images of points at {len(planes)} depths", remedy, SamplingError)
+    if folder is not None:
+        try:
+            Path(folder).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FormatError(f"folder {folder} cannot be made ({error.strerror}). Give another.") from error
+        share = len(octant(layout.sampling.points)) / layout.sampling.classes if objectives[0].is_round else 1
+        memory.require_disk(sum(sizes) * share, folder, "the images of points", SamplingError)
+    kernels = []
+    for done, dz in enumerate(planes):
+        kernels.append(_kept(objectives, lenslet, layout.sampling, dz, demand, folder))
+        if progress is not None:
+            progress((done + 1) / len(planes))
+    return MicroscopeOperator(
+        tuple(kernels), layout.cells, layout.placement, -layout.frame,
+        suits_frequencies(kernels, layout.cells, -layout.frame),
+        object_grid=_object_grid(lenslet, layout), depths=None if depths is None else planes,
+    )  # fmt: skip
+
+
+def require_accuracy(accuracy: float) -> float:
+    """A relative rms that can be asked for, or an error."""
+    if not 1e-5 <= checks.finite("accuracy", accuracy, "1") <= 0.1:
+        raise GeometryError(f"accuracy is {accuracy:g} but must be from 1e-5 to 0.1.")
+    return accuracy
+
+
+def _check_order(depths: tuple[float, ...]) -> None:
+    if not depths:
+        raise GeometryError("there are no depths. Give at least one, such as 0.0 for the focused plane.")
+    steps = np.diff(depths)
+    if len(steps) and not ((steps > 0).all() or (steps < 0).all()):
+        raise GeometryError("depths must ascend or descend, and differ. Sort them, and leave out duplicates.")
+
+
+def _object_grid(lenslet: Lenslet, layout: Layout) -> Grid:
+    s = layout.sampling.points
+    shape = (layout.seen[0] * s, layout.seen[1] * s)
+    pitch = lenslet.pitch / lenslet.magnification / s
+    # Cells are centred as a whole: with an even number of samples the middle lies between two.
+    center = [c + (0.0 if n % 2 else pitch / 2) for c, n in zip(layout.center, shape, strict=True)]
+    return Grid(shape, (pitch, pitch), (center[0], center[1]))
+
+
+def _kept(
+    objectives: Sequence[Objective],
+    lenslet: Lenslet,
+    sampling: CellSampling,
+    dz: float,
+    demand: Demand,
+    folder: str | PathLike[str] | None,
+) -> SliceKernel:
+    """The kernel of a depth, mapped from its file in the folder, or in the user's cache."""
+    told = repr((VERSION, tuple(objectives), lenslet, sampling, dz, demand))
+    key = f"slice-{hashlib.sha256(told.encode()).hexdigest()[:20]}"
+
+    def built() -> dict[str, np.ndarray]:
+        kernel = slice_kernel(objectives, lenslet, sampling, dz, demand)
+        held = {"offsets": kernel.offsets, "blocks": kernel.blocks}
+        if kernel.far is not None:
+            held |= {f"far_{name}": getattr(kernel.far, name) for name in ("offsets", "weights", "images")}
+        return held | {"told": np.array([kernel.error, kernel.passed])}
+
+    found = store.kept(key, built, None if folder is None else Path(folder))
+    symmetric = all(one.is_round for one in objectives)
+    far = (
+        Far(found["far_offsets"], found["far_weights"], found["far_images"])
+        if "far_images" in found
+        else None
+    )
+    error, passed = (float(value) for value in found["told"])
+    return SliceKernel(found["offsets"], found["blocks"], sampling, symmetric, far, error, passed)
