@@ -196,7 +196,7 @@ def ifft(array: Array, n: int | None = None, axis: int = -1, *, overwrite: bool 
 def put_complex(place: Array, real: Array, imaginary: Array) -> None:
     """Write real and imaginary parts into a complex array of their shape."""
     if is_numpy_array(place):
-        place.real[...], place.imag[...] = real, imaginary
+        np.real(place)[...], np.imag(place)[...] = real, imaginary  # views
     else:
         place[...] = real + 1j * imaginary
 

@@ -64,13 +64,11 @@ class FarLight:
         )
         spectra = []
         for far in fars:
-            steps = (
-                far.offsets - margin
-            )  # from an object's lenslet to an image's, each counted from its first
+            steps = far.offsets - margin  # from the object's first lenslet, to the image's first
             inside = (steps > -np.asarray(seen)).all(1) & (steps < cells).all(1)
             wide = np.zeros((y, x, len(far.images)))
-            at = steps[inside] % (y, x)
-            wide[at[:, 0], at[:, 1]] = far.weights[inside]
+            row, column = (steps[inside] % (y, x)).T
+            wide[row, column] = far.weights[inside]
             spectra.append(np.fft.rfft2(wide, axes=(0, 1)).transpose(2, 0, 1))
         images = np.concatenate([far.images for far in fars])
         return cls(arrays.like(np.stack(spectra), like), arrays.like(images, like), (y, x), cells, seen)
