@@ -139,7 +139,7 @@ def _nearest(lines: _Lines, waves: np.ndarray, is_hex: bool, lenslets: float) ->
 
 
 def _first(waves: np.ndarray, is_hex: bool) -> np.ndarray:
-    """Waves (k, 2) of the two shortest kinds of harmonics; of the first alone where the second is too fine."""
+    """Waves (k, 2) of the two shortest kinds of harmonics; the first alone where the second is too fine."""
     i, j = waves
     if is_hex:
         j = min(j, -j, key=lambda wave: float(np.hypot(*(i + wave))))  # 120 deg apart
@@ -162,10 +162,8 @@ def _refined(lines: _Lines, found: _Found, pitch: float) -> tuple[np.ndarray, np
 
     Their standard errors (2, 2), too.
     """
-    highest, waves = (
-        float(np.clip(_SHARPEST * pitch, _SECOND if pitch > _COARSE else 1.0, _HIGHEST)),
-        found.waves,
-    )
+    least = _SECOND if pitch > _COARSE else 1.0
+    highest, waves = float(np.clip(_SHARPEST * pitch, least, _HIGHEST)), found.waves
     errors = np.full((2, 2), np.nan)
     reach = np.arange(-5, 6)
     orders = np.stack(np.meshgrid(reach, reach, indexing="ij"), -1).reshape(-1, 2)
