@@ -35,6 +35,15 @@ def test_disparities_are_written_with_their_confidence(lumigraph, views, tmp_pat
     assert lg.open(tmp_path / "trust.tiff").shape == SHAPE
 
 
+def test_a_zarr_store_holds_the_whole_map(lumigraph, views, tmp_path):
+    found = lumigraph("depth", "views.zarr", "-o", "map.zarr", "--focal-length", "120 mm", "--json")
+    assert found.code == 0, found.err
+    whole, told = lg.open(tmp_path / "map.zarr", lg.DepthMap), json.loads(found.out)
+    assert (whole.quantity, whole.unit) == ("depth", "m")
+    assert whole.usual_error == pytest.approx(told["expected_error"], rel=1e-3)
+    assert np.median(whole.confidence) > 0.5
+
+
 def test_lengths_make_metres_and_points(lumigraph, views, tmp_path):
     found = lumigraph("depth", "views.zarr", "-o", "points.ply", "--focal-length", "120 mm")
     assert found.code == 0, found.err

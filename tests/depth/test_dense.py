@@ -108,7 +108,7 @@ def test_what_does_not_fit_is_refused(monkeypatch):
         dense(raw, calibration, lenslets)
 
 
-def stepped(camera, near, far):
+def stepped(camera, near, far, count=8):
     """Two textured planes above, a slanted one below; and its depth at (y, x) of the focused plane [m]."""
     own = camera.object_grid
     grid = Grid(tuple(int(1.2 * n) // 2 * 2 + 1 for n in own.shape), own.pitch, own.center)
@@ -119,7 +119,7 @@ def stepped(camera, near, far):
         slant = near + (far - near) * np.clip((x / width + 1) / 2, 0, 1)
         return np.where(y < 0, np.where(x < 0, near, far), slant + 0 * y)
 
-    planes = np.linspace(near, far, 8)
+    planes = np.linspace(near, far, count)
     parts = []
     for dz in planes:  # the slanted plane as thin ones that share its light
         y, x = (a / (1 + dz / camera.object_distance) for a in (grid.y[:, None], grid.x))

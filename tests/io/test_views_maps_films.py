@@ -364,6 +364,31 @@ def test_films_are_written_not_read_and_mp4_needs_a_package(tmp_path, monkeypatc
         io.save(Stack(frames()), tmp_path / "a.mp4")
 
 
+@pytest.mark.parametrize("name", ["map.zarr", "map.zarr.zip"])
+@pytest.mark.parametrize("quantity", ["disparity", "depth"])
+def test_zarr_keeps_the_confidence_the_error_and_the_unit_of_a_depth_map(tmp_path, rng, name, quantity):
+    values = rng.random((5, 7), np.float32)
+    values[0, 0] = np.nan
+    whole = lg.DepthMap(values, rng.random((5, 7)), quantity, rng.random((5, 7)))
+    for found in (whole, lg.DepthMap(values, rng.random((5, 7)), quantity)):
+        lg.save(found, tmp_path / name)
+        back = lg.open(tmp_path / name, lg.DepthMap)
+        assert (back.quantity, back.unit, back.values.dtype) == (quantity, found.unit, np.float32)
+        np.testing.assert_array_equal(back.values, values)
+        np.testing.assert_array_equal(back.confidence, found.confidence)
+        assert (back.error is None) == (found.error is None)
+        if found.error is not None:
+            np.testing.assert_array_equal(back.error, found.error)
+
+
+def test_a_store_of_a_damaged_depth_map_is_refused(tmp_path):
+    lg.save(lg.DepthMap(np.eye(3), np.ones((3, 3)), "disparity"), tmp_path / "d.zarr")
+    about = tmp_path / "d.zarr" / "zarr.json"
+    about.write_text(about.read_text().replace('"disparity"', '"width"'))
+    with pytest.raises(FormatError, match="quantity"):
+        lg.open(tmp_path / "d.zarr")
+
+
 def test_a_depth_map_is_saved_by_its_values(tmp_path):
     lg.save(lg.DepthMap(np.eye(3), np.ones((3, 3)), "disparity"), tmp_path / "d.tiff")
     back = lg.open(tmp_path / "d.tiff")

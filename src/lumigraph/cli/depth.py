@@ -212,7 +212,8 @@ def depth(
     confidence
         Where to write the confidence of each place, from 0 to 1.
     lowest
-        Confidence below which a point is left out of .ply.
+        Confidence below which a point is left out of .ply: 0.5 keeps those with an expected error of less
+        than 0.45 px, of cameras 2.0 about 0.55 px.
     """
     common.check()
     files.check_output(output, MAPS)

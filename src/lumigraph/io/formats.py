@@ -22,7 +22,7 @@ from lumigraph.io import source
 from lumigraph.io.source import MAX_PIXELS
 from lumigraph.io.target import check_target
 
-Noun = RawImage | LightField | Stack | Volume | Calibration | PointCloud
+Noun = RawImage | LightField | Stack | Volume | DepthMap | Calibration | PointCloud
 """What a file can hold."""
 
 N = TypeVar("N", bound=Noun)
@@ -73,6 +73,7 @@ class Format:
 
 
 _ALL = ("RawImage", "LightField", "Volume")
+_STORED = (*_ALL, "DepthMap")
 _LYTRO = ("RawImage", "Stack", "Calibration")
 _PLANES = ("RawImage", "Stack", "Volume")
 FORMATS = (
@@ -80,7 +81,7 @@ FORMATS = (
     Format("Lytro ESLF", ("_eslf.png",), "eslf", ("LightField",), ("LightField",), ("views",)),
     Format("PNG", (".png",), "png", ("RawImage",), ("RawImage",), ("views",)),
     Format("JPEG", (".jpg", ".jpeg"), "jpeg", (), ("RawImage",)),
-    Format("Zarr", (".zarr", ".zarr.zip"), "zarr", _ALL, _ALL, ("page",)),
+    Format("Zarr", (".zarr", ".zarr.zip"), "zarr", _STORED, _STORED, ("page",)),
     Format("HDF5", (".h5", ".hdf5"), "hdf5", _ALL, (*_ALL, "Stack"), ("what",)),
     Format("PFM", (".pfm",), "pfm", ("RawImage",), ("RawImage",)),
     Format("PLY", (".ply",), "ply", ("PointCloud",), ("PointCloud",)),
@@ -192,7 +193,7 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
 
     Returns
     -------
-    RawImage | LightField | Stack | Volume | Calibration | PointCloud
+    RawImage | LightField | Stack | Volume | DepthMap | Calibration | PointCloud
         By the format and by what the file says it holds.
 
     Raises
@@ -305,8 +306,8 @@ def save(
     Parameters
     ----------
     thing
-        `RawImage`; an array (y, x) or (y, x, c); a depth map, of which the values are kept; `Stack`, or a
-        list of arrays; `LightField`, `Volume`, `Calibration`, `PointCloud`.
+        `RawImage`; an array (y, x) or (y, x, c); `DepthMap`, of which other formats than Zarr keep the values
+        alone; `Stack`, or a list of arrays; `LightField`, `Volume`, `Calibration`, `PointCloud`.
     path
         Its ending says which format; a light field goes into a folder of views where it has none.
     white
@@ -320,7 +321,8 @@ def save(
         A format that cannot hold the thing, or a folder that does not exist.
     """
     row = format_of(path)
-    thing = _noun(thing, single=row.module == "tiff")
+    if not isinstance(thing, DepthMap) or "DepthMap" not in row.writes:
+        thing = _noun(thing, single=row.module == "tiff")
     noun = type(thing).__name__
     if noun not in row.writes or (isinstance(thing, LightField) and row.module == "png"):
         fitting = tuple("a name without extension" if end == FOLDER else end for end in _endings(noun))

@@ -18,6 +18,7 @@ from zarr.errors import ZarrUserWarning
 from zarr.storage import LocalStore, WrapperStore, ZipStore
 
 from lumigraph.core.arrays import to_numpy
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
@@ -36,10 +37,10 @@ def count(path: Path) -> int | None:
 
 def load(
     path: Path, *, page: int | None = None, max_pixels: int = source.MAX_PIXELS
-) -> RawImage | LightField | Volume:
-    """The raw image, light field or volume in a Zarr store by lumigraph, or the volume in any OME-Zarr.
+) -> RawImage | LightField | Volume | DepthMap:
+    """What is in a Zarr store by lumigraph, or the volume in any OME-Zarr.
 
-    Of a series `page` chooses the frame, which may be a `Stack` or a `DepthMap`, too.
+    Of a series `page` chooses the frame, which may be a `Stack`, too.
 
     Raises
     ------
@@ -66,8 +67,8 @@ def load(
             return _noun(path, group, max_pixels)
 
 
-def save(thing: RawImage | LightField | Volume, path: Path) -> None:
-    """Write a raw image, a light field or a volume.
+def save(thing: RawImage | LightField | Volume | DepthMap, path: Path) -> None:
+    """Write a raw image, a light field, a volume or a depth map.
 
     Coordinates are in metres, in pixels where a raw image has no pitch. A volume becomes OME-Zarr.
     """
@@ -78,6 +79,8 @@ def save(thing: RawImage | LightField | Volume, path: Path) -> None:
         chunks = tuple(min(n, side) for n, side in zip(data.shape[-3:], _SIDES, strict=True))
         attributes = {**header.describe_volume(thing), "ome": ngff.describe(thing)}
         _write(path, [(ngff.LEVEL, data, (1,) * (data.ndim - 3) + chunks, names, {})], attributes)
+    elif isinstance(thing, DepthMap):
+        _save_depth(thing, path)
     else:
         _save_raw(thing, path)
 
@@ -102,6 +105,16 @@ def _save_light_field(views: LightField, path: Path) -> None:
     if views.valid is not None:
         arrays.append(("valid", to_numpy(views.valid), (1, *data.shape[1:4]), names[:4], {}))
     _write(path, arrays, header.describe_views(views))
+
+
+def _save_depth(found: DepthMap, path: Path) -> None:
+    frame, units = series.Frame.of(found), {"confidence": "1"}
+    chunks = tuple(min(n, _SIDE) for n in found.shape)
+    arrays = [
+        (name, array, chunks, frame.axes[name], {"units": units.get(name, found.unit)})
+        for name, array in frame.arrays.items()
+    ]
+    _write(path, arrays, {"lumigraph": header.FORMAT, **frame.attributes})
 
 
 def _axes(names: Names, unit: str) -> list[dict[str, str]]:
@@ -148,7 +161,7 @@ def _add(group: zarr.Group, what: tuple[Any, ...]) -> None:
     array[...] = values
 
 
-def _noun(path: Path, group: zarr.Group, max_pixels: int) -> RawImage | LightField | Volume:
+def _noun(path: Path, group: zarr.Group, max_pixels: int) -> RawImage | LightField | Volume | DepthMap:
     found: dict[str, Any] = dict(group.attrs)
     if "lumigraph" not in found:
         if "ome" not in found:
@@ -162,6 +175,10 @@ def _noun(path: Path, group: zarr.Group, max_pixels: int) -> RawImage | LightFie
         restored = header.restore_planes(np.moveaxis(values, 0, -1) if values.ndim == 4 else values, found)
         assert isinstance(restored, Volume)  # restore_planes goes by the kind
         return restored
+    if found.get("kind") == "DepthMap":
+        values, trust = (_values(path, group, name, max_pixels) for name in ("values", "confidence"))
+        error = _values(path, group, "error", max_pixels) if "error" in group else None
+        return DepthMap(values, trust, found["quantity"], error)
     data = _values(path, group, "data", max_pixels)
     if found.get("kind") == "LightField":
         aperture, lenslets = header.grid(found.get("aperture")), header.grid(found.get("lenslets"))

@@ -13,6 +13,7 @@ from lumigraph.core import checks
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.brief import called
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.progress import Progress, Stage, silent, within
@@ -93,6 +94,8 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
         origin.page is not None or (isinstance(found, Stack | Volume) and origin.is_known)
     ):
         (found,) = read_pages(path, None if origin.page is None else str(origin.page), one=True).values()
+    if isinstance(found, DepthMap):
+        found = RawImage(found.values)
     if isinstance(found, RawImage):
         return _raw(path.name, found, origin or Origin(), tell)
     if origin not in (None, Origin()):
