@@ -4,13 +4,19 @@ import shutil
 from importlib import import_module
 from importlib.metadata import version as _version
 from inspect import ismodule
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
 from matplotlib.figure import Figure
+from rich.console import Console
 from sphinx.errors import ExtensionError
+from sphinx.util.docutils import SphinxDirective
 
 import lumigraph
+from lumigraph.cli.app import VERBS
+from lumigraph.cli.app import app as command_line
 
 project = "lumigraph"
 author = "The lumigraph developers"
@@ -100,6 +106,22 @@ def _every_name_has_a_page(app: Any, error: Exception | None) -> None:
 def setup(app: Any) -> None:
     """Sphinx calls this."""
     app.connect("build-finished", _every_name_has_a_page)
+    app.add_directive("verbs", _Verbs)
+
+
+class _Verbs(SphinxDirective):
+    """The help of every verb, as the command line prints it."""
+
+    def run(self) -> list[nodes.Node]:
+        """Sphinx calls this."""
+        return [self._section(verb.__name__) for verb in VERBS]
+
+    def _section(self, name: str) -> nodes.section:
+        printed = Console(file=StringIO(), width=100, color_system=None)
+        command_line.help_print([name], console=printed)
+        text = printed.file.getvalue().strip()
+        inside = nodes.title(text=name), nodes.literal_block(text, text, language="text")
+        return nodes.section("", *inside, ids=[f"lumigraph-{name}"])
 
 
 sphinx_gallery_conf = {

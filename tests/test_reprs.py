@@ -32,6 +32,7 @@ LARGE = [
     lg.Scene([lg.Slice(PICTURE, GRID, dz) for dz in np.linspace(0, 1e-3, 50)]),
     lg.targets.points([(y, 0.0) for y in np.linspace(0, 1e-3, 999)]).parts[0],
     CAMERA.calibration,
+    CAMERA.describe(),
     PreparedImage(PICTURE, 5e-6, calibration=CAMERA.calibration, reasons=np.zeros((N, N), np.uint8)),
     Exposure(background=PICTURE, response=PICTURE),
     Matrix(PICTURE, (N,), (N,)),

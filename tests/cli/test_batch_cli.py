@@ -94,7 +94,7 @@ def test_ctrl_c_says_what_is_done(views, tmp_path, capsys, monkeypatch):
         ("batch refocs v.zarr -o o.zarr", "batch takes simulate"),
         ("batch refocus --alpha 1 -o o.zarr", "no frames are given"),
         ("batch refocus nothing*.zarr --alpha 1 -o o.zarr", "no file matches it"),
-        ("batch refocus {v} --alpha 1", "where the results go"),
+        ("batch refocus {v} --alpha 1", "no output is given"),
         ("batch refocus {v} --alpha 1 -o o.csv", "Use one of .zarr"),
         ("batch refocus {v} --alpa 1 -o {o}", "--alpa"),
         ("batch refocus {v} --alpha 1 -o {o} --workers 0", "--workers is 0"),

@@ -129,7 +129,7 @@ def test_a_damaged_checkpoint_is_refused(content, raw, tmp_path):
         np.savez(path, other=np.ones(3))
     else:
         path.write_bytes(content)
-    with pytest.raises(lg.FormatError, match=r"is damaged|no checkpoint"):
+    with pytest.raises(lg.FormatError, match=r"is damaged|not a checkpoint"):
         lg.deconvolve(raw, OPERATOR, 2, checkpoint=path)
 
 

@@ -180,3 +180,13 @@ def test_experiments_named_in_the_errata_exist(name):
 
     (found,) = find((name,))
     assert found.id == name
+
+
+def test_the_page_about_waves_images_the_hole():
+    """Twice the focal length before and behind a lens of 0.1 m: the hole again, upside down and as large."""
+    names: dict = {}
+    for number, code in blocks("docs/waves.md", "python"):
+        run("docs/waves.md", number, code, names)
+    hole = np.abs(names["hole"]) ** 2 > 0.5
+    assert names["image"][hole].sum() > 0.97 * names["image"].sum()
+    assert names["choice"].method in lg.METHODS

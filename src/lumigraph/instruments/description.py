@@ -13,7 +13,7 @@ _COMPUTING = "Simulation"
 """Title of the section about samples, which a notebook leaves out."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Description:
     """A camera's table: rows by section, and warnings; `str` gives it as text."""
 
@@ -35,6 +35,9 @@ class Description:
         warned = [("warning", text) for text in self.warnings]
         rows = [(row.name, f"{row.text}   {row.source and f'({row.source})'}".rstrip()) for row in chosen]
         return picture.card(f"{self.title[0].upper()}{self.title[1:]}", [*warned, *rows])
+
+    def __repr__(self) -> str:
+        return f"Description({self.title!r}, {len(self.rows)} rows in {len(self.sections)} sections)"
 
     def __str__(self) -> str:
         name, value = (max(len(getattr(row, part)) for row in self.rows) for part in ("name", "text"))
