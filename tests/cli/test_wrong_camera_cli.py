@@ -34,6 +34,23 @@ shape = [200, 220]
 """
 
 
+FOCUSED = """
+kind = "focused-plenoptic"
+wavelength = "550 nm"
+object_distance = "120 mm"
+[main_lens]
+focal_length = "60 mm"
+[lenslets]
+pitch = "98.0192991366 um"
+focal_length = "2 mm"
+count = [15, 15]
+magnification = 0.3
+[sensor]
+pixel_pitch = "8 um"
+shape = [200, 220]
+"""
+
+
 @pytest.fixture
 def microscope(lumigraph, tmp_path):
     """A white and a raw image of micro-images 12.5 px apart, 5 px from where scope.toml has them."""
@@ -57,6 +74,36 @@ def test_a_microscopes_white_image_tells_where_its_lenslets_are(microscope, tmp_
     found = microscope("depth", "raw.tiff", *words, "-o", "map.pfm")
     assert found.code == 0, found.err
     assert found.out.startswith("depth of")
+
+
+VERBS = {
+    "calibrate": ("calibrate", "white.tiff", "-o", "a.toml"),
+    "decode": ("decode", "raw.tiff", "--white", "white.tiff", "-o", "views.zarr"),
+    "refocus": ("refocus", "raw.tiff", "--white", "white.tiff", "--alpha", 1, "-o", "a.png"),
+    "depth": ("depth", "raw.tiff", "--white", "white.tiff", "-o", "a.pfm"),
+    "view": ("view", "raw.tiff", "--white", "white.tiff", "--export", "a.html"),
+    "deconvolve": ("deconvolve", "raw.tiff", "--white", "white.tiff", "--iterations", 1, "-o", "a.tiff"),
+    "render": ("render", "raw.tiff", "--white", "white.tiff", "-o", "a.png"),
+}
+
+
+@pytest.mark.filterwarnings("always")
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_says_in_one_line_what_the_picture_implies_about_the_camera_file(
+    verb, microscope, tmp_path
+):
+    table = SCOPE if verb != "render" else FOCUSED
+    (tmp_path / "agrees.toml").write_text(table)
+    (tmp_path / "differs.toml").write_text(table.replace('"8 um"', '"8.16 um"'))
+    said = microscope(*VERBS[verb], "--camera", "agrees.toml")
+    assert said.code == 0, said.err
+    told = "by the camera file it has 12.500 px (square): they agree"
+    assert (said.out.count(told), said.err.count(told)) == (1, 0)
+    said = microscope(*VERBS[verb], "--camera", "differs.toml")
+    assert said.code == 0, said.err
+    implied = "a relay of 1.02 instead of 1" if verb != "render" else "pixels of 8 µm instead of 8.16 µm"
+    told = f"by the camera file it has 12.255 px (square): {implied}. The picture's lattice is used"
+    assert (said.out + said.err).count(told) == 1
 
 
 @pytest.mark.parametrize(

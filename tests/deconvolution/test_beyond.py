@@ -56,6 +56,18 @@ def test_light_from_beside_the_picture_is_not_taken_up_by_its_border(crop, monke
     assert max(framed(plane) for plane in np.asarray(lg.deconvolve(raw, operator, 12))) > 1.45 * truth
 
 
+def test_samples_beside_the_picture_are_cut_and_vignetted_ones_are_not(crop):
+    operator, wide, inside, _, raw = crop
+    light = np.asarray(wide.adjoint(np.ones(raw.shape, np.float32)))
+    beside = (light < 0.3 * light.max())[:, inside[0], inside[1]]
+    assert 0 < beside.sum() < 0.4 * beside.size
+    response = np.ones(raw.shape, np.float32)
+    response[:, : raw.shape[1] // 2] = 0.5
+    for exposure, values in ((Exposure(), raw), (Exposure(response=response), raw * response)):
+        found = np.asarray(lg.deconvolve(values, operator, 2, exposure=exposure))
+        np.testing.assert_array_equal(found == 0, beside)
+
+
 def test_dead_pixels_and_what_is_outside_a_region_are_not_fitted(crop):
     operator, *_, raw = crop
     spoilt, mask = raw.copy(), np.ones(raw.shape, bool)

@@ -112,7 +112,7 @@ def board(
     target = None if board is None else metric.Board.from_text(board)
     if sources == (Path("plan"),):
         return _planned(origin, target, known, pictures)
-    seen, target, given = _read(sources, target, origin)
+    seen, target, given, told = _read(sources, target, origin)
     found = metric.board(seen, target, known.nominal(given))
     written = [path for path in (output, table) if path is not None]
     if output is not None:
@@ -126,32 +126,32 @@ def board(
         _headline(found),
         found.quantities(),
         lambda: _figures(found),
-        found.notes,
+        (*told, *found.notes),
         tuple(written),
     )
 
 
 def _read(
     sources: tuple[Path, ...], board: "Board | None", origin: Origin
-) -> "tuple[Corners, Board, dict[str, Any]]":
-    """Corners, their board, and what the files say of the camera."""
+) -> "tuple[Corners, Board, dict[str, Any], tuple[str, ...]]":
+    """Corners, their board, what the files say of the camera, and what was done to raw images."""
     from lumigraph import metric
 
     first, alone = sources[0], len(sources) == 1
     if alone and first.is_dir():
         seen, told, known = metric.load_compote(first)
         given = {name: getattr(known, name) for name in ("focal_length", "pixel_pitch", "shape")}
-        return seen, board or told, given
+        return seen, board or told, given, ()
     if board is None:
         raise FormatError("give --board, such as '9 x 5 corners, 10 mm'.")
     if alone and first.suffix.lower() == ".csv":
-        return metric.load_corners(first), board, {}
+        return metric.load_corners(first), board, {}, ()
     return _found(sources, board, origin)
 
 
 def _found(
     sources: tuple[Path, ...], board: "Board", origin: Origin
-) -> "tuple[Corners, Board, dict[str, Any]]":
+) -> "tuple[Corners, Board, dict[str, Any], tuple[str, ...]]":
     """Of raw images."""
     from lumigraph import metric
     from lumigraph.instruments.capabilities import WithMainLens
@@ -163,7 +163,8 @@ def _found(
     told = {"shape": ready[0].shape, "pixel_pitch": ready[0].pixel_pitch}
     if isinstance(camera, WithMainLens):
         told |= {"focal_length": camera.main_lens.focal_length, "pixel_pitch": camera.sensor.pixel_pitch}
-    return seen, board, {name: value for name, value in told.items() if value is not None}
+    known = {name: value for name, value in told.items() if value is not None}
+    return seen, board, known, ready[0].notes
 
 
 def _prepared(sources: tuple[Path, ...], origin: Origin) -> "Iterator[PreparedImage]":

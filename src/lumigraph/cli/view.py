@@ -153,7 +153,10 @@ def _exported(exhibits: list[Any], page: Page, path: Path) -> Result:
             about = f"{written.files} files, for any web server"
             values = Quantity("bytes", written.size), Quantity("files", written.files)
     text = f"{_megabytes(written.size)} ({about})"
-    return Result("View", "", exhibits, (text,), values, written=(written.path,))
+    told = [value for one in exhibits for what, value in one.facts if what == "Prepared"]
+    return Result(
+        "View", "", exhibits, (text,), values, notes=tuple(dict.fromkeys(told)), written=(written.path,)
+    )
 
 
 def _opened(path: Path, origin: Shown) -> Any:

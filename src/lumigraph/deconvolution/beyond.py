@@ -16,6 +16,12 @@ In a crop of a mouse's brain single ones became 80 times as bright as the inside
 the light that comes in from the side.
 """
 
+BESIDE = 0.3
+"""Samples that send less of their light onto pixels that count lie beside the picture: they are cut.
+
+In that crop those just beside it are up to 17 times as bright as the inside, those in it up to 2 times.
+"""
+
 Inside = tuple[slice, slice]
 """Where an object (y, x) stands in a larger one."""
 
@@ -46,8 +52,10 @@ def least_seen(operator: Linear) -> float:
     return BARELY if isinstance(operator, Widening) else UNSEEN
 
 
-def cut(estimate: Array, inside: Inside) -> Array:
-    """What is asked for of an object (..., y, x)."""
+def cut(estimate: Array, inside: Inside, pictured: Array | None) -> Array:
+    """What is asked for of an object (..., y, x); 0 beside the picture."""
+    if pictured is not None:
+        estimate = arrays.namespace(estimate).where(pictured, estimate, 0 * estimate)
     return estimate[..., inside[0], inside[1]]
 
 

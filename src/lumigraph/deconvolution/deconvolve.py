@@ -15,7 +15,7 @@ from lumigraph.core.linear import Linear
 from lumigraph.core.raw import RawImage
 from lumigraph.core.threads import single_products
 from lumigraph.core.volume import Volume
-from lumigraph.deconvolution.beyond import Inside, beyond, continued, cut, least_seen
+from lumigraph.deconvolution.beyond import BESIDE, Inside, Widening, beyond, continued, cut, least_seen
 from lumigraph.deconvolution.checkpoint import Checkpoint, fingerprint
 from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.methods import Method, State, Stop, check_offers
@@ -237,6 +237,7 @@ class Deconvolver:
         _check(operator, method)
         self._wide, self._inside = beyond(operator)
         self._scale: tuple[str, Scale] | None = None
+        self._pictured: Array | None = None
 
     @single_products()  # threads of small products spin: three times the work on a busy machine
     def __call__(
@@ -251,7 +252,8 @@ class Deconvolver:
         exposure = _known(raw, exposure)
         data = values(raw, self.operator, exposure)
         problem = Problem.of(raw, exposure, self._scaled(exposure, data))
-        run = _Run(problem, self.method, self.limits, progress, (self.operator, self._inside))
+        wanted = self.operator, self._inside, self._pictured
+        run = _Run(problem, self.method, self.limits, progress, wanted)
         if checkpoint is not None:
             run.checkpoint = Checkpoint.of(checkpoint)
             run.key = fingerprint(data, exposure, self.method)
@@ -262,7 +264,10 @@ class Deconvolver:
         key = fingerprint(exposure, str(data.dtype), str(arrays.placement(data)))
         if self._scale is None or self._scale[0] != key:
             _require(self._wide, data)
-            self._scale = key, Scale.of(self._wide, exposure, data, least_seen(self.operator))
+            scale = Scale.of(self._wide, exposure, data, least_seen(self.operator))
+            self._scale = key, scale
+            if isinstance(self.operator, Widening):
+                self._pictured = scale.pictured(BESIDE)
         return self._scale[1]
 
 
@@ -272,7 +277,7 @@ class _Run:
     method: Method
     limits: Stop
     progress: Report | None
-    wanted: tuple[Linear, Inside]
+    wanted: tuple[Linear, Inside, Array | None]
     checkpoint: Checkpoint | None = None
     key: str = ""
     began: float = 0.0
@@ -295,8 +300,8 @@ class _Run:
 
     def result(self, state: State, raw: RawImage | Array) -> Result:
         """What is asked for of the object, with its place in space."""
-        operator, inside = self.wanted
-        return _placed(cut(state.estimate, inside), raw, operator)
+        operator, inside, pictured = self.wanted
+        return _placed(cut(state.estimate, inside, pictured), raw, operator)
 
     def _first(self) -> State:
         kept = None if self.checkpoint is None else self.checkpoint.found(self.problem, self.key)

@@ -68,6 +68,17 @@ class Scale:
             total = xp.where(total > 0, total, xp.zeros_like(total))
         return cls(operator, response, weights, total, sensitivity, seen, exposure.gain or 1.0)
 
+    def pictured(self, least: float) -> Array:
+        """Truth values: samples that send at least this part of their light onto pixels that count.
+
+        How much of it the pixels take, as of vignetting, does not matter.
+        """
+        xp, light = arrays.namespace(self.sensitivity), self.sensitivity
+        if self.response is not None:
+            ones = xp.ones_like(self.response) if self.weights is None else self.weights
+            light = self.operator.adjoint(ones)
+        return light > least * float(xp.max(light))
+
     @property
     def mean_sensitivity(self) -> float:
         """Of the object samples that are seen."""
