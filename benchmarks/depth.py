@@ -80,10 +80,13 @@ def measured(name: str, views: lg.LightField, truth: np.ndarray) -> dict[str, An
 
 def run(names: Sequence[str] = ()) -> list[dict[str, Any]]:
     """Rows of the table, of the scenes whose names begin with one of these; none without data."""
-    chosen = [name for name in SCENES if name.startswith(tuple(names) or "")]
+    return [measured(name, *SCENES[name]()) for name in there() if name.startswith(tuple(names) or "")]
+
+
+def there() -> list[str]:
+    """Names of the scenes whose data are there."""
     folders = {"antinous": "hci_antinous"}
-    there = [n for n in chosen if (DATA / folders.get(n, f"hci_star/{n.split(',')[0]}")).is_dir()]
-    return [measured(name, *SCENES[name]()) for name in there]
+    return [n for n in SCENES if (DATA / folders.get(n, f"hci_star/{n.split(',')[0]}")).is_dir()]
 
 
 def show(rows: Sequence[dict[str, Any]]) -> None:

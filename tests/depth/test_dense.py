@@ -9,7 +9,7 @@ from lumigraph.core.arrays import namespace
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.depth import cloud, correlation, dense, metric
-from lumigraph.errors import GeometryError
+from lumigraph.errors import CalibrationError, GeometryError, SamplingWarning
 from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.rendering import render, sight_grid
 from lumigraph.rendering.patches import Layout, Patches
@@ -95,6 +95,18 @@ def test_an_even_picture_has_no_confidence():
     assert np.isfinite(found.values).all()
 
 
+def test_patches_at_the_end_of_those_tried_are_told():
+    lattice, _ = CAMERAS["square"]
+    paint = texture(np.random.default_rng(1), waves=12, longest=0.6)
+    planes = (paint, lambda y, x: 9.5, lambda y, x: x > 80), (paint, lambda y, x: 4.5, None)
+    raw, calibration = traced_raw(lattice, SHAPE, planes, [6])
+    with pytest.warns(SamplingWarning, match=r"of the places have patches at the end of those tried"):
+        dense(raw, calibration, correlation(raw, calibration, (4, 6)))
+    found = dense(raw, calibration, correlation(raw, calibration))
+    right = np.asarray(found.values)[:, -8:]
+    assert np.median(right) == pytest.approx(9.5, rel=0.01)
+
+
 def test_what_does_not_fit_is_refused(monkeypatch):
     lattice, _ = CAMERAS["square"]
     raw, calibration = traced_raw(
@@ -102,6 +114,8 @@ def test_what_does_not_fit_is_refused(monkeypatch):
     )
     with pytest.raises(GeometryError, match="focus is"):
         dense(raw, calibration, focus=[5, 6, 7])
+    with pytest.raises(CalibrationError, match="1 whole lenslets across but"):
+        dense(*traced_raw(lattice, (26, 60), ((lambda y, x: 1 + 0 * y, lambda y, x: 6.0, None),), [6]))
     lenslets = correlation(raw, calibration)
     monkeypatch.setattr("lumigraph.core.memory.available", lambda: 400_000)
     with pytest.raises(ValueError, match=r"sizes for .* samples needs"):
@@ -129,24 +143,34 @@ def stepped(camera, near, far, count=8):
     return Scene(tuple(parts)), depth
 
 
-@pytest.mark.long  # 20 s of wave optics
-def test_wave_optics_of_two_planes_and_a_slanted_one():
+@pytest.mark.long  # 20 and 50 s of wave optics
+@pytest.mark.parametrize(
+    ("lenslets", "planes"),
+    [
+        ({"focal_length": "3 mm", "count": (11, 11)}, 8),
+        ({"focal_length": ["3 mm", "3.1 mm", "2.9 mm"], "count": (8, 8), "layout": "hex"}, 4),
+    ],
+    ids=["one kind", "three kinds"],
+)
+def test_wave_optics_of_two_planes_and_a_slanted_one(lenslets, planes):
     """Within 5 % of the depth of field of the whole aperture, 1.7 mm, and edges within two samples."""
     camera = FocusedPlenopticCamera(
         wavelength="633 nm", object_distance="120 mm", main_lens={"focal_length": "60 mm"},
-        lenslets={"pitch": "150 um", "focal_length": "3 mm", "count": (11, 11), "magnification": 0.3},
-        sensor={"pixel_pitch": "6 um"},
+        lenslets={"pitch": "150 um", "magnification": 0.3, **lenslets}, sensor={"pixel_pitch": "6 um"},
     )  # fmt: skip
-    scene, truth = stepped(camera, -1.5e-3, 3e-3)
+    scene, truth = stepped(camera, -1.5e-3, 3e-3, planes)
     raw, calibration = simulate(camera, scene, Incoherent(1e-2)), camera.calibration
+    focus = camera.patches_on_raw() if calibration.lattice.kinds > 1 else None
     lenslets = correlation(raw, calibration)
-    found = metric(dense(raw, calibration, lenslets), calibration, focal_length=0.06, object_distance=0.12)
+    found = dense(raw, calibration, lenslets, focus=focus)
+    found = metric(found, calibration, focal_length=0.06, object_distance=0.12)
     grid = sight_grid(calibration, lenslets.values)
     scale = camera.object_distance / camera.separation
     y, x = grid.y[:, None] * scale, grid.x * scale
     error = np.abs(found.values - truth(y, x))
     field = next(row.value for row in camera.trade_offs() if row.name == "depth of field")
     assert np.median(error) < 0.05 * field
+    assert np.mean(found.error) / np.mean(error) == pytest.approx(1, abs=0.3)
     above = y[:, 0] < -0.1e-3
     wrong = (np.asarray(found.values)[above] > 0.75e-3) != (x > 0)
     assert wrong.sum(1).max() <= 2

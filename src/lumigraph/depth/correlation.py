@@ -27,6 +27,7 @@ WIDEST = 0.08, 0.6
 
 _REACH = 1.8  # pitches: nearest neighbours, and the next ones, which in a multi-focus array have one kind
 _LEAST_SEEN = 0.12  # part of a micro-image that both must show
+_FEWEST_LENSLETS = 3
 _FEWEST_PIXELS = 6  # pitch below which a micro-image has nothing to compare
 _BEND = 0.01  # of the correlation's peak: what a texture of waves 60 px long has [1/px²]
 _NOISE = 0.01  # of the picture's white
@@ -74,7 +75,8 @@ def correlation(
     Raises
     ------
     CalibrationError
-        Micro-images of less than 6 px, or a raw image that does not belong to the calibration.
+        Micro-images of less than 6 px, fewer than 3 lenslets across, or a raw image that does not belong to
+        the calibration.
     GeometryError
         A range that is empty, holds 0, or reaches beyond the pitch.
     LumigraphError
@@ -91,6 +93,11 @@ def correlation(
     if pitch < _FEWEST_PIXELS:
         raise CalibrationError(
             f"micro-images are {pitch:.3g} px wide but correlation needs {_FEWEST_PIXELS} px at least."
+        )
+    if (fewest := min(lenslet_indices(calibration).shape[:2])) < _FEWEST_LENSLETS:
+        raise CalibrationError(
+            f"the raw image shows {fewest} whole lenslets across but correlation compares each with its "
+            f"neighbours and needs {_FEWEST_LENSLETS} at least. Crop less."
         )
     ranges = _ranges(patches, pitch)
     micro = _MicroImages.of(raw, calibration)

@@ -1,6 +1,7 @@
 """Depth of each sample of a plenoptic 2.0 picture, by what all micro-images show that see it."""
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -20,12 +21,14 @@ from lumigraph.depth.pictures import noise_of
 from lumigraph.depth.sightings import Sightings
 from lumigraph.depth.smooth import Stiffness, tears, update
 from lumigraph.depth.volume import box, cheapest, guided, semi_global
+from lumigraph.errors import SamplingWarning
 from lumigraph.preparation import of_raw
 from lumigraph.rendering.decode import check_raw
 from lumigraph.rendering.patches import Layout, Patches, checked_focus
 
 # Lengths in px are those by which a detail moves that stands at the edge of its micro-image.
 _STEP = 0.4  # px between sizes that are tried
+_BEYOND = 0.01  # part of the places that may lie at the end of the sizes without a warning
 _SPARE = 2.0  # px beyond the sizes of the lenslets' map
 _SURE = 0.3  # confidence of the lenslets whose sizes span the range
 _MOST = 0.06  # of white: more says only that the size is wrong
@@ -91,6 +94,11 @@ def dense(
     LumigraphError
         It would not fit in memory.
 
+    Warns
+    -----
+    SamplingWarning
+        Places have patches at the end of those that are tried.
+
     References
     ----------
     Perwass and Wietzke, "Single lens 3D-camera with extended depth-of-field", Proc. SPIE 8291 (2012).
@@ -110,6 +118,7 @@ def dense(
     first = _swept(sights, moves, (sign, guide), within(progress, 0.3, 0.8))
     found, evidence = _refined(sights, first, (sign, guide), within(progress, 0.8, 1))
     error = np.minimum(np.maximum(expected(found, evidence), expected(-found, evidence)), reach)
+    _check_ends(found, error, moves, sign * np.exp(moves[[0, -1]] / reach))
     values = sign * np.exp(found / reach)
     trust, error = np.exp(-error / _DOUBT), error * np.abs(values) / reach
     values, trust, error = (like(part, raw.data) for part in (values, trust, error))
@@ -125,6 +134,19 @@ def _labels(sizes: np.ndarray, trust: np.ndarray, reach: float, pitch: float) ->
     low, high = low - _SPARE, min(high + _SPARE, reach * math.log(pitch))
     count = max(math.ceil((high - low) / _STEP), 4)
     return low + (high - low) * np.arange(count + 1) / count
+
+
+def _check_ends(found: np.ndarray, error: np.ndarray, moves: np.ndarray, ends: np.ndarray) -> None:
+    low, high = moves[0] + _STEP / 2, moves[-1] - _STEP / 2
+    share = float((((found < low) | (found > high)) & (error < _DOUBT)).mean())
+    if share > _BEYOND:
+        first, last = sorted(ends.tolist())
+        warnings.warn(
+            f"{share:.1%} of the places have patches at the end of those tried, {first:.4g} to {last:.4g} px: "
+            "theirs may lie beyond. Give lenslets= by correlation with wider patches=(least, most).",
+            SamplingWarning,
+            stacklevel=3,
+        )
 
 
 def _swept(

@@ -10,7 +10,7 @@ from lumigraph.core.arrays import like, to_numpy
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Progress, silent, within
-from lumigraph.depth.expected import expected
+from lumigraph.depth.expected import Evidence, expected
 from lumigraph.depth.lines import refined
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.sweep import labels, span, swept
@@ -80,14 +80,7 @@ def epi(
     0.3
     """
     pictures = Pictures.of(views)
-    (low, high), shading = span(pictures)
-    if disparities is not None:
-        low, high = _range(disparities, pictures.reach)
-    moves = labels(low, high)
-    share = len(moves) / (len(moves) + 20)
-    first = swept(pictures, moves, shading, within(progress, 0, share))
-    first = np.clip(median_filter(first, 5), moves[0], moves[-1])
-    found, evidence = refined(pictures, first, shading, within(progress, share, 1))
+    found, evidence = lines_of(pictures, disparities, progress)
     found, error = found / pictures.reach, expected(found, evidence) / pictures.reach
     if disparities is not None:
         _check_ends(found, error, disparities, _STEP / pictures.reach)
@@ -96,6 +89,20 @@ def epi(
     trust = known * np.exp(-np.nan_to_num(error) / min(_DOUBT, _DOUBT * 4 / pictures.reach))
     found, trust, error = (like(part, views.data) for part in (found, trust, error))
     return DepthMap(found, trust, "disparity", error)
+
+
+def lines_of(
+    pictures: Pictures, disparities: tuple[float, float] | None = None, progress: Progress = silent
+) -> tuple[np.ndarray, Evidence]:
+    """Movements (y, x) in the outermost view [px], and what they rest on."""
+    (low, high), shading = span(pictures)
+    if disparities is not None:
+        low, high = _range(disparities, pictures.reach)
+    moves = labels(low, high)
+    share = len(moves) / (len(moves) + 20)
+    first = swept(pictures, moves, shading, within(progress, 0, share))
+    first = np.clip(median_filter(first, 5), moves[0], moves[-1])
+    return refined(pictures, first, shading, within(progress, share, 1))
 
 
 def _known(views: LightField) -> np.ndarray:

@@ -1,0 +1,60 @@
+"""The factors of expected errors, `lumigraph.depth.expected.FACTORS`: found on rendered scenes with truth.
+
+An error at a place is taken to be of the mean Σ factor · term; the factors are those of the greatest Poisson
+likelihood of all errors, found by Richardson and Lucy's steps, which keep them above zero. Scenes
+that are not there (LUMIGRAPH_DATA) are left out.
+
+    python -m benchmarks.expected
+"""
+
+import numpy as np
+
+from benchmarks.depth import SCENES, there
+from lumigraph.depth.epi import lines_of
+from lumigraph.depth.expected import FACTORS, terms
+from lumigraph.depth.pictures import Pictures
+
+CHOSEN = ("antinous", "cotton, 33 views")
+"""Scenes that the factors are found on; the others say whether they hold."""
+
+_STEPS = 400
+
+Parts = tuple[np.ndarray, np.ndarray]
+"""Terms (term, place) and errors (place,), in px of the outermost view."""
+
+
+def parts_of(name: str) -> Parts:
+    """Of a scene, where the truth is known."""
+    views, truth = SCENES[name]()
+    pictures = Pictures.of(views)
+    found, evidence = lines_of(pictures)
+    known = np.isfinite(truth)
+    parts = terms(found, evidence)
+    return np.stack([parts[name][known] for name in FACTORS]), np.abs(found - truth * pictures.reach)[known]
+
+
+def fitted(parts: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    """Factors (term,) of the greatest Poisson likelihood of errors (place,) of terms (term, place)."""
+    factors, sums = np.full(len(parts), 0.1), parts.sum(1)
+    for _ in range(_STEPS):
+        factors = factors * (parts @ (errors / (factors @ parts + 1e-9))) / sums
+    return factors
+
+
+def show(found: dict[str, Parts]) -> None:
+    """Print the factors by the chosen scenes, beside those in use, and the errors expected of each scene."""
+    joined = [np.concatenate([found[name][k] for name in CHOSEN if name in found], -1) for k in (0, 1)]
+    new, old = fitted(*joined), np.array(list(FACTORS.values()))
+    for name, factor, used in zip(FACTORS, new, old, strict=True):
+        print(f"{name:10} {factor:.3f}, in use {used:.3f}")
+    for scene, (parts, errors) in found.items():
+        ratios = [float((factors @ parts).mean() / errors.mean()) for factors in (new, old)]
+        print(f"{scene}: expected over true error {ratios[0]:.2f}, by those in use {ratios[1]:.2f}")
+
+
+if __name__ == "__main__":
+    measured = {name: parts_of(name) for name in there()}
+    if set(CHOSEN) & set(measured):
+        show(measured)
+    else:
+        print("skipped: no scene is there. Set LUMIGRAPH_DATA to a folder that holds hci_antinous.")

@@ -1,0 +1,38 @@
+"""Errors to expect: what they are made of, and how their factors are found."""
+
+import numpy as np
+import pytest
+from benchmarks.expected import fitted
+
+from lumigraph.depth.expected import FACTORS, Evidence, expected, terms
+
+
+@pytest.fixture
+def edge():
+    """A step of 4 px, nearer on the left, in a picture that shows no edge; noise of 0.1 px."""
+    values = np.where(np.arange(40) < 20, 4.0, 0.0) + np.zeros((30, 1))
+    even = np.zeros_like(values)
+    return values, Evidence(even + 0.1, even, even)
+
+
+def test_a_map_is_least_sure_on_the_near_side_of_an_edge_that_no_picture_shows(edge):
+    values, evidence = edge
+    error = expected(values, evidence)[15]
+    assert error[:10] == pytest.approx(0.1 * FACTORS["noise"])
+    near = 0.1 * FACTORS["noise"] + 4 * (FACTORS["farther"] + FACTORS["faint"] + FACTORS["wide"])
+    assert error[19] == pytest.approx(near)
+    assert error[20] == pytest.approx(0.1 * FACTORS["noise"] + 4 * FACTORS["nearer"])
+    shown = Evidence(evidence.deviation, evidence.disputed, np.ones_like(values))
+    assert expected(values, shown)[15, 19] < 0.5 * near
+
+
+def test_the_factors_that_made_errors_are_found_again(rng):
+    values = np.cumsum(np.cumsum(rng.normal(0, 0.3, (80, 90)), 0), 1) * (rng.random((80, 90)) > 0.3)
+    evidence = Evidence(*rng.random((3, 80, 90)) * np.array([1.0, 0.5, 0.01])[:, None, None])
+    parts = np.stack([part.ravel() for part in terms(values, evidence).values()])
+    true = np.array(list(FACTORS.values()))
+    # Errors are not of one size: exponential, as where some places are right and some far off.
+    errors = rng.exponential(true @ parts)
+    found = fitted(parts, errors)
+    assert (found @ parts).mean() == pytest.approx(errors.mean(), rel=1e-3)
+    assert np.mean(np.abs(found @ parts / (true @ parts) - 1)) < 0.1
