@@ -142,7 +142,8 @@ def _check_ends(found: np.ndarray, error: np.ndarray, moves: np.ndarray, ends: n
     if share > _BEYOND:
         first, last = sorted(ends.tolist())
         warnings.warn(
-            f"{share:.1%} of the places have patches at the end of those tried, {first:.4g} to {last:.4g} px: "
+            f"{share:.1%} of the places have patches at the end of those tried, "
+            f"{first:.4g} to {last:.4g} px: "
             "theirs may lie beyond. Give lenslets= by correlation with wider patches=(least, most).",
             SamplingWarning,
             stacklevel=3,
