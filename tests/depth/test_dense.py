@@ -143,12 +143,12 @@ def stepped(camera, near, far, count=8):
     return Scene(tuple(parts)), depth
 
 
-@pytest.mark.long  # 20 and 50 s of wave optics
+@pytest.mark.long  # 20 and 80 s of wave optics
 @pytest.mark.parametrize(
     ("lenslets", "planes"),
     [
         ({"focal_length": "3 mm", "count": (11, 11)}, 8),
-        ({"focal_length": ["3 mm", "3.1 mm", "2.9 mm"], "count": (8, 8), "layout": "hex"}, 4),
+        ({"focal_length": ["3 mm", "3.1 mm", "2.9 mm"], "count": (9, 9), "layout": "hex"}, 5),
     ],
     ids=["one kind", "three kinds"],
 )
