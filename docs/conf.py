@@ -117,7 +117,7 @@ class _Verbs(SphinxDirective):
         return [self._section(verb.__name__) for verb in VERBS]
 
     def _section(self, name: str) -> nodes.section:
-        printed = Console(file=StringIO(), width=100, color_system=None)
+        printed = Console(file=StringIO(), width=82, color_system=None)
         command_line.help_print([name], console=printed)
         text = printed.file.getvalue().strip()
         inside = nodes.title(text=name), nodes.literal_block(text, text, language="text")
