@@ -11,8 +11,10 @@ from lumigraph import viewer
 from lumigraph.calibration import calibrate
 from lumigraph.cli.origin import Origin
 from lumigraph.core.prepared import Reason
+from lumigraph.core.stack import Stack
 from lumigraph.deconvolution import Exposure
-from lumigraph.errors import CalibrationError, SamplingWarning
+from lumigraph.errors import CalibrationError, FormatError, SamplingWarning
+from lumigraph.preparation import read_pages
 
 PITCH, OFFSET = 12.4, 50.0
 
@@ -132,10 +134,27 @@ def test_a_raw_image_alone_says_what_it_implies_about_the_camera_file(bench):
         lg.prepare(raw, camera=seen(1.08))
 
 
+@pytest.mark.parametrize(
+    ("pages", "numbers"), [("1", [1]), ("1:3", [1, 2, 3]), ("1-3", [1, 2, 3]), ("all", [0, 1, 2, 3])]
+)
+def test_pages_of_a_stack_are_named_one_by_one_or_as_a_range(pages, numbers, tmp_path):
+    frames = np.arange(4, dtype=np.uint16)[:, None, None] * np.ones((20, 30), np.uint16)
+    lg.save(Stack(frames), tmp_path / "film.tif")
+    found = read_pages(tmp_path / "film.tif", pages)
+    assert [int(np.max(raw.data)) for raw in found.values()] == list(found) == numbers
+    for wrong in ("-1", "3-1", "2-4", "1-2-3", "a"):
+        with pytest.raises(FormatError, match=r"has pages 0 to 3\. Give one, some as '0:3'"):
+            read_pages(tmp_path / "film.tif", wrong)
+
+
 @pytest.mark.long  # calibrates and decodes real pictures
 @pytest.mark.parametrize(
     ("folder", "name"),
-    [("lfm_mouse_brain", "LF_img_train_0.tif"), ("letters_plenoptic1", "letters_ULF_M1.png")],
+    [
+        ("lfm_mouse_brain", "LF_img_train_0.tif"),
+        ("lfm_worm", "20131219WORM2_small_full_neg_X1_N15_cropped_uncompressed.tif"),
+        ("letters_plenoptic1", "letters_ULF_M1.png"),
+    ],
 )
 def test_pictures_of_a_raw_image_calibrated_alone_have_no_seams(folder, name):
     """Lenslets were left out for standing off the lattice: 8 and 20 % of the picture differed by over 2 %."""

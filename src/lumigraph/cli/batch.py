@@ -157,7 +157,7 @@ def batch(
     output
         Zarr store (.zarr), or table (.csv).
     page
-        Pages of a stack, 'first:last' or one number, counted from 0; all if left out.
+        Pages of a stack, such as '3:9', '3-9' or 3, counted from 0; all if left out.
     """  # noqa: E501 - an example is one line
     from lumigraph import cluster
 

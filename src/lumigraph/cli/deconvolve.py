@@ -51,7 +51,7 @@ class Seen:
         Part of the raw image that counts, 'rows:columns' in pixels, such as '100-500:80-640'; the rest is
         neither fitted nor cut off.
     page
-        Pages of a stack, counted from 0: one, such as 3, several as 'first:last', or 'all'.
+        Pages of a stack, counted from 0: one, such as 3, several, such as 3:9 or 3-9, or 'all'.
     """
 
     white: Path | None = None

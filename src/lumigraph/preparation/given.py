@@ -101,7 +101,7 @@ def read_pages(path: Path, pages: str | None = None, *, one: bool = False) -> di
     path
         A raw image, or a stack of them.
     pages
-        Of a stack: one, such as "3", some as "first:last", or "all".
+        Of a stack: one, such as "3", some as "3:9" or "3-9", both of which count, or "all".
     one
         Whether a single page is needed, as an error then says.
 
@@ -158,13 +158,15 @@ def _instance(path: Path, thing: object, kind: type[Kind]) -> Kind:
 
 
 def _range(pages: str, count: int, path: Path, *, one: bool) -> range:
-    first, _, last = ("0", ":", str(count - 1)) if pages == "all" else pages.partition(":")
+    if pages == "all":
+        return range(count)
+    first, _, last = pages.partition("-" if "-" in pages else ":")
     try:
         found = range(int(first), int(last or first) + 1)
     except ValueError:
         found = range(0)
     if not found or found[0] < 0 or found[-1] >= count:
-        forms = "one of them" if one else "one, 'first:last' or 'all'"
+        forms = "one of them" if one else "one, some as '0:3' or '0-3', or 'all'"
         raise FormatError(f"--page is {pages!r} but {path} has pages 0 to {count - 1}. Give {forms}.")
     return found
 
