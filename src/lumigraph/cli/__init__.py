@@ -7,7 +7,7 @@
 - `reporting`: `--report` of every verb that computes
 - `serving`: where a page is served, and opening a browser
 - `demo`, `design`, `simulate`, `calibrate`, `decode`, `render`, `refocus`, `depth`, `deconvolve`, `measure`,
-  `batch`, `sweep`, `board`, `view`, `samples`, `catalogue`,
+  `batch`, `sweep`, `dataset`, `board`, `view`, `samples`, `catalogue`,
   `reproduce`: the verbs
 
 Modules of verbs import what is slow inside their functions, so that `--help` answers at once.

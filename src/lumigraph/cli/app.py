@@ -18,6 +18,7 @@ from lumigraph.cli.batch import batch
 from lumigraph.cli.board import board
 from lumigraph.cli.calibrate import calibrate
 from lumigraph.cli.catalogue import catalogue
+from lumigraph.cli.dataset import dataset
 from lumigraph.cli.decode import decode
 from lumigraph.cli.deconvolve import deconvolve
 from lumigraph.cli.demo import demo
@@ -42,7 +43,7 @@ _LONGEST = 400  # characters of a line on standard error
 
 VERBS = (
     demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure, batch, sweep,
-    board, view, samples, catalogue, reproduce,
+    dataset, board, view, samples, catalogue, reproduce,
 )  # fmt: skip
 """In the order of their use."""
 

@@ -68,11 +68,11 @@ def sweep(
 
     common.check()
     files.check_output(output, TABLES)
-    given, values = load_camera(camera), dict(map(_values, vary))
-    if len(values) < len(vary):
+    given, varied = load_camera(camera), dict(map(values, vary))
+    if len(varied) < len(vary):
         raise FormatError("--vary names a key twice. Give all its values at once.")
-    items = _combinations(values)
-    _changed(given, items[0])  # an unknown key is refused before any work
+    items = combinations(varied)
+    changed(given, items[0])  # an unknown key is refused before any work
     names = _names(measure, [row.name for row in given.quantities()])
     source = str(Path(camera).absolute()) if Path(camera).exists() else camera
     with progress("sweep") as shown, kept(output):
@@ -84,7 +84,7 @@ def sweep(
     if found.failures:
         raise LumigraphError(f"{len(found.failures)} of {found.count} failed: {min(found.failures.items())}.")
     rows = [entry.values for _, entry in sorted(found.entries.items())]
-    return _result(rows, list(values), names, output)
+    return _result(rows, list(varied), names, output)
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Designs:
         from lumigraph.instruments import load_camera
 
         try:
-            rows = _changed(load_camera(self.camera), item).quantities()
+            rows = changed(load_camera(self.camera), item).quantities()
         except LumigraphError as error:
             return Values({**item, _ERROR: " ".join(str(error).split())})
         known = {row.name: row for row in rows}
@@ -120,12 +120,12 @@ class Designs:
         )
 
 
-def _values(text: str) -> tuple[str, list[Any]]:
+def values(text: str) -> tuple[str, list[Any]]:
     """A key of the camera file and the values after it.
 
-    >>> _values("lenslets.focal_length=4 mm:6 mm:3")
+    >>> values("lenslets.focal_length=4 mm:6 mm:3")
     ('lenslets.focal_length', ['4 mm', '5 mm', '6 mm'])
-    >>> _values("lenslets.layout=square, hex")[1], _values("lenslets.magnification=0.3,0.5")[1]
+    >>> values("lenslets.layout=square, hex")[1], values("lenslets.magnification=0.3,0.5")[1]
     (['square', 'hex'], [0.3, 0.5])
     """
     name, equals, words = text.partition("=")
@@ -156,16 +156,17 @@ def _number(word: str) -> Any:
     return word
 
 
-def _combinations(values: Mapping[str, list[Any]]) -> list[dict[str, Any]]:
+def combinations(varied: Mapping[str, list[Any]]) -> list[dict[str, Any]]:
+    """Every combination of the values of some keys."""
     count = 1
-    for some in values.values():
+    for some in varied.values():
         count *= len(some)
     if count > MOST:
         raise FormatError(f"--vary asks for {count} combinations; at most {MOST} are taken.")
-    return [dict(zip(values, one, strict=True)) for one in itertools.product(*values.values())]
+    return [dict(zip(varied, one, strict=True)) for one in itertools.product(*varied.values())]
 
 
-def _changed(camera: "Instrument", item: Mapping[str, Any]) -> "Instrument":
+def changed(camera: "Instrument", item: Mapping[str, Any]) -> "Instrument":
     """The camera whose file has other values, by dotted keys; lengths carry a unit as in the file."""
     table = tomllib.loads(camera.to_toml())
     for name, value in item.items():

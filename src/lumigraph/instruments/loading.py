@@ -39,11 +39,12 @@ def load_camera(path: str | PathLike[str]) -> AnyCamera:
     """
     name = str(path)
     if not Path(name).exists() and not name.endswith(".toml") and "/" not in name:
-        return _load(files.read_catalogue(name), name)
-    return _load(files.read(path), name)
+        return camera_of(files.read_catalogue(name), name)
+    return camera_of(files.read(path), name)
 
 
-def _load(table: dict, origin: str) -> AnyCamera:
+def camera_of(table: dict, origin: str) -> AnyCamera:
+    """The camera of a table; errors name its `origin`."""
     kind = files.kind(table, origin)
     camera_class = next(each for each in _CLASSES if kind == each.KIND)
     return camera_class.from_table(table, origin)  # type: ignore[return-value]

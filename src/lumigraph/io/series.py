@@ -150,11 +150,9 @@ def write(path: Path, number: int, frame: Frame) -> Checksums:
     FormatError
         Arrays of other names, shapes or types than the store's, or a full disk.
     """
-    described = _described(path)
-    if frame.layout != described["layout"]:
-        raise FormatError(
-            f"it gives {_told(frame.layout)} where the first frame gave {_told(described['layout'])}."
-        )
+    known = described(path)["layout"]
+    if frame.layout != known:
+        raise FormatError(f"it gives {_told(frame.layout)} where the first frame gave {_told(known)}.")
     writer = _Writer(LocalStore(path))
     group = zarr.open_group(writer, mode="r+", zarr_format=3, use_consolidated=False)
     for name, values in frame.arrays.items():
@@ -180,7 +178,7 @@ def is_whole(path: Path, files: Mapping[str, tuple[int, int]], *, content: bool 
 def count(path: Path) -> int | None:
     """Frames of a series; None where a path holds none."""
     try:
-        found = _described(path)["frames"]
+        found = described(path)["frames"]
     except FormatError:
         return None
     return found if isinstance(found, int) and found > 0 else None
@@ -194,7 +192,7 @@ def load(path: Path, number: int, max_pixels: int = source.MAX_PIXELS) -> Any:
     FormatError
         No series, no such frame, one that is not there yet, or a damaged one.
     """
-    found, frames = _described(path), count(path)
+    found, frames = described(path), count(path)
     if frames is None or isinstance(number, bool) or not 0 <= number < frames:
         raise FormatError(
             f"page is {number!r} but {path} has {frames} frames. Choose 0 ... {(frames or 1) - 1}."
@@ -234,7 +232,14 @@ def _read(path: Path, group: zarr.Group, which: tuple[str, int], max_pixels: int
     return np.asarray(array[number])
 
 
-def _described(path: Path) -> dict[str, Any]:
+def described(path: Path) -> dict[str, Any]:
+    """What a store says of itself: frames, layout, and what is known of all of them.
+
+    Raises
+    ------
+    FormatError
+        It is no series.
+    """
     try:
         if (path / "zarr.json").stat().st_size > _DESCRIBED:
             raise ValueError

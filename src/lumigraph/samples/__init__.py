@@ -4,10 +4,13 @@
 - `still_life`: what stands there, painted by functions of the place
 - `bench`: white and raw image of a plenoptic camera (1.0 or 2.0), with camera, scene and depths
 - `volume`: raw image of a light-field microscope, with the volume that it shows
+- `drawn`: scenes drawn by chance, as a camera sees them; `dataset`: many of them in one store
 - `files`: their camera files; `folder`: all of them as files
 """
 
 from lumigraph.samples.bench import BenchSample, bench
+from lumigraph.samples.dataset import Draws, dataset
+from lumigraph.samples.drawn import DrawnSample, drawn
 from lumigraph.samples.files import camera_file
 from lumigraph.samples.folder import NAMES, write
 from lumigraph.samples.scene import SceneSample, scene
@@ -16,10 +19,14 @@ from lumigraph.samples.volume import VolumeSample, volume
 __all__ = [
     "NAMES",
     "BenchSample",
+    "DrawnSample",
+    "Draws",
     "SceneSample",
     "VolumeSample",
     "bench",
     "camera_file",
+    "dataset",
+    "drawn",
     "scene",
     "volume",
     "write",

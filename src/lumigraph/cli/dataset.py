@@ -1,0 +1,109 @@
+"""`lumigraph dataset`."""
+
+import glob
+import shlex
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from lumigraph.cli import files
+from lumigraph.cli.batch import Hands, kept
+from lumigraph.cli.console import line, progress
+from lumigraph.cli.deconvolve import depths
+from lumigraph.cli.options import COMMAND, COMMON, Common, Output
+from lumigraph.cli.sweep import changed, combinations, values
+from lumigraph.core.result import Quantity, Result
+from lumigraph.errors import FormatError, LumigraphError
+
+ALONE = Hands()
+
+MOST = 1_000_000
+"""Samples."""
+
+
+def dataset(
+    camera: str,
+    /,
+    *,
+    count: Annotated[int, Parameter(name=("--count", "-n"), allow_leading_hyphen=True)],
+    z: Annotated[str, Parameter(allow_leading_hyphen=True)],
+    output: Output,
+    layout: Annotated[list[Literal["patches", "slanted", "beads"]] | None, Parameter(negative="")] = None,
+    photographs: str | None = None,
+    vary: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True, negative="")] = None,
+    seed: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0,
+    accuracy: Annotated[float, Parameter(allow_leading_hyphen=True)] = 1e-2,
+    volume: Annotated[bool, Parameter(negative="")] = False,
+    hands: Hands = ALONE,
+    common: Common = COMMON,
+) -> Result:
+    """Simulate raw images of drawn scenes with their truth, to train and test methods on.
+
+    Each sample is a raw image by wave optics with the sensor's noise, its picture in focus, the depth of
+    each place and what was drawn, in one Zarr store with a data card beside it (.md). The same seed draws
+    the same samples. Kill it at any time: the same line goes on where it was.
+
+    Example: `lumigraph dataset thesis-plenoptic-1 -n 500 --z "-60 mm:60 mm:20 mm" -o train.zarr`
+
+    Example: `lumigraph dataset lfm-guv -n 100 --layout beads --z "-8 um:8 um:4 um" --volume -o beads.zarr`
+
+    Example: `lumigraph dataset camera.toml -n 2000 --z "-9 mm:9 mm:3 mm" --photographs "photos/*.jpg" --vary "object_distance=300 mm, 320 mm" -o train.zarr --workers 2`
+
+    Parameters
+    ----------
+    camera
+        Camera file (TOML), or the name of a bundled one.
+    count
+        Samples.
+    z
+        Depths of the scenes' planes from the focused one, positive farther: 'first:last:step', or some.
+    output
+        Zarr store (.zarr).
+    layout
+        patches: regions at depths of their own (default). slanted: one plane that rises in steps (default).
+        beads: in a dark volume. May be repeated; one is drawn for each sample.
+    photographs
+        Files by a pattern in quotes, parts of which become textures.
+    vary
+        A key of the camera file and its values, as 'lumigraph sweep' takes them: samples take turns.
+    seed
+        Of all that is drawn.
+    accuracy
+        Relative rms error of the raw images before noise.
+    volume
+        Keep the intensity of every plane, too.
+    """  # noqa: E501 - an example is one line
+    from lumigraph.instruments import load_camera
+    from lumigraph.samples import Draws
+    from lumigraph.samples import dataset as make
+
+    files.check_output(output, (".zarr",))
+    hands.check()
+    if not 1 <= count <= MOST:
+        raise FormatError(f"--count is {count} but must be from 1 to {MOST}.")
+    if seed < 0:
+        raise FormatError(f"--seed is {seed} but must be at least 0.")
+    given, varied = load_camera(camera), dict(map(values, vary or []))
+    cameras = tuple(changed(given, one).to_toml() for one in combinations(varied))
+    layouts = tuple(dict.fromkeys(layout or ("patches", "slanted")))
+    if "beads" in layouts and len(layouts) > 1:
+        raise FormatError("--layout beads gives no depth of each place; the others do. Make two data sets.")
+    found = tuple(sorted(str(Path(one).absolute()) for one in glob.glob(photographs or "", recursive=True)))  # noqa: PTH207
+    if photographs is not None and not found:
+        raise FormatError(f"--photographs {photographs!r}: no file matches. Check the pattern.")
+    work = Draws(cameras, depths("--z", z), layouts, found, seed, accuracy, volume)
+    if hands.slurm is not None:
+        return hands.submitted(output)
+    with progress("dataset") as shown, kept(output):
+        made = make(
+            work, count, output, workers=hands.cluster(), part=hands.share(), progress=shown,
+            estimated=lambda needed: line(str(needed)), command=shlex.join(["lumigraph", *COMMAND.get()]),
+        )  # fmt: skip
+    if made.failures:
+        number, why = min(made.failures.items())
+        raise LumigraphError(f"{len(made.failures)} of {made.count} samples failed; number {number}: {why}")
+    text = f"{made.done} of {made.count} samples, {len(cameras)} cameras"
+    counts = (Quantity("done", made.done), Quantity("samples", made.count), Quantity("cameras", len(cameras)))
+    card = output.with_name(f"{output.name}.md")
+    return Result("Data set", "Raw images with truth.", made, (text,), counts, written=(output, card))
