@@ -16,18 +16,23 @@ from typing import Any
 import numpy as np
 
 import lumigraph as lg
-from benchmarks import accuracy, references
+from benchmarks import accuracy, accuracy_microscope, references
 from benchmarks.periodic_operator import relative
 from lumigraph.units import mm, um
 
 METHODS = ("points", "incoherent", "incoherent", "coherent", "tilted waves", "snapshots")
-NAMES = ("2.0, m = 0.5", "2.0, m = 0.25", "2.0, Galilean", "1.0", "2.0, round", "single lens")
+NAMES = (
+    "2.0, m = 0.5", "2.0, m = 0.25", "2.0, Galilean", "1.0", "2.0, round", "single lens", "2.0, hexagonal",
+    "2.0, three kinds", "2.0, square, gaps", "microscope, 20x/0.5",
+)  # fmt: skip
 
 
 def drawn(seed: int) -> dict[str, Any]:
     """Stated and true error of one draw."""
     rng = np.random.default_rng(seed)
-    name, method = rng.choice(NAMES), rng.choice(METHODS)
+    name, method = str(rng.choice(NAMES)), str(rng.choice(METHODS))
+    if name in accuracy_microscope.MICROSCOPES:
+        return {"seed": seed, "camera": name, **_through_microscope(name, rng)}
     found, dz = accuracy.CAMERAS[name](), float(rng.uniform(-3, 3)) * mm
     asked, pattern = float(rng.choice([1e-2, 3e-3, 1e-3])), str(rng.choice(["edge", "grating", "noise"]))
     center = tuple((rng.uniform(-0.25, 0.25, 2) * found.object_grid.size).tolist())
@@ -43,9 +48,20 @@ def drawn(seed: int) -> dict[str, Any]:
         light = lg.Coherent() if method == "coherent" else lg.Incoherent(accuracy=asked)
         raw, truth = lg.simulate(found, scene, light), _summed(found, scene.parts[0], method == "coherent")
     return {
-        "seed": seed, "camera": str(name), "method": str(method), "asked": asked, "pattern": pattern,
+        "seed": seed, "camera": name, "method": method, "asked": asked, "pattern": pattern,
         "stated": raw.metadata["error"]["rms"], "true": relative(raw.data, truth),
     }  # fmt: skip
+
+
+def _through_microscope(name: str, rng: np.random.Generator) -> dict[str, Any]:
+    """A point of fluorescence, in the middle or at the border."""
+    scope, dz = accuracy_microscope.MICROSCOPES[name](), float(rng.uniform(-9, 9)) * um
+    y, x = (float(c) for c in rng.uniform(-3, 3, 2) * scope.lenslet_size)
+    asked = float(rng.choice([1e-2, 3e-3]))
+    raw = lg.simulate(scope, lg.targets.points([(y, x, dz)]), lg.Incoherent(accuracy=asked))
+    truth = accuracy_microscope.points(scope, dz, [(y, x)])[0]
+    known = {"stated": raw.metadata["error"]["rms"], "true": relative(raw.data, truth)}
+    return {"method": "microscope", "asked": asked, "pattern": "point", **known}
 
 
 def _picture(pattern: str, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
@@ -104,7 +120,7 @@ def show(rows: list[dict[str, Any]]) -> None:
     """How many estimates are good, and how many are too small."""
     print("| method | draws | within a factor 2 | too small by more | median of stated over true |")
     print("|---|---|---|---|---|")
-    for method in (*dict.fromkeys(METHODS), "all"):
+    for method in (*dict.fromkeys(METHODS), "microscope", "all"):
         ratios = np.array([r["stated"] / r["true"] for r in rows if method in (r["method"], "all")])
         if len(ratios):
             good, low = int(((ratios > 0.5) & (ratios < 2)).sum()), int((ratios <= 0.5).sum())

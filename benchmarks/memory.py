@@ -1,9 +1,11 @@
 """Memory that a cold operator says it takes to build, beside the peak of a process that builds it.
 
-    python -m benchmarks.memory [--only NAME ...]
+    python -m benchmarks.memory [--count] [--only NAME ...]
 
 Said is `sizes.build_bytes` of as many threads as work, or `stream_bytes` and the raw image's where blocks are
-streamed; used is the process' peak over what it had before. Nothing is kept on disk.
+streamed; used is the process' peak over what it had before. Nothing is kept on disk. `--count` counts the
+factors of blocks inside the array, to an offset, and at each place of its border, beside what `sizes.Factors`
+says: its constants were read off there.
 """
 
 import argparse
@@ -21,8 +23,9 @@ import lumigraph as lg
 from benchmarks.periodic_operator import camera, plenoptic
 from lumigraph.core.arrays import WORKERS
 from lumigraph.operators import kernels, periodic_operator
+from lumigraph.operators.blocks import Builder
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.sizes import build_bytes
+from lumigraph.operators.sizes import Factors, build_bytes, wanted
 from lumigraph.operators.streamed import stream_bytes
 from lumigraph.units import mm, um
 
@@ -41,6 +44,12 @@ CAMERAS: dict[str, tuple[Callable[[], Any], float]] = {
         lambda: camera(count=(24, 21), layout="hex", focal_length=KINDS, shape="round"),
         1e-2,
     ),
+    "2.0, hexagonal, Galilean, 1e-2": (
+        lambda: camera(count=(24, 21), layout="hex", magnification=-0.4, focal_length=8 * mm),
+        1e-2,
+    ),
+    "2.0, square, m = 0.25, 1e-3": (lambda: camera(count=(31, 31), magnification=0.25), 1e-3),
+    "2.0, square, 1e-2": (lambda: camera(count=(31, 31)), 1e-2),
     "2.0, streamed, 1e-3": (lambda: camera(count=(9, 9), magnification=-0.4, focal_length=8 * mm), 1e-3),
 }
 
@@ -63,6 +72,31 @@ def measured(name: str) -> dict[str, float]:
     return {"said": said, "used": _peak() - before, "kept": operator.planes[0].matrix.nbytes}
 
 
+def counted(name: str) -> str:
+    """Factors to a block inside the array and at its border, counted over said, and those found at first."""
+    build, accuracy = CAMERAS[name]
+    found = build()
+    optics = Optics.of(found.optics(), found.object_distance, accuracy).bricks
+    builder, said = Builder(optics, lambda _: None, WORKERS), Factors.of(optics)
+    inside = sum(left.shape[1] for blocks in builder.periodic()[0] for left, _ in blocks.values())
+    first: list[int] = []
+    whole = builder._border_blocks
+
+    def pieces(wanted: Any) -> Any:
+        for place, blocks in whole_pieces(wanted):
+            first.append(sum(len(f.strength) for f in blocks.values()))
+            yield place, blocks
+
+    which = "_row_by_row" if optics.straight else "_kind_by_kind"
+    whole_pieces = getattr(builder, which)
+    setattr(builder, which, pieces)
+    border = sum(left.shape[1] for blocks in whole(wanted(optics)).values() for left, _ in blocks.values())
+    return (
+        f"| {name} | {inside} | {inside / said.inside / optics.cells.kinds:.2f} | {border} "
+        f"| {border / said.border:.2f} | {sum(first) / border:.2f} |"
+    )
+
+
 def _peak() -> float:
     return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
@@ -70,10 +104,17 @@ def _peak() -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", nargs="+", choices=tuple(CAMERAS), default=tuple(CAMERAS))
+    parser.add_argument("--count", action="store_true", help="factors instead of memory")
     parser.add_argument("--child", choices=tuple(CAMERAS), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child:
         print(json.dumps(measured(options.child)))
+        return
+    if options.count:
+        print("| camera | inside | over said | border | over said | at first over kept |")
+        print("|---" * 6 + "|")
+        for name in options.only:
+            print(counted(name), flush=True)
         return
     print("| camera | said, MiB | used, MiB | said over used | kept, MiB |\n|---|---|---|---|---|")
     for name in options.only:

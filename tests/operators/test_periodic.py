@@ -240,6 +240,7 @@ def test_points_behind_lenslets_with_opaque_rims_are_as_exact_as_asked():
     camera = focused(count=(7, 7), fill_factor=0.9)
     step = camera.lenslets.pitch * camera.object_distance / camera.separation
     at = [(-1.8 * step, -1.7 * step), (-0.8 * step, -1.7 * step), (-2.6 * step, -0.7 * step)]
+    at.append((0.45 * step, 0.5 * step))  # on the rims: half as bright, and so is what may be missing
     truth = references.points(camera, 0.0, at, references.Fineness(72, 4, 900, 64))
     share = (1 * um * camera.separation / camera.object_distance) ** 2
     for point, expected in zip(at, truth, strict=True):
@@ -267,7 +268,7 @@ def test_what_takes_too_long_to_build_is_refused_at_once(monkeypatch):
 
     monkeypatch.setattr(memory, "available", lambda: 2**40)
     camera = FocusedPlenopticCamera.from_catalogue("multi-focus-hex")
-    refusal = r"[67]e\+14 operations to build, .* An accuracy of 0\.001 fits \(\S+ GiB, some \d+ min"
+    refusal = r"4e\+14 operations to build, .* An accuracy of 0\.001 fits \(\S+ GiB, some \S+ min"
     with pytest.raises(SamplingError, match=refusal):
         periodic_operator(camera, Grid((4, 4), 30 * um), accuracy=1e-4)
 

@@ -1,5 +1,6 @@
 """Refusing work that cannot fit in memory, before it is allocated."""
 
+import ctypes
 import os
 import shutil
 from contextlib import suppress
@@ -72,6 +73,12 @@ def require_plane(shape: tuple[int, int], itemsize: int, what: str) -> None:
     """
     needed = float(shape[0]) * shape[1] * itemsize
     require(needed, f"{what} of {shape[0]} x {shape[1]} samples", "Use fewer samples.", SamplingError)
+
+
+def give_back() -> None:
+    """Return memory that was let go to the system, where C's library (glibc) keeps it for later."""
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def require(needed: float, what: str, remedy: str, error: type[LumigraphError] = LumigraphError) -> None:

@@ -7,13 +7,15 @@ some percent come from there. Cells count as one each, as in `glare`.
 import math
 from dataclasses import dataclass
 
-from lumigraph.core import arrays
+from lumigraph.core import arrays, memory
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
+from lumigraph.errors import SamplingError
 from lumigraph.operators.cells import Cells, Offset
 from lumigraph.operators.glare import Glare
 from lumigraph.operators.optics import Optics
+from lumigraph.operators.sizes import glare_bytes
 from lumigraph.operators.tiles import as_plane, by_cell, spread
 
 POINTS = (2, 2)
@@ -37,6 +39,11 @@ class Beyond:
     spread: Linear
     glare: Glare
     more: Offset
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes [bytes]."""
+        return self.glare.spectra.nbytes + self.glare.pictures.nbytes
 
     def forward(self, plane: Array) -> Array:
         """Object (y, x) to the image's (rows, columns, samples)."""
@@ -73,6 +80,12 @@ def beyond(optics: Optics, grid: Grid, glare: Glare) -> Beyond | None:
     )
     if not (y or x):
         return None
+    memory.require(
+        glare_bytes(optics, (y, x)),
+        "light from beside the array",
+        "Give an object that is less wide.",
+        SamplingError,
+    )
     wide = glare.widened((y, x))
     ring = (cells.ring[0] + wide.margin[0], cells.ring[1] + wide.margin[1])
     return Beyond(spread(optics, grid, POINTS, ring), wide, (y, x))

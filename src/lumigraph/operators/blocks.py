@@ -23,26 +23,28 @@ import numpy as np
 
 from lumigraph.core import memory
 from lumigraph.core.arrays import WORKERS
-from lumigraph.core.progress import Progress
+from lumigraph.core.progress import Progress, within
 from lumigraph.core.threads import each
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.cell_response import INFINITE, Lenslets, Limits
-from lumigraph.operators.factors import Found, factors, weakest
+from lumigraph.operators.factors import Factors, Found, factors, narrowed, weakest
 from lumigraph.operators.few_points import Chosen, Few, chosen, few
 from lumigraph.operators.lenslet_light import LensletLight, windows
 from lumigraph.operators.missing import Missing
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.places import INSIDE, Place, State, alike, flipped, inside, places, terms
-from lumigraph.operators.point_images import Apart, Line, Lit, lit, mirrored, wave
+from lumigraph.operators.places import INSIDE, Place, State, Turn, alike, flipped, inside, places, terms
+from lumigraph.operators.point_images import Apart, Lit, lit, mirrored, wave
+from lumigraph.operators.shared_blocks import Shared
 from lumigraph.operators.sizes import build_bytes, states_of, symmetric
 
 Offset = tuple[int, int]
 
-Factors = tuple[np.ndarray, np.ndarray]
-
 Blocks = dict[Offset, Factors]
 
 Means = dict[Offset, np.ndarray]
+
+SHARE = 2.0
+"""How much more of a row's blocks factors may leave out than of those inside."""
 
 BORDER = 3.0
 """How much stronger than elsewhere factors are that are looked at in the border's blocks."""
@@ -122,12 +124,21 @@ def _ranks(blocks: Blocks) -> int:
     return sum(left.shape[1] for left, _ in blocks.values())
 
 
+def _together(blocks: Blocks) -> Blocks:
+    """The same in one piece of memory, which the system takes back when it is let go."""
+    ends = np.cumsum([left.shape[1] for left, _ in blocks.values()])[:-1]
+    left = np.concatenate([left.T for left, _ in blocks.values()])
+    right = np.concatenate([right for _, right in blocks.values()])
+    pairs = zip(np.split(left, ends), np.split(right, ends), strict=True)
+    return {key: (mine.T, other) for key, (mine, other) in zip(blocks, pairs, strict=True)}
+
+
 def _parts(cells: _cells.Cells, mine: Iterable[Place], blocks: Blocks) -> Iterator[Part]:
     """Of places that have the same blocks: their factors are the same arrays."""
     lit = (key for key, (left, _) in blocks.items() if left.shape[1])
     order = sorted(lit, key=lambda key: (key[0], key[1] % cells.kinds, key[1]))
     left = np.concatenate([blocks[key][0].T for key in order], axis=0, dtype=np.float32).T
-    right = np.concatenate([blocks[key][1] for key in order], axis=0, dtype=np.float32)
+    right = np.concatenate([blocks[key][1] for key in order], axis=0)
     for place in mine:
         offsets = [(*cells.seen_from(place.parity, *key), blocks[key][0].shape[1]) for key in order]
         yield Part(place.rows, place.columns, tuple(offsets), left, right)
@@ -157,11 +168,14 @@ class Builder:
         """For each kind: blocks inside the array, and the mean images (samples,) of a cell's points."""
         found, kinds = [], self.optics.cells.kinds
         for kind in range(kinds):
-            found.append(self._inside(State(INFINITE, INFINITE, kind)))
+            found.append(self._completed(*self._inside(State(INFINITE, INFINITE, kind))))
+            memory.give_back()
             self.progress(0.1 * (kind + 1) / kinds)
-        return self._completed(found)
+        blocks, means = zip(*found, strict=True)
+        return list(blocks), list(means)
 
-    def _inside(self, state: State) -> dict[Offset, Found]:
+    def _inside(self, state: State) -> tuple[dict[Offset, Found], float]:
+        """Factors of all offsets, more than needed, and the blocks' squared norm."""
         reach = self.optics.reach
         images, (up, left) = self.images([state], reach, folded=True)[state], self.even
         if not self.least:
@@ -181,8 +195,9 @@ class Builder:
             return norm, found
 
         pieces = list(each(piece, self.jobs(up, reach), self.workers))
-        self.norm += sum(norm for norm, _ in pieces) / self.optics.cells.kinds
-        return {key: f for _, part in pieces for key, f in part.items()}
+        norm = sum(norm for norm, _ in pieces)
+        self.norm += norm / self.optics.cells.kinds
+        return {key: f for _, part in pieces for key, f in part.items()}, norm
 
     def _choose(self, kind: int, offset: Offset, block: np.ndarray) -> None:
         """Points for the border, of a cell and those that it mirrors."""
@@ -221,41 +236,45 @@ class Builder:
         blocks = {key: (none, mean[None]) for key, mean in means.items()}
         return {key: mean[0] for key, (_, mean) in self._unfolded(blocks, self.even).items()}
 
-    def _completed(self, found: list[dict[Offset, Found]]) -> tuple[list[Blocks], list[Means]]:
+    def _completed(self, found: dict[Offset, Found], norm: float) -> tuple[Blocks, Means]:
         """The factors that are strong enough, and the light of what is left out."""
-        everything, result, means = [f for mine in found for f in mine.values()], [], []
-        least = weakest(everything, self.optics.fineness.rank**2 * self.norm * len(found))
+        least = weakest(found.values(), self.optics.fineness.rank**2 * norm)
         even = np.ones((math.prod(self.optics.cells.points), 1), np.float32)
-        for mine in found:
-            blocks = self._unfolded({key: f.cut(least) for key, f in mine.items()}, self.even)
-            means.append(self._unfolded_means({key: f.mean for key, f in mine.items()}))
-            for key, (left, right) in blocks.items():
-                left_out = means[-1][key] - left.mean(0, keepdims=True) @ right
-                blocks[key] = np.hstack([left, even]), np.vstack([right, left_out])
-            result.append(blocks)
-        return result, means
+        blocks = self._unfolded({key: f.cut(least) for key, f in found.items()}, self.even)
+        means = self._unfolded_means({key: f.mean for key, f in found.items()})
+        for key, (left, right) in blocks.items():
+            left_out = means[key] - left.mean(0, keepdims=True) @ right.astype(np.float32, copy=False)
+            rest = narrowed(even, left_out, self.optics.precision)
+            blocks[key] = np.hstack([left, rest[0]]), np.vstack([right, rest[1]])
+        return blocks, means
 
     def border(self) -> tuple[int, Iterator[Part]]:
         """Ranks and parts of what differs where lenslets are missing, and of all in the ring."""
         sources = alike(places(self.optics), self.even, self.square)
         blocks = self._border_blocks([place for place, source, _ in sources if place is source])
-        lit = [found for found in sources if _ranks(blocks[found[1]])]
+        alike_to: dict[Place, list[tuple[Place, Turn]]] = {source: [] for source in blocks}
+        for place, source, turn in sources:
+            alike_to[source].append((place, turn))
+        ranks = sum(len(mine) * _ranks(blocks[source]) for source, mine in alike_to.items())
 
         def parts() -> Iterator[Part]:
-            for place, source, turn in lit:
-                yield from _parts(self.optics.cells, [place], self._copied(blocks[source], *turn))
+            for source, mine in alike_to.items():
+                found = blocks.pop(source)  # let go as soon as all parts of it are taken
+                if _ranks(found):
+                    for place, turn in mine:
+                        yield from _parts(self.optics.cells, [place], self._copied(found, *turn))
 
-        return sum(_ranks(blocks[source]) for _, source, _ in lit), parts()
+        return ranks, parts()
 
     def _border_blocks(self, wanted: Sequence[Place]) -> dict[Place, Blocks]:
         """Of some places: row after row of cells, so that what they share is computed once."""
         # A row of cells is a small part of the picture: its error may be larger.
-        budget = (2 * self.optics.fineness.rank) ** 2 * self.norm
-        result, pieces = {}, self._row_by_row if self.apart is None else self._place_by_place
+        budget = (SHARE * self.optics.fineness.rank) ** 2 * self.norm
+        result, pieces = {}, self._row_by_row if self.apart is None else self._kind_by_kind
         for place, blocks in pieces(wanted):
             least = weakest(blocks.values(), budget)
             cut = {key: f.cut(least) for key, f in blocks.items()}
-            result[place] = self._unfolded(cut, self._folds(place))
+            result[place] = _together(self._unfolded(cut, self._folds(place)))
         return result
 
     def _row_by_row(self, wanted: Sequence[Place]) -> Iterator[tuple[Place, dict[Offset, Found]]]:
@@ -268,35 +287,49 @@ class Builder:
         for place in wanted:
             yield place, found.pop(place)
 
-    def _place_by_place(self, wanted: Sequence[Place]) -> Iterator[tuple[Place, dict[Offset, Found]]]:
-        jobs, mirrored = self.jobs(False, self.optics.near), self.optics.cells.mirrored
-        offsets = [(dy, dx) for dy, across in jobs for dx in self.signed(dy, across)]
-        missing, least = self._missing(-1, ()), BORDER * self.least
-        for done, place in enumerate(sorted(wanted, key=lambda place: place.state[::-1])):
-            if missing.kind != place.kind:
-                missing = self._missing(place.kind, offsets)
-            up, left = self._folds(place)
-            mine = [
-                (dy, dx)
-                for dy, dx in missing.chosen
-                if not (up and dy < 0) and not (left and dx < mirrored(dy, dx))
-            ]
-            blocks = each(missing.factors(terms(place), least), mine, self.workers)
-            yield place, dict(zip(mine, blocks, strict=True))
-            self.progress(0.1 + 0.9 * (done + 1) / len(wanted))
+    def _kind_by_kind(self, wanted: Sequence[Place]) -> Iterator[tuple[Place, dict[Offset, Found]]]:
+        jobs, kinds = self.jobs(False, self.optics.near), self.optics.cells.kinds
+        near = [(dy, dx) for dy, across in jobs for dx in self.signed(dy, across)]
+        for kind in range(kinds):
+            mine = [place for place in wanted if place.kind == kind]
+            if mine:
+                chosen = {offset: self.chosen[kind][offset] for offset in near}
+                report = within(self.progress, 0.1 + 0.9 * kind / kinds, 0.1 + 0.9 * (kind + 1) / kinds)
+                yield from self._missing(mine, chosen, report)
+                memory.give_back()
 
-    def _missing(self, kind: int, offsets: Iterable[Offset]) -> Missing:
+    def _missing(
+        self, wanted: Sequence[Place], chosen: dict[Offset, Chosen], progress: Progress
+    ) -> Iterator[tuple[Place, dict[Offset, Found]]]:
+        """Of places of one kind: the images of some offsets with all lenslets that are missing anywhere."""
         assert self.apart is not None  # asked by the caller
-        near = {offset: self.chosen[kind][offset] for offset in offsets}
-        near = {offset: points for offset, points in near.items() if len(points.numbers)}
-        return Missing(self.lenslets, self.apart, self.optics.cells, near, kind, self.workers)
+        cells, lit = self.optics.cells, {key: points for key, points in chosen.items() if len(points.numbers)}
+        missing = Missing(self.lenslets, self.apart, cells, lit, states_of(wanted), self.workers)
+        found: dict[Place, dict[Offset, Found]] = {place: {} for place in wanted}
+        for done, offsets in enumerate(groups := list(missing.groups())):
+            factors = missing.factors(offsets, missing.images(offsets), BORDER * self.least)
+
+            def piece(job: tuple[Place, Offset], of: Callable = factors) -> Found:
+                return of(terms(job[0]), job[1]).narrowed(self.optics.precision)
+
+            pairs = [(place, offset) for place in wanted for offset in offsets if self._own(place, offset)]
+            for (place, offset), block in zip(pairs, each(piece, pairs, self.workers), strict=True):
+                found[place][offset] = block
+            progress((done + 1) / len(groups))
+        for place in wanted:
+            yield place, found.pop(place)
+
+    def _own(self, place: Place, offset: Offset) -> bool:
+        """Whether a place's block is not found in a mirror."""
+        (up, left), (dy, dx) = self._folds(place), offset
+        return not (up and dy < 0) and not (left and dx < self.optics.cells.mirrored(dy, dx))
 
     def _border_piece(
         self, wanted: Sequence[Place], known: dict[State, Apart | Few]
     ) -> Callable[[Job], dict[tuple[Place, Offset], Found]]:
         def piece(job: Job) -> dict[tuple[Place, Offset], Found]:
             (dy, across), found = job, {}
-            shared = _Shared(self, known, dy)
+            shared = Shared(self.optics.cells, self.folded, known, dy)
             for dx in across:
                 for place in wanted:
                     up, left = self._folds(place)
@@ -376,45 +409,5 @@ class Builder:
 
     def _factored(self, block: np.ndarray, copies: int, coarser: float = 1.0) -> Found:
         left, right, strength = factors(block, coarser * self.least)
-        return Found(left, right, strength, copies, block.mean(0, dtype=np.float64))
-
-
-class _Shared:
-    """Blocks of one row of cells with the lenslets of some states, each computed once."""
-
-    def __init__(self, builder: Builder, known: dict[State, Apart | Few], dy: int) -> None:
-        self.builder, self.known, self.dy = builder, known, dy
-        self.lines: dict[State, Line] = {}
-        self.blocks: dict[tuple[State, int], np.ndarray] = {}
-
-    def total(self, signs: dict[State, int], dx: int) -> np.ndarray:
-        """Sum of the states' blocks at `dx`, each times its sign."""
-        (first, sign), *others = signs.items()
-        total = sign * self._block(first, dx)
-        for state, sign in others:
-            (np.add if sign > 0 else np.subtract)(total, self._block(state, dx), out=total)
-        return total
-
-    def forget(self, unwanted: Callable[[State], bool]) -> None:
-        """Let go what some states left."""
-        self.lines = {s: line for s, line in self.lines.items() if not unwanted(s)}
-        self.blocks = {key: block for key, block in self.blocks.items() if not unwanted(key[0])}
-
-    def forget_blocks(self) -> None:
-        """Let go all blocks."""
-        self.blocks = {}
-
-    def _block(self, state: State, dx: int) -> np.ndarray:
-        if (state, dx) not in self.blocks:
-            self.blocks[state, dx] = self._computed(state, dx)
-        return self.blocks[state, dx]
-
-    def _computed(self, state: State, dx: int) -> np.ndarray:
-        cells = self.builder.optics.cells
-        other = cells.mirrored(self.dy, dx)
-        if dx < other and self.builder.folded(1, state.x):
-            block = self._block(state, other)
-            return mirrored(mirrored(block, cells.points, False, True).T, cells.samples, False, True).T
-        if state not in self.lines:
-            self.lines[state] = self.known[state].line(self.dy)
-        return self.lines[state](dx)
+        mean = block.mean(0, dtype=np.float64)
+        return Found(left, right, strength, copies, mean).narrowed(self.optics.precision)

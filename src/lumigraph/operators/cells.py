@@ -171,7 +171,7 @@ class Fineness:
         """
         farther = 0.0 if edges == "meet" else 1.4 * (1e-3 / self.accuracy) ** 0.15 - 1
         return (
-            (1 + farther * _tail(fresnel_number))
+            (1 + farther * tail(fresnel_number))
             * (6 * fresnel_number + 6 + 2 * blur)
             * (1e-3 / self.accuracy) ** 0.2
         )
@@ -179,7 +179,7 @@ class Fineness:
     def neighbours(self, fresnel_number: float, edges: Edges = "meet") -> int:
         """Lenslets on each side of an image's cell whose light is followed into it."""
         pitches = {"meet": 5, "straight": 9, "other": 6}[edges]
-        return math.ceil(pitches * (1e-3 / self.accuracy) ** 0.23 * _tail(fresnel_number))
+        return math.ceil(pitches * (1e-3 / self.accuracy) ** 0.23 * tail(fresnel_number))
 
     @property
     def rank(self) -> float:
@@ -188,7 +188,7 @@ class Fineness:
 
     def border(self, fresnel_number: float) -> float:
         """Lenslets that are missing farther than this from a cell [pitches] are not missed."""
-        return 4 * (1e-3 / self.accuracy) ** 0.25 * _tail(fresnel_number)
+        return 4 * (1e-3 / self.accuracy) ** 0.25 * tail(fresnel_number)
 
     def corner(self, fresnel_number: float, edges: Edges = "meet") -> float:
         """The same for what is missing on two sides of a corner: farther, each counts by itself.
@@ -198,7 +198,7 @@ class Fineness:
         (measured on 13 arrays and fill factors).
         """
         pitches = {"meet": 3.5, "straight": 4.5, "other": 5}[edges]
-        return max(1.2, pitches * (1e-3 / self.accuracy) ** 0.3 * _tail(fresnel_number))
+        return max(1.2, pitches * (1e-3 / self.accuracy) ** 0.3 * tail(fresnel_number))
 
     @property
     def ring(self) -> float:
@@ -222,7 +222,7 @@ class Fineness:
         return blur + 12 * airy * (1e-3 / self.accuracy) ** 0.45
 
 
-def _tail(fresnel_number: float) -> float:
+def tail(fresnel_number: float) -> float:
     """How far a lenslet's edges send light aside, over those that the constants were found on."""
     return min(1.0, math.sqrt(3 / fresnel_number))
 

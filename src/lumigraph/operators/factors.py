@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,20 +10,55 @@ _BLOCK = 2**21
 """Numbers worked on at a time."""
 
 
-@dataclass(slots=True)
+Factors = tuple[np.ndarray, np.ndarray]
+"""Left (points, r) and right (r, samples)."""
+
+LARGEST = 64.0
+"""Norm of a right factor in half precision, far from that type's smallest and largest numbers."""
+
+
+@dataclass(slots=True, eq=False)
 class Found:
-    """tuple[np.ndarray, np.ndarray] of one block, more of them than needed at first."""
+    """Factors of one block, more of them than needed at first.
+
+    Parameters
+    ----------
+    left, right, strength
+        (n, r), (r, samples) and the norm of each product (r,).
+    copies
+        How many blocks they are of.
+    mean
+        Of the block's rows (samples,).
+    basis
+        (points, n) that the left factors are to be taken through; None where they are of all points.
+    """
 
     left: np.ndarray
     right: np.ndarray
     strength: np.ndarray
     copies: int
     mean: np.ndarray
+    basis: np.ndarray | None = None
 
-    def cut(self, least: float) -> tuple[np.ndarray, np.ndarray]:
+    def cut(self, least: float) -> Factors:
         """Those stronger than `least`."""
         kept = self.strength > least
-        return self.left[:, kept], self.right[kept]
+        left = self.left[:, kept]
+        return left if self.basis is None else self.basis @ left, self.right[kept]
+
+    def narrowed(self, precision: type[np.floating]) -> "Found":
+        """With right factors of a precision."""
+        left, right = narrowed(self.left, self.right, precision)
+        return replace(self, left=left, right=right)
+
+
+def narrowed(left: np.ndarray, right: np.ndarray, precision: type[np.floating]) -> Factors:
+    """The same product, with right factors of a precision; those of half of it have `LARGEST` norms."""
+    if precision is np.float16:
+        size = np.linalg.norm(right, axis=1) / LARGEST
+        size[size == 0] = 1.0
+        left, right = left * size, right / size[:, None]
+    return left.astype(np.float32, copy=False), right.astype(precision, copy=False)
 
 
 def factors(block: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

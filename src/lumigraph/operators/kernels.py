@@ -133,7 +133,7 @@ def _build(optics: Optics, progress: Progress | None = None) -> dict[str, np.nda
     even, sent = endless(optics)
     rest = glare(found.means, per, even - sent)
     left = np.empty((found.ranks, math.prod(per.points)), np.float32)
-    right = np.empty((found.ranks, math.prod(per.samples)), np.float32)
+    right = np.empty((found.ranks, math.prod(per.samples)), optics.precision)
     places, offsets, mine, last = [], [], slice(0, 0), None
     for part in found.parts:
         if part.right is not last:

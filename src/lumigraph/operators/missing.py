@@ -1,12 +1,13 @@
 """What lenslets that are missing take from the images of a cell's points, where two axes are not apart.
 
-Images are computed of those points from which all others follow (`few_points.Chosen`), from sums over the
-rows of lenslets that exist.
+Images are computed of those points from which all others follow (`few_points.Chosen`). The lenslets that
+exist lie between limits, so that their light is a difference of sums from one side: each lenslet is followed
+once for all states of a cell, each row of them once for all that differ along y.
 """
 
 import math
-from collections.abc import Callable, Iterator
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,10 +15,20 @@ from lumigraph.core.threads import each
 from lumigraph.operators.cell_response import INFINITE, Lenslets, Limits
 from lumigraph.operators.cells import Cells, Offset
 from lumigraph.operators.factors import Found, strongest
-from lumigraph.operators.few_points import AT_A_TIME, Chosen
+from lumigraph.operators.few_points import Chosen
 from lumigraph.operators.lenslet_light import LensletLight
 from lumigraph.operators.places import State
 from lumigraph.operators.point_images import intensity
+
+AT_A_TIME = 64
+"""Points that a thread works on."""
+
+HELD = 2**27
+"""Numbers of images that are held at a time, but for those of one offset."""
+
+Images = Mapping[State, np.ndarray]
+
+_T = TypeVar("_T")
 
 
 class Missing:
@@ -31,8 +42,8 @@ class Missing:
         Of the array.
     chosen
         Points of the cell at each offset.
-    kind
-        Of the image's cell.
+    states
+        Lenslets that exist, around a cell of one kind.
     workers
         Threads.
     """
@@ -42,99 +53,122 @@ class Missing:
         lenslets: Lenslets,
         light: LensletLight,
         cells: Cells,
-        chosen: dict[Offset, Chosen],
-        kind: int,
+        chosen: Mapping[Offset, Chosen],
+        states: Iterable[State],
         workers: int,
     ) -> None:
-        self.lenslets, self.light, self.cells = lenslets, light, cells
-        self.kind, self.workers = kind, workers
-        self.chosen, self.slices, first = chosen, {}, 0
-        for offset, points in chosen.items():
-            self.slices[offset] = slice(first, first + len(points.numbers))
-            first += len(points.numbers)
-        self._rows: dict[Limits, tuple[list[float], np.ndarray]] = {}
-        self._images: dict[State, np.ndarray] = {}
+        self.light, self.cells, self.chosen, self.workers = light, cells, chosen, workers
+        self.states = sorted(states)
+        self.slack = 1e-9 * lenslets.array.lattice.pitch
+        self.rows = list(lenslets.rows(cells.middle(self.states[0].kind), (INFINITE, INFINITE)))
+        self.samples = math.prod(axis.samples for axis in light.axes)
 
-    @cached_property
-    def numbers(self) -> np.ndarray:
-        """Of all chosen points (n, 2), counted from the image's cell."""
-        points, found = self.cells.points, [np.zeros((0, 2), int)]
-        for (dy, dx), chosen in self.chosen.items():
-            step = self.cells.shift(dy) * self.cells.step(points)
-            y, x = np.divmod(chosen.numbers, points[1])
-            found.append(np.stack([dy * points[0] + y, dx * points[1] + step + x], axis=1))
-        return np.concatenate(found)
+    def groups(self) -> Iterator[list[Offset]]:
+        """Offsets whose images are held at a time."""
+        mine, held = [], 0
+        for offset, points in self.chosen.items():
+            size = len(points.numbers) * self.samples * len(self.states)
+            if mine and held + size > HELD:
+                yield mine
+                mine, held = [], 0
+            mine, held = [*mine, offset], held + size
+        if mine:
+            yield mine
 
-    @cached_property
-    def bases(self) -> dict[Offset, tuple[np.ndarray, np.ndarray]]:
-        """Weights of the chosen points as an orthonormal matrix (points, n) and a triangle (n, n)."""
-        return {offset: np.linalg.qr(chosen.weights) for offset, chosen in self.chosen.items()}
+    def images(self, offsets: Sequence[Offset]) -> dict[State, np.ndarray]:
+        """Of the chosen points at some offsets, one after the other: (n, samples) for each state."""
+        numbers = np.concatenate([self._numbers(offset) for offset in offsets])
+        found = {state: np.empty((len(numbers), self.samples), np.float32) for state in self.states}
 
-    def total(self, signs: dict[State, int]) -> np.ndarray:
-        """Sum of the states' images (n, samples), each times its sign."""
-        (first, sign), *others = signs.items()
-        total = sign * self._image(first)
-        for state, sign in others:
-            (np.add if sign > 0 else np.subtract)(total, self._image(state), out=total)
-        self._images = {state: image for state, image in self._images.items() if INFINITE in state[:2]}
-        return total
+        def fill(mine: slice) -> None:
+            stacks = self._stacks(numbers[mine])
+            for x in {state.x for state in self.states}:
+                states = [state for state in self.states if state.x == x]
+                fields = self._fields(self._between(stacks, x), [state.y for state in states])
+                for state in states:
+                    intensity(self._between(fields, state.y), found[state][mine])
 
-    def factors(self, signs: dict[State, int], least: float) -> Callable[[Offset], Found]:
-        """Of the blocks of such a sum, by their offset."""
-        total = self.total(signs)
+        some = (slice(k, k + AT_A_TIME) for k in range(0, len(numbers), AT_A_TIME))
+        for _ in each(fill, some, self.workers):
+            pass
+        return found
 
-        def found(offset: Offset) -> Found:
-            rows, (basis, triangle) = total[self.slices[offset]], self.bases[offset]
+    def _numbers(self, offset: Offset) -> np.ndarray:
+        """Of the chosen points (n, 2) at an offset, counted from the image's cell."""
+        points, (dy, dx) = self.cells.points, offset
+        step = self.cells.shift(dy) * self.cells.step(points)
+        y, x = np.divmod(self.chosen[offset].numbers, points[1])
+        return np.stack([dy * points[0] + y, dx * points[1] + step + x], axis=1)
+
+    def _stacks(self, numbers: np.ndarray) -> dict[float, np.ndarray]:
+        """Light (n, rows, modes, samples along x) behind the lenslets up to each cut along x."""
+        n, m = len(numbers), self.light.modes[0].shape[1]
+        cuts = self._cuts([state.x for state in self.states])
+        shape = n, len(self.rows), m, self.light.axes[1].samples
+        result = {cut: np.empty(shape, np.complex64) for cut in cuts}
+        for k, (y, members) in enumerate(self.rows):
+            total = np.zeros((n, *shape[2:]), np.complex64)
+            for cut, some in _up_to(cuts, members, lambda member: member[0]):
+                if some and (seen := self.light.across(numbers, (y, some))) is not None:
+                    total += seen
+                result[cut][:, k] = total
+        return result
+
+    def _fields(self, stack: np.ndarray, limits: Sequence[Limits]) -> dict[float, np.ndarray]:
+        """Amplitudes (n, samples) of the rows up to each cut along y."""
+        result, total = {}, np.zeros((len(stack), self.samples), np.complex64)
+        numbers = range(len(self.rows))
+        for cut, some in _up_to(self._cuts(limits), numbers, lambda k: self.rows[k][0]):
+            if some:
+                down = np.hstack([self.light.carried(0, self.rows[k][0]) for k in some])
+                rows = stack[:, some[0] : some[-1] + 1].reshape(len(stack), down.shape[1], -1)
+                total = total + (down @ rows).reshape(total.shape)
+            result[cut] = total
+        return result
+
+    def _cuts(self, limits: Sequence[Limits]) -> list[float]:
+        """Where the lenslets between some limits begin and end, in order."""
+        return sorted({cut for pair in limits for cut in self._ends(pair) if cut > -math.inf})
+
+    def _ends(self, limits: Limits) -> Limits:
+        return limits[0] - self.slack, limits[1] + self.slack
+
+    def _between(self, sums: Mapping[float, np.ndarray], limits: Limits) -> np.ndarray:
+        """Of the lenslets between limits; a copy."""
+        low, high = self._ends(limits)
+        return sums[high] - sums[low] if low in sums else sums[high].copy()
+
+    def factors(
+        self, offsets: Sequence[Offset], images: Images, least: float
+    ) -> Callable[[dict[State, int], Offset], Found]:
+        """Of sums of some states' images, each times its sign, of the points at an offset."""
+        ends = np.cumsum([len(self.chosen[offset].numbers) for offset in offsets])
+        places = {
+            offset: slice(end - len(self.chosen[offset].numbers), end)
+            for offset, end in zip(offsets, ends.tolist(), strict=True)
+        }
+        # Weights of the chosen points as an orthonormal matrix (points, n) and a triangle (n, n).
+        bases = {offset: np.linalg.qr(self.chosen[offset].weights) for offset in offsets}
+
+        def found(signs: dict[State, int], offset: Offset) -> Found:
+            mine, (basis, triangle) = places[offset], bases[offset]
+            (first, sign), *others = signs.items()
+            rows = sign * images[first][mine]
+            for state, sign in others:
+                (np.add if sign > 0 else np.subtract)(rows, images[state][mine], out=rows)
             left, right, strength = strongest(triangle @ rows, least)
             mean = self.chosen[offset].weights.mean(0, dtype=np.float64) @ rows
-            return Found(basis @ left, right, strength, 1, mean)
+            return Found(left, right, strength, 1, mean, basis)
 
         return found
 
-    def _image(self, state: State) -> np.ndarray:
-        if state not in self._images:
-            self._images = {s: image for s, image in self._images.items() if s.x in (INFINITE, state.x)}
-            self._images[state] = self._computed(state)
-        return self._images[state]
 
-    def _computed(self, state: State) -> np.ndarray:
-        places, stack = self._behind(state.x)
-        here = {y for y, _ in self.lenslets.rows(self.cells.middle(state.kind), (state.y, state.x))}
-        seen = [k for k, y in enumerate(places) if y in here]
-        axes = self.light.axes
-        image = np.zeros((len(self.numbers), axes[0].samples * axes[1].samples), np.float32)
-        if not seen:
-            return image
-        down = np.hstack([self.light.carried(0, places[k]) for k in seen])
-
-        def fill(mine: slice) -> None:
-            rows = stack[mine, seen[0] : seen[-1] + 1]
-            field = down @ rows.reshape(len(rows), down.shape[1], -1)
-            intensity(field.reshape(len(rows), -1), image[mine])
-
-        for _ in each(fill, self._some(), self.workers):
-            pass
-        return image
-
-    def _behind(self, limits: Limits) -> tuple[list[float], np.ndarray]:
-        """Rows of lenslets between limits along x, and the light behind them (n, row, modes, samples)."""
-        if limits not in self._rows:
-            self._rows = {key: kept for key, kept in self._rows.items() if key == INFINITE}
-            rows = list(self.lenslets.rows(self.cells.middle(self.kind), (INFINITE, limits)))
-            shape = len(self.numbers), len(rows), self.light.modes[0].shape[1], self.light.axes[1].samples
-            stack = np.zeros(shape, np.complex64)
-
-            def fill(mine: slice) -> None:
-                for k, row in enumerate(rows):
-                    if (seen := self.light.across(self.numbers[mine], row)) is not None:
-                        stack[mine, k] = seen
-
-            for _ in each(fill, self._some(), self.workers):
-                pass
-            self._rows[limits] = [y for y, _ in rows], stack
-        return self._rows[limits]
-
-    def _some(self) -> Iterator[slice]:
-        """Points that are worked on at a time."""
-        step = max(1, AT_A_TIME // math.prod(axis.samples for axis in self.light.axes))
-        return (slice(k, k + step) for k in range(0, len(self.numbers), step))
+def _up_to(
+    cuts: Sequence[float], members: Iterable[_T], place: Callable[[_T], float]
+) -> Iterator[tuple[float, list[_T]]]:
+    """Each cut, and the members beyond the one before."""
+    rest = sorted(members, key=place)
+    for cut in cuts:
+        count = sum(place(member) <= cut for member in rest)
+        yield cut, rest[:count]
+        rest = rest[count:]

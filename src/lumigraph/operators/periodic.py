@@ -64,6 +64,11 @@ class Plane:
     spread: Linear
     beyond: Beyond | None = None
 
+    @property
+    def nbytes(self) -> float:
+        """Memory that it takes [bytes]."""
+        return self.matrix.nbytes + (self.beyond.nbytes if self.beyond else 0)
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PeriodicOperator(Linear):
@@ -142,7 +147,9 @@ class PeriodicOperator(Linear):
         """Memory that `forward` and `adjoint` of a single-precision image take, with the matrices [bytes]."""
         cells = math.prod(self.cells.image) * math.prod(self.cells.samples)
         pixels = math.prod(self.shape[0])
-        kept = sum(plane.matrix.nbytes for plane in self.planes)
+        kept = sum(
+            plane.matrix.nbytes + (plane.beyond.nbytes if plane.beyond else 0) for plane in self.planes
+        )
         return kept + 4 * (4 * cells + math.sqrt(cells * pixels) + pixels)
 
     @property

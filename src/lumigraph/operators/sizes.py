@@ -4,37 +4,93 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import numpy as np
+
 from lumigraph.elements import LensletArray
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.cell_response import INFINITE
+from lumigraph.operators.missing import AT_A_TIME, HELD
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.places import INSIDE, Place, State, alike, places, terms
 
+MORE = 1.8
+"""Factors that are found at first, of those that are kept in the end."""
+
+LEAST = 12 * 2.0**20
+"""What building takes besides [bytes]: the main lens' light, the white image."""
+
 
 def build_bytes(optics: Optics, workers: int = 1) -> float:
-    """Memory that building all parts takes [bytes], from their sizes and the usual number of factors."""
-    cells, near = optics.cells, optics.near
+    """Memory that building all parts takes [bytes], from their sizes and the usual number of factors.
+
+    What was let go is not given back, but serves again where large arrays follow large ones: the fields of
+    few points and the images at the border. Factors are small arrays, found, cut and put side by side.
+    """
+    cells, factors = optics.cells, Factors.of(optics)
+    points, samples = math.prod(cells.points), math.prod(cells.samples)
+    block, factor = 4.0 * points * samples, 4.0 * points + np.dtype(optics.precision).itemsize * samples
+    inside, border = factors.inside * factor, factors.border * factor
+    kept = inside * cells.kinds + factors.all * factor
+    if optics.straight:
+        states = {INSIDE} | states_of(wanted(optics))
+        light = len({state.x for state in states}) * optics.images_bytes(optics.near)
+        shared = 1 + sum(INFINITE in state for state in states)
+        light += workers * (2 * shared + 4) * block
+        return light + MORE * (inside + border) + kept + glare_bytes(optics) + LEAST
+    few = Few.of(optics)
+    begun = few.table + few.fields + workers * (few.line + 5 * block) + MORE * inside
+    begun = max(begun, few.table + few.images + workers * few.stacks + MORE * border)
+    return begun + kept + glare_bytes(optics) + LEAST
+
+
+def glare_bytes(optics: Optics, more: tuple[int, int] = (0, 0)) -> float:
+    """Memory that transforming the pictures of `glare` takes, of more cells on each side [bytes]."""
+    cells, reach = optics.cells, optics.reach
+    margin = [m + n for m, n in zip(optics.margin(reach), more, strict=True)]
+    window = math.prod(2 * (n + m) for n, m in zip(cells.image, margin, strict=True))
+    return 40.0 * 4 * sum(reach) * window * (2 if cells.staggered else 1)
+
+
+def wanted(optics: Optics) -> list[Place]:
+    """Places at the border whose blocks do not mirror those of others."""
     mirrored = _cells.mirrored(optics.camera)
     even = mirrored, mirrored and symmetric(optics.array)
-    square = mirrored and cells.size[0] == cells.size[1]
-    wanted = [place for place, source, _ in alike(places(optics), even, square) if place is source]
-    points, samples = math.prod(cells.points), math.prod(cells.samples)
-    block = 4.0 * points * samples
-    factors = (1.3 * len(wanted) + 0.7 * len(places(optics))) * math.sqrt(points)  # of a block
-    # Small lenslets diffract more widely, and so do the gaps between discs.
-    factors /= optics.array.fill_factor * (0.5 if optics.array.shape == "round" else 1.0)
-    held = factors * math.prod(2 * n + 1 for n in near) * 4.0 * (points + samples)
-    if not optics.straight:
-        few, inside = (
-            Few.of(optics),
-            0.6 * cells.kinds * math.sqrt(points) * math.prod(2 * n + 1 for n in optics.reach),
+    square = mirrored and optics.cells.size[0] == optics.cells.size[1]
+    return [place for place, source, _ in alike(places(optics), even, square) if place is source]
+
+
+@dataclass(frozen=True, slots=True)
+class Factors:
+    """How many factors blocks have: a power of the points, as `benchmarks.memory --count` counts them.
+
+    Opaque rims make more of them; those at the border are fewer where only strong ones count.
+
+    Parameters
+    ----------
+    inside
+        Of the cells of one kind inside the array.
+    border, all
+        Of the places at the border that do not mirror others, and of all.
+    """
+
+    inside: float
+    border: float
+    all: float
+
+    @classmethod
+    def of(cls, optics: Optics) -> "Factors":
+        """Of one depth."""
+        usual = math.prod(optics.cells.points) ** 0.85
+        inside, border = (0.45, 0.08) if optics.straight else (0.55, 0.16)
+        rims = {"meet": 1.0, "straight": 1.75, "other": 1.3}[_cells.edges(optics.array)]
+        border *= min(1.0, (1e-3 / optics.fineness.accuracy) ** 0.25)
+        border *= _cells.tail(_cells.fresnel_number(optics.camera))
+        near = rims * border * usual * math.prod(2 * n + 1 for n in optics.near)
+        return cls(
+            rims * inside * usual * math.prod(2 * n + 1 for n in optics.reach),
+            near * len(wanted(optics)),
+            near * len(places(optics)),
         )
-        held += inside * 4.0 * (points + samples)
-        return few.table + max(few.fields + workers * (few.line + 5 * block), few.border) + held
-    states = {INSIDE} | states_of(wanted)
-    light = len({state.x for state in states}) * optics.images_bytes(near)
-    kept = 1 + sum(INFINITE in state for state in states)
-    return held + workers * (2 * kept + 4) * block + light
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +103,12 @@ class Few:
         Light in a lenslet, of all points around it [bytes].
     fields, line
         Fields of the few points, and of all of one row of cells [bytes].
-    border
-        Images of the chosen points with some lenslets missing [bytes].
+    chosen
+        Points that are looked at for the border, of one kind.
+    stacks
+        What a thread holds of the lenslets' light along x and along y for them [bytes].
+    images
+        Of the points of some offsets with some lenslets missing [bytes].
     operations
         Multiplications and additions of all fields and images.
     """
@@ -56,7 +116,9 @@ class Few:
     table: float
     fields: float
     line: float
-    border: float
+    chosen: float
+    stacks: float
+    images: float
     operations: float
 
     @classmethod
@@ -75,14 +137,20 @@ class Few:
         # To the few numbers behind each lenslet and along x, then along y: 8 for a complex product and sum.
         along_x = lit * (light * math.prod(modes) + math.prod(modes) * axes[1].samples)
         along_y = rows * modes[0] * samples
-        states = states_of(places(optics))
-        turns = len({(state.x, state.kind) for state in states})
+        states = states_of(wanted(optics))
+        turns = len({state.x for state in states})
+        chosen = near / 2
+        # Amplitudes up to each limit, of rows and of samples; the largest block's images are held at least.
+        stacks = 8.0 * AT_A_TIME * ((turns + 1) * rows * modes[0] * axes[1].samples + turns * samples)
+        images = 4.0 * len(states) / kinds * samples * chosen
         return cls(
             8.0 * light * points,
             8.0 * samples * few,
             8.0 * samples * axes[0].points * optics.few(optics.reach)[1],
-            near * (16.0 * rows * modes[0] * axes[1].samples + 4.0 * 8 * samples),
-            8.0 * (kinds * few * (along_x + along_y) + near * (turns * along_x + len(states) * along_y)),
+            chosen,
+            stacks,
+            max(min(4.0 * HELD, images), images / 15),
+            8.0 * kinds * (few * (along_x + along_y) + chosen * (along_x + turns * along_y)),
         )
 
 
@@ -91,9 +159,12 @@ def build_operations(optics: Optics) -> float:
     if optics.straight:
         return 0.0
     points, samples = math.prod(optics.cells.points), math.prod(optics.cells.samples)
-    # Factors of blocks: three products of theirs, each block and its mirror image once.
+    few = Few.of(optics)
+    # Factors of blocks: three products of theirs, each block and its mirror image once; at the border of the
+    # chosen points, a fifteenth of them in the largest block.
     blocks = optics.cells.kinds * math.prod(2 * n + 1 for n in optics.reach) / 2
-    return Few.of(optics).operations + 3 * 2.0 * blocks * points**2 * samples
+    border = len(wanted(optics)) * few.chosen**2 / 15
+    return few.operations + 3 * 2.0 * samples * (blocks * points**2 + border)
 
 
 def states_of(group: Iterable[Place]) -> set[State]:

@@ -17,6 +17,7 @@ from lumigraph.operators.blocks import Builder, Job, Offset, Part
 from lumigraph.operators.glare import Glare, glare
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.places import INSIDE, State, Turn, alike, inside, places, terms
+from lumigraph.operators.sizes import LEAST, glare_bytes
 
 Cells = tuple[range, range]
 
@@ -121,4 +122,4 @@ def stream_bytes(optics: Optics, workers: int = WORKERS) -> float:
     points, samples = math.prod(optics.cells.points), math.prod(optics.cells.samples)
     # Those computed ahead, the one that is applied, what it is turned to, and products with it.
     blocks = 4.0 * points * samples * (2 * workers + 3)
-    return blocks + optics.images_bytes(optics.reach)
+    return blocks + optics.images_bytes(optics.reach) + glare_bytes(optics) + LEAST

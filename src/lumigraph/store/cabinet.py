@@ -15,7 +15,7 @@ import numpy as np
 from lumigraph.errors import FormatError
 from lumigraph.store import sealed
 
-LIMIT = 4 * 2**30
+LIMIT = 8 * 2**30
 """Bytes that all files in the user's cache folder may hold together."""
 
 _ENDING = ".kept.npz"
