@@ -21,9 +21,7 @@ def image_of(
     if coherent and isinstance(part, Slice):
         amplitude = np.sqrt(arrays.to_numpy(part.intensity))
         image = coherent_image(camera, amplitude, part.grid, part.dz, accuracy)
-        array = camera.optics().array
-        rims = array is not None and (array.shape == "round" or array.fill_factor < 1)
-        return image, error.of_quadrature("coherent, opaque rims" if rims else "coherent", accuracy)
+        return image, error.of_quadrature("coherent", accuracy)
     if camera.lattice is None:
         return _without_lenslets(camera, part), error.SINGLE_LENS
     if isinstance(part, Points):
