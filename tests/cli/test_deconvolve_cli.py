@@ -183,6 +183,7 @@ def test_vignetting_is_what_a_white_image_shows_over_many_lenslets():
         (("--report", "page.txt"), "wrong extension"),
         (("--checkpoint", "state.txt"), "must end in .npz"),
         (("--camera", "thesis-2f"), "error:"),
+        (("--warm",), "there is one page"),
     ],
 )
 def test_mistakes_are_told_in_one_line(arguments, message, lumigraph, tmp_path):

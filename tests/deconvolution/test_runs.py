@@ -11,11 +11,13 @@ from deconvolution.models import Matrix, blurred, disc
 from lumigraph import store
 from lumigraph.deconvolution import (
     Checkpoint,
+    Deconvolver,
     Exposure,
     Interrupted,
     LeastSquares,
     LowPass,
     RichardsonLucy,
+    Stop,
     TotalVariation,
     Wavelets,
 )
@@ -224,3 +226,37 @@ def test_a_series_needs_one_sensitivity_and_one_frame_at_a_time(rng):
     assert len(list(volumes)) == 97
     assert len(calls) == 100 * 2 + 1
     np.testing.assert_array_equal(first[2].data, lg.deconvolve(pictures[2], operator, 2).data)
+
+
+def drifting(rng, count=5):
+    """Raw images of a disc that drifts by a quarter of a sample a frame."""
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    for k in range(count):
+        light = OPERATOR.forward(0.01 + 1.0 * (np.hypot(y - 6, x - 4 - 0.25 * k) < 3.2))
+        yield rng.poisson(500 * light).astype(np.float32)
+
+
+def test_a_warm_start_is_as_likely_in_half_of_the_iterations(rng):
+    frames, told = list(drifting(rng)), {}
+    for name, warm, iterations in (("cold", False, 12), ("half", False, 6), ("warm", True, 6)):
+        steps = []
+        found = lg.deconvolve_series(frames, OPERATOR, iterations, progress=steps.append, warm=warm)
+        first = next(found)
+        list(found)
+        told[name] = [step.deviance for step in steps if step.iteration == iterations]
+    np.testing.assert_array_equal(first, lg.deconvolve(frames[0], OPERATOR, 6))  # begins as it does alone
+    assert np.mean(told["warm"][1:]) < np.mean(told["cold"][1:])
+    assert np.mean(told["half"][1:]) > 1.2 * np.mean(told["cold"][1:])
+
+
+def test_a_warm_start_finds_what_appears_in_the_dark():
+    """Richardson-Lucy keeps what is 0: some of an even object goes into each start."""
+    dark, lit = np.zeros(SHAPE), np.zeros(SHAPE)
+    dark[2:5, 2:5], lit[9:12, 8:11] = 1, 1
+    frames = [1000 * OPERATOR.forward(one) for one in (dark, lit)]
+    engine = Deconvolver(OPERATOR, 3000, warm=True)
+    assert engine(frames[0])[9:12, 8:11].max() < 1e-9
+    engine.limits = Stop(20)
+    second = engine(frames[1])
+    assert second[8:13, 7:12].sum() == pytest.approx(9000, rel=0.01)
+    assert second[1:6, 1:6].sum() < 90
