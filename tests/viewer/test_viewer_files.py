@@ -233,10 +233,29 @@ def test_a_raw_image_with_a_calibration_is_decoded(tmp_path, rng):
         open_exhibit(tmp_path / "other.toml")
 
 
+@pytest.mark.parametrize("name", ["thesis-plenoptic-1", "galilean", "lfm-fourier"])
+def test_a_camera_is_shown_things_at_several_depths(tmp_path, name):
+    camera = lg.load_camera(name)
+    if name != "lfm-fourier":
+        camera = camera.replace(lenslets={"count": (9, 9)}, sensor={"shape": None})
+    (tmp_path / "camera.toml").write_text(camera.to_toml())
+    shown = open_exhibit(tmp_path / "camera.toml")
+    assert "Simulated" in dict(shown.facts)
+    if shown.planes is not None:
+        assert len(shown.planes.positions) == 13
+        first, last = np.asarray(shown.planes.data)[[0, -1]]
+        assert np.abs(first - last).mean() > 0.02 * first.mean()
+    else:
+        views = np.asarray(shown.views.data)
+        assert views.shape[0] == (3 if name == "lfm-fourier" else 31)
+        first, last = views[views.shape[0] // 2, [views.shape[1] // 4, -1 - views.shape[1] // 4]]
+        assert np.abs(first - last).mean() > 0.01 * views.mean()  # things have moved
+
+
 def test_galilean_patches_ascend_too(rng):
     none = np.zeros((0, 2))
     calibration = lg.Calibration(lg.Lattice.square(8.0, origin=(4, 4)), (64, 80), none, none, 0.0)
-    planes = rendered(lg.RawImage(rng.random((64, 80))), calibration, -3.0, 5)
+    planes = rendered(lg.RawImage(rng.random((64, 80))), calibration, -3.0)
     assert list(planes.positions) == sorted(planes.positions)
     assert max(planes.positions) < 0
 

@@ -54,6 +54,11 @@ class WithMainLens(Protocol):
 class WithObjective(Protocol):
     """An objective forms its image: depths are small and go with the refocus factor."""
 
+    @property
+    def in_pupil(self) -> bool:
+        """Whether lenslets stand in the pupil, so that each micro-image is a view."""
+        ...
+
     def depth_per_alpha(self, separation: float) -> float:
         """Depth from the focused plane [m] over α' - 1, of views with a separation [m]."""
         ...

@@ -197,6 +197,11 @@ class LightFieldMicroscope(Instrument):
         shape = given.shape or tuple(2 * math.ceil(reach * size - 0.5) + 1 for reach in self.lenslets.reach)
         return given.sensor((shape[0], shape[1]))
 
+    @property
+    def in_pupil(self) -> bool:
+        """Whether lenslets stand in the pupil, so that each micro-image is a view."""
+        return self.configuration == "fourier"
+
     @cached_property
     def calibration(self) -> Calibration:
         """Where the micro-images stand on the raw image [px], by geometry; only those inside the sensor."""

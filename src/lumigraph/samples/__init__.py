@@ -2,6 +2,8 @@
 
 - `scene`: a light field of opaque things at known depths, with its disparity map
 - `still_life`: what stands there, painted by functions of the place
+- `portrait`: raw and white image of that scene before a plenoptic camera, by rays; `glowing`: its layers,
+  which shine through one another, for microscopes
 - `bench`: white and raw image of a plenoptic camera (1.0 or 2.0), with camera, scene and depths
 - `volume`: raw image of a light-field microscope, with the volume that it shows
 - `drawn`: scenes drawn by chance, as a camera sees them; `dataset`: many of them in one store
@@ -13,6 +15,7 @@ from lumigraph.samples.dataset import Draws, dataset
 from lumigraph.samples.drawn import DrawnSample, drawn
 from lumigraph.samples.files import camera_file
 from lumigraph.samples.folder import NAMES, write
+from lumigraph.samples.portrait import PortraitSample, glowing, portrait
 from lumigraph.samples.scene import SceneSample, scene
 from lumigraph.samples.volume import VolumeSample, volume
 
@@ -21,12 +24,15 @@ __all__ = [
     "BenchSample",
     "DrawnSample",
     "Draws",
+    "PortraitSample",
     "SceneSample",
     "VolumeSample",
     "bench",
     "camera_file",
     "dataset",
     "drawn",
+    "glowing",
+    "portrait",
     "scene",
     "volume",
     "write",

@@ -4,7 +4,7 @@ import tomllib
 import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.brief import called
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
+from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.progress import Progress, Stage, silent, within
@@ -21,13 +22,18 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError, SamplingWarning
-from lumigraph.instruments.capabilities import Rendered, WithMainLens
+from lumigraph.instruments.capabilities import Decoded, Rendered, WithMainLens, WithObjective
 from lumigraph.preparation import Described, Given, prepare, read_pages, sharp_kinds
 from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_of, depth_of_pixels
 
+if TYPE_CHECKING:
+    from lumigraph.instruments.loading import AnyCamera
+    from lumigraph.samples import PortraitSample
+
 _CAMERA_FILE = 1 << 20  # bytes; camera files have some hundred
 _PATCHES = 25
-_PAINTED = 256  # samples across the picture that a camera is shown
+_SIMULATED_PATCHES, _PER_LOBE = 13, 3.0  # pictures of a camera that is simulated; samples in λb/d
+_MANY_DIRECTIONS = 10  # of a microscope, whose simulation by waves takes minutes
 _PATCH_SPAN = 1.8  # 2.0 pictures from tiles so many times smaller to so many times larger
 _LABELS = {
     "alpha": ("Focus α′", ""),
@@ -35,6 +41,38 @@ _LABELS = {
     "lambda": ("Focus λ", ""),
     "page": ("Page", ""),
 }
+
+
+@dataclass(frozen=True)
+class PatchRange:
+    """Pictures of a camera 2.0, each from patches of one size.
+
+    Parameters
+    ----------
+    sizes
+        Of the patches [px], ascending.
+    samples
+        Of the pictures for each lenslet; the largest size to the nearest whole number where None.
+    """
+
+    sizes: tuple[float, ...]
+    samples: int | None = None
+
+    @classmethod
+    def about(cls, patch: float, calibration: Calibration) -> "PatchRange":
+        """From some times smaller to some times larger than one."""
+        checks.finite("patch", patch, "px")
+        most = 0.98 * calibration.lattice.pitch
+        sizes = np.linspace(abs(patch) / _PATCH_SPAN, min(abs(patch) * _PATCH_SPAN, most), _PATCHES)
+        return cls(tuple(np.unique(np.copysign(sizes, patch)).tolist()))
+
+    @classmethod
+    def of(cls, camera: Rendered, seen: "PortraitSample") -> "PatchRange":
+        """Of all depths of a scene, as finely as diffraction at the lenslets leaves it."""
+        first, last = (camera.patch_at(dz) for dz in seen.depths)
+        sizes = np.unique(np.linspace(first, last, _SIMULATED_PATCHES))
+        largest = float(np.abs(sizes).max())
+        return cls(tuple(sizes.tolist()), max(1, round(min(largest, _PER_LOBE * largest / seen.lobe))))
 
 
 @dataclass(frozen=True)
@@ -148,7 +186,7 @@ def of_raw(
     name: str,
     raw: RawImage,
     calibration: Calibration | None = None,
-    patch: float | None = None,
+    patch: float | PatchRange | None = None,
     origin: Origin = Origin(),
 ) -> Exhibit:
     """A raw image; with a calibration also its views, or (camera 2.0) pictures with patches about `patch`."""
@@ -175,15 +213,27 @@ def of_raw(
             depth=lambda: depth_of_pixels(raw, calibration, focus, camera),
             measure=("Patch", "px") if camera is None else ("Depth", "m"),
         )  # fmt: skip
-    from lumigraph.rendering import decode
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SamplingWarning)  # of cameras 2.0, which have been looked for
-        views, relative = comfortable(decode(raw, calibration))
+        views, relative = comfortable(_decoded(raw, calibration, origin.camera))
     return Exhibit(
         name, views=views, raw=raw, calibration=calibration, depth=depth_of(views),
         facts=(*facts, *_about_views(views)), relative=relative, focal_length=_lens(origin, views, relative),
     )  # fmt: skip
+
+
+def _decoded(raw: RawImage, calibration: Calibration, camera: Described | None) -> LightField:
+    """Views of a raw image; each micro-image is one where the lenslets stand in the pupil."""
+    from lumigraph.rendering import decode
+
+    views = decode(raw, calibration)
+    if not (isinstance(camera, WithObjective) and camera.in_pupil):
+        return views
+    data = np.moveaxis(to_numpy(views.data), (2, 3), (0, 1))[:, :, ::-1, ::-1]
+    valid = (
+        None if views.valid is None else np.moveaxis(to_numpy(views.valid), (2, 3), (0, 1))[:, :, ::-1, ::-1]
+    )
+    return LightField(data, Grid(data.shape[:2], (1.0, 1.0)), Grid(data.shape[2:4], (1.0, 1.0)), 1.0, valid)
 
 
 def _lens(origin: Origin, views: LightField, relative: bool) -> float | None:
@@ -195,16 +245,13 @@ def _lens(origin: Origin, views: LightField, relative: bool) -> float | None:
     return focal_length if views.separation > focal_length else None
 
 
-def rendered(raw: RawImage, calibration: Calibration, patch: float, count: int = _PATCHES) -> Planes:
-    """Pictures of a camera 2.0 with patches about `patch` [px], by `lumigraph.rendering.render_stack`."""
+def rendered(raw: RawImage, calibration: Calibration, patch: float | PatchRange) -> Planes:
+    """Pictures of a camera 2.0 with patches about one, or as given, by `lumigraph.rendering.render_stack`."""
     from lumigraph.rendering import render_stack
 
-    checks.finite("patch", patch, "px")
-    most = 0.98 * calibration.lattice.pitch
-    sizes = np.linspace(abs(patch) / _PATCH_SPAN, min(abs(patch) * _PATCH_SPAN, most), count)
-    patches = np.unique(np.copysign(sizes, patch))
-    pictures = to_numpy(render_stack(raw, calibration, patches)).astype(np.float32, copy=False)
-    return Planes(pictures, tuple(patches.tolist()), "Patch", "px")
+    range_ = patch if isinstance(patch, PatchRange) else PatchRange.about(patch, calibration)
+    pictures = to_numpy(render_stack(raw, calibration, range_.sizes, samples=range_.samples))
+    return Planes(pictures.astype(np.float32, copy=False), range_.sizes, "Patch", "px")
 
 
 def is_camera(path: Path) -> bool:
@@ -222,19 +269,45 @@ def is_camera(path: Path) -> bool:
 
 
 def _simulated(path: Path, tell: Progress) -> Exhibit:
-    """What a camera sees of the painted scene, as one flat picture, by wave optics."""
+    """What a camera sees of the painted scene, whose layers lie at several depths."""
     from lumigraph import samples
     from lumigraph.instruments import load_camera
-    from lumigraph.scene import targets
-    from lumigraph.simulation import simulate
+    from lumigraph.simulation import Incoherent, simulate
 
     camera = load_camera(path)
-    picture = samples.scene((_PAINTED, _PAINTED), 3).views.view(1, 1).mean(axis=2)
-    raw = simulate(
-        camera, targets.photo(camera.object_grid, picture),
-        progress=within(tell, 0.0, 1.0, "simulating"),
-    )  # fmt: skip
-    return of_raw(path.name, raw, camera.calibration, camera.patch, Origin(camera=camera))
+    report = within(tell, 0.0, 0.4, "simulating")
+    if isinstance(camera, Decoded | Rendered) and isinstance(camera, WithMainLens):
+        found = samples.portrait(camera, progress=report)
+        tell(Stage(0.4, "rendering"))
+        raw = prepare(found.raw, camera.calibration, white=found.white)
+        patches = PatchRange.of(camera, found) if isinstance(camera, Rendered) else None
+        facts = (("Simulated", "by rays and the lenses' diffraction, without noise"),)
+    else:
+        scene, used = samples.glowing(camera.object_grid, _depth(camera)), _quick(camera)
+        raw, patches = simulate(used, scene, Incoherent(1e-2), progress=report), None
+        how = "by wave optics to 1 %" if used is camera else "by rays, without diffraction"
+        facts = (("Simulated", f"{how}, without noise"),)
+    exhibit = of_raw(path.name, raw, camera.calibration, patches, Origin(camera=camera))
+    return replace(exhibit, facts=(*exhibit.facts, *facts))
+
+
+def _quick(camera: "AnyCamera") -> "AnyCamera":
+    """The camera, or one that rays describe where waves would take minutes."""
+    known = {row.name: row.value for row in camera.quantities()}
+    if "refocus range" not in known or known["directions per axis"] <= _MANY_DIRECTIONS:
+        return camera
+    return camera.replace(objective={"model": "rays"})
+
+
+def _depth(camera: "AnyCamera") -> float:
+    """From the focused plane to the nearest and the farthest thing that a camera is shown [m]."""
+    known = {row.name: row.value for row in camera.quantities()}
+    if "refocus range" in known:
+        return 0.4 * known["refocus range"]
+    if isinstance(camera, WithMainLens):
+        return 3 * known["depth of field"]
+    # Of a Fourier microscope: the outermost views move by a twelfth of the field.
+    return camera.object_grid.size[0] / 12 * known["immersion index"] / known["numerical aperture"]
 
 
 def _raw(name: str, raw: RawImage, origin: Origin, tell: Progress) -> Exhibit:

@@ -70,6 +70,8 @@ export class FilmDialog {
     by("film-what").replaceChildren(...films.map(([name, words]) => new Option(words, name)));
     by("film-seconds").value = ROUNDS[films[0][0]];
     this.length();
+    const { width, height } = pictureCanvas(this.app, { ...this.app.state }), { factor } = this.app.main.model;
+    by("film-size").textContent = `${width} × ${height} px${factor > 1 ? `: every ${factor} samples of the file, as finer ones are loaded only where somebody looks` : ""}.`;
     this.show(false, "");
     by("film").showModal();
   }
