@@ -223,7 +223,7 @@ def test_a_raw_image_with_a_calibration_is_decoded(tmp_path, rng):
     assert focused.planes.label == "Patch"
     assert focused.planes.positions[0] == pytest.approx(3 / 1.8)
     lg.save(lg.Calibration(lattice, (64, 81), none, none, 0.0), tmp_path / "other.toml")
-    with pytest.raises(CalibrationError, match="64 x 80 pixels but the calibration"):
+    with pytest.raises(CalibrationError, match="64 x 80 pixels but its calibration"):
         open_exhibit(tmp_path / "raw.png", viewer.Origin(calibration=tmp_path / "other.toml"))
     with pytest.raises(FormatError, match="where a white image is needed"):
         open_exhibit(tmp_path / "raw.png", viewer.Origin(white=tmp_path / "other.toml"))
