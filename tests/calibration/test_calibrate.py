@@ -203,6 +203,16 @@ def test_whole_pixels_do_not_make_a_lattice_coarser(layout, pitch):
     assert calibration.lattice.pitch == pytest.approx(pitch, abs=0.01)
 
 
+@pytest.mark.parametrize("steps", [(11.2, 0.6), (10.2, 0.6), (10.3, 0.1)])
+def test_whole_pixels_of_a_turned_lattice_do_not_make_it_coarser(steps):
+    """Squares stand on the same part of a pixel after 5 or 10 cells: 10.22 px was found as 22.86."""
+    lattice = Lattice.square(math.hypot(*steps), math.atan2(*steps[::-1]), (5, 6))
+    calibration = calibrate(drawn(lattice, (300, 320), "square", 0.77))
+    pitch_error, centre_error = errors(calibration, lattice)
+    assert pitch_error < 0.01
+    assert centre_error < 0.1
+
+
 def test_touching_discs_of_one_kind_are_not_three_kinds(rng):
     white = calibration_drawing.white(Lattice.hex(21.3, 0.01), (330, 350), fill=1.0, noise=0.05, rng=rng)[0]
     calibration = calibrate(white)

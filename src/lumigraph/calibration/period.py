@@ -30,7 +30,14 @@ _SHEARED = 1.06  # two pitches that a search finds
 _FOLDED = 768  # px of the middle that are folded
 _ALIKE = 0.55  # correlation of lenslets of several kinds; touching discs of one kind reach 0.46
 _FEWEST = 2.8  # lenslets across a picture
-_SUBLATTICES = [(a, b, n // a) for n in (4, 3, 2) for a in (1, 2, 3, 4) if n % a == 0 for b in range(n // a)]
+_COARSEST = 9  # cells of the finer lattice in one of the coarser
+_SUBLATTICES = [
+    (a, b, n // a)
+    for n in range(_COARSEST, 1, -1)
+    for a in range(1, n + 1)
+    if n % a == 0
+    for b in range(n // a)
+]
 _NEAR = 0.012  # of a pitch, within which two candidates are one
 _AROUND = 0.04  # and within which polishing one finds the other
 _LOOKED_AT = 4  # candidates polished
@@ -136,9 +143,9 @@ def _finest(light: Gaps, vectors: Vectors) -> Vectors:
     """The finest lattice that holds a candidate's points and all harmonics that its light really has.
 
     Micro-images of 5.5 px repeat on whole pixels after 11 px only: the aliases of high orders leave lines,
-    faint ones, at the harmonics of the coarser lattice.
+    faint ones, at the harmonics of the coarser lattice. Turned, they may repeat after any number of cells.
     """
-    if _pitch(vectors) > 2.2 * _ALIASED:
+    if _pitch(vectors) > math.sqrt(_COARSEST) * _ALIASED:
         return vectors
     coarse = np.stack([vectors.column, vectors.row], -1)
     for a, b, d in _SUBLATTICES:
