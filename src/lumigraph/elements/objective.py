@@ -16,6 +16,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from threading import Lock
 from typing import Literal, get_args
 
 import numpy as np
@@ -226,10 +227,16 @@ class Objective:
 
 
 def _at(places: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-    """Cubic polynomials (n, 4), highest power first, at places in steps from the first one's start."""
+    """Cubic polynomials (2, 4, n), real and imaginary, highest power first, at places in steps."""
     index = places.astype(np.intp)
-    rest, own = places - index, pieces[index]
-    return ((own[..., 0] * rest + own[..., 1]) * rest + own[..., 2]) * rest + own[..., 3]
+    rest, found = places - index, np.empty(places.shape, np.complex128)
+    for part, (first, *others) in zip((found.real, found.imag), pieces, strict=True):
+        value = first[index]
+        for coefficient in others:
+            value *= rest
+            value += coefficient[index]
+        part[...] = value
+    return found
 
 
 def _power(turn: np.ndarray | float, order: int) -> np.ndarray | float:
@@ -343,7 +350,7 @@ def _aberrated(objective: Objective, rho: np.ndarray, angle: np.ndarray) -> np.n
 def _harmonics(
     spectrum: np.ndarray, amplitude: np.ndarray, q: np.ndarray, steps: np.ndarray
 ) -> list[tuple[int, np.ndarray]]:
-    """Order and radial integral, in cubic pieces (radii, 4), of each azimuthal harmonic that counts."""
+    """Order and radial integral, in cubic pieces (2, 4, radii), of each azimuthal harmonic that counts."""
     strength = np.abs(spectrum).max(1)
     found = []
     for row in np.flatnonzero(strength > _WEAK * strength.max()):
@@ -352,23 +359,25 @@ def _harmonics(
         wave = amplitude * spectrum[row]
         parts = bessel @ np.stack([wave.real, wave.imag], axis=1)
         values = CubicSpline(np.arange(len(steps)), 1j ** abs(order) * (parts[:, 0] + 1j * parts[:, 1]))
-        found.append((order, np.ascontiguousarray(values.c.T)))
+        found.append((order, np.stack([values.c.real, values.c.imag])))
     return found
 
 
 _BESSEL: dict[tuple, np.ndarray] = {}
+_LOCK = Lock()
 
 
 def _bessel(order: int, q: np.ndarray, step: float, count: int) -> np.ndarray:
     """J of this order at (radii, nodes); the last few are kept, for depths share them."""
     key = order, len(q), float(q[-1]), float(q[0]), step, count
-    if key not in _BESSEL:
-        argument = np.arange(count)[:, None] * (step * q)
-        while len(_BESSEL) > 5:
-            _BESSEL.pop(next(iter(_BESSEL)))
-        if order == 2:  # by recurrence, three times as fast as jv
-            near = np.where(argument > 0, argument, 1)
-            _BESSEL[key] = 2 * j1(argument) / near - np.where(argument > 0, j0(argument), 0)
-        else:
-            _BESSEL[key] = {0: j0, 1: j1}.get(order, lambda x: jv(order, x))(argument)
-    return _BESSEL[key]
+    with _LOCK:
+        if key not in _BESSEL:
+            argument = np.arange(count)[:, None] * (step * q)
+            while len(_BESSEL) > 5:
+                _BESSEL.pop(next(iter(_BESSEL)))
+            if order == 2:  # by recurrence, three times as fast as jv
+                near = np.where(argument > 0, argument, 1)
+                _BESSEL[key] = 2 * j1(argument) / near - np.where(argument > 0, j0(argument), 0)
+            else:
+                _BESSEL[key] = {0: j0, 1: j1}.get(order, lambda x: jv(order, x))(argument)
+        return _BESSEL[key]

@@ -100,7 +100,6 @@ class Bench:
         self.lenslets = self._lenslets()
         f2 = np.fft.fftfreq(n, self.step) ** 2
         self.transfer = np.exp(-1j * np.pi * wave * lenslet.distance * f2).astype(np.complex64)
-        self.lost = 0.0
 
     def _lenslets(self) -> np.ndarray:
         """What the lenslets do to the field on the grid, as finely as neither is aliased.
@@ -117,16 +116,16 @@ class Bench:
         taper *= taper[::-1]  # light that goes out on one side comes in on the other, without an edge
         return (np.tile(own, (self.cells, self.cells)) * np.outer(taper, taper)).astype(np.complex64)
 
-    def image(self, point: tuple[float, float], dz: float) -> np.ndarray:
+    def image(self, point: tuple[float, float], dz: float) -> tuple[np.ndarray, float]:
         """Samples ((2 reach + 1) N, the same) of a point (ky, kx) of the middle cell [samples].
 
-        For a point that sends s⁻² of the light of a lenslet's area: the mean over all points is 1. `lost`
-        becomes the relative rms of what the samples do not hold.
+        For a point that sends s⁻² of the light of a lenslet's area: the mean over all points is 1. And the
+        relative rms of what the samples do not hold.
         """
         edge = self.guard * self.sampling.pixels
-        image, self.lost = self.sampled(arrays.fft2(self.intensity(point, dz)), self.sampling)
+        image, lost = self.sampled(arrays.fft2(self.intensity(point, dz)), self.sampling)
         light = (self.lenslet.pitch / self.lenslet.magnification / self.sampling.points) ** 2
-        return image[edge:-edge, edge:-edge] * np.float32(light)
+        return image[edge:-edge, edge:-edge] * np.float32(light), lost
 
     def sampled(self, spectrum: np.ndarray, sampling: CellSampling) -> tuple[np.ndarray, float]:
         """Samples, none below 0, of an intensity's spectrum, and the relative rms that they do not hold."""

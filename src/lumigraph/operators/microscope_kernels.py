@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from lumigraph.core import memory
-from lumigraph.core.threads import single_products
+from lumigraph.core.threads import each, single_products
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import SamplingError
 from lumigraph.operators.microscope_bench import Bench, fineness, guard
@@ -327,10 +327,11 @@ def _images(
     cells = np.zeros((len(points), T * T, N * N), np.float32)
     for objective in objectives:
         bench = Bench(objective, lenslet, sampling, reach, demand.margin)
-        for row, point in enumerate(points):
-            image = bench.image(point, dz) / len(objectives)
-            cells[row] += image.reshape(T, N, T, N).transpose(0, 2, 1, 3).reshape(T * T, N * N)
-            lost = max(lost, bench.lost)
+        found = each(lambda point, bench=bench: bench.image(point, dz), points)
+        for row, (image, missed) in enumerate(found):
+            parted = image.reshape(T, N, T, N).transpose(0, 2, 1, 3).reshape(T * T, N * N)
+            cells[row] += parted / len(objectives)
+            lost = max(lost, missed)
     return cells, lost
 
 
