@@ -38,6 +38,7 @@ VERBS = (
         "measure",
         "batch",
         "sweep",
+        "dataset",
         "board",
         "view",
         "samples",

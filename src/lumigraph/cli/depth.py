@@ -13,12 +13,12 @@ from lumigraph.cli.options import Output, above_zero, length
 from lumigraph.cli.origin import NO_ORIGIN, Origin
 from lumigraph.cli.refocus import range_of
 from lumigraph.cli.reporting import REPORTED, Reported, enlarged
-from lumigraph.core.progress import Progress, silent, within
+from lumigraph.core.progress import Progress, silent
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from lumigraph.core.calibration import Calibration
     from lumigraph.core.grid import Grid
@@ -114,25 +114,25 @@ class Search:
         return [float(alpha) for alpha in np.linspace(first, last, min(max(21, planes), _MOST_PLANES))]
 
     def of_raw(
-        self, raw: "RawImage", calibration: "Calibration", sharp: list[float] | None, shown: Progress
+        self, raw: "RawImage", calibration: "Calibration", sharp: "Sequence[float] | None", shown: Progress
     ) -> "_Measured":
         """Patches of the lenslets, or of the samples of the picture."""
         from lumigraph import depth, preparation, rendering
 
         if self.views != "all":
             raise FormatError(f"--views {self.views} is for views, and cameras 1.0. Leave it out.")
-        share = 1.0 if self.method == "correlation" else 0.3
-        found = depth.correlation(raw, calibration, self.ends(), progress=within(shown, 0, share))
         if self.method == "correlation":
-            found = depth.fuse(found, smoothness=self.smooth) if self.smooth else found
-            return _Measured(found, calibration)
-        if sharp is not None:
-            sharp = list(rendering.match_kinds(raw, calibration, found.values, sharp))
-        picture = preparation.render(raw, calibration, found.values, blend=True, focus=sharp)
-        grid = rendering.sight_grid(calibration, found.values)
-        found = depth.dense(raw, calibration, found, focus=sharp, progress=within(shown, share, 1))
-        found = depth.fuse(found, picture, smoothness=self.smooth) if self.smooth else found
-        return _Measured(found, calibration, picture, grid)
+            found = depth.correlation(raw, calibration, self.ends(), progress=shown)
+            return _Measured(self._smoothed(found), calibration)
+        found, lenslets, sharp = depth.of_pixels(raw, calibration, self.ends(), focus=sharp, progress=shown)
+        picture = preparation.render(raw, calibration, lenslets.values, blend=True, focus=sharp)
+        grid = rendering.sight_grid(calibration, lenslets.values)
+        return _Measured(self._smoothed(found, picture), calibration, picture, grid)
+
+    def _smoothed(self, found: "DepthMap", picture: Any = None) -> "DepthMap":
+        from lumigraph import depth
+
+        return depth.fuse(found, picture, smoothness=self.smooth) if self.smooth else found
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from lumigraph.cli import console, files
 from lumigraph.cli.options import COMMAND, WARNED, Common
 from lumigraph.core.result import Result
+from lumigraph.errors import LumigraphError
 
 if TYPE_CHECKING:
     from lumigraph.report import Page
@@ -54,13 +55,21 @@ def enlarged(image: Any) -> int | None:
 
 
 def telling(verb: Verb) -> Verb:
-    """The verb as the command line runs it: its result is printed, and written as a report where asked."""
+    """The verb as the command line runs it: its result is printed, and written as a report where asked.
+
+    Raises
+    ------
+    LumigraphError
+        The result's failure, after it is told.
+    """
 
     @wraps(verb)
     def run(*arguments: Any, **options: Any) -> None:
         result = verb(*arguments, **options)
         if result is not None:
             tell(options.get("common", REPORTED), result)
+            if result.failure:
+                raise LumigraphError(result.failure)
 
     return run
 
@@ -71,7 +80,7 @@ def tell(common: Common, result: Result) -> None:
     if isinstance(common, Reported) and common.report is not None:
         _page(result).write(common.report)
         text, values = f"{text}\nwritten {common.report}", {**values, "report": str(common.report)}
-    console.report(common, text, values)
+    console.report(common, text, values if result.rows is None else result.rows)
 
 
 def _page(result: Result) -> "Page":

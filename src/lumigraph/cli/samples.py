@@ -3,8 +3,9 @@
 from pathlib import Path
 from typing import Literal
 
-from lumigraph.cli.console import progress, report
+from lumigraph.cli.console import progress
 from lumigraph.cli.options import COMMON, Common, Output
+from lumigraph.core.result import Result
 from lumigraph.errors import FormatError
 
 
@@ -14,7 +15,7 @@ def samples(
     output: Output = Path("samples"),
     size: tuple[int, int] = (192, 256),
     common: Common = COMMON,
-) -> None:
+) -> Result:
     """Write sample data to try things on, with the truth beside it; nothing is downloaded.
 
     scene: a light field of opaque things and its disparity map. bench: camera file, white image and raw
@@ -41,5 +42,5 @@ def samples(
 
     with progress("samples") as shown:
         files = write(output, names or NAMES, size=size, progress=shown)
-    text = "\n".join(f"Wrote {file}" for file in files)
-    report(common, text, {"output": str(output), "files": [str(file) for file in files]})
+    values = {"output": str(output), "files": [str(file) for file in files]}
+    return Result("Samples", "", files, tuple(f"Wrote {file}" for file in files), extra=values)

@@ -110,6 +110,10 @@ class Result:
         Files.
     extra
         What only programs read.
+    rows
+        What programs read instead of named values, where that is a list.
+    failure
+        Why the command ends with an error after all is told; empty where it does not.
     """
 
     title: str
@@ -121,6 +125,8 @@ class Result:
     notes: tuple[str, ...] = ()
     written: tuple[Path, ...] = ()
     extra: Mapping[str, Any] = field(default_factory=dict)
+    rows: Sequence[Mapping[str, Any]] | None = None
+    failure: str = ""
 
     def text(self, known: Sequence[str] = ()) -> str:
         """What people read on a terminal, without the notes that they have read already."""

@@ -175,13 +175,9 @@ def depth_of_pixels(
 
     Depths from the focused plane [m] where the camera's description is known, else patches [px].
     """
-    from lumigraph.depth import correlation, dense, metric
-    from lumigraph.rendering import match_kinds
+    from lumigraph.depth import metric, of_pixels
 
-    lenslets = correlation(raw, calibration)
-    if focus is not None:
-        focus = list(match_kinds(raw, calibration, lenslets.values, focus))
-    found = dense(raw, calibration, lenslets, focus=focus)
+    found = of_pixels(raw, calibration, focus=focus).depth
     if camera is None:
         return found
     lens, distance = camera.main_lens.focal_length, camera.object_distance
