@@ -115,7 +115,7 @@ def tilings(cells: tuple[int, int], margin: int, reach: int, least: int) -> Iter
     """Those with tiles of at least `least` lenslets to a side, the largest tiles first.
 
     >>> [told.lengths for told in tilings((20, 30), 4, 4, 10)]
-    [(28, 40), (27, 24), (18, 24)]
+    [(30, 40), (18, 24), (18, 18)]
     """
     seen = set()
     for parts in range(1, max(1, max(cells) // least) + 1):
