@@ -16,7 +16,7 @@ from lumigraph.depth.lines import visible
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import Fit
 from lumigraph.depth.smooth import Stiffness, tears, update
-from lumigraph.depth.sweep import costs, half_on, span
+from lumigraph.depth.sweep import costs, span
 from lumigraph.errors import GeometryError, SamplingWarning
 
 
@@ -259,16 +259,6 @@ def test_a_place_hidden_from_one_side_still_agrees_at_its_own_depth(bar):
         at_wall, at_bar = cost[:, 4:-4, columns]
         assert np.median(at_wall) < 0.02  # along y nothing is hidden; of the two sides the better one counts
         assert np.median(at_bar) > 0.05
-
-
-def test_between_pixels_a_view_is_not_blurred_and_stays_even_beside_an_edge():
-    x = np.arange(60.0)
-    wave = np.sin(1.2 * x)[None, None].astype(np.float32)
-    found = half_on(wave, 2)[0, 0, 8:-8]
-    # The mean of two samples is off by 0.12.
-    assert np.sqrt(np.mean((found - np.sin(1.2 * (x + 0.5))[8:-8]) ** 2)) < 0.03
-    cut = np.where(x < 30, 0, 1).astype(np.float32)[None, None]
-    np.testing.assert_array_equal(half_on(cut, 2)[0, 0, :27], 0)  # a spline swings by 0.01 to 0.1 there
 
 
 def test_views_that_cannot_see_a_place_are_told(bar):

@@ -3,18 +3,13 @@
 Only the cross of views through the middle one is used: each is moved along one axis only. What stands before
 a place hides it from the views of one side; so the better of the left and the right half counts, and the
 better of the upper and the lower.
-
-Of each half a view counts by its distance from the middle one, as a place moves there by the more. Between
-pixels views are read from samples half a pixel apart, by splines: the mean of two pixels is a blurred one,
-which looks like disagreement, and moves the best label by the more the nearer a view is to the middle.
 """
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from scipy.ndimage import correlate1d, gaussian_filter, map_coordinates, spline_filter1d
+from scipy.ndimage import gaussian_filter, map_coordinates
 
 from lumigraph.core import memory
 from lumigraph.core.progress import Progress, silent
@@ -23,15 +18,12 @@ from lumigraph.depth.shading import WINDOW, Fit, Shading
 from lumigraph.depth.volume import box, cheapest, guided, semi_global
 from lumigraph.errors import GeometryError
 
-_spline: Any = spline_filter1d
-
 _STEP = 0.4  # between labels: how far a point moves in the outermost view [px]
 _MOST_LABELS = 2000
 _MOST_DIFFERENCE = 0.017  # of a picture from 0 to 1: more says only that the label is wrong
 _FAR = 0.15  # part of a picture's width that a point may cross from the middle view to the outermost
 _COARSE = 4
 _SLOW = 2.0  # px of the small pictures: what varies over more may be shading
-_SWING = 0.5  # of second differences: a parabola leaves the mean by an eighth
 _MODEST = 0.05  # preference for small movements where the views do not say
 
 
@@ -89,19 +81,18 @@ def costs(
 class _View:
     """A view of the cross, and the middle view as bright as it is seen from there (c, y, x).
 
-    `place` is where it stands along `axis` of its array; `data` goes on at its edges: whole pixels, and those
-    half a pixel on.
+    `place` is where it stands along `axis` of its array; `data` goes on at its edges.
     """
 
-    data: tuple[np.ndarray, np.ndarray]
+    data: np.ndarray
     middle: np.ndarray
     place: float
     axis: int
 
     def difference(self, move: float, out: np.ndarray) -> np.ndarray:
-        """From the middle view (c, y, x) if all places move by `move`, linearly between half pixels."""
-        below = math.floor(2 * move * self.place)
-        part = np.float32(2 * move * self.place - below)
+        """From the middle view (c, y, x) if all places move by `move`, linearly between samples."""
+        below = math.floor(move * self.place)
+        part = np.float32(move * self.place - below)
         first, second = self._read(below), self._read(below + 1)
         np.subtract(second, first, out=out)
         out *= part
@@ -110,11 +101,10 @@ class _View:
         return np.abs(out, out=out)
 
     def _read(self, start: int) -> np.ndarray:
-        whole, half = divmod(start, 2)
-        data, count = self.data[half], self.middle.shape[self.axis]
-        whole += (data.shape[self.axis] - count) // 2
-        places = slice(whole, whole + count)
-        return data[:, places] if self.axis == 1 else data[:, :, places]
+        count = self.middle.shape[self.axis]
+        start += (self.data.shape[self.axis] - count) // 2
+        places = slice(start, start + count)
+        return self.data[:, places] if self.axis == 1 else self.data[:, :, places]
 
 
 def _halves(pictures: Pictures, shading: Shading, pad: int) -> list[list[list[_View]]]:
@@ -143,30 +133,16 @@ def _view(
     place, axis = float(stands[0]), stands[1]
     data = np.pad(pictures.data[which], [(pad, pad) if k == axis else (0, 0) for k in range(3)], "edge")
     seen = shading.at(place, 0.0) if axis == 1 else shading.at(0.0, place)
-    return _View((data, half_on(data, axis)), pictures.center + seen, place, axis)
-
-
-def half_on(data: np.ndarray, axis: int) -> np.ndarray:
-    """What lies half a sample on along an axis, by the cubic spline through the samples.
-
-    Where a picture is cut off, as at black, splines swing beside the edge. So they may leave the mean of two
-    samples by no more than some of the lesser of their second differences: 0 where the picture is even.
-    """
-    spline = _spline(data, 3, axis, output=np.float32, mode="nearest")
-    half = correlate1d(spline, np.array([1.0, 23, 23, 1]) / 48, axis, mode="nearest", origin=-1)
-    bend = np.abs(correlate1d(data, np.array([1.0, -2, 1]), axis, mode="nearest"))
-    bend = np.minimum(bend, correlate1d(bend, np.array([0.0, 0, 1]), axis, mode="nearest"))
-    mean = correlate1d(data, np.array([0.0, 1, 1]) / 2, axis, mode="nearest")
-    return mean + np.clip(half - mean, -_SWING * bend, _SWING * bend)
+    return _View(data, pictures.center + seen, place, axis)
 
 
 def _disagreement(
     side: list[_View], move: float, most: float, room: tuple[np.ndarray, np.ndarray]
 ) -> np.ndarray:
-    """Mean over the views of one side, far ones first, of how they differ from the middle one (y, x)."""
-    total, weights = np.zeros(room[1].shape, np.float32), [abs(view.place) for view in side]
+    """Mean over the views of one side of how much they differ from the middle one (y, x)."""
+    total = np.zeros(room[1].shape, np.float32)
     difference = room[1]
-    for view, weight in zip(side, weights, strict=True):
+    for view in side:
         colours = view.difference(move, room[0])
         np.copyto(difference, colours[0])
         for colour in colours[1:]:
@@ -174,8 +150,8 @@ def _disagreement(
         difference /= len(colours)
         np.minimum(difference, np.float32(most), out=difference)
         _outside(difference, move * view.place, view.axis - 1)[...] = most
-        difference *= np.float32(weight / sum(weights))
         total += difference
+    total /= len(side)
     return total
 
 
