@@ -62,4 +62,4 @@ def test_the_white_image_is_that_of_waves():
 
 def test_other_cameras_are_refused():
     with pytest.raises(lg.GeometryError, match="must be a PlenopticCamera or FocusedPlenopticCamera"):
-        lg.samples.portrait(lg.load_camera("thesis-2f"))  # type: ignore[arg-type]
+        lg.samples.portrait(lg.load_camera("thesis-2f"))  # type: ignore[arg-type]  # it is refused

@@ -1,6 +1,5 @@
 """`lumigraph batch`: another verb for each of many frames."""
 
-import glob
 import os
 import sys
 import tempfile
@@ -275,7 +274,7 @@ def _split(words: Sequence[str], leading: int) -> tuple[list[str], tuple[str, ..
 
 def _items(paths: Sequence[str], pages: str | None) -> Iterator[dict[str, Any]]:
     for path in paths:
-        found = [path] if Path(path).exists() else sorted(glob.glob(path, recursive=True))  # noqa: PTH207 - absolute too
+        found = [path] if Path(path).exists() else files.matching(path)
         if not found:
             raise FormatError(f"{path} is not a file, and no file matches it. Check the path.")
         for name in found:

@@ -1,6 +1,5 @@
 """`lumigraph dataset`."""
 
-import glob
 import shlex
 from pathlib import Path
 from typing import Annotated, Literal
@@ -89,7 +88,7 @@ def dataset(
     layouts = tuple(dict.fromkeys(layout or ("patches", "slanted")))
     if "beads" in layouts and len(layouts) > 1:
         raise FormatError("--layout beads gives no depth of each place; the others do. Make two data sets.")
-    found = tuple(sorted(str(Path(one).absolute()) for one in glob.glob(photographs or "", recursive=True)))  # noqa: PTH207
+    found = tuple(str(Path(one).absolute()) for one in files.matching(photographs or ""))
     if photographs is not None and not found:
         raise FormatError(f"--photographs {photographs!r}: no file matches. Check the pattern.")
     work = Draws(cameras, depths("--z", z), layouts, found, seed, accuracy, volume)

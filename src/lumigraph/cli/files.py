@@ -1,5 +1,6 @@
 """Reading inputs, checking outputs before a computation, writing them."""
 
+import glob
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -29,6 +30,11 @@ def check_output(path: Path, endings: Sequence[str]) -> None:
         check_target(path, folder=True)
     else:
         check_target(path, endings)
+
+
+def matching(pattern: str) -> list[str]:
+    """Files that match a pattern, in order of their names."""
+    return sorted(glob.glob(pattern, recursive=True))  # noqa: PTH207 - Path.glob takes no absolute patterns
 
 
 def check_page(path: Path) -> None:

@@ -32,7 +32,7 @@ MOST = 2**32
 
 READ, PASSED = 24, 150
 """Multiply-adds of a matrix product in the time of reading one number of `R` from memory, and of what is done
-to one number of a tile: transforms, parts and copies."""
+to one number of a tile (transforms, parts and copies). The former was measured, the latter is a guess."""
 
 GROUP = 2**26
 """Numbers of the transforms of all tiles that are held at a time, at most, if one depth has fewer."""

@@ -3,7 +3,7 @@
 import json
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -145,7 +145,7 @@ def dataset(
     FormatError
         A store of something else.
     """
-    described = {name: getattr(work, name) for name in Draws.__dataclass_fields__}
+    described = asdict(work)
     sizes = [Path(file).stat().st_size for file in work.photographs]
     what = {"dataset": json.loads(json.dumps(described)), "sizes": sizes, "parameters": list(PARAMETERS)}
     found = batch(
