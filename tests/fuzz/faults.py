@@ -177,7 +177,7 @@ def traced(function: Callable[[], object], log: Path, call: str = "", which: int
 
     def run() -> None:
         inject = ["-e", f"inject={call}:signal=SIGKILL:when={which}"] if call else []
-        watched = ["strace", "-f", "-qq", "-o", str(log), "-e", f"trace={CALLS},chdir", *inject]
+        watched = ["strace", "-f", "-q", "-o", str(log), "-e", f"trace={CALLS},chdir", *inject]
         subprocess.Popen([*watched, "-p", str(os.getpid())], stderr=subprocess.DEVNULL)
         while not log.exists() or log.stat().st_size == 0:  # from a call that it has seen on, it sees all
             os.chdir(".")
@@ -194,7 +194,10 @@ def calls_of(name: str, old: Path) -> list[tuple[str, int]]:
         folder, log = Path(place) / "f", Path(place) / "log"
         shutil.copytree(old, folder)
         assert forked(traced(lambda: WRITERS[name].write(folder / name, 2), log)) == 0
-        time.sleep(0.1)  # strace writes its last lines
+        late = time.monotonic() + 60
+        while "+++ exited" not in log.read_text():  # on a busy machine strace is late with its last lines
+            assert time.monotonic() < late
+            time.sleep(0.01)
         found = re.findall(r"^\d+ +(\w+)\(", log.read_text(), re.MULTILINE)
     calls = []
     for call in found:
