@@ -34,3 +34,7 @@ class FormatError(LumigraphError):
 
 class SamplingWarning(UserWarning):
     """Legal but suspicious sampling: the result may alias; the message gives the numbers."""
+
+
+class ParaxialWarning(UserWarning):
+    """Parabolic lenses are farther from real ones than the accuracy that was asked for; how far is said."""

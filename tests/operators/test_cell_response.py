@@ -78,12 +78,12 @@ def image_of(array, axes, center, limits=(INFINITE, INFINITE)):
         return one_by_one(lenslets, center, limits)
     y, x = (c + a.window for c, a in zip(center, axes, strict=True))
     found = lenslets.response(center, limits)
-    return found.down @ light(y[:, None], x) @ found.across.T
+    return found.down[0] @ light(y[:, None], x) @ found.across[0].T
 
 
 def one_by_one(lenslets, center, limits):
     """The sum over the lenslets by `LensletLight`, with the phase that it leaves out."""
-    one, axes = LensletLight(lenslets, None, 0.0), lenslets.axes
+    one, axes = LensletLight(lenslets, None, 0.0, 1e-4), lenslets.axes
     (down, _), (across, _) = one.bases
     field = np.zeros((axes[0].samples, axes[1].samples), complex)
     for place, members in lenslets.rows(center, limits):

@@ -12,7 +12,8 @@ from lumigraph.elements import RectangularAperture, Train
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.instruments import SingleLensCamera
 from lumigraph.operators import cells
-from lumigraph.operators.cells import Cells, Fineness
+from lumigraph.operators.cells import Cells
+from lumigraph.operators.fineness import Fineness
 from lumigraph.units import mm, nm, um
 
 focused = partial(cameras.focused, count=(5, 4))

@@ -10,7 +10,7 @@ import cameras
 from lumigraph.core.cache import Budget, ByteCache
 from lumigraph.instruments import PlenopticCamera
 from lumigraph.operators import blocks, factors, few_points, kernels, places, point_images
-from lumigraph.operators.cells import Fineness
+from lumigraph.operators.fineness import Fineness
 from lumigraph.operators.kernels import matrix
 from lumigraph.operators.missing import Missing
 from lumigraph.operators.optics import Optics
@@ -152,7 +152,7 @@ def test_what_makes_building_larger_is_told():
         camera = focused(fill_factor=fill_factor).replace(
             lenslets={"count": (9, 9)}, main_lens={"focal_length": 60 * mm, **main_lens}
         )
-        return build_bytes(Optics.of(camera, 122 * mm, 3e-3))
+        return build_bytes(Optics.of(camera, 122 * mm, 3e-3, camera.object_distance))
 
     faint = 1e-3  # it hardly blurs, and is odd all the same
     # As many factors are kept in the end: those found at first make the difference.

@@ -231,7 +231,7 @@ def test_what_cannot_be_is_refused(operator, monkeypatch):
     ):
         operator.adjoint(np.ones(4))
     many = Layout((5, 6), CellSampling(60, 8, 1 / 8))
-    monkeypatch.setattr("lumigraph.core.memory.available", lambda: 3 * 10**8)
+    monkeypatch.setattr("lumigraph.core.memory.available", lambda: 4 * 10**8)
     with pytest.raises(SamplingError, match=r"images of points at 1 depths needs .* or folder= to keep them"):
         microscope_operator([SCOPE], LENSLET, many, (0.0,))
 

@@ -58,10 +58,13 @@ def expected(name):
 @pytest.mark.parametrize("name", CAMERAS)
 def test_points_are_as_exact_as_asked_inside_at_the_border_and_outside(name):
     for accuracy in (1e-2, 1e-3, 1e-4) if name == "2.0" else (1e-2,):
-        for place, reference in expected(name):
+        for k, (place, reference) in enumerate(expected(name)):
             raw = simulate(CAMERAS[name], targets.points([(*place, DZ)]), Incoherent(accuracy=accuracy))
-            assert relative(raw.data, reference) < accuracy
+            off = relative(raw.data, reference)
+            assert off < accuracy
             assert raw.metadata["error"]["rms"] <= accuracy
+            if k < 2 and off > 1e-4:  # references are off by 2e-5, and 1e-4 beside the array
+                assert 0.5 < raw.metadata["error"]["rms"] / off < 1.5
 
 
 @pytest.mark.parametrize("name", ["2.0", "1.0", "round", "three kinds"])

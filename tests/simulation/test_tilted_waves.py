@@ -51,10 +51,16 @@ def test_few_waves_reach_what_random_phases_need_many_for(exact, count, limit):
 
 
 def test_snapshots_estimate_their_error(exact):
-    """Halves that share snapshots, or a spread not divided by a root, are 1.4 times off or more."""
+    """Blocks that share snapshots, or a spread not divided by a root, are 1.4 times off or more."""
     for count, seed in ((20, 3), (45, 3), (12, 4), (12, 5)):
         raw = simulate(CAMERA, chart(), Snapshots(count, rng=seed))
         assert raw.metadata["estimated_error"] == pytest.approx(error(raw.data, exact), rel=0.15)
+
+
+def test_a_dark_slice_has_no_error():
+    dark = Scene([Slice(np.zeros((4, 4)), Grid((4, 4), 20 * um))])
+    for light in (Snapshots(3, rng=0), TiltedWaves(3)):
+        assert simulate(CAMERA, dark, light).metadata["error"]["rms"] == 0
 
 
 def test_what_is_exact_estimates_no_error():

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Literal
 
@@ -19,7 +20,7 @@ from lumigraph.instruments.camera import Camera, Making
 from lumigraph.instruments.parameters import Parameter, optional
 from lumigraph.instruments.parts import Lenslets
 from lumigraph.instruments.point_view import PointImage
-from lumigraph.operators import CameraOptics, periodic_operator
+from lumigraph.operators import CameraOptics, Model, is_possible, periodic_operator
 from lumigraph.propagation import Propagate
 
 
@@ -28,6 +29,7 @@ class LensletCamera(Camera):
 
     lenslets: Lenslets
     matching: Literal["views", "full"] = "views"
+    model: Model = "paraxial"
 
     @property
     def lenslet_distance(self) -> float:
@@ -107,6 +109,17 @@ class LensletCamera(Camera):
             optics, self._lenslet_samples(samples), 0.0 if depths is None else depths,
             accuracy=making.accuracy, folder=making.folder, progress=making.progress,
         )  # fmt: skip
+
+    def optics(self) -> CameraOptics:
+        """What operators read of the camera, as plain values."""
+        plain = replace(super().optics(), model=self.model)
+        if self.model == "exact" and not is_possible(plain):
+            raise GeometryError(
+                f'model is "exact" but the lenslets are {self.lenslets.shape or self.lenslets.layout}, of '
+                f"{len(self.lenslets.focal_length)} focal lengths; it takes square ones of one. "
+                'Use model = "paraxial" or "auto".'
+            )
+        return plain
 
     def _lenslet_samples(self, samples: int | None) -> Grid:
         """Object samples over the array's field, so many along a lenslet's pitch."""

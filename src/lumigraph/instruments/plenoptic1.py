@@ -35,6 +35,10 @@ class PlenopticCamera(LensletCamera):
         `Pixels`; without a shape all micro-images fit.
     matching
         "views" or "full", which are the same here.
+    model
+        "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration and
+        Rayleigh and Sommerfeld's integral, for square lenslets of one focal length; "auto": exact where the
+        paraxial one misses the accuracy that is asked for.
 
     Raises
     ------

@@ -32,6 +32,10 @@ class FocusedPlenopticCamera(LensletCamera):
     matching
         "views": D = z2 p / b, with which 1/m lenslets per axis see a point; "full": D = p L / b, with which
         micro-images are as wide as the lenslets.
+    model
+        "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration and
+        Rayleigh and Sommerfeld's integral, for square lenslets of one focal length; "auto": exact where the
+        paraxial one misses the accuracy that is asked for.
 
     Raises
     ------

@@ -14,19 +14,24 @@
   `microscope_cell`, a lenslet and its cell; `microscope_tiles`, lenslets in tiles;
   `microscope_kernels`, images of its points; `microscope_rays`, the same by rays; `microscope_spectrum`, the
   lenslets' frequencies; `microscope_pixels`, real pixels; `fourier_microscope`
+- `exact`: lenslets and distances beyond the paraxial; `paraxial`, how far off that is
+- `fineness`: what an accuracy asks for
 - `band`: band-limited samples along an axis, to and from points and pixels
 - `camera`: `CameraOptics`, what an operator reads of an instrument, as plain values
 """
 
-from lumigraph.operators.camera import CameraOptics, HasOptics
+from lumigraph.operators.camera import CameraOptics, HasOptics, Model
+from lumigraph.operators.paraxial import is_possible
 from lumigraph.operators.periodic import PeriodicOperator, periodic_operator
 from lumigraph.operators.single_lens import SingleLensOperator, single_lens_operator
 
 __all__ = [
     "CameraOptics",
     "HasOptics",
+    "Model",
     "PeriodicOperator",
     "SingleLensOperator",
+    "is_possible",
     "periodic_operator",
     "single_lens_operator",
 ]

@@ -26,7 +26,8 @@ from lumigraph.core.arrays import WORKERS
 from lumigraph.core.progress import Progress, within
 from lumigraph.core.threads import each
 from lumigraph.operators import cells as _cells
-from lumigraph.operators.cell_response import INFINITE, Lenslets, Limits
+from lumigraph.operators.cell_response import INFINITE, Limits
+from lumigraph.operators.exact import lenslets_of
 from lumigraph.operators.factors import Factors, Found, factors, narrowed, weakest
 from lumigraph.operators.few_points import Chosen, Few, chosen, few
 from lumigraph.operators.lenslet_light import LensletLight, windows
@@ -149,15 +150,17 @@ class Builder:
 
     def __init__(self, optics: Optics, progress: Progress, workers: int) -> None:
         self.optics, self.axes, self.progress, self.workers = optics, optics.axes, progress, workers
-        distance = _cells.telecentric_distance(optics.camera)
-        self.lenslets = Lenslets(self.axes, optics.array, optics.camera.wavelength, distance)
+        self.lenslets = lenslets_of(optics)
         axes, cells = self.axes, optics.margin(optics.reach)
         if not optics.straight:
             axes = windows(self.lenslets)
             cells = [math.ceil(optics.lit / axis.size) for axis in axes]
-        light = wave(optics.camera, optics.distance, axes, cells)
+        light = wave(optics.camera, optics.distance, axes, cells, optics.place)
         self.light = light.dimmed(optics.image_scale)
-        self.apart = None if optics.straight else LensletLight(self.lenslets, self.light, optics.lit)
+        accuracy = optics.fineness.accuracy
+        self.apart = None
+        if not optics.straight:
+            self.apart = LensletLight(self.lenslets, self.light, optics.lit, accuracy)
         self.even = self.light.even, self.light.even and symmetric(optics.array)
         y, x = self.axes
         self.square = y == x and bool(np.allclose(self.light.data, self.light.data.T))
@@ -353,7 +356,9 @@ class Builder:
         behind: dict[Limits, Lit] = {}
 
         def of(state: State) -> Apart:
-            response = self.lenslets.response(self.optics.cells.middle(state.kind), (state.y, state.x))
+            response = self.lenslets.response(
+                self.optics.cells.middle(state.kind), (state.y, state.x), self.optics.place
+            )
             if state.x not in behind:
                 columns = self._columns(self.folded(1, state.x), reach[1])
                 behind[state.x] = lit(self.light, response.across, self.axes[1], columns)

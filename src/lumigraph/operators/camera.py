@@ -1,11 +1,14 @@
 """`CameraOptics`: what an operator reads of a camera, as plain values."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 from lumigraph.core.lattice import Lattice
 from lumigraph.elements import LensletArray, Train
 from lumigraph.sensor import Sensor
+
+Model = Literal["paraxial", "exact", "auto"]
+"""How light goes through lenses and to the sensor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +33,9 @@ class CameraOptics:
         The lenslets; None without them.
     lenslet_distance
         Lenslets to sensor, b [m]; None without lenslets.
+    model
+        "paraxial", parabolic phases and Fresnel's distances; "exact", lenses free of spherical aberration and
+        Rayleigh and Sommerfeld's; "auto", exact where the paraxial one misses the accuracy that is asked for.
     """
 
     wavelength: float
@@ -41,6 +47,7 @@ class CameraOptics:
     object_pitch: float
     array: LensletArray | None = None
     lenslet_distance: float | None = None
+    model: Model = "paraxial"
 
     def optics(self) -> "CameraOptics":
         """Itself: an operator takes an instrument, or the values that it reads of one."""

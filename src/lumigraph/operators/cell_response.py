@@ -30,6 +30,11 @@ Pair = tuple[float, float]
 
 Limits = Pair
 
+Box = tuple[Pair, Pair]
+"""Middle (y, x) and half the size of where some cells' centres are on the array [m]."""
+
+MIDDLE: Box = ((0.0, 0.0), (0.0, 0.0))
+
 INFINITE: Limits = (-math.inf, math.inf)
 
 
@@ -91,12 +96,13 @@ class Axis:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
-    """Field on a cell's samples behind square lenslets: ``down @ light @ across.T``.
+    """Field on a cell's samples behind square lenslets: the sum of all ``down @ light @ across.T``.
 
     Parameters
     ----------
     down, across
-        (samples along y, window) and (samples along x, window), complex.
+        (terms, samples along y, window) and (terms, samples along x, window), complex; one term where the
+        two axes are apart.
     """
 
     down: np.ndarray
@@ -131,27 +137,39 @@ class Lenslets:
         """Matrices (m, window), along y and along x, to the numbers that hold band-limited light."""
         return self._bases[0][0], self._bases[1][0]
 
-    def response(self, center: Pair, limits: tuple[Limits, Limits] = (INFINITE, INFINITE)) -> Response:
+    def response(
+        self,
+        center: Pair,
+        limits: tuple[Limits, Limits] = (INFINITE, INFINITE),
+        place: Pair = (0.0, 0.0),
+    ) -> Response:
         """Of the cell centred at (y, x) [m], behind square lenslets; others: `lenslet_light`.
 
         Only lenslets whose centres lie within the limits, along y and x from the cell's centre [m], exist.
         """
-        return Response(*(self.along(k, center[k], limits[k]) for k in (0, 1)))
+        box = place, MIDDLE[1]
+        return Response(*(self.along(k, center[k], limits[k], place[k], box) for k in (0, 1)))
 
-    def along(self, which: int, center: float, limits: Limits) -> np.ndarray:
-        """Square lenslets: the field (samples, window) along one axis."""
+    def along(
+        self, which: int, center: float, limits: Limits, place: float = 0.0, box: Box = MIDDLE
+    ) -> np.ndarray:
+        """Square lenslets: the fields (terms, samples, window) along one axis, here of one term.
+
+        A cell with its lenslets is taken as if it stood at `place` [m] from the main lens' axis, one of those
+        in a `box`; where lenses are paraxial they are all alike.
+        """
         axis, (coefficients, light) = self.axes[which], self._bases[which]
         step = abs(self.array.lattice.basis[1 - which][which])
         (focal_length,), squared = focal_lengths(self.array), self.optics[0] * self.optics[1]
         half, total = self.array.fill_factor * step / 2, np.zeros((axis.samples, len(coefficients)))
         count = nodes(half, focal_length, axis, self.optics)
         reach = axis.size / 2 + axis.neighbourhood
-        for middle in _row(self.array.lattice.origin[which] - center, step, reach, limits):
+        for middle in row(self.array.lattice.origin[which] - center, step, reach, limits):
             at, weight = legendre(middle - half, middle + half, count)
             phase = np.exp(-1j * np.pi * (at - middle) ** 2 / (self.optics[0] * focal_length))
             weight = weight * axis.fade(at, step)
             total = total + (fresnel(axis.image, at, squared) * (weight * phase)) @ light(at)
-        return total @ coefficients
+        return (total @ coefficients)[None]
 
     def rows(self, center: Pair, limits: tuple[Limits, Limits]) -> Iterator[tuple[float, list[Pair]]]:
         """Rows of lenslets: their y, and (x, focal length) of their members."""
@@ -210,7 +228,7 @@ class Lenslets:
         return y, weight, chord
 
 
-def _row(origin: float, step: float, reach: float, limits: Limits) -> Iterator[float]:
+def row(origin: float, step: float, reach: float, limits: Limits) -> Iterator[float]:
     """Centres ``origin + k step`` within the reach and the limits."""
     low, high = max(-reach, limits[0]), min(reach, limits[1])
     slack = 1e-9 * step
@@ -244,3 +262,19 @@ def _legendre(count: int) -> tuple[np.ndarray, np.ndarray]:
 def focal_lengths(array: LensletArray) -> tuple[float, ...]:
     """Of each kind of lenslet [m]."""
     return array.focal_length if isinstance(array.focal_length, tuple) else (array.focal_length,)
+
+
+def sphere(squared: Any, radius: float) -> Any:
+    """Sagitta √(r² + ρ²) - |r| of a sphere, with its radius' sign, without cancellation [m]."""
+    return math.copysign(1, radius) * squared / (np.sqrt(radius * radius + squared) + abs(radius))
+
+
+def bent(squared: np.ndarray, focal_length: float, distance: float) -> np.ndarray:
+    """Path that an ideal lenslet takes away at a squared distance from its middle [m].
+
+    The one between the points at `distance` behind it, b, and at a before it, 1/a = 1/f - 1/b.
+    """
+    inverse = 1 / focal_length - 1 / distance
+    flat = abs(inverse) * distance < 1e-9
+    before = squared * inverse / 2 if flat else sphere(squared, 1 / inverse)
+    return sphere(squared, distance) + before

@@ -3,17 +3,17 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.elements import CircularAperture, LensletArray, ThinLens, Train, ZernikePlate, noll_to_nm
 from lumigraph.elements.train import Element
-from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.errors import GeometryError
 from lumigraph.operators.camera import CameraOptics
+from lumigraph.operators.fineness import Edges, Fineness
 
 OVERSAMPLING = 1.2
 """How much closer than λL/(2D) the points of a cell stand: a kernel of `HALF_WIDTH` interpolates them."""
@@ -21,14 +21,7 @@ OVERSAMPLING = 1.2
 HALF_WIDTH = 20
 """Of that kernel [points]: its spectrum falls to nothing between OVERSAMPLING and 2 - 1/OVERSAMPLING."""
 
-COARSEST, FINEST = 1e-2, 1e-5
-"""Accuracies that can be asked for."""
-
 Offset = tuple[int, int]
-
-Edges = Literal["meet", "straight", "other"]
-"""Of lenslets: those that meet, and opaque rims, which send light farther aside. Straight ones send it along
-two lines, and so farthest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,103 +123,6 @@ class Cells:
         return y, x
 
 
-@dataclass(frozen=True, slots=True)
-class Fineness:
-    """What an accuracy asks for: found on the thesis' cameras against runs with twice as much of each.
-
-    Parameters
-    ----------
-    accuracy
-        Relative rms error of the raw image.
-
-    Raises
-    ------
-    SamplingError
-        An accuracy out of 1e-2 to 1e-5.
-    """
-
-    accuracy: float
-
-    def __post_init__(self) -> None:
-        accuracy = checks.finite("accuracy", self.accuracy, "1", SamplingError)
-        if not COARSEST >= accuracy >= FINEST:
-            raise SamplingError(
-                f"accuracy is {accuracy:g} but must lie between {FINEST:g} and {COARSEST:g}, relative rms."
-            )
-
-    def samples(self, fresnel_number: float, blur: float, edges: Edges = "meet") -> float:
-        """Samples of the image along a lenslet's pitch p.
-
-        Light of the lenslet and of those beside it has frequencies up to some p/(λb); less of it comes from
-        farther ones the larger p²/(λb), and more the wider the point's image and where edges do not meet.
-
-        Parameters
-        ----------
-        fresnel_number
-            p²/(λb).
-        blur
-            Radius of a point's geometric image [p].
-        edges
-            Of the lenslets.
-        """
-        farther = 0.0 if edges == "meet" else 1.4 * (1e-3 / self.accuracy) ** 0.15 - 1
-        return (
-            (1 + farther * tail(fresnel_number))
-            * (6 * fresnel_number + 6 + 2 * blur)
-            * (1e-3 / self.accuracy) ** 0.2
-        )
-
-    def neighbours(self, fresnel_number: float, edges: Edges = "meet") -> int:
-        """Lenslets on each side of an image's cell whose light is followed into it."""
-        pitches = {"meet": 5, "straight": 9, "other": 6}[edges]
-        return math.ceil(pitches * (1e-3 / self.accuracy) ** 0.23 * tail(fresnel_number))
-
-    @property
-    def rank(self) -> float:
-        """Part of the kernels' norm that their factors may leave out."""
-        return self.accuracy / 6
-
-    def border(self, fresnel_number: float) -> float:
-        """Lenslets that are missing farther than this from a cell [pitches] are not missed."""
-        return 4 * (1e-3 / self.accuracy) ** 0.25 * tail(fresnel_number)
-
-    def corner(self, fresnel_number: float, edges: Edges = "meet") -> float:
-        """The same for what is missing on two sides of a corner: farther, each counts by itself.
-
-        Of a cell's distances from both borders [pitches]: their sum behind square lenslets, whose axes are
-        apart, else the distance from the corner. What is left out then is 0.2 to 0.7 times the accuracy
-        (measured on 13 arrays and fill factors).
-        """
-        pitches = {"meet": 3.5, "straight": 4.5, "other": 5}[edges]
-        return max(1.2, pitches * (1e-3 / self.accuracy) ** 0.3 * tail(fresnel_number))
-
-    @property
-    def ring(self) -> float:
-        """How far beyond the array's micro-images light is followed [pitches]."""
-        return 1.9 * (1e-3 / self.accuracy) ** 0.3
-
-    def near(self, blur: float, airy: float) -> float:
-        """As `reach`, for what the lenslets that are missing beyond the border take away."""
-        return blur + 8 * airy * (1e-3 / self.accuracy) ** 0.4
-
-    def reach(self, blur: float, airy: float) -> float:
-        """How far from its geometric image a point's light is followed in full.
-
-        Parameters
-        ----------
-        blur
-            Radius of that image.
-        airy
-            Width λL/D of the diffraction at the main lens, in the same unit as `blur` and the result.
-        """
-        return blur + 12 * airy * (1e-3 / self.accuracy) ** 0.45
-
-
-def tail(fresnel_number: float) -> float:
-    """How far a lenslet's edges send light aside, over those that the constants were found on."""
-    return min(1.0, math.sqrt(3 / fresnel_number))
-
-
 def lenslet_distance(camera: CameraOptics) -> float:
     """Lenslets to sensor, b [m], of a camera that has lenslets."""
     assert camera.lenslet_distance is not None  # asked by `lenslet_array`
@@ -261,7 +157,9 @@ def straight(lattice: Lattice) -> Lattice:
     return replace(lattice, basis=(row, column), origin=turned(origin))
 
 
-def cells_of(camera: CameraOptics, array: LensletArray, fineness: Fineness) -> Cells:
+def cells_of(
+    camera: CameraOptics, array: LensletArray, fineness: Fineness, distance: float | None = None
+) -> Cells:
     """The smallest upright rectangle that repeats the lattice, its points and its samples."""
     lattice = array.lattice
     if lattice.layout == "hex":
@@ -274,14 +172,16 @@ def cells_of(camera: CameraOptics, array: LensletArray, fineness: Fineness) -> C
     edge = tuple(
         _nearest(-n * s / 2, o - s / 2, s) for n, s, o in zip(count, size, lattice.origin, strict=True)
     )
-    return _sampled(camera, fineness, Cells(_pair(size), _pair(edge), _pair(count), (2, 2), (1, 1)))
+    return _sampled(camera, fineness, Cells(_pair(size), _pair(edge), _pair(count), (2, 2), (1, 1)), distance)
 
 
-def bricks_of(camera: CameraOptics, array: LensletArray, fineness: Fineness) -> Cells:
+def bricks_of(
+    camera: CameraOptics, array: LensletArray, fineness: Fineness, distance: float | None = None
+) -> Cells:
     """A rectangle around each lenslet; those of a hexagonal array are staggered."""
     lattice = array.lattice
     if lattice.layout == "square":
-        return cells_of(camera, array, fineness)
+        return cells_of(camera, array, fineness, distance)
     height, pitch = math.sqrt(3) / 2 * lattice.pitch, lattice.pitch
     tall, wide = array.extent or camera.sensor.grid.size
     rows = max(1, math.ceil(tall / height - 1e-6))
@@ -297,16 +197,16 @@ def bricks_of(camera: CameraOptics, array: LensletArray, fineness: Fineness) -> 
         (height, pitch), (low, left), (rows, columns), (2, 2), (1, 1),
         staggered=True, kinds=kinds, kind=int(lattice.kind(np.array(i), np.array(steps))) % kinds,
     )  # fmt: skip
-    return _sampled(camera, fineness, bricks)
+    return _sampled(camera, fineness, bricks, distance)
 
 
-def _sampled(camera: CameraOptics, fineness: Fineness, cells: Cells) -> Cells:
+def _sampled(camera: CameraOptics, fineness: Fineness, cells: Cells, distance: float | None) -> Cells:
     """The cells with as many points and samples, and as wide a ring, as the accuracy asks for."""
     finest = airy(camera) / 2 / OVERSAMPLING
     assert camera.lattice is not None  # asked by `lenslet_array`
     assert camera.array is not None
     pitch = camera.lattice.pitch
-    widest, beyond = blur(camera, camera.object_distance) / pitch, spill(camera)
+    widest, beyond = blur(camera, distance or camera.object_distance) / pitch, spill(camera)
     # Where micro-images overlap, light of more lenslets interferes.
     number = fresnel_number(camera) * (1 + 2 / 3 * beyond / pitch)
     image = pitch / fineness.samples(number, widest, edges(camera.array))

@@ -78,18 +78,26 @@ def factors(block: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np
     return left if basis is None else basis @ left, right, strength
 
 
-def strongest(rows: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As `factors`, of few rows that need no sketch."""
-    return _strongest(rows, least)[:3]
+def strongest(
+    rows: np.ndarray, weights: np.ndarray, least: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """As `factors`, of ``weights @ rows``, few rows that need no sketch."""
+    return _strongest(rows, least, weights)[:3]
 
 
-def _strongest(rows: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def _strongest(
+    rows: np.ndarray, least: float, weights: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Orthonormal left factors, right ones, their strengths above `least`, and the weakest of all."""
-    strength, vectors = np.linalg.eigh(_products(rows))
+    products = _products(rows)
+    if weights is not None:
+        products = weights @ products @ weights.T
+    strength, vectors = np.linalg.eigh(products)
     strength = np.sqrt(np.maximum(strength, 0))
     kept = strength > least
     left = vectors[:, kept].astype(np.float32)
-    return left, left.T @ rows, strength[kept], float(strength[0])
+    across = left.T if weights is None else left.T @ weights
+    return left, across @ rows, strength[kept], float(strength[0])
 
 
 def _products(rows: np.ndarray) -> np.ndarray:

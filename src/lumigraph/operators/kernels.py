@@ -106,7 +106,7 @@ def _require(optics: Optics) -> None:
     if _streams(optics):
         return
     coarser = (a for a in (1e-4, 1e-3, 1e-2) if a > optics.fineness.accuracy)
-    others = (Optics.of(optics.camera, optics.distance, a).bricks for a in coarser)
+    others = (Optics.of(optics.camera, optics.distance, a, optics.blurred).bricks for a in coarser)
     fits = next((o for o in others if _held(o) or _streams(o)), None)
     remedy = "Use slower lenslets" if fits is None else f"{_price(fits)}: ask for that"
     if (operations := build_operations(optics)) > LONGEST:

@@ -25,8 +25,8 @@ Pair = tuple[float, float]
 Row = tuple[float, Sequence[Pair]]
 """Lenslets that stand in a row: their y from a cell's centre [m], and their x and focal length."""
 
-FAINTEST = 1e-6
-"""Part of a light's amplitude that its few numbers may leave out."""
+FAINTEST = 1e-2
+"""Part of the accuracy that a lenslet's few numbers may leave out of its light's amplitude."""
 
 AROUND = 6.0
 """How far beyond a lenslet's edge light is sampled, in periods of the band."""
@@ -43,13 +43,17 @@ class LensletLight:
         Of a point.
     widest
         Distances from the point's image at which a lenslet is lit [m].
+    accuracy
+        That is asked for.
     """
 
-    def __init__(self, lenslets: Lenslets, light: Wave, widest: float) -> None:
+    def __init__(self, lenslets: Lenslets, light: Wave, widest: float, accuracy: float) -> None:
         self.lenslets, self.axes, self.squared = lenslets, lenslets.axes, math.prod(lenslets.optics)
         self.window = windows(lenslets)
         self.bases = [axis.basis() for axis in self.window]
-        self.modes = [_modes(a, h, self.squared) for a, h in zip(self.axes, _half(lenslets), strict=True)]
+        self.faintest = FAINTEST * accuracy
+        halves = zip(self.axes, _half(lenslets), strict=True)
+        self.modes = [_modes(a, h, self.squared, self.faintest) for a, h in halves]
         self._known: dict[tuple[float, float, float], np.ndarray] = {}
         self._carriers: dict[tuple[int, float], np.ndarray] = {}
         self.light, self.widest = light, widest
@@ -65,7 +69,7 @@ class LensletLight:
         n, m = along_y.shape[1], along_x.shape[1]
         gram = (products.T @ along_x.reshape(len(lines), -1)).reshape(n, n, m, m)
         strength, vectors = np.linalg.eigh(gram.transpose(0, 2, 1, 3).reshape(n * m, n * m))
-        return vectors[:, strength > FAINTEST**2 * strength[-1]].astype(np.float32)
+        return vectors[:, strength > self.faintest**2 * strength[-1]].astype(np.float32)
 
     @cached_property
     def table(self) -> tuple[np.ndarray, tuple[int, int]]:
@@ -179,9 +183,9 @@ def _gram(light: Callable[[np.ndarray], np.ndarray], chord: float) -> np.ndarray
     return (light(at).T * weight) @ light(at)
 
 
-def _modes(axis: Axis, half: float, squared: float) -> np.ndarray:
+def _modes(axis: Axis, half: float, squared: float, faintest: float) -> np.ndarray:
     """Orthonormal (samples, modes): all that a lenslet brings to a cell, but for where the lenslet is."""
     at = np.linspace(-half, half, 4 * math.ceil(2 * half * axis.size / squared) + 40)
     turn = np.exp(-2j * np.pi / squared * axis.image[:, None] * at)
     vectors, strength, _ = np.linalg.svd(turn, full_matrices=False)
-    return vectors[:, strength > FAINTEST * strength[0]]
+    return vectors[:, strength > faintest * strength[0]]

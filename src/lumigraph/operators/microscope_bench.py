@@ -6,6 +6,7 @@ leave out is known for each image from its own spectrum.
 """
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -23,15 +24,23 @@ DEGREE = 3
 WIDEST = 8
 """Cells to each side of the window by which the number of samples is chosen."""
 
+MORE = 1.2
+"""How many more samples along a lenslet may be taken so that the fields of all points are windows of one."""
+
 ALIASES = np.arange(-6, 7)
 """Repetitions of a sampled spectrum that are followed."""
 
 
-def fineness(objective: Objective, lenslet: Lenslet, margin: float) -> int:
-    """Samples of the light along a lenslet."""
+def fineness(objective: Objective, lenslet: Lenslet, margin: float, points: int = 1) -> int:
+    """Samples of the light along a lenslet; a multiple of `points` where that takes few more."""
     steepest = objective.numerical_aperture / lenslet.magnification
     steepest += lenslet.pitch / (2 * abs(lenslet.focal_length))
     least = math.ceil(lenslet.pitch * 2 * margin * steepest / objective.wavelength)
+    shared = _fast(math.ceil(least / points)) * points
+    return shared if points > 1 and shared <= MORE * least else _fast(least)
+
+
+def _fast(least: int) -> int:
     return int(scipy.fft.next_fast_len(least) or least)
 
 
@@ -91,7 +100,7 @@ class Bench:
     ) -> None:
         self.objective, self.lenslet, self.sampling = objective, lenslet, sampling
         wave, p = objective.wavelength, lenslet.pitch
-        self.fine = fineness(objective, lenslet, margin)
+        self.fine = fineness(objective, lenslet, margin, sampling.points)
         self.guard = guard(objective, lenslet)
         self.cells = 2 * (reach + self.guard) + 1
         self.step = p / self.fine
@@ -116,16 +125,24 @@ class Bench:
         taper *= taper[::-1]  # light that goes out on one side comes in on the other, without an edge
         return (np.tile(own, (self.cells, self.cells)) * np.outer(taper, taper)).astype(np.complex64)
 
-    def image(self, point: tuple[float, float], dz: float) -> tuple[np.ndarray, float]:
-        """Samples ((2 reach + 1) N, the same) of a point (ky, kx) of the middle cell [samples].
+    def image(self, field: np.ndarray) -> tuple[np.ndarray, float]:
+        """Samples ((2 reach + 1) N, the same) of a point of the middle cell, from its `fields`.
 
         For a point that sends s⁻² of the light of a lenslet's area: the mean over all points is 1. And the
         relative rms of what the samples do not hold.
         """
-        edge = self.guard * self.sampling.pixels
-        image, lost = self.sampled(arrays.fft2(self.intensity(point, dz)), self.sampling)
-        light = (self.lenslet.pitch / self.lenslet.magnification / self.sampling.points) ** 2
-        return image[edge:-edge, edge:-edge] * np.float32(light), lost
+        edge, lost = self.guard * self.sampling.pixels, 0.0
+        inner = slice(edge, self.cells * self.sampling.pixels - edge)
+        light = self.intensity(field)
+        if self.sampling.degree:
+            image, lost = self.sampled(arrays.fft2(light), self.sampling)
+            image = image[inner, inner]
+        else:
+            factors = self.responses(self.sampling)[0][: len(self.at) // 2 + 1]
+            across = _averaged(light, factors, self.cells * self.sampling.pixels)[:, inner]
+            image = np.maximum(_averaged(across.T, factors, self.cells * self.sampling.pixels)[:, inner].T, 0)
+        area = (self.lenslet.pitch / self.lenslet.magnification / self.sampling.points) ** 2
+        return image * np.float32(area), lost
 
     def sampled(self, spectrum: np.ndarray, sampling: CellSampling) -> tuple[np.ndarray, float]:
         """Samples, none below 0, of an intensity's spectrum, and the relative rms that they do not hold."""
@@ -142,13 +159,35 @@ class Bench:
             lost = math.sqrt(max(whole - float(held @ power @ held) + clipped, 0.0) / whole)
         return np.maximum(image, 0), lost
 
-    def intensity(self, point: tuple[float, float], dz: float) -> np.ndarray:
-        """On the whole fine grid behind the lenslets, of a point that sends 1 to an object area of 1."""
-        s, p, M = self.sampling.points, self.lenslet.pitch, self.lenslet.magnification
-        y, x = ((self.at - ((k - (s - 1) / 2) / s) * p) / M for k in point)
+    def fields(self, dz: float) -> Callable[[tuple[float, float]], np.ndarray]:
+        """Gives the field (modes, n, n) before the lenslets of a point (ky, kx) at a depth [samples]."""
+        s, pitch = self.sampling.points, self.lenslet.pitch / self.lenslet.magnification
+        at, step = self.at / self.lenslet.magnification, self.fine // s
+
+        def field(point: tuple[float, float]) -> np.ndarray:
+            y, x = (at - (k - (s - 1) / 2) / s * pitch for k in point)
+            return self.objective.fields(y[:, None], x[None, :], dz).astype(np.complex64)
+
+        if s == 1 or self.fine % s:
+            return field
+        # From one point to the next it moves by whole samples.
+        wide = np.arange(len(at) + (s - 1) * step) - (len(at) - 1 + (s - 1) * step) / 2
+        wide *= pitch / self.fine
+        whole = self.objective.fields(wide[:, None], wide[None, :], dz).astype(np.complex64)
+
+        def window(point: tuple[float, float]) -> np.ndarray:
+            if any(k % 1 for k in point):
+                return field(point)
+            top, left = ((s - 1 - int(k)) * step for k in point)
+            return whole[:, top : top + len(at), left : left + len(at)]
+
+        return window
+
+    def intensity(self, field: np.ndarray) -> np.ndarray:
+        """On the whole fine grid behind the lenslets, from the field (modes, n, n) of a point before them."""
         image = np.zeros((len(self.at),) * 2, np.float32)
-        for field in self.objective.fields(y[:, None], x[None, :], dz):
-            behind = field.astype(np.complex64) * self.lenslets
+        for mode in field:
+            behind = mode * self.lenslets
             spectrum = arrays.fft2(behind, overwrite=True)
             spectrum *= self.transfer[:, None]
             spectrum *= self.transfer
@@ -169,6 +208,24 @@ class Bench:
         return (averaged * own * shift).astype(np.complex64), averaged, averaged**2 * held
 
 
+def _averaged(light: np.ndarray, factors: np.ndarray, count: int) -> np.ndarray:
+    """Light (k, n) in `count` samples for n, (k, count), by the factors of its frequencies from 0 on."""
+    n = light.shape[1]
+    spectrum = arrays.rfft(light, n, axis=1)
+    spectrum *= factors * np.float32(count / n)
+    half = count // 2 + 1
+    folded = np.zeros((len(light), half), spectrum.dtype)
+    # What is taken less finely than it was computed has its spectrum folded.
+    for start in range(0, n // 2 + 1, count):
+        part = spectrum[:, start : start + half]
+        folded[:, : part.shape[1]] += part
+    for start in range(count, (n - 1) // 2 + half, count):
+        first = max(start - (n - 1) // 2, 0)
+        part = spectrum[:, start - half + 1 : start - first + 1]
+        folded[:, first:] += part[:, ::-1].conj()
+    return arrays.irfft(folded, count, axis=1)
+
+
 @lru_cache(maxsize=64)
 def samples_needed(objective: Objective, lenslet: Lenslet, width: float, dz: float, accuracy: float) -> int:
     """Samples N along a lenslet from which pixels of a width [lenslets] are interpolated to an accuracy.
@@ -180,7 +237,7 @@ def samples_needed(objective: Objective, lenslet: Lenslet, width: float, dz: flo
     reach = min(2 + math.ceil(lit * lenslet.magnification / lenslet.pitch), WIDEST)
     bench = Bench(objective, lenslet, CellSampling(1, 1, width), reach, 3.0)
     places = {((0.03, -0.46), 0.0), ((0.21, 0.37), dz)}
-    spectra = [arrays.fft2(bench.intensity(*place)) for place in places]
+    spectra = [arrays.fft2(bench.intensity(bench.fields(at)(point))) for point, at in places]
     N = max(2, math.floor(cutoff))
     while max(bench.sampled(one, CellSampling(1, N, width, DEGREE))[1] for one in spectra) > accuracy:
         N = math.ceil(1.06 * N)

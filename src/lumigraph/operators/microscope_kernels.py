@@ -16,6 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from lumigraph.core import memory
+from lumigraph.core.arrays import WORKERS
 from lumigraph.core.threads import each, single_products
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import SamplingError
@@ -327,7 +328,8 @@ def _images(
     cells = np.zeros((len(points), T * T, N * N), np.float32)
     for objective in objectives:
         bench = Bench(objective, lenslet, sampling, reach, demand.margin)
-        found = each(lambda point, bench=bench: bench.image(point, dz), points)
+        fields = bench.fields(dz)
+        found = each(lambda point, bench=bench, fields=fields: bench.image(fields(point)), points)
         for row, (image, missed) in enumerate(found):
             parted = image.reshape(T, N, T, N).transpose(0, 2, 1, 3).reshape(T * T, N * N)
             cells[row] += parted / len(objectives)
@@ -335,8 +337,10 @@ def _images(
     return cells, lost
 
 
-def require_window(objective: Objective, lenslet: Lenslet, dz: float, demand: Demand) -> None:
-    """Refuse a depth at which the window of a point's image does not fit in memory.
+def require_window(
+    objective: Objective, lenslet: Lenslet, dz: float, demand: Demand, points: int = 1
+) -> None:
+    """Refuse a depth at which the windows of points' images, one in each thread, do not fit in memory.
 
     Raises
     ------
@@ -346,10 +350,13 @@ def require_window(objective: Objective, lenslet: Lenslet, dz: float, demand: De
     lit = math.ceil(_ray_radius(objective, dz) * lenslet.magnification / lenslet.pitch)
     reach = max(reach_of(objective, lenslet, dz, demand), lit)
     cells = 2 * (reach + guard(objective, lenslet)) + 1
-    side = cells * fineness(objective, lenslet, demand.margin)
+    fine = fineness(objective, lenslet, demand.margin, points)
+    field, threads = 16.0 * objective.modes + 64, min(WORKERS, points)
+    # Points share one field if it moves by whole samples, and each thread holds its light.
+    held = threads * field if fine % points else max(field, 8.0 * objective.modes + 8 + 32 * threads)
     what = f"the image of a point at {dz * 1e6:.4g} µm, which lights {cells} lenslets across,"
     memory.require(
-        (16.0 * objective.modes + 64) * side**2,
+        held * (cells * fine) ** 2,
         what,
         "Use depths nearer to the focused plane.",
         SamplingError,

@@ -156,7 +156,7 @@ class Missing:
             rows = sign * images[first][mine]
             for state, sign in others:
                 (np.add if sign > 0 else np.subtract)(rows, images[state][mine], out=rows)
-            left, right, strength = strongest(triangle @ rows, least)
+            left, right, strength = strongest(rows, triangle, least)
             mean = self.chosen[offset].weights.mean(0, dtype=np.float64) @ rows
             return Found(left, right, strength, 1, mean, basis)
 

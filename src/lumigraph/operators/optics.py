@@ -10,9 +10,10 @@ from lumigraph.elements import LensletArray
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.cell_response import SLACK, Axis
-from lumigraph.operators.cells import Cells, Fineness
+from lumigraph.operators.cells import Cells
+from lumigraph.operators.fineness import Fineness
 
-VERSION = 12
+VERSION = 13
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 
@@ -26,6 +27,10 @@ class Optics:
         The camera, its array with rows along x, the array's cells, and the accuracy.
     distance
         Object to main lens [m].
+    blurred
+        That of the plane whose points are blurred most, of those that share the cells [m].
+    place
+        Where all cells are taken to be in the straight array (y, x) [m]; it matters to the exact model.
     """
 
     camera: CameraOptics
@@ -33,18 +38,23 @@ class Optics:
     cells: Cells
     fineness: Fineness
     distance: float
+    blurred: float
+    place: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
-    def of(cls, camera: HasOptics, distance: float, accuracy: float) -> "Optics":
-        """Of a plane at a distance from the main lens [m]."""
+    def of(
+        cls, camera: HasOptics, distance: float, accuracy: float, blurred: float | None = None
+    ) -> "Optics":
+        """Of a plane at a distance from the main lens [m]; `blurred`, that of the most blurred of several."""
         plain, fineness = camera.optics(), Fineness(accuracy)
-        array = _cells.lenslet_array(plain)
-        return cls(plain, array, _cells.cells_of(plain, array, fineness), fineness, distance)
+        array, widest = _cells.lenslet_array(plain), distance if blurred is None else blurred
+        cells = _cells.cells_of(plain, array, fineness, widest)
+        return cls(plain, array, cells, fineness, distance, widest)
 
     @property
     def bricks(self) -> "Optics":
         """With a cell around each lenslet, as the matrices have them."""
-        return replace(self, cells=_cells.bricks_of(self.camera, self.array, self.fineness))
+        return replace(self, cells=_cells.bricks_of(self.camera, self.array, self.fineness, self.blurred))
 
     @property
     def rotation(self) -> float:
@@ -58,7 +68,8 @@ class Optics:
         with np.printoptions(threshold=2**62, floatmode="unique"):
             known = repr((
                 VERSION, camera.wavelength, camera.separation, camera.lenslet_distance, camera.pupil_diameter,
-                _cells.lens(camera), self.array, self.cells, self.fineness, self.distance,
+                _cells.lens(camera), self.array, self.cells, self.fineness, self.distance, camera.model,
+                self.place,
             ))  # fmt: skip
         return hashlib.sha256(known.encode()).hexdigest()[:32]
 

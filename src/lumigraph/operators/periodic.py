@@ -36,9 +36,12 @@ from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators.beyond import Beyond, beyond
 from lumigraph.operators.blocks import Part
 from lumigraph.operators.camera import HasOptics
-from lumigraph.operators.cells import Cells
+from lumigraph.operators.cell_response import Pair
+from lumigraph.operators.cells import Cells, blur
 from lumigraph.operators.kernels import Matrix, matrix
 from lumigraph.operators.optics import Optics
+from lumigraph.operators.over_field import over_field
+from lumigraph.operators.paraxial import field_matters, resolved
 from lumigraph.operators.streamed import Streamed
 from lumigraph.operators.tiles import as_plane, by_cell, readout, spread
 
@@ -241,7 +244,7 @@ def periodic_operator(
     accuracy: float = 1e-3,
     folder: str | PathLike[str] | None = None,
     progress: Progress | None = None,
-) -> PeriodicOperator:
+) -> Linear:
     """Operator from planes sampled on `grid` to the raw image of a camera with lenslets.
 
     What it takes to compute is kept, in memory and on disk (see `store`), for the same camera and
@@ -275,18 +278,30 @@ def periodic_operator(
     ``periodic_operator(camera, camera.object_grid).forward(picture)``
     """
     depths = tuple(float(d) for d in np.ravel(np.asarray(dz, np.float64)))
-    plain, planes, optics = camera.optics(), [], None
-    for k, depth in enumerate(depths):
-        optics = Optics.of(plain, plain.object_distance + depth, accuracy).bricks
-        report = part_of(progress, k, len(depths))
-        planes.append(_plane(optics, matrix(optics, report, None if folder is None else Path(folder)), grid))
-        report(1.0)
-    if optics is None:
+    if not depths:
         raise GeometryError("dz is empty. Give at least one depth.")
-    several = depths if np.ndim(dz) else None
-    operator = PeriodicOperator(
-        optics.cells, tuple(planes), readout(optics), accuracy, object_grid=grid, depths=several
-    )
+    plain, several = resolved(camera.optics(), accuracy), depths if np.ndim(dz) else None
+
+    distances = [plain.object_distance + depth for depth in depths]
+    blurred = max([plain.object_distance, *distances], key=lambda z: blur(plain, z))
+
+    def at(place: Pair, report: Progress | None) -> PeriodicOperator:
+        planes, optics = [], []
+        for k, distance in enumerate(distances):
+            optics.append(replace(Optics.of(plain, distance, accuracy, blurred).bricks, place=place))
+            told = part_of(report, k, len(depths))
+            held = matrix(optics[k], told, None if folder is None else Path(folder))
+            planes.append(_plane(optics[k], held, grid))
+            told(1.0)
+        return PeriodicOperator(
+            optics[0].cells, tuple(planes), readout(optics[0]), accuracy, object_grid=grid, depths=several
+        )
+
+    if plain.model == "exact" and field_matters(plain, accuracy):
+        parts = (part_of(progress, k, 9) for k in range(9))
+        operator: Linear = over_field(plain, lambda place: at(place, next(parts)))
+    else:
+        operator = at((0.0, 0.0), progress)
     memory.require(
         operator.memory_bytes, "the raw image", "Use fewer lenslets, or larger pixels.", SamplingError
     )

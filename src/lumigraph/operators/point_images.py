@@ -45,15 +45,24 @@ class Wave:
         return all(np.abs(core - np.flip(core, axis)).max() < tolerance for axis in (0, 1))
 
 
-def wave(camera: CameraOptics, distance: float, axes: tuple[Axis, Axis], reach: Sequence[int]) -> Wave:
-    """Of a point on the axis, without the phase exp(iπw²/(λL)), wide enough for cells `reach` away."""
+def wave(
+    camera: CameraOptics,
+    distance: float,
+    axes: tuple[Axis, Axis],
+    reach: Sequence[int],
+    place: tuple[float, float] = (0.0, 0.0),
+) -> Wave:
+    """Of a point on the axis or imaged at a place, without the phase exp(iπw²/(λL)).
+
+    It is wide enough for cells `reach` away.
+    """
     multiples = []
     for axis, cells in zip(axes, reach, strict=True):
         n = axis.margin + (cells + 1) * axis.points + STEP
         multiples.append(np.arange(-n, n + 1))
     pitch = [axis.size / axis.points for axis in axes]
     y, x = (m * step for m, step in zip(multiples, pitch, strict=True))
-    data = point_light(camera, distance, math.hypot(y[-1], x[-1])).at(y, x)
+    data = point_light(camera, distance, math.hypot(y[-1], x[-1]), place).at(y, x)
     data *= np.sqrt(np.prod(pitch))
     return Wave(data.astype(np.complex64), (int(multiples[0][0]), int(multiples[1][0])))
 
@@ -65,7 +74,7 @@ class Lit:
     Parameters
     ----------
     rows
-        Even and odd rows of the wave, each (n, points along x, samples along x).
+        Even and odd rows of the wave, each (terms, n, points along x, samples along x).
     first
         Multiple of the points' pitch of the wave's first row.
     columns
@@ -78,10 +87,11 @@ class Lit:
 
 
 def lit(light: Wave, across: np.ndarray, axis: Axis, columns: range) -> Lit:
-    """All rows of a wave through `across` (samples, window), of points in cells of `columns`."""
+    """All rows of a wave through `across` (terms, samples, window), of points in cells of `columns`."""
     points = np.arange(columns.start * axis.points, columns.stop * axis.points)
-    rows = through(light, across, axis, points)
-    return Lit((rows[::STEP].copy(), rows[1::STEP].copy()), light.first[0], columns)
+    rows = [through(light, term, axis, points) for term in across]
+    even, odd = (np.stack([term[k::STEP] for term in rows]) for k in range(STEP))
+    return Lit((even, odd), light.first[0], columns)
 
 
 def through(light: Wave, across: np.ndarray, axis: Axis, points: np.ndarray) -> np.ndarray:
@@ -99,7 +109,7 @@ class Apart:
     lit
         Light behind what they do along x.
     down
-        (samples, window) along y.
+        (terms, samples, window) along y.
     axes
         Of the cells.
     """
@@ -118,8 +128,12 @@ class Apart:
         result = np.empty((y.points, x.points, y.samples, x.samples), np.float32)
         for k, image in enumerate(result):
             top = -y.margin - (dy * y.points + k) - self.lit.first
-            rows = self.lit.rows[top % STEP][top // STEP :, start : start + x.points]
-            intensity(down @ rows[: down.shape[1]].transpose(1, 0, 2), image)
+            rows = self.lit.rows[top % STEP][:, top // STEP :, start : start + x.points]
+            first, *others = rows[:, : down.shape[2]].transpose(0, 2, 1, 3)
+            field = down[0] @ first
+            for term, seen in zip(down[1:], others, strict=True):
+                field += term @ seen
+            intensity(field, image)
         return result.reshape(y.points * x.points, -1)
 
 

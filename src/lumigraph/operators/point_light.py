@@ -13,6 +13,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.elements import ThinLens, Train
 from lumigraph.errors import SamplingWarning
 from lumigraph.operators import cells as _cells
+from lumigraph.operators import exact_light
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.cell_response import legendre
 from lumigraph.scene import sources
@@ -32,11 +33,20 @@ class PointLight(Protocol):
         ...
 
 
-def point_light(camera: CameraOptics, distance: float, widest: float) -> PointLight:
-    """Of a point at a distance from the main lens [m], followed to `widest` from its image [m]."""
+def point_light(
+    camera: CameraOptics, distance: float, widest: float, place: tuple[float, float] = (0.0, 0.0)
+) -> PointLight:
+    """Of a point at a distance from the main lens [m], followed to `widest` from its image [m].
+
+    Where the image is makes no difference, but to the exact model: at `place` in the lenslet plane [m].
+    """
     lens = _cells.lens(camera)
-    first = lens.elements[0]
+    first = next(iter(lens.elements))
+    if camera.model == "exact" and (place != (0.0, 0.0) or len(lens.elements) > 1):
+        return exact_light.Oblique(camera, lens, distance, widest, place)
     if len(lens.elements) == 1 and isinstance(first, ThinLens) and first.diameter is not None:
+        if camera.model == "exact":
+            return Round(exact_light.radial(camera, distance, widest))
         return Round(_radial(camera, first.focal_length, distance, widest))
     return Sampled(camera, lens, distance, widest)
 

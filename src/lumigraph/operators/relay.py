@@ -11,8 +11,8 @@ from typing import Protocol
 
 import numpy as np
 
-from lumigraph.operators import cells as _cells
-from lumigraph.operators.cell_response import INFINITE, STEP, Axis, Lenslets, Limits, fresnel
+from lumigraph.operators.cell_response import INFINITE, MIDDLE, STEP, Axis, Box, Lenslets, Limits, fresnel
+from lumigraph.operators.exact import lenslets_of
 from lumigraph.operators.optics import Optics
 
 Pair = tuple[float, float]
@@ -76,21 +76,16 @@ class _Cells:
         return slice(start, start + len(self.axis.window))
 
 
-def _lenslets(optics: Optics) -> Lenslets:
-    distance = _cells.telecentric_distance(optics.camera)
-    return Lenslets(optics.axes, optics.array, optics.camera.wavelength, distance)
-
-
 @dataclass(slots=True)
 class Straight:
-    """Square lenslets, whose two axes are apart."""
+    """Square lenslets, whose two axes are apart, or a sum of terms whose are."""
 
     optics: Optics
-    _known: dict[tuple[int, Limits], np.ndarray] = field(default_factory=dict)
+    _known: dict[tuple[int, Limits, float, Box], np.ndarray] = field(default_factory=dict)
     _lenslets: Lenslets = field(init=False)
 
     def __post_init__(self) -> None:
-        self._lenslets = _lenslets(self.optics)
+        self._lenslets = lenslets_of(self.optics)
 
     def places(self, rows: range, columns: range) -> tuple[np.ndarray, np.ndarray]:
         """As `Relay.places`."""
@@ -98,20 +93,31 @@ class Straight:
 
     def field(self, light: np.ndarray, rows: range, columns: range) -> np.ndarray:
         """As `Relay.field`."""
-        return self.along(1, self.along(0, light, rows).T, columns).T
+        box = self._box(rows, columns) if self.optics.camera.model == "exact" else MIDDLE
+        down = self._along(0, light[None], rows, box)
+        return self._along(1, down.transpose(0, 2, 1), columns, box).sum(0).T
 
-    def along(self, which: int, light: np.ndarray, cells: range) -> np.ndarray:
-        """Amplitude (samples, n) along one axis of light (places, n)."""
-        mine = _Cells(self.optics, which)
-        parts = [self.matrix(which, cell) @ light[mine.window(k)] for k, cell in enumerate(cells)]
-        return np.concatenate(parts)
+    def _box(self, rows: range, columns: range) -> Box:
+        ends = [
+            (mine.center(cells[0]), mine.center(cells[-1]))
+            for mine, cells in ((_Cells(self.optics, 0), rows), (_Cells(self.optics, 1), columns))
+        ]
+        (top, bottom), (left, right) = ends
+        return ((top + bottom) / 2, (left + right) / 2), ((bottom - top) / 2, (right - left) / 2)
 
-    def matrix(self, which: int, cell: int) -> np.ndarray:
-        """Amplitude (samples, window) of one cell along one axis."""
+    def _along(self, which: int, light: np.ndarray, cells: range, box: Box) -> np.ndarray:
+        """Amplitudes (terms, samples, n) along one axis of light (1 or terms, places, n)."""
         mine = _Cells(self.optics, which)
-        key = which, mine.limits(cell)
+        parts = [self._matrix(which, cell, box) @ light[:, mine.window(k)] for k, cell in enumerate(cells)]
+        return np.concatenate(parts, axis=1)
+
+    def _matrix(self, which: int, cell: int, box: Box) -> np.ndarray:
+        """Amplitudes (terms, samples, window) of one cell along one axis."""
+        mine = _Cells(self.optics, which)
+        middle, limits = mine.center(cell), mine.limits(cell)
+        key = which, limits, 0.0 if box is MIDDLE else middle, box
         if key not in self._known:
-            found = self._lenslets.along(which, mine.center(cell), key[1])
+            found = self._lenslets.along(which, middle, limits, key[2], box)
             self._known[key] = found.astype(np.complex64)
         return self._known[key]
 
@@ -126,7 +132,7 @@ class Lines:
     _lenslets: Lenslets = field(init=False)
 
     def __post_init__(self) -> None:
-        self._lenslets = _lenslets(self.optics)
+        self._lenslets = lenslets_of(self.optics)
 
     def places(self, rows: range, columns: range) -> tuple[np.ndarray, np.ndarray]:
         """As `Relay.places`: along y, the lines of all rows of lenslets."""

@@ -9,6 +9,8 @@ import numpy as np
 from lumigraph.elements import LensletArray
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.cell_response import INFINITE
+from lumigraph.operators.exact import terms_of
+from lumigraph.operators.fineness import tail
 from lumigraph.operators.missing import AT_A_TIME, HELD
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.places import INSIDE, Place, State, alike, places, terms
@@ -33,7 +35,7 @@ def build_bytes(optics: Optics, workers: int = 1) -> float:
     kept = inside * cells.kinds + factors.all * factor
     if optics.straight:
         states = {INSIDE} | states_of(wanted(optics))
-        light = len({state.x for state in states}) * optics.images_bytes(optics.near)
+        light = len({state.x for state in states}) * optics.images_bytes(optics.near) * terms_of(optics)
         shared = 1 + sum(INFINITE in state for state in states)
         light += workers * (2 * shared + 4) * block
         return light + MORE * (inside + border) + kept + glare_bytes(optics) + LEAST
@@ -84,7 +86,7 @@ class Factors:
         inside, border = (0.45, 0.08) if optics.straight else (0.55, 0.16)
         rims = {"meet": 1.0, "straight": 1.75, "other": 1.3}[_cells.edges(optics.array)]
         border *= min(1.0, (1e-3 / optics.fineness.accuracy) ** 0.25)
-        border *= _cells.tail(_cells.fresnel_number(optics.camera))
+        border *= tail(_cells.fresnel_number(optics.camera))
         near = rims * border * usual * math.prod(2 * n + 1 for n in optics.near)
         return cls(
             rims * inside * usual * math.prod(2 * n + 1 for n in optics.reach),

@@ -15,10 +15,13 @@ from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.elements import masks
 from lumigraph.errors import LumigraphError, SamplingError
-from lumigraph.operators.cells import COARSEST, FINEST
+from lumigraph.operators.fineness import COARSEST, FINEST
 from lumigraph.simulation import directions
 
 Seed = int | np.random.Generator | None
+
+BLOCKS = 8
+"""Of shots, whose spread tells the error: two show one difference, which by chance may be small."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,8 +64,9 @@ class Coherence(Protocol):
         """Power of the number of shots with which the error falls."""
         ...
 
-    def half(self, number: int) -> int | None:
-        """Of two halves, alike in kind, the one of a shot (from 0): their difference shows the error."""
+    @property
+    def blocks(self) -> int:
+        """Blocks of shots, alike in kind and one after the other, whose spread shows the error; or 1."""
         ...
 
     def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
@@ -98,9 +102,10 @@ class Coherent:
         """None: nothing is drawn."""
         return 0.0
 
-    def half(self, number: int) -> int | None:
-        """None: nothing is drawn."""
-        return None
+    @property
+    def blocks(self) -> int:
+        """One: nothing is drawn."""
+        return 1
 
     def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
         """Amplitude 1 everywhere."""
@@ -160,9 +165,10 @@ class Snapshots:
         """That of random numbers."""
         return 0.5
 
-    def half(self, number: int) -> int | None:
-        """Every other one."""
-        return number % 2 if self.count > 1 else None
+    @property
+    def blocks(self) -> int:
+        """A few."""
+        return min(self.count, BLOCKS)
 
     def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
         """Random phases, independent from plane to plane and from snapshot to snapshot."""
@@ -274,12 +280,13 @@ class TiltedWaves:
 
     @property
     def convergence(self) -> float:
-        """That of quasi-random points (measured, charts of bars, blocks and stars)."""
-        return 0.9
+        """That of quasi-random points that count what lies in a disc: here, the main lens' pupil."""
+        return 0.75
 
-    def half(self, number: int) -> int | None:
-        """The first half or the second: both cover all directions evenly, which every other one does not."""
-        return 2 * number // self.count if self.count > 1 else None
+    @property
+    def blocks(self) -> int:
+        """A few: what comes one after the other covers all directions evenly."""
+        return min(self.count, BLOCKS)
 
     def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
         """Converging waves exp(-ikr²/2z) with a tilt, each as bright as the directions it stands for."""

@@ -19,7 +19,7 @@ from lumigraph.simulation import error
 from lumigraph.simulation.camera import Camera, Imaging
 from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Snapshots, TiltedWaves
 from lumigraph.simulation.exact import image_of
-from lumigraph.simulation.light import Light, read_out
+from lumigraph.simulation.light import Light, Shots, read_out
 from lumigraph.simulation.microscope_scene import Microscope, microscope_image
 from lumigraph.simulation.shots import Shot, number_of_shots, shots
 from lumigraph.simulation.spectrum import Spectrum, by_wavelength
@@ -63,7 +63,7 @@ def simulate(
         Slices, points and diffusers; see `lumigraph.targets`. Or a `Volume`, whose planes are slices.
     coherence
         Of slices: `Incoherent` (default), `Coherent`, `Snapshots` or `TiltedWaves`. The last two leave the
-        raw image's relative rms error, estimated from two halves of their shots, in
+        raw image's relative rms error, estimated from the spread of blocks of their shots, in
         ``metadata["estimated_error"]``.
     spectrum
         Wavelengths that take the place of the camera's own, and the channels that see them. Then slices
@@ -103,7 +103,8 @@ def _imaged(
     progress: Progress | None,
     map: Callable[..., Iterable[Any]],  # noqa: A002 - as `simulate` names it
 ) -> RawImage:
-    light = Light(np.zeros(camera.image_grid.shape), np.zeros(camera.sensor.shape))
+    dark = np.zeros(camera.sensor.shape)
+    light = Light(dark, Shots(camera, dark))
     slices, count, accuracy = [], 0, 1e-3
     fields: Iterable[Shot] = ()
     coherent = isinstance(coherence, Coherent) and is_followed(camera)
@@ -121,17 +122,18 @@ def _imaged(
         for part in exact:
             report = share(progress, light.done, total)
             image, reached = image_of(camera, part, accuracy, report, coherent=coherent)
-            light.pixels += image
+            light.pixels = light.pixels + image
             light.reached.append((error.norm(image), reached))
             light.count(progress, total)
-        for half, image in map(Shot.arrive, fields):
-            light.add(half, image)
+        for block, image in map(Shot.arrive, fields):
+            light.shots.add(block, image)
             light.count(progress, total)
     except KeyboardInterrupt:
         if not light.done:
             raise
         if not exact:
-            light.brighten(total / light.done)  # equal shots: fewer of them, as bright
+            light.shots.complete()
+            light.shots.brighten(total / light.done)  # equal shots: fewer of them, as bright
         raise Interrupted(read_out(camera, light, coherence)) from None
     return read_out(camera, light, coherence)
 

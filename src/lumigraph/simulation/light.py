@@ -14,31 +14,72 @@ from lumigraph.simulation.coherence import Coherence, Incoherent
 
 
 @dataclass(slots=True)
-class Light:
-    """What has arrived so far: intensity on the camera's grid and on the pixels, after `done` shots."""
+class Shots:
+    """Sum of the images of mutually incoherent shots, block by block: what tells how far off it is.
 
-    intensity: np.ndarray
-    pixels: np.ndarray
-    done: int = 0
-    halves: dict[int, np.ndarray] = field(default_factory=dict)
-    """What random or quasi-random shots brought, in two halves."""
-    drawn: dict[int, int] = field(default_factory=lambda: {0: 0, 1: 0})
-    """Shots in each half."""
-    reached: list[tuple[float, error.Reached]] = field(default_factory=list)
-    """Norm of each part that is imaged at once, and how far off it is."""
+    Parameters
+    ----------
+    camera
+        That they went through.
+    total
+        On the pixels, of all blocks that are complete.
+    drawn
+        Shots in each of these.
+    squares
+        Of their images' norms, each over its shots, summed.
+    """
 
-    def add(self, half: int | None, image: np.ndarray) -> None:
-        """Intensity on the camera's grid, of a shot that belongs to one of two halves or to none."""
-        if half is None:
-            self.intensity += image
+    camera: Camera
+    total: np.ndarray
+    drawn: list[int] = field(default_factory=list)
+    squares: float = 0.0
+    _block: int = 0
+    _begun: int = 0
+    _image: np.ndarray | None = None
+
+    def add(self, block: int, image: np.ndarray) -> None:
+        """Intensity on the camera's grid, of a shot of a block; blocks come one after the other."""
+        if block != self._block:
+            self.complete()
+        self._block, self._begun = block, self._begun + 1
+        self._image = image if self._image is None else self._image + image
+
+    def complete(self) -> None:
+        """What was begun is a block of its own."""
+        if self._image is None:
             return
-        self.halves[half] = self.halves.get(half, 0.0) + image
-        self.drawn[half] += 1
+        seen = integrate(self._image, self.camera.image_grid, self.camera.sensor)
+        self.total = self.total + seen
+        self.drawn.append(self._begun)
+        self.squares += error.norm(seen) ** 2 / self._begun
+        self._begun, self._image = 0, None
 
     def brighten(self, factor: float) -> None:
-        """All that shots have brought, times a factor."""
-        self.intensity *= factor
-        self.halves = {half: image * factor for half, image in self.halves.items()}
+        """All that they have brought, times a factor."""
+        self.total, self.squares = self.total * factor, self.squares * factor**2
+
+    def error(self, power: float) -> float:
+        r"""Relative rms error of the mean of n shots, from how the means of B blocks are spread around it.
+
+        Errors that fall as a power p of the number of shots are :math:`B^p` times as large in a block, whose
+        mean square error is that of the whole more than the spread
+
+        .. math:: V = \sum_b \frac{n_b}{n} |m_b - m|^2 = e^2 (B^{2p} - 1)
+        """
+        n, squared = sum(self.drawn), error.norm(self.total) ** 2
+        spread = max(0.0, n * self.squares - squared)
+        return math.sqrt(spread / (len(self.drawn) ** (2 * power) - 1) / max(squared, np.finfo(float).tiny))
+
+
+@dataclass(slots=True)
+class Light:
+    """What has arrived so far: intensity on the pixels, after `done` shots or parts."""
+
+    pixels: np.ndarray
+    shots: Shots
+    done: int = 0
+    reached: list[tuple[float, error.Reached]] = field(default_factory=list)
+    """Norm of each part that is imaged at once, and how far off it is."""
 
     def count(self, progress: Progress | None, total: int) -> None:
         """One more of all shots has arrived."""
@@ -49,36 +90,24 @@ class Light:
 
 def read_out(camera: Camera, light: Light, coherence: Coherence | Incoherent) -> RawImage:
     """Raw image of what has arrived, with what is known of its error."""
-    pixels = light.pixels
-    reached = list(light.reached)
-    if light.intensity.any():
-        seen = integrate(light.intensity, camera.image_grid, camera.sensor)
-        reached.append((error.norm(seen), error.of_grids(camera)))
-        pixels = pixels + seen
-    halves = {k: integrate(image, camera.image_grid, camera.sensor) for k, image in light.halves.items()}
-    for half in halves.values():
-        pixels = pixels + half
+    shots, reached = light.shots, list(light.reached)
+    shots.complete()
+    pixels = light.pixels + shots.total
     # A hard edge rings below zero when it is interpolated to pixels; a sensor counts no negative light.
     data = np.maximum(pixels, 0, dtype=np.float32)
     known = {"simulated": repr(coherence), "shots": light.done, "wavelength": camera.wavelength}
-    if len(halves) == 2 and not isinstance(coherence, Incoherent):
-        known["estimated_error"] = _error(halves, light.drawn, pixels, coherence.convergence)
-        drawn = error.Reached(known["estimated_error"], f"two halves of {light.done} shots on grids")
-        reached.append((error.norm(pixels), drawn.and_also(error.of_grids(camera).rms)))
+    if shots.drawn and not isinstance(coherence, Incoherent):
+        there = error.of_grids(camera).through(camera.optics())
+        if len(shots.drawn) > 1:
+            drawn = shots.error(coherence.convergence)
+            known["estimated_error"] = drawn * error.norm(shots.total) / (error.norm(pixels) or 1.0)
+            source = f"{len(shots.drawn)} blocks of {sum(shots.drawn)} shots on grids"
+            there = error.Reached(drawn, source, there.paraxial).and_also(there.rms)
+        reached.append((error.norm(shots.total), there))
     if (whole := error.together(reached)) is not None:
         known["error"] = {"rms": whole.rms, "source": whole.source}
+        if whole.paraxial:
+            known["error"]["paraxial"] = whole.paraxial
     if isinstance(coherence, Incoherent):
         error.warn_if_missed(coherence.accuracy, whole)
     return RawImage(data, pixel_pitch=camera.sensor.pixel_pitch, metadata=known)
-
-
-def _error(halves: dict[int, np.ndarray], drawn: dict[int, int], pixels: np.ndarray, power: float) -> float:
-    """Relative rms error of a mean, from the difference between the means of its two halves.
-
-    Errors that fall as a power p of the number of shots make halves of n1 and n2 of them differ by
-    sqrt((n/n1)^2p + (n/n2)^2p) times the error of all n. Of a dozen quasi-random ones it may be twice that.
-    """
-    both = drawn[0] + drawn[1]
-    difference = halves[0] * (both / drawn[0]) - halves[1] * (both / drawn[1])
-    spread = math.hypot(*((both / n) ** power for n in drawn.values()))
-    return float(np.linalg.norm(difference) / spread / max(np.linalg.norm(pixels), np.finfo(float).tiny))

@@ -24,15 +24,15 @@ class Shot:
     field: Field
     train: Train
     weight: float
-    half: int | None = None
-    """Of two halves of a random or quasi-random sample, the one that this shot belongs to."""
+    block: int = 0
+    """Of the blocks of a random or quasi-random sample, the one that this shot belongs to."""
 
-    def arrive(self) -> tuple[int | None, np.ndarray]:
-        """Its half, and its intensity on the samples of the image."""
+    def arrive(self) -> tuple[int, np.ndarray]:
+        """Its block, and its intensity on the samples of the image."""
         *elements, last = self.train.elements or (Train(()),)
         before = Train(elements)(self.field)
         intensity = last.intensity(before) if isinstance(last, Propagate) else last(before).intensity
-        return self.half, intensity if self.weight == 1 else self.weight * intensity
+        return self.block, intensity if self.weight == 1 else self.weight * intensity
 
 
 def number_of_shots(slices: list[Slice], coherence: Coherence) -> int:
@@ -55,12 +55,12 @@ def shots(camera: Camera, slices: list[Slice], coherence: Coherence) -> Iterator
                     warnings.simplefilter("ignore", SamplingWarning)
                 wave = Field(amplitude * light, plane.grid, camera.wavelength)
                 arriving.append(propagate(wave, plane.distance, "fresnel", grid=grid))
-        half = coherence.half(number)
+        block = number * coherence.blocks // coherence.shots
         if coherence.planes_independent:
             together = Field(sum(wave.data for wave in arriving), grid, camera.wavelength)
-            yield Shot(together, train, 1.0, half)
+            yield Shot(together, train, 1.0, block)
         else:
-            yield from (Shot(wave, train, 1.0, half) for wave in arriving)
+            yield from (Shot(wave, train, 1.0, block) for wave in arriving)
 
 
 def _plane(camera: Camera, part: Slice) -> Plane:

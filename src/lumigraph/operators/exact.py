@@ -1,0 +1,236 @@
+r"""Square lenslets beyond the paraxial: exact phases and distances, as sums of products of one axis each.
+
+Light goes from a place w of the lenslet plane to S on the sensor by Rayleigh and Sommerfeld's first integral,
+
+.. math:: h = \frac{b}{i \lambda R^2} \Big(1 + \frac{i}{k R}\Big) e^{i k R}, \qquad R^2 = b^2 + |S - w|^2,
+
+after lenslets that are thin and free of spherical aberration: each brings the light of a point at the
+distance a before it to one point of the sensor, with 1/a = 1/f - 1/b,
+
+.. math:: t = e^{-i k [\sqrt{b^2 + v^2} - b \pm (\sqrt{a^2 + v^2} - |a|)]}.
+
+The main lens' light comes with the sphere around the middle of its stop, :math:`e^{i k \sqrt{L^2 + w^2}}`.
+None of the three is a product of a function of y and one of x, as their paraxial forms are, but each is a sum
+of few: singular values of what is left of them beside their own axes' phases.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from lumigraph.elements import LensletArray
+from lumigraph.operators import cells as _cells
+from lumigraph.operators.cell_response import (
+    MIDDLE,
+    Axis,
+    Box,
+    Lenslets,
+    Limits,
+    Pair,
+    bent,
+    focal_lengths,
+    legendre,
+    nodes,
+    row,
+    sphere,
+)
+from lumigraph.operators.optics import Optics
+
+KEPT = 0.2
+"""Part of the accuracy that products may leave out."""
+
+Function = Callable[[np.ndarray, np.ndarray], Any]
+"""Of places along y and along x [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Products:
+    """A function of two axes: a sum of products of a function of each.
+
+    Parameters
+    ----------
+    middle, half
+        Of each axis' interval [m].
+    coefficients
+        Of Chebyshev's polynomials there, (n, R) for each axis.
+    strength
+        Of each product, from 1 on.
+    """
+
+    middle: Pair
+    half: Pair
+    coefficients: tuple[np.ndarray, np.ndarray]
+    strength: np.ndarray
+
+    def along(self, which: int, at: np.ndarray) -> np.ndarray:
+        """Factors (R, ...) of all products at places on an axis [m]."""
+        place, coefficients = (at - self.middle[which]) / self.half[which], self.coefficients[which]
+        return np.moveaxis(chebyshev.chebvander(place, len(coefficients) - 1) @ coefficients, -1, 0)
+
+
+def products(
+    function: Function, middle: Pair, half: Pair, turns: float, least: float, bright: Function | None = None
+) -> Products:
+    """Of a function of (y, x) [m] that turns so often across the intervals, but for `least` of it.
+
+    What is left out is weighed by how `bright` it is at (y, x), a product of both axes' own.
+    """
+    count = 24 + math.ceil(4 * turns)
+    nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    y, x = (m + h * nodes for m, h in zip(middle, half, strict=True))
+    down, across = (np.ones(count), np.ones(count)) if bright is None else bright(y, x)
+    left, strength, right = np.linalg.svd(down[:, None] * function(y[:, None], x[None, :]) * across)
+    rest = np.sqrt(np.cumsum(strength[::-1] ** 2)[::-1])
+    kept = max(1, int((rest > least * rest[0]).sum()))
+    root = np.sqrt(strength[:kept])
+    pair = left[:, :kept] * root / down[:, None], right[:kept].T * root / across[:, None]
+    to = 2 / count * np.cos(np.arange(count)[:, None] * np.arccos(nodes))
+    to[0] /= 2
+    return Products(middle, half, (to @ pair[0], to @ pair[1]), strength[:kept] / strength[0])
+
+
+class ExactLenslets(Lenslets):
+    """Lenslets of one focal length, square; see `Lenslets`.
+
+    Parameters
+    ----------
+    axes, array, wavelength
+        As of `Lenslets`.
+    distance
+        Lenslets to sensor, b [m].
+    separation
+        Main lens to lenslets, L [m].
+    accuracy
+        Relative rms of the image.
+    """
+
+    def __init__(
+        self, axes: tuple[Axis, Axis], array: LensletArray, wavelength: float, distance: float,
+        separation: float, accuracy: float,
+    ) -> None:  # fmt: skip
+        scale = 1 + distance / separation
+        super().__init__(axes, array, wavelength, distance / scale)
+        self.b, self.L, self.scale, self.k = distance, separation, scale, 2 * np.pi / wavelength
+        self.least = KEPT * accuracy
+        (self.focal_length,) = focal_lengths(array)
+        self._terms: dict[Box, tuple[tuple[Products, ...], list[tuple[int, ...]]]] = {}
+
+    def _bent(self, squared: np.ndarray) -> np.ndarray:
+        return bent(squared, self.focal_length, self.b)
+
+    def terms(self, box: Box) -> tuple[tuple[Products, ...], list[tuple[int, ...]]]:
+        """For cells centred in a box: way to the sensor, lenslets, sphere; and numbers of their products.
+
+        Kept are those whose strengths' product counts.
+        """
+        if box not in self._terms:
+            parts = self._way(box), self._lenslet(), self._sphere_around(box)
+            numbers = product(*(range(len(part.strength)) for part in parts))
+            strengths = {n: math.prod(p.strength[k] for p, k in zip(parts, n, strict=True)) for n in numbers}
+            self._terms[box] = parts, [n for n, strength in strengths.items() if strength > self.least]
+        return self._terms[box]
+
+    def _reach(self, box: Box) -> Pair:
+        y, x = (
+            half + (self.scale + 1) / 2 * axis.size + axis.neighbourhood
+            for axis, half in zip(self.axes, box[1], strict=True)
+        )
+        return y, x
+
+    def _way(self, box: Box) -> Products:
+        tilt, b, k = self.scale - 1, self.b, self.k
+        middle = box[0][0] * tilt, box[0][1] * tilt
+        half = self._reach((box[0], (box[1][0] * tilt, box[1][1] * tilt)))
+
+        def beside(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+            squared = b * b + y * y + x * x
+            path = _left(lambda squared: sphere(squared, b), y, x)
+            return b * b / squared * (1 + 1j / (k * np.sqrt(squared))) * np.exp(1j * k * path)
+
+        def bright(*places: np.ndarray) -> tuple[np.ndarray, ...]:
+            """Edges send light aside that falls with the distance, from a lenslet's own micro-image on."""
+            result, falls = [], np.pi * self.array.lattice.pitch / math.sqrt(math.prod(self.optics))
+            for at, m, spread in zip(places, middle, box[1], strict=True):
+                beyond = np.abs(at - m) - spread * tilt - self.array.lattice.pitch
+                result.append(1 / (1 + falls * np.maximum(0, beyond) / self.array.lattice.pitch))
+            return tuple(result)
+
+        far = max(abs(m) + h for m, h in zip(middle, half, strict=True))
+        return products(beside, middle, half, self._turns(far, b), self.least, bright)
+
+    def _lenslet(self) -> Products:
+        down, across = (self.array.fill_factor * pitch / 2 for pitch in self.array.lattice.pitches)
+
+        def beside(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+            return np.exp(-1j * self.k * _left(self._bent, y, x))
+
+        turns = 2 * self._turns(max(down, across), self.b)
+        return products(beside, (0.0, 0.0), (down, across), turns, self.least)
+
+    def _sphere_around(self, box: Box) -> Products:
+        def beside(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+            return np.exp(1j * self.k * _left(lambda squared: sphere(squared, self.L), y, x))
+
+        half = self._reach(box)
+        far = max(abs(m) + h for m, h in zip(box[0], half, strict=True))
+        return products(beside, box[0], half, self._turns(far, self.L), self.least)
+
+    def _turns(self, far: float, radius: float) -> float:
+        """Of the phase beside both axes' own, at a corner."""
+        corner = np.asarray(far)
+        path = _left(lambda squared: sphere(squared, radius), corner, corner)
+        return abs(float(path)) * self.k / (2 * np.pi)
+
+    def along(
+        self, which: int, center: float, limits: Limits, place: float = 0.0, box: Box = MIDDLE
+    ) -> np.ndarray:
+        """As `Lenslets.along`: (terms, samples, window), whose products are added up."""
+        axis, (coefficients, light) = self.axes[which], self._bases[which]
+        step, (parts, terms) = abs(self.array.lattice.basis[1 - which][which]), self.terms(box)
+        half, reach = self.array.fill_factor * step / 2, axis.size / 2 + axis.neighbourhood
+        count = nodes(half, self.focal_length, axis, self.optics)
+        total = np.zeros((len(terms), axis.samples, len(coefficients)), complex)
+        for middle in row(self.array.lattice.origin[which] - center, step, reach, limits):
+            at, weight = legendre(middle - half, middle + half, count)
+            off, there = at - middle, at + place
+            apart = self.scale * axis.image[:, None] - at + (self.scale - 1) * place
+            path = sphere(there**2, self.L) - self._bent(off**2)
+            weight = (
+                weight * axis.fade(at, step) * np.exp(1j * self.k * path) / math.sqrt(math.prod(self.optics))
+            )
+            spread, bright = np.exp(1j * self.k * sphere(apart**2, self.b)), light(at)
+            way, lenslet, curved = (
+                part.along(which, places) for part, places in zip(parts, (apart, off, there), strict=True)
+            )
+            for n in dict.fromkeys(number[0] for number in terms):
+                mine = [k for k, number in enumerate(terms) if number[0] == n]
+                light_in = [weight * lenslet[terms[k][1]] * curved[terms[k][2]] for k in mine]
+                seen = (spread * way[n]) @ (np.array(light_in)[:, :, None] * bright)
+                for k, field in zip(mine, seen, strict=True):
+                    total[k] += field
+        return total @ coefficients
+
+
+def _left(path: Callable[[np.ndarray], np.ndarray], y: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """What a path by the squared distance has beside those along both axes [m]."""
+    return path(y * y + x * x) - path(y * y) - path(x * x)
+
+
+def lenslets_of(optics: Optics) -> Lenslets:
+    """What a camera's lenslets do to light, by its model."""
+    camera, (axes, array) = optics.camera, (optics.axes, optics.array)
+    if camera.model == "paraxial":
+        return Lenslets(axes, array, camera.wavelength, _cells.telecentric_distance(camera))
+    distance, accuracy = _cells.lenslet_distance(camera), optics.fineness.accuracy
+    return ExactLenslets(axes, array, camera.wavelength, distance, camera.separation, accuracy)
+
+
+def terms_of(optics: Optics) -> int:
+    """Products whose sum the light behind square lenslets is."""
+    lenslets = lenslets_of(optics)
+    return len(lenslets.terms(MIDDLE)[1]) if isinstance(lenslets, ExactLenslets) else 1
