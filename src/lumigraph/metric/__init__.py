@@ -7,6 +7,11 @@
   with the noise of corners that are seen many times (`noise`). `Measured` holds it, its errors, the poses.
 - `plan`: how to take pictures of the board, and how well they will tell the camera.
 - `triangulate`: positions of points from their micro-images.
+- `datasheet`: what a camera does, on `Charts` that `read_charts` finds in a folder or `simulate_charts` takes
+  by wave optics (`planes`: a picture of the charts; `Sheet`: the lines).
+- `twin`: what is out of place on a bench, from white images; a `Bench` simulates one, `corrected` gives the
+  camera file as it stands.
+- `simulated`: some of these of a camera as it is described, as sweeps measure them.
 
 T. Georgiev and A. Lumsdaine, "Focused plenoptic camera and rendering", J. Electron. Imaging 19 (2010),
 has the geometry; M. Labussiere et al., "Leveraging blur information for plenoptic camera calibration",
@@ -15,28 +20,49 @@ IJCV 130 (2022), calibrate multi-focus cameras from such boards.
 
 from lumigraph.metric.calibration import Measured, Pose, board
 from lumigraph.metric.camera import MetricCamera, Nominal
+from lumigraph.metric.charts import Charts, Seen, read_charts, save_charts, simulate_charts
 from lumigraph.metric.corners import Board, Corners
+from lumigraph.metric.datasheet import datasheet
 from lumigraph.metric.files import load, load_compote, load_corners, save, save_corners
 from lumigraph.metric.finding import find_corners
 from lumigraph.metric.planning import Plan, plan
+from lumigraph.metric.sheet import Entry, Plane, Sheet
+from lumigraph.metric.simulated import MEASURES, is_measure, simulated
 from lumigraph.metric.triangulation import Triangulated, triangulate
+from lumigraph.metric.twin import Bench, Twin, corrected, twin
 
 __all__ = [
+    "MEASURES",
+    "Bench",
     "Board",
+    "Charts",
     "Corners",
+    "Entry",
     "Measured",
     "MetricCamera",
     "Nominal",
     "Plan",
+    "Plane",
     "Pose",
+    "Seen",
+    "Sheet",
     "Triangulated",
+    "Twin",
     "board",
+    "corrected",
+    "datasheet",
     "find_corners",
+    "is_measure",
     "load",
     "load_compote",
     "load_corners",
     "plan",
+    "read_charts",
     "save",
+    "save_charts",
     "save_corners",
+    "simulate_charts",
+    "simulated",
     "triangulate",
+    "twin",
 ]

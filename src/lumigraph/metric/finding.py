@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from scipy.ndimage import map_coordinates, spline_filter
+from scipy.ndimage import spline_filter
 
+from lumigraph.analysis.saddles import settle
 from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.progress import Progress, silent
@@ -34,13 +35,7 @@ LEAST_SQUARE = _RADII[0] / _WINDOW
 """Of a board behind a lenslet [px]."""
 
 _ROUNDS = 3  # corners found, places of the next round told by those found
-_STEPS = 12  # of one search
 _STRAY = 2.5  # px: from where a corner is expected
-_ODD = 0.15
-"""Part of a window's contrast that changes when it is turned by 180°: a corner has none but noise."""
-
-_STILL = 0.02  # px: of the last step
-
 _OFF = 3.0  # times the median distance from the corner's own line
 
 
@@ -224,49 +219,5 @@ class _Search:
 
     def settled(self, sights: _Sights) -> _Sights:
         """The sights of saddles near the expected places, moved there."""
-        y, x = _disc(self.radius)
-        solve, at = _quadratic(y, x, self.radius / 2), sights.way
-
-        def step(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return _towards_saddle(self._windows(sights.center + at, y, x) @ solve)
-
-        for _ in range(_STEPS):
-            at = at + step(at)[0]
-        move, saddle = step(at)
-        near = np.hypot(*(at - sights.way).T) < _STRAY
-        kept = saddle & near & (np.hypot(*move.T) < _STILL)
-        kept[kept] = _odd(self._windows((sights.center + at)[kept], y, x)) < _ODD
-        return replace(sights, way=at)[kept]
-
-    def _windows(self, at: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        places = np.stack([at[:, :1] + y, at[:, 1:] + x])
-        return map_coordinates(self.splines, places, order=3, mode="nearest", prefilter=False)
-
-
-def _disc(radius: int) -> np.ndarray:
-    """Ways (2, k) from the middle of a round window to its pixels."""
-    ways = np.mgrid[-radius : radius + 1, -radius : radius + 1].reshape(2, -1).astype(np.float64)
-    return ways[:, np.hypot(*ways) <= radius + 0.5]
-
-
-def _odd(values: np.ndarray) -> np.ndarray:
-    """Part of the contrast of windows (n, k) that turns its sign when they are turned by 180°."""
-    values = values - values.mean(1, keepdims=True)
-    return ((values - values[:, ::-1]) ** 2).sum(1) / np.maximum(4 * (values**2).sum(1), 1e-30)
-
-
-def _quadratic(y: np.ndarray, x: np.ndarray, width: float) -> np.ndarray:
-    """From values (n, k) to the terms (n, 6) of the quadratic 1, y, x, y²/2, yx, x²/2 that fits them best."""
-    weight = np.exp(-(y**2 + x**2) / (4 * width**2))  # its square is a Gaussian of `width`
-    terms = np.stack([np.ones_like(y), y, x, y * y / 2, y * x, x * x / 2], 1)
-    return (np.linalg.pinv(terms * weight[:, None]) * weight).T
-
-
-def _towards_saddle(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Step (n, 2) [px], at most 1, to where the gradient is 0, and which quadratics are saddles."""
-    _, gy, gx, yy, yx, xx = terms.T
-    determinant = yy * xx - yx**2
-    saddle = determinant < 0
-    safe = np.where(saddle, determinant, -np.inf)
-    step = np.stack([(yx * gx - xx * gy) / safe, (yx * gy - yy * gx) / safe], 1)
-    return np.clip(step, -1.0, 1.0), saddle
+        at, kept = settle(self.splines, sights.center + sights.way, self.radius, stray=_STRAY)
+        return replace(sights, way=at - sights.center)[kept]

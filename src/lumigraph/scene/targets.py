@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
 from lumigraph.core import checks, coverage
 from lumigraph.core.arrays import to_numpy
@@ -34,6 +35,7 @@ __all__ = [
     "points",
     "siemens_star",
     "slanted_edge",
+    "texture",
     "usaf1951",
     "usaf_elements",
     "white",
@@ -327,6 +329,31 @@ def points(positions: Sequence[Sequence[float]], intensities: Sequence[float] | 
         rows.append((*position, 0.0)[:3])
     weights = np.ones(len(rows)) if intensities is None else intensities
     return Scene([Points(rows or np.zeros((0, 3)), weights)])  # type: ignore[arg-type]
+
+
+def texture(grid: Grid, width: float, *, seed: int = 0) -> Scene:
+    """A random grey pattern without edges or period, as charts for depth need it.
+
+    Parameters
+    ----------
+    grid
+        Samples of the focused plane.
+    width
+        Of its grains, the standard deviation of the blur that makes them from noise [m].
+    seed
+        Of the random numbers.
+
+    Examples
+    --------
+    >>> grains = texture(Grid.square(64, 1e-5), 3e-5).parts[0].intensity
+    >>> bool(0 <= grains.min() < 0.1), bool(0.9 < grains.max() <= 1)
+    (True, True)
+    """
+    coverage.check_canvas(grid)
+    blur = [checks.positive("width", width) / pitch for pitch in grid.pitch]
+    noise = np.random.default_rng(checks.whole("seed", seed, 0)).standard_normal(grid.shape)
+    grains = gaussian_filter(noise, blur, mode="wrap")
+    return Scene([Slice(np.clip(0.5 + 0.25 * grains / max(float(grains.std()), 1e-30), 0, 1), grid)])
 
 
 def white(intensity: float = 1.0) -> Scene:

@@ -1,0 +1,207 @@
+"""`lumigraph datasheet`."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from lumigraph.cli.console import progress
+from lumigraph.cli.files import check_output
+from lumigraph.cli.options import COMMON, Common, Output, length
+from lumigraph.cli.reporting import page
+from lumigraph.core.result import Figure, Result
+from lumigraph.errors import FormatError
+
+if TYPE_CHECKING:
+    from lumigraph.core.progress import Progress
+    from lumigraph.metric import Charts, Plane, Sheet
+
+_MOST = 3  # cameras side by side
+
+
+def datasheet(
+    sources: Annotated[tuple[str, ...], Parameter(negative="")],
+    /,
+    *,
+    camera: str | None = None,
+    depths: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
+    seed: int = 1,
+    charts: Path | None = None,
+    output: Output | None = None,
+    common: Common = COMMON,
+) -> Result:
+    """Write the data sheet of a plenoptic camera: resolution, directions, depth, light and geometry.
+
+    SOURCES are folders of raw images, or camera files, whose charts are simulated by wave optics and measured
+    in the same way; several stand side by side. A folder has a charts.toml that names its pictures (see the
+    page on metric cameras), or white images and scenes told apart by "white" and "dark" in their names.
+
+    Example: `lumigraph datasheet camera.toml -o sheet.html`
+
+    Example: `lumigraph datasheet bench/ --camera camera.toml -o sheet.html`
+
+    Example: `lumigraph datasheet thesis-plenoptic-1 thesis-plenoptic-2-m050 -o both.html`
+
+    Parameters
+    ----------
+    sources
+        Folders, camera files, or names of the catalogue.
+    camera
+        Camera file of the folders' pictures: depths in metres, and limits.
+    depths
+        Where simulated charts stand, from the plane in focus, such as --depths '-5 mm' --depths '0 mm'; five
+        distances over what the camera refocuses if left out.
+    seed
+        Of the simulated sensor's noise.
+    charts
+        Folder to write the simulated raw images into, as a laboratory would take them; for one camera file.
+    output
+        Page to write (.html).
+    """
+    if output is not None:
+        check_output(output, (".html", ".htm"))
+    if not 1 <= len(sources) <= _MOST:
+        raise FormatError(f"there are {len(sources)} cameras. Give one to {_MOST}, side by side.")
+    simulated = [source for source in sources if not Path(source).is_dir()]
+    if charts is not None and (len(sources) > 1 or not simulated):
+        raise FormatError("--charts takes the pictures of one camera file. Give that alone.")
+    planes = None if not depths else [length("--depths", one) or 0.0 for one in depths]
+    sheets, written = [], []
+    from lumigraph import metric
+
+    for source in sources:
+        with progress(f"data sheet of {source}") as tell:
+            found = _charts(source, camera, planes, seed, tell)
+            if charts is not None:
+                written += metric.save_charts(found, charts)
+            sheets.append(metric.datasheet(found))
+    result = _result(_distinct(sheets), written)
+    if output is None:
+        return result
+    page(result).write(output)
+    return replace(result, written=(*result.written, output))
+
+
+def _charts(
+    source: str, camera: str | None, depths: list[float] | None, seed: int, tell: "Progress"
+) -> "Charts":
+    import numpy as np
+
+    from lumigraph import metric
+    from lumigraph.instruments import load_camera
+    from lumigraph.metric.charts import check_camera
+
+    if Path(source).is_dir():
+        return metric.read_charts(source, None if camera is None else check_camera(load_camera(camera)))
+    rng, name = np.random.default_rng(seed), Path(source).stem
+    one = check_camera(load_camera(source))
+    return metric.simulate_charts(one, depths, name=name, rng=rng, progress=tell)
+
+
+def _distinct(sheets: "Sequence[Sheet]") -> "list[Sheet]":
+    """Sheets whose names differ."""
+    names = [sheet.name for sheet in sheets]
+    return [
+        replace(sheet, name=f"{sheet.name} ({k})") if names.count(sheet.name) > 1 else sheet
+        for k, sheet in enumerate(sheets, 1)
+    ]
+
+
+def _result(sheets: "list[Sheet]", written: list[Path]) -> Result:
+    names = " and ".join(sheet.name for sheet in sheets)
+    rows = [row for sheet in sheets for row in sheet.rows()]
+    limits = {sheet.name: [list(row) for row in sheet.limits] for sheet in sheets}
+    notes = [f"{sheet.name}: {note}" for sheet in sheets for note in sheet.notes]
+    return Result(
+        f"Data sheet: {names}",
+        "Measured on white images and charts. Intervals hold the value with 95 % probability as far as noise "
+        "and scatter over the picture tell; each line says how it was measured, or why it was not.",
+        sheets, tuple(_lines(sheets)), figures=lambda: _figures(sheets), notes=tuple(notes),
+        written=tuple(written), extra={"entries": rows, "limits": limits},
+    )  # fmt: skip
+
+
+def _lines(sheets: "list[Sheet]") -> Iterator[str]:
+    for sheet in sheets:
+        yield sheet.name
+        for one in sheet.entries:
+            text = one.text if one.value is not None else one.how
+            yield f"  {one.section:<16} {one.quantity.label:<26} {text}"
+
+
+def _figures(sheets: "list[Sheet]") -> Iterable[Figure]:
+    from lumigraph import plots
+
+    for section in dict.fromkeys(one.section for sheet in sheets for one in sheet.entries):
+        yield Figure(_table(sheets, section), section=section)
+        if section == "Resolution" and (curve := _over_depth(sheets)):
+            text = "Half contrast in the middle of the picture, over the charts' distances from the focus."
+            yield Figure(
+                plots.curves([], curve, xlabel="chart [mm from the focus]", ylabel="MTF50"), text, section
+            )
+        if section == "Directions":
+            lines = {sheet.name: sheet.profile for sheet in sheets if sheet.profile is not None}
+            if lines:
+                text = "Mean light from the middle of a micro-image to the middle of the next one."
+                curve = plots.curves([], lines, xlabel="along the row [px]", ylabel="light over the middle's")
+                yield Figure(curve, text, section)
+    for sheet in sheets:
+        if sheet.planes:
+            yield Figure(_planes(sheet.planes), section=f"Charts of {sheet.name}")
+            yield from _pictures(sheet)
+        if sheet.limits:
+            rows = [["limit", "value", "by"], *map(list, sheet.limits)]
+            yield Figure(rows, section=f"Limits of {sheet.name}, by ray and wave optics")
+
+
+def _table(sheets: "list[Sheet]", section: str) -> list[list[str]]:
+    """Quantities down, cameras across, how each was measured last."""
+    entries = [{e.quantity.name: e for e in s.entries if e.section == section} for s in sheets]
+    names = dict.fromkeys(name for one in entries for name in one)
+    rows = [["quantity", *(sheet.name for sheet in sheets), "how"]]
+    for name in names:
+        found = [one.get(name) for one in entries]
+        told = list(dict.fromkeys(one.how for one in found if one is not None))
+        label = next(one.quantity.label for one in found if one is not None)
+        rows.append([label, *("-" if one is None else one.text for one in found), " / ".join(told)])
+    return rows
+
+
+_COLUMNS = (
+    "mtf50_middle", "mtf50_border", "mtf10_middle", "disparity", "disparity_noise", "patch", "patch_noise",
+    "depth_error", "depth_noise", "distortion", "sample_on_chart",
+)  # fmt: skip
+
+
+def _planes(planes: "Sequence[Plane]") -> list[list[str]]:
+    """Measures down, distances of the charts across."""
+    rows = [["chart at", *(plane.label for plane in planes)]]
+    for name in _COLUMNS:
+        found = [next((e for e in plane.entries if e.quantity.name == name), None) for plane in planes]
+        if any(one is not None and one.value is not None for one in found):
+            rows.append([name.replace("_", " "), *("-" if one is None else one.text for one in found)])
+    return rows
+
+
+def _over_depth(sheets: "list[Sheet]") -> dict[str, tuple[list[float], list[float]]]:
+    curves = {}
+    for sheet in sheets:
+        known = [
+            (plane.depth, one.value)
+            for plane in sheet.planes for one in plane.entries
+            if plane.depth is not None and one.quantity.name == "mtf50_middle" and one.value is not None
+        ]  # fmt: skip
+        if len(known) > 1:
+            on_chart = sheet.planes[0].entries[0].quantity.unit == "1/m"
+            scale, unit = (1e-3, "lp/mm") if on_chart else (1.0, "cycles/sample")
+            curves[f"{sheet.name} [{unit}]"] = [1e3 * z for z, _ in known], [scale * v for _, v in known]
+    return curves
+
+
+def _pictures(sheet: "Sheet") -> Iterator[Figure]:
+    shown = [plane for plane in sheet.planes if plane.picture is not None]
+    for plane in shown[:: max(1, len(shown) // 3)]:
+        caption = f"The chart at {plane.label} from the focus, as it was measured."
+        yield Figure(plane.picture, caption, f"Charts of {sheet.name}")

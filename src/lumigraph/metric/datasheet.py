@@ -1,0 +1,373 @@
+"""`datasheet`: what a plenoptic camera does, measured on its white images and on charts."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from lumigraph.analysis import PupilEdge, photon_transfer, pupil_edge
+from lumigraph.calibration import calibrate
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.prepared import PreparedImage
+from lumigraph.core.progress import Progress, silent
+from lumigraph.core.raw import RawImage
+from lumigraph.core.result import Quantity
+from lumigraph.errors import CalibrationError, LumigraphError
+from lumigraph.instruments import LensletCamera
+from lumigraph.metric import planes
+from lumigraph.metric.charts import Charts, Seen
+from lumigraph.metric.planes import is_rendered
+from lumigraph.metric.sheet import Entry, Plane, Sheet
+from lumigraph.preparation import decode, prepare, render
+from lumigraph.rendering import refocus
+
+GRID, LIGHT, DIRECTIONS, RESOLUTION, DEPTH, GEOMETRY = (
+    "Micro-images", "Light and noise", "Directions", "Resolution", "Depth", "Geometry"
+)  # fmt: skip
+
+LIMITS = (
+    "picture cut-off", "picture cut-off at the object", "rendered cut-off", "rendered cut-off at the object",
+    "cut-off at the object", "lenslet cut-off", "lenslet Airy radius", "Airy radius", "resolvable directions",
+    "pixels per micro-image", "views per axis", "directions per axis", "lateral resolution", "depth of field",
+    "refocus range", "cross-talk",
+)  # fmt: skip
+"""Rows of a camera's `quantities` that bound what can be measured."""
+
+_KEPT = 0.5
+"""Part of the best MTF50 that the ends of the refocus range keep."""
+
+
+def datasheet(charts: Charts, *, progress: Progress = silent) -> Sheet:
+    """A camera's data sheet, each number with its 95 % interval and how it was measured.
+
+    Simulated and real pictures take the same way: a lattice from the white image, raw images prepared,
+    decoded or rendered as the verbs do, and measured on the pictures. What cannot be measured says why.
+
+    Parameters
+    ----------
+    charts
+        `read_charts` or `simulate_charts` gives them.
+    progress
+        Called as ``progress(fraction)``.
+
+    Raises
+    ------
+    CalibrationError
+        The white image shows no lattice.
+
+    References
+    ----------
+    EMVA Standard 1288, release 4.0 linear, for light and noise; ISO 12233:2023 for resolution; VDI/VDE 2634,
+    part 2, for depth: a plane at several distances, its mean error and the scatter about it.
+    """
+    white, dark = mean_image(charts.whites), mean_image(charts.darks) if charts.darks else None
+    camera = charts.camera
+    lattice = _lattice(white, camera)
+    steps = len(charts.boards) + len(charts.scenes) + 2
+    progress(1 / steps)
+
+    def ready(raw: RawImage) -> PreparedImage:
+        return prepare(raw, lattice, white=white, dark=dark, camera=camera)
+
+    first = next((one.raw for one in charts.boards), next(iter(charts.scenes), None))
+    rendered = is_rendered(camera, ready(first)) if first is not None else camera is not None and is_rendered(
+        camera, ready(white)
+    )  # fmt: skip
+    bare = np.asarray(to_numpy(white.data), float) - (0.0 if dark is None else np.asarray(dark.data))
+    edge, edge_entries = _edges(bare, lattice)
+    entries = [*_grid(lattice), *_vignetting(lattice), *_light(charts), *edge_entries]
+    found: list[Plane] = []
+    for k, seen in enumerate(charts.boards, 2):
+        found.append(_plane(seen, ready, camera, charts.spacing, rendered=rendered))
+        progress(k / steps)
+    found.sort(key=lambda one: math.inf if one.depth is None else one.depth)
+    for k, raw in enumerate(charts.scenes, 2 + len(found)):
+        entries += _scene(ready(raw), k - 1 - len(found), rendered=rendered)
+        progress(k / steps)
+    entries += [*_resolution(found), *_of_depth(found), *_geometry(found)]
+    if rendered:
+        entries += _times_seen(found, lattice)
+    if len(charts.whites) > 1:
+        entries += _picture_noise(
+            charts, [ready(one) for one in charts.whites[:2]], camera, rendered=rendered
+        )
+    profile = None if edge is None else (edge.position, edge.profile)
+    limits = () if camera is None else tuple(_limits(camera))
+    notes = [f"lattice: {note}" for note in lattice.notes]
+    if camera is None:
+        notes.append(
+            "the camera's lengths are not known: depths are in pixels. Give a camera file for metres"
+        )
+    if charts.boards and charts.spacing is None:
+        notes.append("the chart's spacing is not known: resolution is in cycles per sample of the picture")
+    return Sheet(charts.name, tuple(entries), tuple(found), limits, profile, tuple(notes))
+
+
+def _lattice(white: RawImage, camera: LensletCamera | None) -> Calibration:
+    """Of the white image; the camera file decides where that shows two pitches that are as likely."""
+    try:
+        return calibrate(white)
+    except CalibrationError:
+        if camera is None:
+            raise
+        return calibrate(white, layout=camera.lenslets.layout, pitch=camera.calibration.lattice.pitch)
+
+
+def mean_image(images: Sequence[RawImage]) -> RawImage:
+    """Of several raw images of one light."""
+    first = images[0]
+    if len(images) == 1:
+        return first
+    data = np.mean([np.asarray(to_numpy(one.data), float) for one in images], 0).astype(np.float32)
+    return replace(first, data=data, metadata={})
+
+
+def _entry(section: str, name: str, value: Any, unit: str, how: str, half: float | None = None) -> Entry:
+    interval = None if half is None else (value - half, value + half)
+    return Entry(section, Quantity(name, value, unit, interval), how)
+
+
+def _missing(section: str, name: str, why: Exception | str) -> Entry:
+    return Entry(section, Quantity(name, None), f"not measured: {why}")
+
+
+def _grid(lattice: Calibration) -> Iterator[Entry]:
+    """Pitch and rotation, with the errors of a straight line through the centres that were measured."""
+    off, index = lattice.residuals, lattice.indices - lattice.indices.mean(0)
+    spread = np.sqrt((off**2).sum() / max(2 * len(off) - 6, 1))
+    half = 1.96 * float(spread / np.sqrt((index**2).sum(0).min())) if lattice.measured else None
+    pitch, turn = lattice.lattice.pitch, lattice.lattice.rotation
+    how = f"straight lines through {len(off)} centres of micro-images on the white image"
+    yield _entry(GRID, "pitch_px", pitch, "px", how, half)
+    yield _entry(GRID, "rotation", 1e3 * turn, "mrad", how, None if half is None else 1e3 * half / pitch)
+    yield _entry(
+        GRID, "residual_px", lattice.residual_px, "px", "rms distance of the centres from the lattice"
+    )
+
+
+def _vignetting(lattice: Calibration) -> Iterator[Entry]:
+    """Light at the corner over that of the middle."""
+    name = "light_at_corner"
+    if lattice.light is None or len(lattice.light) < 12:
+        yield _missing(LIGHT, name, "too few whole micro-images")
+        return
+    middle = (np.array(lattice.shape) - 1) / 2
+    r2 = (((lattice.centers - middle) / np.hypot(*middle)) ** 2).sum(1)
+    design = np.column_stack([np.ones_like(r2), r2])
+    fit = np.linalg.lstsq(design, lattice.light, rcond=None)[0]
+    off = lattice.light - design @ fit
+    covariance = np.linalg.inv(design.T @ design) * (off**2).sum() / (len(off) - 2)
+    ratio = fit[1] / fit[0]
+    slope = np.array([-ratio, 1.0]) / fit[0]
+    half = 1.96 * float(np.sqrt(slope @ covariance @ slope))
+    how = "light of whole micro-images, fitted by 1 + c r²; the white image's own evenness is in it"
+    yield _entry(LIGHT, name, 100 * float(1 + ratio), "%", how, 100 * half)
+
+
+def _light(charts: Charts) -> Iterator[Entry]:
+    """Noise of pixels: photon transfer where flats and darks allow, and the white images' own."""
+    if len(charts.whites) > 1:
+        a, b = (np.asarray(to_numpy(one.data), float) for one in charts.whites[:2])
+        dark = float(np.mean(np.asarray(charts.darks[0].data))) if charts.darks else 0.0
+        level = (a + b) / 2 - dark
+        bright = level > level.max() / 2
+        noise = float(np.std((a - b)[bright])) / math.sqrt(2)
+        mean, n = float(level[bright].mean()), int(bright.sum())
+        if noise > 0:
+            snr = mean / noise
+            how = f"two white images, pixels above half of the brightest, {mean:.4g} counts in the mean"
+            yield _entry(LIGHT, "snr_of_pixels", snr, "", how, 1.96 * snr / math.sqrt(2 * n))
+    else:
+        yield _missing(LIGHT, "snr_of_pixels", "there is one white image; two of the same light are needed")
+    try:
+        yield from _transfer(charts)
+    except LumigraphError as error:
+        yield _missing(LIGHT, "gain", error)
+
+
+def _transfer(charts: Charts) -> Iterator[Entry]:
+    if not charts.flats or len(charts.darks) < 2:
+        raise LumigraphError(
+            f"{len(charts.flats)} pairs of flats and {len(charts.darks)} darks; one pair and two are needed"
+        )
+    found = photon_transfer(charts.flats, [charts.darks[:2]])
+    how = f"photon transfer, EMVA 1288: {int(found.fitted.sum())} pairs of white images, one of darks"
+    yield _entry(LIGHT, "gain", found.gain, "electrons/count", how, 1.96 * found.gain_error)
+    yield _entry(LIGHT, "dark_noise", found.dark_noise, "electrons", how, 1.96 * found.dark_noise_error)
+    yield _entry(LIGHT, "dark_signal", found.dark_signal, "counts", how, 1.96 * found.dark_signal_error)
+    if found.full_well is not None:
+        yield _entry(LIGHT, "full_well", found.full_well, "electrons", how)
+
+
+def _edges(white: np.ndarray, lattice: Calibration) -> tuple[PupilEdge | None, list[Entry]]:
+    names = ("micro_image_width_px", "directions_per_axis")
+    try:
+        edge = pupil_edge(white, lattice)
+    except LumigraphError as error:
+        return None, [_missing(DIRECTIONS, name, error) for name in names]
+    how = "edges of micro-images on the white image, along their rows; 4 sectors of the picture"
+    wide, blur, talk = edge.width, edge.blur, 100 * edge.cross_talk()
+    # Cross-talk of pixels depends on view over blur alone: the blur's interval as one of the view's width.
+    ends = [100 * edge.cross_talk(blur / (blur + sign * edge.blur_error)) for sign in (1, -1)]
+    spill, part = 100 * edge.spill, edge.blur_error / blur
+    return edge, [
+        _entry(DIRECTIONS, names[0], wide, "px", how, edge.width_error),
+        _entry(
+            DIRECTIONS, "direction_blur_px", blur, "px", f"full width at half maximum; {how}", edge.blur_error
+        ),
+        _entry(
+            DIRECTIONS, names[1], edge.directions, "", "width of a micro-image over the blur of its edges",
+            edge.directions_error,
+        ),
+        _entry(
+            DIRECTIONS, "cross_talk_of_pixels", talk, "%",
+            "part of a direction's light outside the pixel it belongs to, from the blur",
+            abs(ends[0] - ends[1]) / 2,
+        ),
+        _entry(
+            DIRECTIONS, "spill", spill, "%",
+            "part of a micro-image's light that falls into its two neighbours, from width and blur",
+            spill * min(1.0, 4 * part),
+        ),
+    ]  # fmt: skip
+
+
+def _plane(
+    seen: Seen, ready: Callable[[RawImage], PreparedImage], camera: LensletCamera | None,
+    spacing: float | None, *, rendered: bool,
+) -> Plane:  # fmt: skip
+    try:
+        return planes.plane(seen, ready, camera, spacing, rendered=rendered)
+    except LumigraphError as error:
+        return Plane(seen.depth, (_missing("", "picture", error),), None)
+
+
+def _scene(ready: PreparedImage, number: int, *, rendered: bool) -> Iterator[Entry]:
+    """How sure depth is of a scene that nobody knows."""
+    name = f"depth_noise_of_scene_{number}"
+    found = planes.measured(ready, rendered=rendered).depth
+    trust = np.asarray(to_numpy(found.confidence)) >= planes.TRUSTED
+    if found.error is None or not trust.any():
+        yield _missing(DEPTH, name, "no place has a depth to trust, or the method does not tell its error")
+        return
+    error = float(np.median(np.asarray(to_numpy(found.error))[trust]))
+    how = f"median of the errors that the depth map expects, {trust.mean():.0%} of the places trusted"
+    yield _entry(DEPTH, name, error, "px/view", how)
+    low, high = (float(v) for v in found.quantiles(0.05, 0.95))
+    yield Entry(
+        DEPTH, Quantity(f"disparities_of_scene_{number}", (low, high), "px/view"),
+        "5 % and 95 % of the places, by their confidence",
+    )  # fmt: skip
+
+
+def _with(found: Sequence[Plane], name: str) -> list[tuple[Plane, Quantity, str]]:
+    """Planes that have a value, it, and how it was measured."""
+    hits = ((p, e) for p in found for e in p.entries if e.quantity.name == name and e.value is not None)
+    return [(plane, entry.quantity, entry.how) for plane, entry in hits]
+
+
+def _resolution(found: Sequence[Plane]) -> Iterator[Entry]:
+    for zone in ("middle", "border"):
+        for percent in (50, 10):
+            name = f"mtf{percent}_{zone}"
+            known = _with(found, name)
+            if not known:
+                yield _missing(RESOLUTION, f"best_{name}", "no picture of the chart shows enough edges")
+                continue
+            plane, q, how = max(known, key=lambda one: one[1].value)
+            yield Entry(
+                RESOLUTION, replace(q, name=f"best_{name}"), f"chart at {plane.label} from the focus; {how}"
+            )
+    yield _refocus_range(found)
+
+
+def _refocus_range(found: Sequence[Plane]) -> Entry:
+    """Depths between which pictures keep half of the best MTF50, counted in samples of the picture."""
+    name = "refocus_range"
+    known = [(p.depth, q.value) for p, q, _ in _with(found, "mtf50_middle") if p.depth is not None]
+    if len(known) < 3:
+        return _missing(RESOLUTION, name, f"{len(known)} charts of known depth show edges; 3 are needed")
+    depths, sharp = np.array([d for d, _ in known], float), np.array([v for _, v in known], float)
+    least, kept = _KEPT * sharp.max(), sharp >= _KEPT * sharp.max()
+    ends = [depths[kept].min(), depths[kept].max()]
+    closed = [False, False]
+    for (d0, s0), (d1, s1) in pairwise(zip(depths, sharp, strict=True)):
+        if (s0 < least) != (s1 < least):
+            side = int(s1 < least)
+            ends[side], closed[side] = float(d0 + (d1 - d0) * (least - s0) / (s1 - s0)), True
+    how = "depths whose refocused pictures keep half of the best MTF50, between the charts by straight lines"
+    if not all(closed):
+        how += "; not beyond the last charts, which are still sharp: the range may be wider"
+    return Entry(RESOLUTION, Quantity(name, (float(ends[0]), float(ends[1])), "m"), how)
+
+
+def _of_depth(found: Sequence[Plane]) -> Iterator[Entry]:
+    for name in ("disparity", "patch", "depth"):
+        known = _with(found, f"{name}_noise")
+        if known:
+            plane, q, how = min(known, key=lambda one: one[1].value)
+            yield Entry(
+                DEPTH, replace(q, name=f"least_{name}_noise"), f"chart at {plane.label} from the focus; {how}"
+            )
+        errors = [q.value for _, q, _ in _with(found, f"{name}_error")]
+        if errors:
+            unit = _with(found, f"{name}_error")[0][1].unit
+            rms = float(np.sqrt(np.mean(np.square(errors))))
+            how = f"root mean square of the planes' mean errors, {len(errors)} charts, no correction"
+            yield _entry(DEPTH, f"{name}_error", rms, unit, how)
+
+
+def _geometry(found: Sequence[Plane]) -> Iterator[Entry]:
+    for name in ("distortion", "sample_on_chart"):
+        known = _with(found, name)
+        if not known:
+            yield _missing(
+                GEOMETRY, name, "no picture shows enough of the chart, or its spacing is not known"
+            )
+            continue
+        plane, q, how = min(known, key=lambda one: abs(one[0].depth or 0.0))
+        yield Entry(GEOMETRY, q, f"chart at {plane.label} from the focus; {how}")
+
+
+def _times_seen(found: Sequence[Plane], lattice: Calibration) -> Iterator[Entry]:
+    known = _with(found, "patch")
+    if known:
+        plane, q, _ = min(known, key=lambda one: abs(one[0].depth or 0.0))
+        pitch, (low, high) = lattice.lattice.pitch, q.interval or (q.value, q.value)
+        how = f"pitch over patch: lenslets along an axis that show a point; chart at {plane.label}"
+        ends = sorted((pitch / abs(low), pitch / abs(high)))
+        views = Quantity("views_per_axis", pitch / abs(q.value), "", (ends[0], ends[1]))
+        yield Entry(DIRECTIONS, views, how)
+
+
+def _picture_noise(
+    charts: Charts, whites: list[PreparedImage], camera: LensletCamera | None, *, rendered: bool
+) -> Iterator[Entry]:
+    """SNR of a picture of an even scene, as bright as the white images."""
+    pictures = []
+    for ready in whites:
+        assert ready.calibration is not None  # prepared with a white image
+        if rendered:
+            patch = (
+                camera.patch if camera is not None and camera.patch else ready.calibration.lattice.pitch / 3
+            )
+            picture = render(ready, ready.calibration, patch)
+        else:
+            picture = refocus(decode(ready, ready.calibration), 1.0)
+        pictures.append(planes.inner(np.asarray(to_numpy(picture), float)))
+    noise = float(np.std(pictures[0] - pictures[1])) / math.sqrt(2)
+    if noise > 0:
+        snr, n = float(np.mean(pictures)) / noise, pictures[0].size
+        what = "rendered" if rendered else "all views in focus"
+        how = f"two white images made into pictures, {what}, even light; {n} samples"
+        yield _entry(LIGHT, "snr_of_picture", snr, "", how, 1.96 * snr / math.sqrt(2 * n))
+
+
+def _limits(camera: LensletCamera) -> Iterator[tuple[str, str, str]]:
+    for row in camera.quantities():
+        if row.name in LIMITS:
+            yield row.name, row.text, row.source

@@ -1,0 +1,283 @@
+"""What a picture of the chart tells: sharpness, size, distortion and depth of its plane."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import t as student
+
+from lumigraph import depth
+from lumigraph.analysis import Chart, find_chart
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.depth_map import DepthMap
+from lumigraph.core.lightfield import LightField
+from lumigraph.core.prepared import PreparedImage
+from lumigraph.core.raw import RawImage
+from lumigraph.core.result import Quantity
+from lumigraph.errors import LumigraphError, SamplingError
+from lumigraph.instruments import LensletCamera
+from lumigraph.instruments.capabilities import Rendered
+from lumigraph.metric.charts import Seen
+from lumigraph.metric.sheet import Entry, Plane
+from lumigraph.preparation import decode, render
+from lumigraph.rendering import refocus
+from lumigraph.rendering.kind_check import focused_shift
+
+TRUSTED = 0.5
+"""Confidence from which on a place counts for depth."""
+
+_BLOCKS = 4
+"""Pieces of the field along each axis: places closer together do not err independently."""
+
+_MIDDLE = 0.5  # part of the way to the corner up to which the field is called its middle
+_LEAST_EDGES = 2
+_TO_SIGMA = 1.4826  # of a normal distribution, over the median distance from its middle
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Depth of a raw image: disparities with the views of a camera 1.0, or patches of a camera 2.0."""
+
+    calibration: Calibration
+    depth: DepthMap
+    views: LightField | None
+
+
+def measured(ready: PreparedImage, *, rendered: bool) -> Found:
+    """Depth of a raw image, as the verb `depth` measures it for each lenslet.
+
+    Parameters
+    ----------
+    ready
+        The raw image.
+    rendered
+        Whether it is of a camera 2.0.
+    """
+    assert ready.calibration is not None  # prepared with a white image
+    if rendered:
+        return Found(ready.calibration, depth.correlation(ready, ready.calibration), None)
+    views = decode(ready, ready.calibration)
+    return Found(ready.calibration, depth.epi(views), views)
+
+
+def _pictured(
+    ready: PreparedImage, views: LightField | None, value: float, camera: LensletCamera | None
+) -> np.ndarray:
+    """Picture (y, x) in focus at a disparity or a patch."""
+    if views is not None:
+        alpha = depth.alpha_of(_one(value, "disparity"), views)
+        return grey(refocus(views, float(to_numpy(alpha.values)[0, 0])))
+    return rendered_at(ready, value, camera)
+
+
+def rendered_at(ready: PreparedImage, value: float, camera: LensletCamera | None) -> np.ndarray:
+    """Picture (y, x) of a camera 2.0 in focus at a patch."""
+    assert ready.calibration is not None  # prepared with a white image
+    kinds = ready.calibration.lattice.kinds
+    focus = camera.patches_on_raw() if kinds > 1 and isinstance(camera, Rendered) else None
+    return grey(render(ready, ready.calibration, value, focus=focus))
+
+
+def grey(picture: Any) -> np.ndarray:
+    """Values (y, x) of a picture, the mean of its colours."""
+    data = np.asarray(to_numpy(picture), float)
+    return data.mean(-1) if data.ndim == 3 else data
+
+
+def _one(value: float, quantity: str) -> DepthMap:
+    return DepthMap(np.array([[value]]), np.ones((1, 1)), quantity)
+
+
+def trusted_median(found: DepthMap) -> float:
+    """Median of the values that are trusted.
+
+    Raises
+    ------
+    SamplingError
+        None is.
+    """
+    values = _trusted(found)
+    known = values[np.isfinite(values)]
+    if not known.size:
+        raise SamplingError("no place of the picture has a depth to trust. Use a chart with more contrast.")
+    return float(np.median(known))
+
+
+def _trusted(found: DepthMap) -> np.ndarray:
+    """Inner values (y, x); NaN of those that are not trusted."""
+    return inner(np.asarray(to_numpy(found.trusted(TRUSTED)), float))
+
+
+def inner(values: np.ndarray) -> np.ndarray:
+    """Without the outermost tenth of the field."""
+    return values[tuple(slice(n // 10, n - n // 10) for n in values.shape)]
+
+
+def plane(
+    seen: Seen,
+    ready: Callable[[RawImage], PreparedImage],
+    camera: LensletCamera | None,
+    spacing: float | None,
+    *,
+    rendered: bool,
+) -> Plane:
+    """What the pictures of the charts at one distance tell.
+
+    Parameters
+    ----------
+    seen
+        The charts.
+    ready
+        Prepares a raw image.
+    camera, spacing
+        As `Charts` has them.
+    rendered
+        Whether the raw images are of a camera 2.0.
+    """
+    board = ready(seen.raw)
+    textured = board if seen.texture is None else ready(seen.texture)
+    found = measured(textured, rendered=rendered)
+    views, value = found.views, trusted_median(found.depth)
+    if seen.texture is not None and not rendered:
+        views = decode(board, found.calibration)
+    picture = _pictured(board, views, value, camera)
+    entries = _depths(found, seen.depth, camera)
+    try:
+        chart = find_chart(picture)
+    except SamplingError as error:
+        return Plane(seen.depth, (*entries, _not("mtf50_middle", error)), picture)
+    return Plane(seen.depth, (*_sharpness(chart, spacing), *_shape(chart, spacing), *entries), picture)
+
+
+def _not(name: str, error: Exception | str) -> Entry:
+    return Entry("", Quantity(name, None), f"not measured: {error}")
+
+
+def of_chart(chart: Chart, spacing: float | None) -> list[Quantity]:
+    """Sharpness, size and distortion of a picture of the chart, whose squares are `spacing` wide [m]."""
+    return [entry.quantity for entry in (*_sharpness(chart, spacing), *_shape(chart, spacing))]
+
+
+def is_middle(at: np.ndarray, chart: Chart) -> bool:
+    """Whether a place (y, x) is in the middle of the picture."""
+    middle = (np.array(chart.picture.shape) - 1) / 2
+    return bool(np.hypot(*(at - middle)) < _MIDDLE * np.hypot(*middle))
+
+
+def _sharpness(chart: Chart, spacing: float | None) -> list[Entry]:
+    """MTF50 and MTF10 in the middle and towards the border, on the chart if its spacing is known."""
+    per, unit = (1.0, "cycles/sample") if spacing is None else (chart.spacing / spacing, "1/m")
+    found: dict[tuple[int, str], list[float]] = {}
+    for at, edge in chart.edges():
+        zone = "middle" if is_middle(at, chart) else "border"
+        for percent in (50, 10):
+            if (edge.mtf < percent / 100).any():
+                found.setdefault((percent, zone), []).append(edge.at(percent / 100) * per)
+    entries = []
+    for percent, zone in ((50, "middle"), (50, "border"), (10, "middle"), (10, "border")):
+        name, values = f"mtf{percent}_{zone}", found.get((percent, zone), [])
+        if len(values) < _LEAST_EDGES:
+            width = f"squares are {chart.spacing:.3g} samples wide"
+            entries.append(_not(name, f"{len(values)} edges there, {_LEAST_EDGES} are needed; {width}"))
+            continue
+        value, interval = mean_within(values)
+        how = f"mean over {len(values)} slanted edges of the chart, ISO 12233, pixels' blur included"
+        entries.append(Entry("", Quantity(name, value, unit, interval), how))
+    return entries
+
+
+def _shape(chart: Chart, spacing: float | None) -> list[Entry]:
+    entries = []
+    if spacing is not None:
+        how = f"width of the chart's squares over that of their picture, {len(chart)} corners"
+        entries.append(Entry("", Quantity("sample_on_chart", spacing / chart.spacing, "m"), how))
+    try:
+        bent, error = chart.distortion()
+    except SamplingError as problem:
+        return [*entries, _not("distortion", problem)]
+    interval = (100 * (bent - 1.96 * error), 100 * (bent + 1.96 * error))
+    how = f"radial, at the picture's corner, over the distance from its middle; {len(chart)} corners"
+    return [*entries, Entry("", Quantity("distortion", 100 * bent, "%", interval), how)]
+
+
+def _depths(got: Found, true: float | None, camera: LensletCamera | None) -> list[Entry]:
+    """Virtual depth and metres: what was found, its error and its noise."""
+    name = "disparity" if got.views is not None else "patch"
+    unit = "px/view" if name == "disparity" else "px"
+    entries = _steady(got.depth, name, unit)
+    if camera is None:
+        return entries
+    if true is not None and isinstance(camera, Rendered):
+        expected = camera.patch_at(true)
+    elif true is not None and got.views is not None:
+        alpha = _one(camera.alpha(true), "alpha")
+        expected = float(to_numpy(depth.disparity_of(alpha, got.views).values)[0, 0])
+    else:
+        expected = math.nan
+    if not math.isnan(expected):
+        how = f"{name} measured less that of the camera file at the chart's depth"
+        entries.append(_less(entries[0], f"{name}_error", expected, how))
+    source = got.calibration if got.views is None else got.views
+    try:
+        metres = depth.metric(
+            got.depth, source, focal_length=camera.main_lens.focal_length,
+            object_distance=camera.object_distance,
+        )  # fmt: skip
+    except LumigraphError as error:
+        return [*entries, _not("depth", error)]
+    found = _steady(metres, "depth", "m")
+    if true is not None and found[0].value is not None:
+        how = "depth by the camera file's lengths, less where the chart stood"
+        found.append(_less(found[0], "depth_error", true, how))
+    return entries + found
+
+
+def _less(entry: Entry, name: str, reference: float, how: str) -> Entry:
+    q = entry.quantity
+    if q.value is None:
+        return _not(name, entry.how)
+    ends = None if q.interval is None else (q.interval[0] - reference, q.interval[1] - reference)
+    return Entry("", Quantity(name, q.value - reference, q.unit, ends), how)
+
+
+def _steady(found: DepthMap, name: str, unit: str) -> list[Entry]:
+    """The plane's value over the field, and how much single places scatter about it."""
+    values = _trusted(found)
+    known = values[np.isfinite(values)]
+    if known.size < _BLOCKS**2:
+        return [_not(name, f"{known.size} places with a confidence above {TRUSTED:g}")]
+    middles = [
+        float(np.median(part[np.isfinite(part)]))
+        for rows in np.array_split(values, _BLOCKS, axis=0)
+        for part in np.array_split(rows, _BLOCKS, axis=1)
+        if np.isfinite(part).sum() >= 3
+    ]
+    value, interval = mean_within(middles)
+    scatter = _TO_SIGMA * float(np.median(np.abs(known - np.median(known))))
+    part = f"{known.size / values.size:.0%} of the places, those with a confidence above {TRUSTED:g}"
+    return [
+        Entry(
+            "", Quantity(name, value, unit, interval), f"mean of {len(middles)} parts of the field; {part}"
+        ),
+        Entry("", Quantity(f"{name}_noise", scatter, unit), f"1.48 times the median deviation; {part}"),
+    ]
+
+
+def mean_within(values: Sequence[float]) -> tuple[float, tuple[float, float] | None]:
+    """Mean and its 95 % interval, by Student's t; None of a single value."""
+    n, mean = len(values), float(np.mean(values))
+    if n < 2:
+        return mean, None
+    half = float(student.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
+    return mean, (mean - half, mean + half)
+
+
+def is_rendered(camera: LensletCamera | None, ready: PreparedImage) -> bool:
+    """Whether raw images are of a camera 2.0: by the camera file, or by what the picture shows."""
+    if camera is not None:
+        return isinstance(camera, Rendered)
+    assert ready.calibration is not None  # prepared with a white image
+    return focused_shift(ready.data, ready.calibration) is not None

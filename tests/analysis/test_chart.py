@@ -1,0 +1,97 @@
+"""Chessboards on pictures, and edges of micro-images."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from lumigraph.analysis.chart import find_chart
+from lumigraph.analysis.pupil_edge import pupil_edge
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.lattice import Lattice
+from lumigraph.errors import CalibrationError, SamplingError
+
+
+def board(shape, spacing, turn, *, bend=0.0, finer=6):
+    """Mean brightness of pixels of a chessboard, bent about the picture's middle as x_d = x (1 + k r²)."""
+    y, x = ((np.arange(n * finer) + 0.5) / finer - n / 2 for n in shape)
+    y, x = y[:, None], x[None]
+    reach = math.hypot(*shape) / 2
+    r = np.hypot(y, x) / reach
+    ideal = r.copy()
+    for _ in range(6):
+        ideal = r / (1 + bend * ideal**2)
+    scale = np.divide(ideal, r, out=np.ones_like(r), where=r > 0)
+    y, x = y * scale, x * scale
+    rows = np.floor((math.cos(turn) * y - math.sin(turn) * x) / spacing + 0.5)
+    columns = np.floor((math.cos(turn) * x + math.sin(turn) * y) / spacing + 0.5)
+    fine = (rows + columns) % 2
+    return fine.reshape(shape[0], finer, shape[1], finer).mean((1, 3))
+
+
+def test_edges_of_a_chart_have_the_pixels_own_mtf():
+    found = find_chart(board((150, 190), 26.0, math.radians(7)))
+    half = [edge.at(0.5) for _, edge in found.edges()]
+    assert len(half) > 40
+    assert np.mean(half) == pytest.approx(0.6034 / math.cos(math.radians(7)), rel=0.02)  # of sinc
+    assert found.spacing == pytest.approx(26.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.12, 0.7])
+def test_corners_are_found_to_a_hundredth_whatever_the_turn(turn):
+    picture = gaussian_filter(board((120, 140), 15.0, turn), 1.0)
+    found = find_chart(picture)
+    middle = (np.array(picture.shape) - 1) / 2
+    way = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    units = (found.corners - middle) @ way.T / 15.0 - 0.5
+    off = 15.0 * (units - np.rint(units))
+    assert len(found) > 40
+    assert np.abs(off).max() < 0.05
+    assert len(np.unique(found.indices, axis=0)) == len(found)
+
+
+@pytest.mark.parametrize("bend", [-0.03, 0.0, 0.02])
+def test_distortion_is_found_within_its_interval(bend):
+    rng = np.random.default_rng(3)
+    picture = gaussian_filter(board((200, 240), 20.0, 0.12, bend=bend), 1.0)
+    value, error = find_chart(picture + 0.01 * rng.standard_normal(picture.shape)).distortion()
+    assert abs(value - bend) < 3 * error + 2e-4
+    assert error < 2e-3
+
+
+def test_a_picture_without_a_chart_is_refused():
+    with pytest.raises(SamplingError, match="corners of a chessboard were found where 4 are needed"):
+        find_chart(np.ones((60, 60)))
+
+
+def stops(pitch, width, sigma, count=10):
+    """A white image of square lenslets whose square stops are blurred, its rows and columns independent."""
+    n = round(count * pitch)
+    at = (np.arange(n * 5) + 0.5) / 5 - 0.5
+    away = np.abs(at % pitch - pitch / 2)
+    line = gaussian_filter((away < width / 2).astype(float), sigma * 5, mode="wrap").reshape(n, 5).mean(1)
+    lattice = Lattice.square(pitch, origin=(pitch / 2, pitch / 2))
+    return np.outer(line, line), Calibration(lattice, (n, n), np.zeros((0, 2), int), np.zeros((0, 2)), 0.0)
+
+
+@pytest.mark.parametrize(("width", "sigma"), [(12.3, 0.8), (15.5, 1.4), (17.0, 1.0)])
+def test_width_and_blur_of_micro_images_are_found(width, sigma):
+    found = pupil_edge(*stops(17.37, width, sigma))
+    blur = 2.3548 * math.hypot(sigma, 1 / math.sqrt(12))  # a pixel is as wide as its standard deviation says
+    assert found.width == pytest.approx(width, rel=0.01)
+    assert found.blur == pytest.approx(blur, rel=0.03)
+    assert found.directions == pytest.approx(width / blur, rel=0.04)
+
+
+def test_spill_is_the_light_beyond_the_border():
+    found = pupil_edge(*stops(17.37, 16.0, 1.5))
+    sigma, t = found.blur / 2.3548, np.linspace(-40, 40, 80001)
+    image = gaussian_filter((np.abs(t) < found.width / 2).astype(float), sigma / (t[1] - t[0]))
+    assert found.spill == pytest.approx(image[np.abs(t) > 17.37 / 2].sum() / image.sum(), rel=0.01)
+
+
+def test_micro_images_without_a_border_are_refused():
+    white, calibration = stops(17.37, 17.37, 0.5)
+    with pytest.raises(CalibrationError, match="Stop the main lens down"):
+        pupil_edge(np.ones_like(white), calibration)
