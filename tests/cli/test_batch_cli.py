@@ -8,8 +8,9 @@ import pytest
 import zarr
 
 import lumigraph as lg
-from cluster_jobs import Here
+from cluster_jobs import Here, picture
 from lumigraph.cli import main
+from lumigraph.cli.standing import Standing
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +37,10 @@ def test_each_frame_is_what_the_verb_alone_gives(views, tmp_path, capsys):
     group = zarr.open_group(tmp_path / "out.zarr", mode="r")
     np.testing.assert_array_equal(group["data"][1], lg.open(tmp_path / "one.tiff").data)
     assert main(["batch", "status", str(tmp_path / "out.zarr"), "--json"]) == 0
+    page = lg.cluster.page(tmp_path / "out.zarr").read_text()
+    assert "out.zarr: 3 of 3 frames" in page
+    assert "ended" in page
+    assert 'http-equiv="refresh"' not in page
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a shell script stands in for sbatch")
@@ -65,6 +70,24 @@ def test_numbers_become_a_table(views, tmp_path):
         rows = list(csv.DictReader(file))
     assert [Path(row["file"]).name for row in rows] == ["0.tiff", "1.tiff"]
     assert float(rows[0]["mean"]) == pytest.approx(lg.open(tmp_path / "0.tiff").data.mean(), rel=1e-6)
+
+
+def test_the_page_of_what_goes_on_is_read_again_and_says_what_failed(tmp_path):
+    out = tmp_path / "out.zarr"
+    lg.cluster.batch(picture, [{"seed": 1}, {"seed": 2, "bad": True}, {"seed": 3}], out, workers=Here())
+    (tmp_path / "out.zarr.ledger/dashboard.txt").write_text("http://10.0.0.1:8787/status")
+    told = []
+    page = Standing(out, told.append)
+    page(0.5)
+    text = lg.cluster.page(out).read_text()
+    assert told == [0.5]
+    assert '<meta http-equiv="refresh" content="3">' in text
+    assert "2 of 3, 66.7 %" in text
+    assert "ValueError: this one is bad" in text
+    assert "http://10.0.0.1:8787/status" in text
+    lg.cluster.page(out).unlink()
+    page(0.6)  # not yet time for another one
+    assert not lg.cluster.page(out).exists()
 
 
 def test_a_frame_that_fails_ends_it_with_an_error(views, tmp_path, capsys):
@@ -102,6 +125,7 @@ def test_ctrl_c_says_what_is_done(views, tmp_path, capsys, monkeypatch):
         ("batch refocus {v} --alpha 1 -o {o} --part 3/2", "part is 3 of 2"),
         ("batch refocus {v} --alpha 1 -o {o} --workers 1 --scheduler tcp://a:1", "Give one of them"),
         ("batch refocus {v} --alpha 1 -o {o} --sbatch x", "--sbatch is for"),
+        ("batch deconvolve {v} --warm --run 1 --camera lfm-guv -o {o}", "--run is 1 but must be at least 2"),
         ("batch status", "status takes the output"),
         ("batch status {v}", "is not the ledger"),
     ],

@@ -40,6 +40,8 @@ VERBS = (
         "sweep",
         "dataset",
         "board",
+        "datasheet",
+        "twin",
         "view",
         "samples",
     ),

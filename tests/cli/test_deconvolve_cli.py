@@ -225,3 +225,28 @@ def test_a_single_lens_is_deconvolved_too(lumigraph, tmp_path):
     refused = lumigraph(*words, "other.tiff", "--samples", 3)
     assert refused.code == 1
     assert "has no lenslets to count --samples by" in refused.err
+
+
+def test_a_batch_warms_up_in_runs_that_are_the_same_whoever_does_them(lumigraph, tmp_path, rng):
+    """Frames 0 and 1 are those of the verb's own --warm; 2 begins cold, as if it stood alone."""
+    (tmp_path / "scope.toml").write_text(SCOPE)
+    film = rng.poisson(200, (3, 41, 41)).astype(np.uint16)
+    tifffile.imwrite(tmp_path / "film.tif", film, photometric="minisblack")
+    asked = ["film.tif", "--camera", "scope.toml", "--z=-10 um,0 um", "--samples", "1", "--iterations", "2"]
+    batch = ["batch", "deconvolve", *asked, "--warm", "--run", "2", "--workers", "1"]
+    found = lumigraph(*batch, "-o", "v.ome.zarr")
+    assert found.code == 0, found.err
+    assert "2 of 2 runs of 2 frames are done" in found.out
+    assert lumigraph("deconvolve", *asked, "--warm", "--page", "0:1", "-o", "w.ome.zarr").code == 0
+    assert lumigraph("deconvolve", *asked, "--page", "2", "-o", "c.ome.zarr").code == 0
+    for page, alone in enumerate(("w-page-0.ome.zarr", "w-page-1.ome.zarr", "c.ome.zarr")):
+        mine = lg.open(tmp_path / "v.ome.zarr", page=page)
+        np.testing.assert_array_equal(mine.data, lg.open(tmp_path / alone).data)
+    assert lumigraph("deconvolve", *asked, "--page", "1", "-o", "d.ome.zarr").code == 0
+    cold = lg.open(tmp_path / "d.ome.zarr").data
+    assert not np.array_equal(lg.open(tmp_path / "v.ome.zarr", page=1).data, cold)
+    (tmp_path / "v.ome.zarr.ledger/done/000000.json").unlink()  # as if killed in the first run
+    (tmp_path / "v.ome.zarr/0/c/1/0/0/0").unlink()
+    assert lumigraph(*batch, "-o", "v.ome.zarr").code == 0
+    again = lg.open(tmp_path / "v.ome.zarr", page=1)
+    np.testing.assert_array_equal(again.data, lg.open(tmp_path / "w-page-1.ome.zarr").data)

@@ -25,6 +25,22 @@ def test_a_question_ends_with_its_mark(lumigraph):
     assert "Did you mean --plot? Try 'lumigraph design --help'." in lumigraph("design", "x", "--plt", "y").err
 
 
+@pytest.mark.parametrize(
+    ("words", "needs"),
+    [
+        (("decode", "raw.png"), "decode needs --output (-o). Try 'lumigraph decode --help'."),
+        (("decode", "raw.png", "-o"), "-o needs a value."),
+        (("design", "thesis-2f", "--plot"), "--plot needs a value."),
+        (("measure",), "measure needs WHAT: edge or point or noise or sensor."),
+        (("refocus",), "refocus needs VIEWS."),
+    ],
+)
+def test_what_a_command_lacks_is_named(lumigraph, words, needs):
+    result = lumigraph(*words)
+    assert result.code == app.USAGE
+    assert needs in result.err
+
+
 def test_the_folder_of_a_missing_file_is_written_out(lumigraph, tmp_path):
     assert f"the folder is {tmp_path.resolve()}." in lumigraph("calibrate", "no.tiff", "-o", "c.toml").err
 

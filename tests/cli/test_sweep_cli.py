@@ -1,5 +1,7 @@
 import csv
+import sys
 
+import numpy as np
 import pytest
 
 import lumigraph as lg
@@ -28,6 +30,48 @@ def test_each_row_is_what_the_camera_of_its_values_says(tmp_path):
     assert float(rows[4]["patch [px]"]) == pytest.approx(other.patch, rel=1e-12)
     assert "<svg" in page.read_text() or "<img" in page.read_text()
     assert lg.cluster.status(out).is_whole
+
+
+def asked(out):
+    parts = "lenslets.magnification=0.3,0"  # the latter is none that a camera can have
+    words = ["sweep", CAMERA, "--vary", FOCAL, "--vary", parts, "--measure", "patch,views per axis"]
+    return [*words, "--workers", "1", "-o", str(out)]
+
+
+def patches():
+    """Of the cameras that there can be, by their focal lengths."""
+    camera = lg.FocusedPlenopticCamera.from_catalogue(CAMERA)
+    given = ({"focal_length": f"{focal} mm", "magnification": 0.3} for focal in (4, 5, 6))
+    return [camera.replace(lenslets=lenslets).patch for lenslets in given]
+
+
+def test_a_table_as_parquet_has_the_numbers(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is an extra")
+    assert main(asked(tmp_path / "t.parquet")) == 0
+    found = parquet.read_table(tmp_path / "t.parquet").to_pydict()
+    assert found["patch [px]"][::2] == patches()
+    assert found["patch [px]"][1] is None
+    assert found["lenslets.magnification"] == [0.3, 0] * 3
+    assert "lenslets.magnification is 0" in found["error"][1]
+
+
+def test_without_pyarrow_a_line_says_what_to_install(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert main(asked(tmp_path / "t.parquet")) == 1
+    assert "pip install 'lumigraph[tables]', or use .csv" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_netcdf_has_the_varied_keys_as_axes(tmp_path):
+    xarray = pytest.importorskip("xarray", reason="xarray is an extra")
+    assert main(asked(tmp_path / "t.nc")) == 0
+    with xarray.open_dataset(tmp_path / "t.nc", engine="scipy") as found:
+        assert found.patch.dims == ("lenslets.focal_length", "lenslets.magnification")
+        np.testing.assert_allclose(found["lenslets.focal_length"], [4e-3, 5e-3, 6e-3])
+        np.testing.assert_allclose(found.patch[:, 0], patches())
+        assert np.isnan(found.patch[:, 1]).all()
+        assert found.patch.attrs["units"] == "px"
+        assert "lenslets.magnification is 0" in str(found.error.values[2, 1])
 
 
 def test_what_no_camera_can_have_is_a_row_with_the_reason(tmp_path, capsys):

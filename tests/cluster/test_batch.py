@@ -147,6 +147,36 @@ def test_parts_together_are_the_whole(tmp_path):
         cluster.batch(jobs.picture, items(7), tmp_path / "out.zarr", part=(4, 3))
 
 
+def test_a_part_does_not_fail_for_another(tmp_path):
+    whole = [{"seed": 0, "bad": True}, {"seed": 1}]
+    out = tmp_path / "out.zarr"
+    first, second = (
+        cluster.batch(jobs.picture, whole, out, workers=jobs.Here(), part=(k, 2)) for k in (1, 2)
+    )
+    assert list(first.failures) == [0]
+    assert second.failures == {}
+    assert list(cluster.status(out).failures) == [0]
+
+
+def test_a_start_says_how_far_it_has_checked(tmp_path):
+    run(tmp_path / "out.zarr", count=20)
+    told = []
+    cluster.batch(
+        jobs.picture, items(20), tmp_path / "out.zarr", what={"job": 1}, workers=jobs.Here(),
+        progress=told.append,
+    )  # fmt: skip
+    assert told == [1 / 20, 17 / 20]
+    assert told[1].what == "frame 16 of 20 is whole"
+
+
+def test_the_pace_is_that_of_the_last_frames_without_pauses(tmp_path):
+    run(tmp_path / "out.zarr", count=8)
+    for k in range(8):
+        when = 1000 + 2 * k + (5000 if k > 3 else 0)  # as if somebody had stopped it for a while
+        os.utime(tmp_path / f"out.zarr.ledger/done/{k:06}.json", (when, when))
+    assert cluster.status(tmp_path / "out.zarr").pace == pytest.approx(0.5)
+
+
 def test_tables_stay_in_the_ledger(tmp_path):
     cluster.batch(jobs.row, items(4), tmp_path / "out.csv", workers=jobs.Here())
     with cluster.rows(tmp_path / "out.csv") as rows:

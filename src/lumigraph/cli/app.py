@@ -10,15 +10,17 @@ from collections.abc import Sequence
 from contextlib import suppress
 from difflib import get_close_matches
 from importlib.metadata import version
+from typing import get_args
 
 from cyclopts import App
-from cyclopts.exceptions import CycloptsError, UnknownCommandError
+from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownCommandError
 
 from lumigraph.cli.batch import batch
 from lumigraph.cli.board import board
 from lumigraph.cli.calibrate import calibrate
 from lumigraph.cli.catalogue import catalogue
 from lumigraph.cli.dataset import dataset
+from lumigraph.cli.datasheet import datasheet
 from lumigraph.cli.decode import decode
 from lumigraph.cli.deconvolve import deconvolve
 from lumigraph.cli.demo import demo
@@ -33,6 +35,7 @@ from lumigraph.cli.reproduce import reproduce
 from lumigraph.cli.samples import samples
 from lumigraph.cli.simulate import simulate
 from lumigraph.cli.sweep import sweep
+from lumigraph.cli.twin import twin
 from lumigraph.cli.view import view
 from lumigraph.errors import LumigraphError
 
@@ -43,7 +46,7 @@ _LONGEST = 400  # characters of a line on standard error
 
 VERBS = (
     demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure, batch, sweep,
-    dataset, board, view, samples, catalogue, reproduce,
+    dataset, board, datasheet, twin, view, samples, catalogue, reproduce,
 )  # fmt: skip
 """In the order of their use."""
 
@@ -133,8 +136,23 @@ def _usage(error: CycloptsError) -> str:
         return _unknown(error.unused_tokens[0])
     verb = " ".join(error.command_chain or ())
     hint = f"lumigraph {verb} --help".replace("  ", " ")
-    text = str(error).rstrip(".")
+    text = (_missing(error, verb) if isinstance(error, MissingArgumentError) else str(error)).rstrip(".")
     return f"{text}{'' if text.endswith('?') else '.'} Try '{hint}'."
+
+
+def _missing(error: MissingArgumentError, verb: str) -> str:
+    """What a verb, or one of its options, was not given."""
+    if error.argument is None:
+        return str(error)
+    given = error.keyword or next((token.keyword for token in error.argument.tokens if token.keyword), None)
+    if given is not None:
+        return f"{given} needs a value"
+    names, words = error.argument.names, get_args(error.argument.hint)
+    if error.argument.field_info.is_positional:
+        choices = f": {' or '.join(words)}" if words and all(isinstance(word, str) for word in words) else ""
+        return f"{verb} needs {names[0].lstrip('-').upper()}{choices}"
+    short = next((name for name in names if not name.startswith("--")), None)
+    return f"{verb} needs {names[0]}{f' ({short})' if short else ''}"
 
 
 def _unknown(word: str) -> str:

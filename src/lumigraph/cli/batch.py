@@ -13,17 +13,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from lumigraph.cli import files
+from lumigraph.cli import files, standing
 from lumigraph.cli.console import line, progress
 from lumigraph.cli.options import COMMAND, COMMON, PARAMETER, Common, Output
+from lumigraph.cli.standing import Standing
 from lumigraph.core import memory
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
 
 if TYPE_CHECKING:
     from lumigraph.cluster import Cluster, Report
+    from lumigraph.io import tables
 
-SERIES, TABLES = (".zarr",), (".csv",)
+SERIES, TABLES = (".zarr",), (".csv", ".parquet")
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,9 @@ KINDS = {
     "measure": Kind("", 1, is_table=True),
 }  # fmt: skip
 """Verbs that are taken."""
+
+RUN = 16
+"""Frames in a row of warm starts."""
 
 _STATUS = "status"
 _SHOWN = 5
@@ -132,6 +137,7 @@ def batch(
     *words: Annotated[str, Parameter(allow_leading_hyphen=True)],
     output: Output | None = None,
     page: str | None = None,
+    run: Annotated[int, Parameter(allow_leading_hyphen=True)] = RUN,
     hands: Hands = Hands(),
     common: Common = COMMON,
 ) -> Result:
@@ -154,9 +160,12 @@ def batch(
     words
         The verb's own: files or patterns in quotes first, then its options.
     output
-        Zarr store (.zarr), or table (.csv).
+        Zarr store (.zarr), or table (.csv, .parquet).
     page
         Pages of a stack, such as '3:9', '3-9' or 3, counted from 0; all if left out.
+    run
+        With the --warm of 'deconvolve', frames in a row that one worker does, the first one cold: more are
+        better for the last ones, fewer for many workers.
     """  # noqa: E501 - an example is one line
     from lumigraph import cluster
 
@@ -169,17 +178,23 @@ def batch(
     kind = KINDS[verb]
     hands.check()
     files.check_output(output, TABLES if kind.is_table else SERIES)
+    if kind.is_table:
+        require_table(output)
     paths, options = _split(words, kind.leading)
     items = list(_items(paths, None if kind.is_table or verb == "simulate" else page or "all"))
-    work = Frames(verb, options, str(Path.cwd()))
+    work, what = Frames(verb, options, str(Path.cwd())), {"verb": verb, "options": list(options)}
+    first = items[0]
+    if verb == "deconvolve" and "--warm" in options:
+        items, what = runs(items, run), {**what, "run": run}
     with tempfile.TemporaryDirectory(prefix="lumigraph-") as place:
-        work.bound(items[0], Path(place))  # refuse a line that is wrong before any worker starts
+        work.bound(first, Path(place))  # refuse a line that is wrong before any worker starts
     if hands.slurm is not None:
         return hands.submitted(output)
     with progress("batch") as shown, kept(output):
+        line(f"how it stands: {cluster.page(output)}")
         found = cluster.batch(
-            work, items, output, what={"verb": verb, "options": list(options)},
-            workers=hands.cluster(), part=hands.share(), progress=shown,
+            work, items, output, what=what, workers=hands.cluster(), part=hands.share(),
+            progress=Standing(output, shown),
             estimated=lambda needed: line(str(needed)),
         )  # fmt: skip
     if kind.is_table:
@@ -191,17 +206,19 @@ def batch(
 
 @contextmanager
 def kept(output: Path) -> Iterator[None]:
-    """Context in which Ctrl-C says what is done already."""
+    """Context in which Ctrl-C says what is done already; at its end the page says that it has ended."""
     try:
         yield
+        standing.write(output)
     except KeyboardInterrupt:
         from lumigraph import cluster
 
         try:
             found = cluster.status(output)
+            standing.write(output)
         except FormatError:  # it had not begun
             raise KeyboardInterrupt from None
-        told = f"{found.done} of {found.count} frames are in {output}. The same line goes on."
+        told = f"{found.stand} are in {output}. The same line goes on."
         raise KeyboardInterrupt(told) from None
 
 
@@ -225,8 +242,10 @@ class Frames:
 
     def __call__(self, item: dict[str, Any]) -> Any:
         """What the verb makes of one frame, as if it had been run for it alone."""
-        from lumigraph.cluster import Values
+        from lumigraph.cluster import Several, Values
 
+        if "frames" in item:
+            return Several(item["first"], item["count"], self._run(item["frames"]))
         os.chdir(self.folder)
         _check_unchanged(item)
         with tempfile.TemporaryDirectory(prefix="lumigraph-") as place, redirect_stderr(StringIO()):
@@ -234,6 +253,13 @@ class Frames:
         if KINDS[self.verb].is_table:
             return Values({"file": item["file"], **_numbers(result)})
         return result.thing
+
+    def _run(self, items: Sequence[dict[str, Any]]) -> Iterator[Any]:
+        """Results of frames of which each begins with the one before."""
+        from lumigraph.cli.deconvolve import pages_apart
+
+        with pages_apart():
+            yield from map(self, items)
 
     def bound(self, item: dict[str, Any], folder: Path) -> Any:
         """The verb with its arguments, which writes into a folder; called, it gives its `Result`.
@@ -281,6 +307,18 @@ def _items(paths: Sequence[str], pages: str | None) -> Iterator[dict[str, Any]]:
             yield from _frames(Path(name), pages)
 
 
+def runs(items: Sequence[dict[str, Any]], length: int) -> list[dict[str, Any]]:
+    """Frames in a row, `length` in each but the last: the same ones whoever does them.
+
+    >>> [(run["first"], len(run["frames"])) for run in runs([{}] * 5, 2)]
+    [(0, 2), (2, 2), (4, 1)]
+    """
+    if length < 2:
+        raise FormatError(f"--run is {length} but must be at least 2: --warm needs a frame before.")
+    starts = range(0, len(items), length)
+    return [{"first": k, "count": len(items), "frames": list(items[k : k + length])} for k in starts]
+
+
 def _frames(path: Path, pages: str | None) -> Iterator[dict[str, Any]]:
     from lumigraph.preparation import pages_of
 
@@ -306,19 +344,20 @@ def _numbers(result: Result) -> dict[str, Any]:
     return {name: value for name, value in found.items() if not isinstance(value, list | dict)}
 
 
-def save_table(output: Path) -> None:
-    """Write what is in the ledger; jobs that end at once wait for each other."""
-    import csv
+def require_table(output: Path, axes: "tables.Axes | None" = None) -> None:
+    """Refuse a table that cannot be written, before any work."""
+    from lumigraph.io import tables
 
+    tables.require(output, axes)
+
+
+def save_table(output: Path, axes: "tables.Axes | None" = None) -> None:
+    """Write what is in the ledger; jobs that end at once wait for each other."""
     from lumigraph import cluster
-    from lumigraph.store import replacing
+    from lumigraph.io import tables
 
     with cluster.rows(output) as rows:
-        names = list(dict.fromkeys(name for row in rows for name in row))
-        with replacing(output) as temporary, temporary.open("w", newline="") as file:
-            table = csv.DictWriter(file, names)
-            table.writeheader()
-            table.writerows(rows)
+        tables.save(output, rows, axes)
 
 
 def _only(words: Sequence[str]) -> Path:
@@ -332,14 +371,14 @@ def _failures(found: "Report") -> str:
     named = [f"frame {number}: {why}" for number, why in sorted(found.failures.items())[:_SHOWN]]
     more = len(found.failures) - len(named)
     tail = f" ... and {more} more" if more > 0 else ""
-    return f"{len(found.failures)} of {found.count} frames failed. {'; '.join(named)}{tail}."
+    return f"{len(found.failures)} of {found.stand.partition(' of ')[2]} failed. {'; '.join(named)}{tail}."
 
 
 def _told(found: "Report", output: Path) -> Result:
     entries = list(found.entries.values())
     failed = len(found.failures)
     values = [Quantity("frames", found.count), Quantity("done", found.done), Quantity("failed", failed)]
-    lines = [f"{found.done} of {found.count} frames are done"]
+    lines = [f"{found.stand} are done"]
     if entries:
         middle = sorted(entry.seconds for entry in entries)[len(entries) // 2]
         size, most = sum(entry.size for entry in entries), max(entry.memory for entry in entries)
@@ -348,7 +387,10 @@ def _told(found: "Report", output: Path) -> Result:
             Quantity("bytes", size),
             Quantity("memory", most),
         ]
-        lines.append(f"{middle:.3g} s a frame, {memory.told(size)}, at most {memory.told(most)} a worker")
+        lines.append(
+            f"{middle:.3g} s a {found.noun}, {memory.told(size)}, at most {memory.told(most)} a worker"
+        )
+    lines += [f"how it stands, as a page: {found.page}"] if found.page else []
     lines += [_failures(found)] if failed else []
     notes = tuple(dict.fromkeys(note for entry in entries for note in entry.notes))[:_SHOWN]
     extra = {"failures": {str(number): why for number, why in found.failures.items()}}

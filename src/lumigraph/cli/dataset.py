@@ -11,6 +11,7 @@ from lumigraph.cli.batch import Hands, kept
 from lumigraph.cli.console import line, progress
 from lumigraph.cli.deconvolve import depths
 from lumigraph.cli.options import COMMAND, COMMON, Common, Output
+from lumigraph.cli.standing import Standing
 from lumigraph.cli.sweep import changed, combinations, values
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
@@ -96,8 +97,9 @@ def dataset(
         return hands.submitted(output)
     with progress("dataset") as shown, kept(output):
         made = make(
-            work, count, output, workers=hands.cluster(), part=hands.share(), progress=shown,
-            estimated=lambda needed: line(str(needed)), command=shlex.join(["lumigraph", *COMMAND.get()]),
+            work, count, output, workers=hands.cluster(), part=hands.share(),
+            progress=Standing(output, shown), estimated=lambda needed: line(str(needed)),
+            command=shlex.join(["lumigraph", *COMMAND.get()]),
         )  # fmt: skip
     if made.failures:
         number, why = min(made.failures.items())

@@ -1,6 +1,8 @@
 """`lumigraph deconvolve`."""
 
 import math
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -10,7 +12,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, above_zero, length
+from lumigraph.cli.options import Output, above_zero, length, region
 from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.core.progress import Progress, Stage, silent, within
 from lumigraph.core.result import Figure, Quantity, Result
@@ -48,8 +50,8 @@ class Seen:
         File made by 'lumigraph calibrate', or by the camera's maker, instead of the lenslets found on the
         white image.
     region
-        Part of the raw image that counts, 'rows:columns' in pixels, such as '100-500:80-640'; the rest is
-        neither fitted nor cut off.
+        Rows and columns of the raw image that count, such as '100:501, 80:641'; the rest is neither fitted
+        nor cut off.
     page
         Pages of a stack, counted from 0: one, such as 3, several, such as 3:9 or 3-9, or 'all'.
     """
@@ -81,16 +83,8 @@ class Seen:
 
         if self.region is None:
             return None
-        try:
-            (top, bottom), (left, right) = (
-                map(int, part.split("-")) for part in self.region.split(":")
-            )  # fmt: skip
-        except ValueError:
-            raise FormatError(f"--region is {self.region!r} but must be like '100-500:80-640'.") from None
         mask = np.zeros(shape, bool)
-        mask[top : bottom + 1, left : right + 1] = True
-        if not mask.any():
-            raise FormatError(f"--region {self.region} has no pixel of {shape[0]} x {shape[1]}.")
+        mask[region(self.region, shape)] = True
         return mask
 
     def frames(self, path: Path) -> "list[tuple[str, Any]]":
@@ -223,7 +217,7 @@ def deconvolve(
     frames = seen.frames(raw)
     if len(frames) > 1 and way.checkpoint is not None:
         raise FormatError("--checkpoint keeps one run, not several pages. Give one --page.")
-    if way.warm and len(frames) == 1:
+    if way.warm and len(frames) == 1 and _RUN.get() is None:
         raise FormatError(
             "--warm begins with the page before, but there is one page. Give several by --page."
         )
@@ -232,12 +226,36 @@ def deconvolve(
         ready = seen.prepared(frames[0][1], described)
         made = within(shown, 0.0, 1.0, "point images")
         made(0.0)
-        task = _Task(_engine(_Asked.of(camera, wanted, way, ready.calibration, made)), way, output)
+        engine = _engine(_Asked.of(camera, wanted, way, ready.calibration, made))
+        _begin(engine)
+        task = _Task(engine, way, output)
         pages = [(name, replace(ready, data=frame.data)) for name, frame in frames]
         for name, found in task.run(pages, (steps, shown)):
             written.append(_named(output, name))
             io.save(found, written[-1])
     return _result(found, pages[-1][1], steps, tuple(written))
+
+
+_RUN: ContextVar["list[Deconvolver] | None"] = ContextVar("run", default=None)
+
+
+@contextmanager
+def pages_apart() -> "Iterator[None]":
+    """Context in which the pages of a series come in calls of their own; the first one begins cold."""
+    token = _RUN.set([])
+    try:
+        yield
+    finally:
+        _RUN.reset(token)
+
+
+def _begin(engine: "Deconvolver") -> None:
+    """Forget the result of the page before, unless it is of the same series."""
+    run = _RUN.get()
+    if run is None or engine not in run:
+        engine.forget()
+    if run is not None:
+        run[:] = [engine]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from cyclopts import Parameter
 
-from lumigraph.cli.options import above_zero, length
+from lumigraph.cli.options import above_zero, length, region
 from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
@@ -43,17 +43,7 @@ class Looked:
             raise FormatError(f"the picture is a {picture.bayer} mosaic. Demosaic it, by lumigraph.demosaic.")
         data = np.asarray(picture.data)
         grey = data if data.ndim == 2 else data.mean(-1)
-        if self.region is None:
-            return grey
-        parts = [part.split(":") for part in self.region.split(",")]
-        if [len(part) for part in parts] != [2, 2] or not all(n.strip().isdigit() for p in parts for n in p):
-            raise FormatError(f"--region {self.region!r} must be 'y0:y1, x0:x1', such as '100:180, 40:120'.")
-        (top, bottom), (left, right) = ([int(n) for n in part] for part in parts)
-        if not (top < bottom <= grey.shape[0] and left < right <= grey.shape[1]):
-            raise FormatError(
-                f"--region {self.region!r} is not inside the picture of {grey.shape[0]} x {grey.shape[1]} px."
-            )
-        return grey[top:bottom, left:right]
+        return grey if self.region is None else grey[region(self.region, grey.shape)]
 
     def pixels(self, picture: "RawImage") -> float | None:
         """Pitch [m], or None where neither the option nor the file says."""

@@ -1,6 +1,7 @@
 """What verbs share: `--json`, `--debug`, and quantities with units."""
 
 import math
+import re
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
@@ -62,6 +63,31 @@ def length(option: str, text: str | None) -> float | None:
         return parse(text)
     except FormatError as error:
         raise FormatError(f"{option}: {error}") from error
+
+
+_REGION = re.compile(r"\s*(\d+):(\d+)\s*,\s*(\d+):(\d+)\s*")
+_CLOSED = re.compile(r"\s*(\d+)-(\d+):(\d+)-(\d+)\s*")  # rows:columns, each with its last one
+
+
+def region(text: str, shape: tuple[int, ...]) -> tuple[slice, slice]:
+    """Rows and columns of a picture (y, x[, c]) after `--region`, such as '100:180, 40:120'.
+
+    The ends are left out, as in slices; '100-179:40-119' is another spelling of the same.
+
+    Raises
+    ------
+    FormatError
+        Another form, or not inside the picture.
+    """
+    half_open, closed = _REGION.fullmatch(text), _CLOSED.fullmatch(text)
+    found = half_open or closed
+    if found is None:
+        raise FormatError(f"--region {text!r} must be 'y0:y1, x0:x1', such as '100:180, 40:120'.")
+    top, bottom, left, right = map(int, found.groups())
+    bottom, right = (bottom, right) if half_open else (bottom + 1, right + 1)
+    if not (top < bottom <= shape[0] and left < right <= shape[1]):
+        raise FormatError(f"--region {text!r} is not inside the picture of {shape[0]} x {shape[1]} px.")
+    return slice(top, bottom), slice(left, right)
 
 
 def above_zero(option: str, value: float | None, unit: str = "") -> float | None:

@@ -264,7 +264,7 @@ def _figures(made: _Made, output: Path) -> "Iterator[Figure]":
 
 
 def _from_raw(found: "RawImage", how: tuple[Origin, Tiles], output: Path, shown: Progress) -> _Made:
-    from lumigraph import depth, io, preparation, rendering
+    from lumigraph import depth, io, preparation
 
     origin, tiles = how
     camera = cast("Rendered | None", origin.described("render"))
@@ -274,10 +274,9 @@ def _from_raw(found: "RawImage", how: tuple[Origin, Tiles], output: Path, shown:
     sharp = tiles.sharp(camera, calibration, origin)
     extra = None
     if tiles.is_auto:
-        extra = depth.correlation(ready, calibration, progress=shown)
-        size = extra.values
-        if sharp is not None and tiles.focus is None:
-            sharp = list(rendering.match_kinds(ready, calibration, size, sharp))
+        matched = None if tiles.focus is not None else sharp
+        extra, order = depth.of_lenslets(ready, calibration, focus=matched, progress=shown)
+        size, sharp = extra.values, order or sharp
     if tiles.patches is not None:
         sizes = range_of("--patches", tiles.patches)
         stack = preparation.render_stack(ready, calibration, sizes, samples=tiles.samples, focus=sharp)

@@ -78,18 +78,19 @@ def tell(common: Common, result: Result) -> None:
     """Print a result as text or as JSON, and write its report where one is asked for."""
     text, values = result.text(WARNED.get([])), result.values()
     if isinstance(common, Reported) and common.report is not None:
-        _page(result).write(common.report)
+        page(result).write(common.report)
         text, values = f"{text}\nwritten {common.report}", {**values, "report": str(common.report)}
     console.report(common, text, values if result.rows is None else result.rows)
 
 
-def _page(result: Result) -> "Page":
+def page(result: Result) -> "Page":
+    """A result as a page: its figures, its numbers, what to know, and how it was made."""
     from lumigraph.report import Page
 
-    page, sections = Page(result.title, result.about), {}
+    found, sections = Page(result.title, result.about), {}
     for figure in result.figures():
         if figure.section not in sections:
-            sections[figure.section] = page.section(figure.section)
+            sections[figure.section] = found.section(figure.section)
         section = sections[figure.section]
         match figure.image:
             case str() as text:
@@ -99,8 +100,8 @@ def _page(result: Result) -> "Page":
             case image:
                 section.figure(image, figure.caption, **figure.options)
     if result.quantities:
-        page.section("Numbers").table([(one.label, str(one)) for one in result.quantities])
+        found.section("Numbers").table([(one.label, str(one)) for one in result.quantities])
     if result.notes:
-        page.section("What to know").text("\n\n".join(result.notes))
-    page.made_by(shlex.join(("lumigraph", *COMMAND.get())))
-    return page
+        found.section("What to know").text("\n\n".join(result.notes))
+    found.made_by(shlex.join(("lumigraph", *COMMAND.get())))
+    return found

@@ -215,6 +215,8 @@ def simulate(
     lines = [f"{rows} x {columns} px, mean {mean:.4g}, largest {largest:.4g}"]
     if error is not None:
         lines.append(f"estimated error {100 * error:.2g} % rms, from the difference of two halves")
+    if paraxial := raw.metadata.get("error", {}).get("paraxial"):
+        lines.append(f"by parabolic lenses, which are off by some {100 * paraxial:.2g} % rms")
     values = (
         Quantity("shape", raw.shape, "px"), Quantity("mean", mean, unit), Quantity("largest", largest),
         Quantity("pixel_pitch", raw.pixel_pitch, "m"), Quantity("estimated_error", error),

@@ -3,7 +3,7 @@
 import itertools
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -12,21 +12,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.batch import TABLES, Hands, kept, save_table
+from lumigraph.cli.batch import TABLES, Hands, kept, require_table, save_table
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output
 from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.cli.standing import Standing
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
 
 if TYPE_CHECKING:
     from lumigraph.cluster import Values
     from lumigraph.instruments import Instrument
+    from lumigraph.io.tables import Axes
 
 MOST = 100_000
 """Combinations."""
 
-_CURVES = 6
+_CURVES = 60
 """Quantities that a report draws at most."""
 
 _ERROR = "error"
@@ -44,8 +46,9 @@ def sweep(
 ) -> Result:
     """Vary a camera's values and write what follows from each combination into a table.
 
-    What follows are the closed forms that 'lumigraph design' prints; nothing is simulated. A combination that
-    no camera can have is a row with the reason. Killed at any time, the same line goes on where it was.
+    What follows are the closed forms that 'lumigraph design' prints, and of plenoptic cameras what is measured
+    on a simulated picture of a chessboard. A combination that no camera can have is a row with the reason.
+    Killed at any time, the same line goes on where it was.
 
     Example: `lumigraph sweep thesis-plenoptic-2-m050 --vary "lenslets.focal_length=4 mm:6 mm:9" --vary "lenslets.magnification=0.3,0.5" --measure "views per axis, lateral resolution" -o table.csv`
 
@@ -57,9 +60,12 @@ def sweep(
         A key of the camera file and its values: 'first:last:count', or several, separated by commas.
         May be repeated: every combination is computed.
     measure
-        Names of quantities as 'lumigraph design' prints them, separated by commas; all if left out.
+        Names of quantities as 'lumigraph design' prints them, separated by commas; all if left out. Simulated:
+        mtf@10/mm (contrast at 10 cycles per mm of the object), mtf50_middle, mtf10_middle, mtf50_border,
+        mtf10_border, sample_on_chart, distortion.
     output
-        Table (.csv); lengths in metres.
+        Table (.csv, or .parquet with pyarrow), or NetCDF (.nc) whose axes are the varied keys, which xarray
+        opens; lengths in metres.
     workers
         Processes on this machine; one for each processor if left out.
     """  # noqa: E501 - an example is one line
@@ -67,20 +73,23 @@ def sweep(
     from lumigraph.instruments import load_camera
 
     common.check()
-    files.check_output(output, TABLES)
+    files.check_output(output, (*TABLES, ".nc"))
     given, varied = load_camera(camera), dict(map(values, vary))
     if len(varied) < len(vary):
         raise FormatError("--vary names a key twice. Give all its values at once.")
     items = combinations(varied)
+    axes = axes_of(varied)
+    require_table(output, axes)
     changed(given, items[0])  # an unknown key is refused before any work
     names = _names(measure, [row.name for row in given.quantities()])
+    check_measures(given, names)
     source = str(Path(camera).absolute()) if Path(camera).exists() else camera
     with progress("sweep") as shown, kept(output):
         found = cluster.batch(
             Designs(source, tuple(names)), items, output, what={"camera": given.to_toml(), "measure": names},
-            workers=Hands(workers).cluster(), progress=shown,
+            workers=Hands(workers).cluster(), progress=Standing(output, shown),
         )  # fmt: skip
-    save_table(output)
+    save_table(output, axes)
     if found.failures:
         raise LumigraphError(f"{len(found.failures)} of {found.count} failed: {min(found.failures.items())}.")
     rows = [entry.values for _, entry in sorted(found.entries.items())]
@@ -108,16 +117,26 @@ class Designs:
         from lumigraph.instruments import load_camera
 
         try:
-            rows = changed(load_camera(self.camera), item).quantities()
+            camera = changed(load_camera(self.camera), item)
+            known = {row.name: row for row in (*camera.quantities(), *self._simulated(camera))}
         except LumigraphError as error:
             return Values({**item, _ERROR: " ".join(str(error).split())})
-        known = {row.name: row for row in rows}
         return Values(
             {
                 **item,
                 **{_column(known[name]): _plain(known[name].value) for name in self.names if name in known},
             }
         )
+
+    def _simulated(self, camera: "Instrument") -> "Iterable[Quantity]":
+        """What is measured on a simulated picture."""
+        from lumigraph import metric
+        from lumigraph.metric.charts import check_camera
+
+        names = [name for name in self.names if metric.is_measure(name)]
+        if not names:
+            return ()
+        return metric.simulated(check_camera(camera), names).values()
 
 
 def values(text: str) -> tuple[str, list[Any]]:
@@ -166,6 +185,21 @@ def combinations(varied: Mapping[str, list[Any]]) -> list[dict[str, Any]]:
     return [dict(zip(varied, one, strict=True)) for one in itertools.product(*varied.values())]
 
 
+def axes_of(varied: Mapping[str, list[Any]]) -> "Axes":
+    """The varied keys as axes of a table; lengths are places in metres."""
+    from lumigraph.io.tables import Axes
+    from lumigraph.units import parse
+
+    places = {}
+    for name, some in varied.items():
+        if all(isinstance(value, str) for value in some):
+            try:
+                places[name] = [parse(value) for value in some]
+            except FormatError:  # words, or another dimension
+                continue
+    return Axes(varied, places)
+
+
 def changed(camera: "Instrument", item: Mapping[str, Any]) -> "Instrument":
     """The camera whose file has other values, by dotted keys; lengths carry a unit as in the file."""
     table = tomllib.loads(camera.to_toml())
@@ -184,13 +218,24 @@ def _names(measure: str | None, known: Sequence[str]) -> list[str]:
     """The quantities that are asked for."""
     if measure is None:
         return list(known)
+    from lumigraph.metric import is_measure
+
     names = [name.strip() for name in measure.split(",")]
     for name in names:
-        if name not in known:
+        if name not in known and not is_measure(name):
             near = get_close_matches(name, known, 3, 0.4)
             hint = f" Did you mean {', '.join(map(repr, near))}?" if near else ""
             raise FormatError(f"--measure names {name!r}, which 'lumigraph design' does not print.{hint}")
     return names
+
+
+def check_measures(camera: "Instrument", names: Sequence[str]) -> None:
+    """Refuse measures on simulated pictures of cameras that have none."""
+    from lumigraph.metric import is_measure
+    from lumigraph.metric.charts import check_camera
+
+    if any(map(is_measure, names)):
+        check_camera(camera)
 
 
 def _column(row: Any) -> str:

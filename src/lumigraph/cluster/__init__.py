@@ -10,9 +10,9 @@
 
 from lumigraph.cluster import slurm
 from lumigraph.cluster.ledger import Entry
-from lumigraph.cluster.run import Cluster, Estimate, Local, Report, batch, rows, status
+from lumigraph.cluster.run import Cluster, Estimate, Local, Report, batch, page, rows, status
 from lumigraph.cluster.scheduler import Dask
-from lumigraph.cluster.task import Values
+from lumigraph.cluster.task import Several, Values
 
 __all__ = [
     "Cluster",
@@ -21,8 +21,10 @@ __all__ = [
     "Estimate",
     "Local",
     "Report",
+    "Several",
     "Values",
     "batch",
+    "page",
     "rows",
     "slurm",
     "status",

@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,12 @@ except ImportError:  # Windows: two starts at once are not told apart
 FORMAT = 1
 ENDING = ".ledger"
 _DONE, _FAILED = "done", "failed"
+_LATEST, _PAUSE = 65, 10
+"""Frames whose times say how fast it goes, and what is longer than the usual step by this is none."""
+
+PAGE, LINK = "status.html", "dashboard.txt"
+"""A page that says how it stands, and the address of the scheduler's own."""
+
 _MEMORY = 1 << 26
 """Bytes of a job's description that are read at most."""
 
@@ -122,6 +129,12 @@ class Ledger:
         except (ValueError, KeyError, TypeError) as error:
             raise FormatError(f"{path} is damaged ({error}). Remove the ledger and the output.") from None
 
+    @property
+    def noun(self) -> str:
+        """What an item is: a frame, or as many in a row as the job says."""
+        run = self.job()["what"].get("run")
+        return f"run of {run} frames" if run else "frame"
+
     def entry(self, number: int) -> Entry | None:
         """That of a frame; None where there is none, or a torn one."""
         with suppress(OSError, ValueError, TypeError, AttributeError):
@@ -142,6 +155,21 @@ class Ledger:
             with suppress(OSError, ValueError, KeyError, TypeError):
                 found[number] = str(json.loads(self._path(_FAILED, number).read_bytes())["error"])
         return found
+
+    def pace(self) -> float:
+        """Frames a second by when the last ones were noted, by whatever worker; 0 while that is not known.
+
+        Times without work, as between two starts, are left out: those ten times as long as the usual one.
+        """
+        times = []
+        for number in self._numbers(_DONE):
+            with suppress(OSError):
+                times.append(self._path(_DONE, number).stat().st_mtime)
+        times = sorted(times)[-_LATEST:]
+        steps = sorted(late - early for early, late in pairwise(times))
+        usual = steps[len(steps) // 2] if steps else 0.0
+        kept = [step for step in steps if step <= max(_PAUSE * usual, 1.0)]
+        return len(kept) / sum(kept) if sum(kept) > 0 else 0.0
 
     def record(self, entry: Entry) -> None:
         """Note that a frame is done; its shards are in place."""

@@ -4,11 +4,11 @@ import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from lumigraph.cluster.ledger import Entry, Ledger
+from lumigraph.cluster.ledger import LINK, PAGE, Entry, Ledger
 from lumigraph.cluster.pool import Outcome, Pool
 from lumigraph.cluster.task import BUSY, Task, Work
 from lumigraph.core import checks, memory
@@ -17,6 +17,9 @@ from lumigraph.errors import LumigraphError, SamplingError
 
 _FIRST = 2
 """Frames that are done before the others are estimated: the first one makes what they share."""
+
+_TOLD = 16
+"""Of so many frames that are checked, one is told of."""
 
 _ROUNDS, _PATIENCE = 600, 1.0
 """How often, and after how many seconds, frames are asked for again that somebody else works on."""
@@ -80,12 +83,29 @@ class Report:
         Why frames failed, by number.
     seconds
         That this start took [s].
+    pace
+        Frames a second, of late; 0 where it is not known.
+    link
+        Of the scheduler's own page, while it is in use.
+    page
+        File that shows how it stands, where there is one.
+    noun
+        What an item is.
     """
 
     count: int
     entries: dict[int, Entry] = field(repr=False)
     failures: dict[int, str] = field(repr=False)
     seconds: float = 0.0
+    pace: float = 0.0
+    link: str = ""
+    page: Path | None = None
+    noun: str = "frame"
+
+    @property
+    def stand(self) -> str:
+        """How many are done, in words."""
+        return f"{self.done} of {self.count} {_many(self.noun, self.count)}"
 
     @property
     def done(self) -> int:
@@ -112,12 +132,15 @@ class Estimate:
         Of one worker [bytes].
     size
         On the disk [bytes].
+    noun
+        What an item is.
     """
 
     frames: int
     seconds: float
     memory: int
     size: int
+    noun: str = "frame"
 
     @classmethod
     def of(cls, entries: Iterable[Entry], frames: int, workers: int) -> "Estimate":
@@ -129,7 +152,7 @@ class Estimate:
 
     def __str__(self) -> str:
         minutes = f"{self.seconds / 60:.1f} minutes" if self.seconds > 90 else f"{self.seconds:.0f} s"
-        frames = f"{self.frames} frame{'s' * (self.frames != 1)}"
+        frames = f"{self.frames} {_many(self.noun, self.frames)}"
         return (
             f"{frames} to do: about {minutes}, {memory.told(self.memory)} a worker, {memory.told(self.size)} "
             "on the disk"
@@ -150,7 +173,9 @@ class Estimate:
                 f"{workers} workers need {self.memory * workers / 2**30:.3g} GiB but the machine has "
                 f"{whole / 2**30:.3g} GiB. Use at most {fitting}."
             )
-        memory.require_disk(self.size, output.parent, f"{self.frames} frames", SamplingError)
+        memory.require_disk(
+            self.size, output.parent, f"{self.frames} {_many(self.noun, self.frames)}", SamplingError
+        )
 
 
 def batch(
@@ -175,7 +200,7 @@ def batch(
     work
         Called with an item in another process: a function of a module, or an object that can be pickled.
         It gives a picture, several, views, a volume, a depth map or arrays by name, of one shape for all
-        items, which go into shards of a Zarr store; or `Values`, which stay in the ledger.
+        items, which go into shards of a Zarr store; `Several` of them; or `Values`, which stay in the ledger.
     items
         What JSON can hold: paths, numbers, mappings of them.
     output
@@ -194,8 +219,8 @@ def batch(
     Returns
     -------
     Report
-        With the failures: an item whose work raises an error is noted and left out, and tried again at the
-        next start.
+        With the failures of this part: an item whose work raises an error is noted and left out, and tried
+        again at the next start.
 
     Raises
     ------
@@ -215,7 +240,7 @@ def batch(
     _ready(output)
     task.ledger.open(what or {}, items)
     with task.ledger.started(first, last):
-        left = [number for number in range(first, last) if not _kept(task, number)]
+        left = list(_left(task, first, last, progress))
         with cluster.group(task) as group:
             if left:
                 for done in range(min(_FIRST, len(left))):
@@ -223,7 +248,8 @@ def batch(
                 _check(task, (cluster, group), left, estimated)
                 _do(group, left[_FIRST:], _FIRST, len(left), progress)
     found = status(output)
-    return Report(found.count, found.entries, found.failures, time.perf_counter() - began)
+    mine = {number: why for number, why in found.failures.items() if first <= number < last}
+    return replace(found, failures=mine, seconds=time.perf_counter() - began)
 
 
 @contextmanager
@@ -253,7 +279,17 @@ def status(output: str | os.PathLike[str]) -> Report:
     ledger = Ledger(path) if (path / "job.json").exists() else Ledger.beside(path)
     entries = ledger.entries()
     failures = {number: why for number, why in ledger.failures().items() if number not in entries}
-    return Report(len(ledger.job()["items"]), entries, failures)
+    link, page = ledger.folder / LINK, ledger.folder / PAGE
+    return Report(
+        len(ledger.job()["items"]), entries, failures, pace=ledger.pace(), noun=ledger.noun,
+        link=link.read_text().strip() if link.exists() else "", page=page if page.exists() else None,
+    )  # fmt: skip
+
+
+def page(output: str | os.PathLike[str]) -> Path:
+    """Where the page lies that shows how a job stands, by its output or its ledger."""
+    path = Path(output)
+    return (path if (path / "job.json").exists() else Ledger.beside(path).folder) / PAGE
 
 
 def _do(group: Group, numbers: list[int], done: int, total: int, progress: Progress) -> None:
@@ -267,7 +303,7 @@ def _do(group: Group, numbers: list[int], done: int, total: int, progress: Progr
                 continue
             done += 1
             rate = (done - before) / (time.perf_counter() - began)
-            progress(Stage(done / total, f"{done} of {total} frames, {_pace(rate)}"))
+            progress(Stage(done / total, f"{done} of {total} done, {_pace(rate)}"))
         if not busy:
             return
         numbers = busy
@@ -286,14 +322,33 @@ def _check(
     if not first or len(left) <= _FIRST:
         return
     cluster, group = who
-    needed = Estimate.of(first, len(left) - _FIRST, group.count)
+    needed = replace(Estimate.of(first, len(left) - _FIRST, group.count), noun=task.ledger.noun)
     if estimated is not None:
         estimated(needed)
     needed.require(group.count if cluster.is_here else 1, task.output)
 
 
+def _many(noun: str, count: int) -> str:
+    """A noun's plural.
+
+    >>> _many("run of 16 frames", 2), _many("frame", 1)
+    ('runs of 16 frames', 'frame')
+    """
+    first, *rest = noun.split(" ")
+    return " ".join([first + "s" * (count != 1), *rest])
+
+
 def _pace(rate: float) -> str:
     return f"{rate:.2g} a second" if rate >= 1 else f"{1 / rate:.2g} s each"
+
+
+def _left(task: Task, first: int, last: int, progress: Progress) -> Iterator[int]:
+    """Frames that are still to do, by the checksums of all that is there."""
+    for number in range(first, last):
+        if not _kept(task, number):
+            yield number
+        elif number % _TOLD == 0:
+            progress(Stage((number + 1) / task.count, f"frame {number} of {task.count} is whole"))
 
 
 def _kept(task: Task, number: int) -> bool:

@@ -7,6 +7,7 @@ from threading import Lock
 from typing import Any
 from uuid import uuid4
 
+from lumigraph.cluster.ledger import LINK
 from lumigraph.cluster.pool import DEATHS, Outcome
 from lumigraph.cluster.task import FAILED, Task
 from lumigraph.errors import LumigraphError
@@ -54,7 +55,12 @@ class Dask:
             ) from None
         try:
             client.wait_for_workers(1, timeout=_WAIT)
-            yield _Group(client, task)
+            link = task.ledger.folder / LINK
+            link.write_text(client.dashboard_link or "")
+            try:
+                yield _Group(client, task)
+            finally:
+                link.unlink(missing_ok=True)
         except TimeoutError:
             raise LumigraphError(f"the scheduler at {self.address} has no workers. Start some.") from None
         finally:

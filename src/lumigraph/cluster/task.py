@@ -5,7 +5,7 @@ import platform
 import sys
 import time
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -33,6 +33,25 @@ class Values:
     row: Mapping[str, Any]
 
 
+@dataclass(frozen=True, slots=True)
+class Several:
+    """Results of frames in a row, which one item makes: all are done, or none.
+
+    Parameters
+    ----------
+    first
+        Number of the first one in the output.
+    count
+        Frames of the whole output.
+    things
+        Results, taken and written one after the other.
+    """
+
+    first: int
+    count: int
+    things: Iterable[Any]
+
+
 @dataclass(frozen=True)
 class Task:
     """A job as a worker sees it; it is sent to other processes and machines.
@@ -46,7 +65,7 @@ class Task:
     output
         A store of shards, beside which the ledger lies.
     count
-        Frames of the job.
+        Items of the job.
     """
 
     work: Work
@@ -84,22 +103,29 @@ class Task:
         began = time.perf_counter()
         with warnings.catch_warnings(record=True) as caught, single_products():
             warnings.simplefilter("default")
-            found = self.work(self.items[number])
+            files, values = self._done(number, self.work(self.items[number]))
         notes = list(dict.fromkeys(str(one.message)[:_LONGEST] for one in caught))
-        if isinstance(found, Values):
-            files, values = {}, dict(found.row)
-        else:
-            files, values = self._written(number, series.Frame.of(found)), {}
         return Entry(
             number, time.perf_counter() - began, peak(), sum(size for size, _ in files.values()),
             f"{platform.node()}:{os.getpid()}", files, values, notes,
         )  # fmt: skip
 
-    def _written(self, number: int, frame: series.Frame) -> series.Checksums:
+    def _done(self, number: int, found: Any) -> tuple[series.Checksums, dict[str, Any]]:
+        """Files that were written, and values."""
+        if isinstance(found, Values):
+            return {}, dict(found.row)
+        if not isinstance(found, Several):
+            return self._written(number, series.Frame.of(found), self.count), {}
+        files: series.Checksums = {}
+        for place, thing in enumerate(found.things, found.first):
+            files |= self._written(place, series.Frame.of(thing), found.count)
+        return files, {}
+
+    def _written(self, number: int, frame: series.Frame, count: int) -> series.Checksums:
         if not (self.output / "zarr.json").exists():
             with self.ledger.alone():
                 if not (self.output / "zarr.json").exists():
-                    series.create(self.output, frame, self.count)
+                    series.create(self.output, frame, count)
         return series.write(self.output, number, frame)
 
 

@@ -1,6 +1,8 @@
 """Arrays with names along their axes, as xarray holds them."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -112,6 +114,43 @@ def _library() -> ModuleType:
             "Or use np.asarray."
         ) from error
     return xarray
+
+
+def require() -> None:
+    """Refuse if xarray is not installed.
+
+    Raises
+    ------
+    LumigraphError
+        It is not.
+    """
+    _library()
+
+
+def save_dataset(
+    path: Path,
+    along: Mapping[str, tuple[Sequence[Any], str]],
+    variables: Mapping[str, tuple[np.ndarray, str]],
+) -> None:
+    """Write variables over the same axes as NetCDF, which `xarray.open_dataset` reads.
+
+    Parameters
+    ----------
+    path
+        File.
+    along
+        Coordinates of each axis and their unit, or "".
+    variables
+        Arrays over all axes in their order, and their unit.
+    """
+    xarray = _library()
+
+    def told(unit: str) -> dict[str, str]:
+        return {"units": unit} if unit else {}
+
+    coordinates = {name: ((name,), list(places), told(unit)) for name, (places, unit) in along.items()}
+    data = {name: (tuple(along), array, told(unit)) for name, (array, unit) in variables.items()}
+    xarray.Dataset(data, coordinates).to_netcdf(path, engine="scipy")
 
 
 def to_xarray(data: np.ndarray, labels: Labels) -> Any:

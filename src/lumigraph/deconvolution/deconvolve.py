@@ -274,6 +274,10 @@ class Deconvolver:
         self._last = state.estimate if self.warm else None
         return run.result(state, raw)
 
+    def forget(self) -> None:
+        """Begin the next raw image as if it were the first one, though starts are warm."""
+        self._last = None
+
     def _begun(self, problem: Problem) -> Array | None:
         """A warm start: the last object and an even one."""
         if self._last is None or tuple(self._last.shape) != tuple(problem.scale.sensitivity.shape):
