@@ -76,6 +76,17 @@ def wait(page, condition: str) -> float:
     return time.monotonic()
 
 
+def at_rest(page) -> float:
+    """Time since which nothing has been loaded or drawn any more for a second."""
+    busy = f"{FINER}.loading || ({FINER}.window && (!{FINER}.window.drawn || {FINER}.window.work))"
+    last = time.monotonic()
+    while time.monotonic() < last + 1:
+        if page.evaluate(f"(lumigraph.app.schedule(), Boolean({busy}))"):
+            last = time.monotonic()
+        time.sleep(0.05)
+    return last
+
+
 def measure(page, address: str) -> None:
     """Opens the page and prints what came when."""
     page.goto(address, wait_until="commit")
@@ -88,8 +99,7 @@ def measure(page, address: str) -> None:
     for what, state in LOOKS.items():
         page.evaluate("state => lumigraph.set(state)", state)
         began, before = time.monotonic(), Counting.sent
-        time.sleep(0.6)
-        ended = wait(page, f"!{FINER}.loading && (lumigraph.app.schedule(), !{FINER}.loading)")
+        ended = at_rest(page)
         memory = page.evaluate("performance.memory.usedJSHeapSize") / 1e6
         step = page.evaluate(f"{FINER}.window?.step ?? {FINER}.coarsest")
         loaded = (Counting.sent - before) / 1e6

@@ -6,6 +6,7 @@ import time
 from contextlib import contextmanager
 
 import numpy as np
+import pytest
 
 import lumigraph as lg
 from lumigraph import viewer
@@ -110,3 +111,31 @@ class Page:
 
     def close(self):
         self.context.close()
+
+
+def frames_of(path):
+    """Times [s] and pictures of a film, and how long it is."""
+    av = pytest.importorskip("av", reason="PyAV is not installed")
+    with av.open(str(path)) as container:
+        (stream,) = container.streams.video
+        assert float(stream.average_rate) == 25
+        pictures = [
+            (float(frame.time), frame.to_ndarray(format="rgb24").astype(float))
+            for frame in container.decode(stream)
+        ]
+        return (
+            [time for time, _ in pictures],
+            np.array([picture for _, picture in pictures]),
+            container.duration / 1e6,
+        )
+
+
+def film(page, what, seconds, path):
+    """Save a film; the name that the page gives it."""
+    page.page.click("#save-film")
+    page.page.select_option("#film-what", what)
+    page.page.fill("#film-seconds", str(seconds))
+    with page.page.expect_download() as download:
+        page.page.click("#film-start")
+    download.value.save_as(path)
+    return download.value.suggested_filename

@@ -6,7 +6,8 @@ import pytest
 import lumigraph as lg
 from lumigraph import viewer
 from lumigraph.cli import main
-from lumigraph.viewer.exhibit import detail, focal_stack
+from lumigraph.viewer import opening
+from lumigraph.viewer.exhibit import detail, focal_stack, object_depths
 from viewer_pages import served
 
 
@@ -105,7 +106,12 @@ def test_depths_of_a_camera_1_are_shown_in_metres_from_the_focused_plane(open_pa
     )
     alphas = np.linspace(0.9, 1.1, 320).reshape(16, 20)
     depth = lg.DepthMap(alphas, np.ones(alphas.shape), "alpha", error=np.full(alphas.shape, 1e-3))
-    shown = viewer.Exhibit("views", views=views, depth=lambda: depth, focal_length=focal_length)
+
+    def metres(disparities):
+        found = lg.DepthMap(disparities, np.ones(disparities.shape), "disparity")
+        return lg.depth.metric(found, views, focal_length=focal_length).values
+
+    shown = viewer.Exhibit("views", views=views, depth=lambda: depth, metres=metres)
     expected = lg.depth.metric(depth, views, focal_length=focal_length).values
     with served(shown) as address:
         page = open_page(f"{address}#mode=depth")
@@ -116,8 +122,40 @@ def test_depths_of_a_camera_1_are_shown_in_metres_from_the_focused_plane(open_pa
             page.wait("lumigraph.app.main.readout.textContent.includes('depth ')")
             words = page.page.inner_text(".readout")
             found, unit = words.split("depth ")[1].split()[:2]
-            assert float(found) * {"mm": 1e-3, "µm": 1e-6}[unit] == pytest.approx(expected[y, x], abs=5e-5)
+            assert float(found.replace("−", "-")) * {"mm": 1e-3, "µm": 1e-6}[unit] == pytest.approx(
+                expected[y, x], abs=5e-5
+            )
             assert "lenslets" in words
         ends = [page.page.inner_text(f"#legend-{end}") for end in ("low", "high")]
-        assert [end[0] for end in ends] == ["-", "+"] if expected[0, 0] < 0 else ["+", "-"]
-        assert page.page.inner_text("#legend-label") == "from the focused plane"
+        assert [end[0] for end in ends] == (["−", "+"] if expected[0, 0] < 0 else ["+", "−"])
+        assert page.page.inner_text("#legend-label") == "from focus"
+
+
+@pytest.mark.parametrize("kind", ["camera whose range was widened", "microscope"])
+def test_depths_in_metres_are_those_of_the_command_line_however_the_page_counts_lenslets(kind):
+    if kind == "microscope":
+        camera = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
+            lenslets={"count": (9, 9)}, sensor={"shape": (140, 140)}
+        )
+    else:
+        camera = lg.PlenopticCamera(
+            wavelength=550e-9,
+            object_distance=0.24,
+            main_lens={"focal_length": 0.12},
+            lenslets={"pitch": 150e-6, "focal_length": 20e-3, "count": (61, 61)},
+            sensor={"pixel_pitch": 10e-6},
+        )
+    raw = lg.RawImage(np.random.default_rng(0).random(camera.sensor.shape).astype(np.float32))
+    shown = opening.of_raw("raw", raw, camera.calibration, origin=viewer.Origin(camera=camera))
+    assert shown.relative == (kind != "microscope")
+    views = lg.decode(lg.prepare(raw, camera.calibration), camera.calibration)
+    alphas, depths = object_depths(shown.views, shown.metres)
+    found = lg.DepthMap(np.array([alphas]), np.ones((1, len(alphas))), "alpha")
+    same = lg.depth.disparity_of(found, shown.views)  # in lenslets a view, which widening leaves as they are
+    if kind == "microscope":
+        expected = lg.depth.defocus(same, views, camera.depth_per_alpha)
+    else:
+        expected = lg.depth.metric(same, views, focal_length=0.12)
+        assert np.ptp(lg.depth.alpha_of(same, views).values) > 1.5 * np.ptp(alphas)
+    np.testing.assert_allclose(depths, expected.values[0], rtol=1e-6, atol=1e-12)
+    assert min(depths) < 0 < max(depths)

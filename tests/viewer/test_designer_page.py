@@ -75,6 +75,22 @@ def test_values_change_everything_and_wrong_ones_are_told(page, tmp_path):
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
+def test_a_place_is_kept_for_pictures_that_are_not_there_yet(page):
+    with designer("thesis-plenoptic-1") as address:
+        page.route("**/call/layout", lambda route: None)
+        page.route("**/call/point", lambda route: None)
+        page.goto(address, wait_until="commit")
+        for box, words in (("#rays", "Drawing …"), ("#spot", "Simulating …")):
+            page.wait_for_selector(f"{box} .hint")
+            assert page.inner_text(box) == words
+            assert page.locator(box).bounding_box()["height"] > 100
+    with designer("thesis-plenoptic-1") as address:
+        page.unroute_all()
+        page.goto(address)
+        settle(page)
+        assert page.inner_text("#rays") == page.inner_text("#spot") == ""
+
+
 def test_a_link_restores_the_values(page):
     with designer("thesis-plenoptic-2-m050") as address:
         page.goto(f"{address}#lenslets.magnification=0.4&dz=5&lenslets.pitch=x&unknown=1")

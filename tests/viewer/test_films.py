@@ -5,33 +5,7 @@ import pytest
 
 import lumigraph as lg
 from lumigraph.viewer.opening import of_views, of_volume
-from viewer_pages import FAR, NEAR, served
-
-
-def frames_of(path):
-    av = pytest.importorskip("av", reason="PyAV is not installed")
-    with av.open(str(path)) as container:
-        (stream,) = container.streams.video
-        assert float(stream.average_rate) == 25
-        pictures = [
-            (float(frame.time), frame.to_ndarray(format="rgb24").astype(float))
-            for frame in container.decode(stream)
-        ]
-        return (
-            [time for time, _ in pictures],
-            np.array([picture for _, picture in pictures]),
-            container.duration / 1e6,
-        )
-
-
-def film(page, what, seconds, path):
-    page.page.click("#save-film")
-    page.page.select_option("#film-what", what)
-    page.page.fill("#film-seconds", str(seconds))
-    with page.page.expect_download() as download:
-        page.page.click("#film-start")
-    download.value.save_as(path)
-    return download.value.suggested_filename
+from viewer_pages import FAR, NEAR, film, frames_of, served
 
 
 def test_a_pull_of_focus_has_every_frame_as_the_library_refocuses_it(open_page, views, tmp_path):

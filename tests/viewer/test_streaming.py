@@ -17,7 +17,7 @@ from lumigraph.errors import FormatError
 from lumigraph.viewer.encoding import Coding
 from lumigraph.viewer.opening import of_views, of_volume
 from lumigraph.viewer.pyramid import Pyramid, halved
-from viewer_pages import two_planes
+from viewer_pages import film, frames_of, two_planes
 
 LEVELS = 1.0  # of 255: rounding is 0.5; another place of a tile by one sample differs by more than 20
 FINER = "lumigraph.app.main.model.finer"
@@ -117,6 +117,46 @@ def test_finer_pictures_are_those_of_the_library(open_page, tmp_path, masked, rn
         page.set(focus=1.12, aperture=0.6)
         small = lg.reduce_aperture(views, 0.6)
         assert np.abs(page.pixels() - levels(lg.refocus(small, 1.12))).max() <= LEVELS
+
+
+def test_only_the_part_on_the_screen_is_drawn(open_page, tmp_path):
+    views = two_planes()
+    large = lg.LightField(
+        np.tile(views.data, (1, 1, 3, 3, 1)), views.aperture, lg.Grid((120, 192), 1.0), views.separation
+    )
+    exported(of_views("two planes", large), tmp_path / "page", coarse=120_000, tile=32)
+    with files(tmp_path / "page") as (address, _):
+        page = open_page(f"{address}#focus=0.93&zoom=6&at=9,24")
+        at_rest(page, "views", 1)
+        page.wait("lumigraph.app.main.finest?.factor === 0.25")
+        found = page.pixels()
+        low, origin, factor = page.page.evaluate(
+            "(({ low, origin, factor }) => [low, origin, factor])(lumigraph.app.main.finest)"
+        )
+        top, left = (
+            round(max(0, np.ceil((a - b) / factor)) + b / factor) for a, b in zip(low, origin, strict=True)
+        )
+        height, width = found.shape[:2]
+        assert height < 120
+        assert width < 192
+        expected = levels(lg.refocus(large, 0.93))[top : top + height, left : left + width]
+        assert np.abs(found - expected).max() <= LEVELS
+
+
+def test_a_film_of_a_streamed_folder_is_as_fine_as_it_can_be(open_page, tmp_path):
+    views = two_planes()
+    exported(of_views("two planes", views), tmp_path / "page")
+    with files(tmp_path / "page") as (address, _):
+        page = open_page(address)
+        page.page.evaluate("lumigraph.app.main.model.took = 1")
+        assert page.page.evaluate("lumigraph.app.main.model.factor") == 4
+        film(page, "pull", 1, tmp_path / "film.webm")
+        low, high = page.page.evaluate("lumigraph.app.main.model.focus")
+        _, pictures, _ = frames_of(tmp_path / "film.webm")
+        assert pictures.shape == (25, 40, 64, 3)
+        for k in (0, 9):
+            alpha = low + (high - low) * (1 - np.cos(2 * np.pi * k / 25)) / 2
+            assert np.sqrt(((pictures[k] - levels(lg.refocus(views, alpha))) ** 2).mean()) < 20
 
 
 def levels(picture):

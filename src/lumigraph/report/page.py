@@ -102,7 +102,7 @@ class Section:
 
 @dataclass(slots=True)
 class Page:
-    """A report: a title, an introduction and sections.
+    """A report: a title, an introduction and sections; read again every `refresh` seconds, if above 0.
 
     Examples
     --------
@@ -116,6 +116,7 @@ class Page:
     title: str
     introduction: str = ""
     sections: list[Section] = field(default_factory=list)
+    refresh: int = 0
 
     @property
     def framed(self) -> bool:

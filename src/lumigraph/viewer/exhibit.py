@@ -75,8 +75,9 @@ class Exhibit:
         (what, value) to tell about the file.
     relative
         Whether the refocus factors have no meaning but the shift per view; see `comfortable`.
-    focal_length
-        Of the main lens [m], where it is known: depths are then distances from the focused plane.
+    metres
+        Function from disparities of the views [lenslets or px] to depths from the focused plane [m]; None
+        where the camera is not known.
     """
 
     name: str
@@ -89,7 +90,7 @@ class Exhibit:
     volume: Volume | None = None
     facts: tuple[tuple[str, str], ...] = ()
     relative: bool = False
-    focal_length: float | None = None
+    metres: Callable[[np.ndarray], np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         if all(part is None for part in (self.views, self.raw, self.planes, self.volume)):
@@ -153,17 +154,17 @@ def depth_of(views: LightField) -> Callable[[], DepthMap] | None:
 
 
 def object_depths(
-    views: LightField, focal_length: float, count: int = 129
+    views: LightField, metres: Callable[[np.ndarray], np.ndarray], count: int = 513
 ) -> tuple[list[float], list[float]]:
-    """Refocus factors through the whole range that have an object, and its depths from the focused plane [m].
+    """Refocus factors that have an object, and its depths from the focused plane [m].
 
-    As `lumigraph.depth.metric` gives them.
+    They reach farther than the slider, as measured depths do.
     """
-    from lumigraph.depth import metric
+    from lumigraph.depth import disparity_of
 
-    alphas = np.linspace(*focus_range(views), count)[None]
-    table = DepthMap(alphas, np.ones(alphas.shape), "alpha")
-    depths = to_numpy(metric(table, views, focal_length=focal_length).values)
+    low, high = focus_range(views)
+    alphas = np.linspace(2 * low - high, 2 * high - low, count)[None]
+    depths = metres(to_numpy(disparity_of(DepthMap(alphas, np.ones(alphas.shape), "alpha"), views).values))
     known = np.isfinite(depths)
     return alphas[known].tolist(), depths[known].tolist()
 

@@ -239,10 +239,10 @@ def _coarser_views(
     small, changed = comfortable(
         LightField(data.reshape(shape), views.aperture, lenslets, views.separation, valid)
     )
-    depth = exhibit.depth and depth_of(small)
-    lens = None if changed else exhibit.focal_length
+    depth, finer = exhibit.depth and depth_of(small), exhibit.metres
+    metres = None if finer is None else lambda disparities: finer(disparities * step)
     return dataclasses.replace(
-        exhibit, views=small, depth=depth, relative=exhibit.relative or changed, focal_length=lens
+        exhibit, views=small, depth=depth, relative=exhibit.relative or changed, metres=metres
     )
 
 

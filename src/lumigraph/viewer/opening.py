@@ -2,6 +2,7 @@
 
 import tomllib
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -215,10 +216,11 @@ def of_raw(
         )  # fmt: skip
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SamplingWarning)  # of cameras 2.0, which have been looked for
-        views, relative = comfortable(_decoded(raw, calibration, origin.camera))
+        decoded = _decoded(raw, calibration, origin.camera)
+    views, relative = comfortable(decoded)
     return Exhibit(
         name, views=views, raw=raw, calibration=calibration, depth=depth_of(views),
-        facts=(*facts, *_about_views(views)), relative=relative, focal_length=_lens(origin, views, relative),
+        facts=(*facts, *_about_views(views)), relative=relative, metres=_metres(origin.camera, decoded),
     )  # fmt: skip
 
 
@@ -236,13 +238,21 @@ def _decoded(raw: RawImage, calibration: Calibration, camera: Described | None) 
     return LightField(data, Grid(data.shape[:2], (1.0, 1.0)), Grid(data.shape[2:4], (1.0, 1.0)), 1.0, valid)
 
 
-def _lens(origin: Origin, views: LightField, relative: bool) -> float | None:
-    """Focal length of the main lens, where it and the lengths of the light field are known."""
-    camera = origin.camera
-    if relative or not isinstance(camera, WithMainLens) or isinstance(camera, Rendered):
+def _metres(camera: Described | None, views: LightField) -> Callable[[np.ndarray], np.ndarray] | None:
+    """Depths from the focused plane [m] of disparities, as `lumigraph depth` has them; None if unknown."""
+    from lumigraph.depth import defocus, metric
+
+    def disparities(values: np.ndarray) -> DepthMap:
+        return DepthMap(values, np.ones(values.shape), "disparity")
+
+    if isinstance(camera, WithObjective) and not camera.in_pupil:
+        return lambda values: to_numpy(defocus(disparities(values), views, camera.depth_per_alpha).values)
+    if isinstance(camera, Rendered) or not isinstance(camera, WithMainLens):
         return None
-    focal_length = camera.main_lens.focal_length
-    return focal_length if views.separation > focal_length else None
+    lens = camera.main_lens.focal_length
+    if views.separation <= lens:
+        return None
+    return lambda values: to_numpy(metric(disparities(values), views, focal_length=lens).values)
 
 
 def rendered(raw: RawImage, calibration: Calibration, patch: float | PatchRange) -> Planes:

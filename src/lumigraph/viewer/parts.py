@@ -161,8 +161,8 @@ class Parts:
             self.arrays["error"] = lambda: Coded.of(_expected(once()))
         if (views := exhibit.views) is not None:
             self.about["sharp"] = True
-            if exhibit.focal_length is not None:
-                self.about["depth"]["metres"] = object_depths(views, exhibit.focal_length)
+            if exhibit.metres is not None:
+                self.about["depth"]["metres"] = object_depths(views, exhibit.metres)
             self.arrays["sharp"] = lambda: Coded.of(_sharp(views, once()))
         self.arrays["depth"] = lambda: Coded.of(_finite(to_numpy(once().values)))
         self.arrays["confidence"] = lambda: Coded.of(

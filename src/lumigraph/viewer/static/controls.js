@@ -7,7 +7,7 @@ import { depthMap } from "./models.js";
 import { canQuilt } from "./quilt.js";
 import { filmsOf } from "./film.js";
 import { rulerText } from "./measures.js";
-import { depthText, lengthText } from "./overlay.js";
+import { depthText, lengthText, signed } from "./overlay.js";
 import { turned } from "./turning.js";
 import { cachedMap } from "./tone.js";
 
@@ -143,12 +143,15 @@ export class Controls {
   focus(model, state) {
     const [low, high] = model.focus, { stack } = model.about, input = by("focus");
     Object.assign(input, { min: low, max: high, value: state.focus });
-    by("focus-label").textContent = model.views ? (model.views.relative ? "Disparity" : "Focus α′") : stack?.label ?? "Focus";
+    const metres = Boolean(model.views && model.about.depth?.metres), relative = Boolean(model.views?.relative);
+    by("focus-label").textContent = model.views ? (!relative ? "Focus α′" : metres ? "Focus" : "Disparity") : stack?.label ?? "Focus";
     if (model.views) {
-      const shift = model.factor * viewShifts(model.views, state.focus, 1).step, plane = model.views.metric ? ` · image at ${lengthText(model.views.separation / state.focus)}` : "";
-      const factor = model.views.relative ? "" : `${state.focus.toFixed(4)} · `;
-      tell("focus-out", `${factor}${shift >= 0 ? "+" : "−"}${Math.abs(shift).toFixed(2)} ${model.samples(state).word} per view${plane}`);
-    } else tell("focus-out", `${Number((this.app.main.image?.position ?? state.focus).toPrecision(5))} ${stack?.unit ?? ""}`);
+      const shift = model.factor * viewShifts(model.views, state.focus, 1).step, parts = relative ? [] : [state.focus.toFixed(4)];
+      parts.push(signed(shift, (x) => `${x.toFixed(2)} ${model.samples(state).word} per view`));
+      if (metres) parts.push(`${depthText(model.about.depth, state.focus)} from the focused plane`);
+      else if (model.views.metric) parts.push(`image at ${lengthText(model.views.separation / state.focus)}`);
+      tell("focus-out", parts.join(" · "));
+    } else tell("focus-out", stackText(stack, this.app.main.image?.position ?? state.focus));
     input.setAttribute("aria-valuetext", by("focus-out").value);
   }
 
@@ -187,11 +190,11 @@ export class Controls {
     const range = model.depthRange(), map = cachedMap(depthMap(state));
     const colours = Array.from({ length: 17 }, (_, k) => { const i = 4 * Math.round((k * 255) / 16); return `rgb(${map[i]} ${map[i + 1]} ${map[i + 2]})`; });
     by("legend-bar").style.background = `linear-gradient(to right, ${colours.join(", ")})`;
-    const { metres } = model.about.depth, metric = !metres && model.views?.metric && model.about.depth.label.startsWith("Focus"), place = (x) => lengthText(model.views.separation / x);
+    const { metres, shift } = model.about.depth, metric = !metres && !shift && model.views?.metric && model.about.depth.label.startsWith("Focus"), place = (x) => lengthText(model.views.separation / x);
     const shown = (x) => (metric ? place(x) : depthText(model.about.depth, x));
     by("legend-low").textContent = range ? shown(range[0]) : "";
     by("legend-high").textContent = range ? shown(range[1]) : "";
-    by("legend-label").textContent = metres ? "from the focused plane" : metric ? "image distance" : model.about.depth.label;
+    by("legend-label").textContent = metres ? "from focus" : shift ? "Disparity" : metric ? "image distance" : model.about.depth.label;
   }
 
   measures(state) {
@@ -210,4 +213,12 @@ export class Controls {
       return [term, text];
     }));
   }
+}
+
+/** Where a picture of a stack is focused, with the digits that tell it from its neighbours. */
+function stackText(stack, position) {
+  const { positions = [], unit = "" } = stack ?? {}, step = Math.abs((positions.at(-1) ?? 0) - (positions[0] ?? 0)) / Math.max(positions.length - 1, 1);
+  if (unit === "m") return lengthText(position);
+  const digits = step > 0 ? Math.min(8, Math.max(0, 1 - Math.floor(Math.log10(step)))) : 3;
+  return `${Number(position.toFixed(digits))} ${unit}`.trim();
 }

@@ -143,6 +143,7 @@ class Designer {
 
   pointed(found, error) {
     this.errors.point = error?.message;
+    if (error) at("spot").lastElementChild.textContent = "No image.";
     at("point").classList.toggle("old", Boolean(error));
     if (found) {
       at("point").src = found.png;
@@ -162,6 +163,7 @@ class Designer {
     at("drawing").hidden = !found?.svg && !at("drawing").src;
     if (found?.svg) at("drawing").src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(found.svg)}`;
     this.errors.layout = error?.message;
+    if (error) at("rays").lastElementChild.textContent = "No drawing.";
   }
 
   save() {

@@ -51,7 +51,7 @@ export class Controls {
       const known = v ?? computed;
       if (tick) { tick.checked = v === null; slider.disabled = box.disabled = v === null; }
       if (known === undefined) return;
-      if (document.activeElement !== box) box.value = Number(known.toPrecision(6));
+      if (document.activeElement !== box) box.value = Number(known.toPrecision(v === null ? 5 : 6));
       if (document.activeElement !== slider) slider.value = place(p, known);
       slider.ariaValueText = `${Number(known.toPrecision(4))} ${p.unit}`;
     };

@@ -160,14 +160,24 @@ class Device {
       gl.uniform1f(at.lift, tone.lift);
       gl.uniform1f(at.power, tone.power);
     });
+    this.everywhere();
+  }
+
+  /** What is drawn next changes a part of a texture only: from a corner (x, y) to another. */
+  within([left, top], [right, bottom]) {
+    const { gl } = this;
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(left, top, Math.max(0, right - left), Math.max(0, bottom - top));
+  }
+
+  everywhere() {
     this.gl.disable(this.gl.SCISSOR_TEST);
   }
 
   /** What is drawn next changes a part of the canvas only: [left, top, right, bottom] from its upper left corner. */
   clipTo(clip, height) {
-    const { gl } = this, [left, top, right, bottom] = clip.map(Math.round);
-    gl.enable(gl.SCISSOR_TEST);
-    gl.scissor(left, height - bottom, Math.max(0, right - left), Math.max(0, bottom - top));
+    const [left, top, right, bottom] = clip.map(Math.round);
+    this.within([left, height - bottom], [right, height - top]);
   }
 
   /** Bytes r, g, b, a of an image in its own size, as it is shown. */

@@ -1,10 +1,11 @@
 // A film as a file: every frame is drawn exactly, however long that takes, and encoded by the browser.
 
+import { WIDEST } from "./models.js";
 import { ROUNDS, moment } from "./play.js";
 import { nameOf, pictureCanvas, saveBlob } from "./saving.js";
 import { webm } from "./webm.js";
 
-const RATE = 25, WIDEST = 1920, LEAST_BITS = 1e6; // frames a second, pixels, bits a second
+const RATE = 25, LEAST_BITS = 1e6; // frames a second, pixels, bits a second
 const CODECS = { "vp09.00.41.08": "V_VP9", vp8: "V_VP8" };
 const by = (id) => document.getElementById(id);
 
@@ -21,18 +22,33 @@ async function codecFor(size) {
   throw new Error("This browser encodes neither VP9 nor VP8.");
 }
 
+/** Settings of every frame of a film. */
+function frames(app, what, count) {
+  const start = { ...app.state };
+  return Array.from({ length: count }, (_, k) => ({ ...start, ...moment(what, app.main.model, start, k / count) }));
+}
+
 /** The film as a WebM file; `told` is called with the number of frames that are done. */
 export async function film(app, what, seconds, told, signal) {
-  const count = Math.round(seconds * RATE), start = { ...app.state }, { model } = app.main;
-  const frameOf = (k) => pictureCanvas(app, { ...start, ...moment(what, model, start, k / count) });
+  const count = Math.round(seconds * RATE), states = frames(app, what, count), { model, device } = app.main, plan = model.filmPlan(states);
+  const finer = plan && (await model.filmWindow(plan, device, signal));
+  try {
+    return await encoded(count, (k) => pictureCanvas(app, states[k], finer?.at(states[k])), told, signal);
+  } finally {
+    finer?.release();
+  }
+}
+
+/** Frames as a WebM file. */
+async function encoded(count, frameOf, told, signal) {
   const first = frameOf(0), shrink = Math.min(1, WIDEST / first.width), sheet = document.createElement("canvas");
   [sheet.width, sheet.height] = [first.width, first.height].map((n) => Math.max(2, 2 * Math.floor((n * shrink) / 2))); // encoders want even sizes: an odd one loses its last line
-  const size = { width: sheet.width, height: sheet.height }, setting = await codecFor(size), frames = [];
+  const size = { width: sheet.width, height: sheet.height }, setting = await codecFor(size), coded = [];
   let wrong = null;
   const encoder = new VideoEncoder({ error: (error) => { wrong = error; }, output: (chunk) => {
     const data = new Uint8Array(chunk.byteLength);
     chunk.copyTo(data);
-    frames.push({ data, key: chunk.type === "key", time: Math.round(chunk.timestamp / 1000) });
+    coded.push({ data, key: chunk.type === "key", time: Math.round(chunk.timestamp / 1000) });
   } });
   try {
     encoder.configure(setting);
@@ -50,7 +66,7 @@ export async function film(app, what, seconds, told, signal) {
     if (encoder.state !== "closed") encoder.close();
   }
   if (wrong) throw wrong;
-  return webm({ codec: CODECS[setting.codec], ...size, duration: (1000 * count) / RATE }, frames);
+  return webm({ codec: CODECS[setting.codec], ...size, duration: (1000 * count) / RATE }, coded);
 }
 
 /** The dialog that asks for a film, shows how far it is, and stops it. */
@@ -58,7 +74,7 @@ export class FilmDialog {
   constructor(app) {
     this.app = app;
     by("film-seconds").addEventListener("input", () => this.length());
-    by("film-what").addEventListener("change", () => { by("film-seconds").value = ROUNDS[by("film-what").value]; this.length(); });
+    by("film-what").addEventListener("change", () => { by("film-seconds").value = ROUNDS[by("film-what").value]; this.length(); this.size(); });
     by("film-start").addEventListener("click", () => this.save());
     by("film-stop").addEventListener("click", () => by("film").close());
     by("film").addEventListener("close", () => this.stop?.abort());
@@ -70,10 +86,16 @@ export class FilmDialog {
     by("film-what").replaceChildren(...films.map(([name, words]) => new Option(words, name)));
     by("film-seconds").value = ROUNDS[films[0][0]];
     this.length();
-    const { width, height } = pictureCanvas(this.app, { ...this.app.state }), { factor } = this.app.main.model;
-    by("film-size").textContent = `${width} × ${height} px${factor > 1 ? `: every ${factor} samples of the file, as finer ones are loaded only where somebody looks` : ""}.`;
+    this.size();
     this.show(false, "");
     by("film").showModal();
+  }
+
+  /** How large the film will be, and of a streamed file, how fine. */
+  size() {
+    const { model } = this.app.main, { width, height } = pictureCanvas(this.app, { ...this.app.state }, null), plan = model.filmPlan(frames(this.app, by("film-what").value, RATE));
+    const times = plan ? model.factor / plan.step : 1, step = model.factor / times;
+    by("film-size").textContent = `${times > 1 ? "About " : ""}${times * width} × ${times * height} px${step > 1 ? `: every ${step} samples of the file` : ""}.`;
   }
 
   length() {

@@ -6,6 +6,8 @@ import { loadArray } from "./source.js";
 
 const BUDGET = 192 << 20; // bytes of graphics memory for the pictures of one window
 const AT_ONCE = 8; // requests
+const BLOCK = 64; // samples in which the part that is drawn grows, so that small movements need nothing new
+const SLICE = 100; // ms of drawing, after which the page answers again
 
 /** Tiles of pictures in steps of 1, 2, 4, ... samples; places are in samples of the coarsest. */
 export class Finer {
@@ -13,8 +15,8 @@ export class Finer {
     Object.assign(this, { path, size: [ny, nx], coarsest, tile, pack, bytes, changed, window: null });
   }
 
-  /** The finest window of these pictures (ascending indices) around what is seen that memory, and `most` samples, allow; null where the coarsest does. */
-  plan({ low, high, scale }, pictures, { margin = [0, 0], extra = 0, most = Infinity } = {}) {
+  /** The finest window of these pictures (ascending indices) around what is seen that memory, and drawing `most` samples, allow; null where the coarsest does. */
+  plan({ low, high, scale }, pictures, { margin = [0, 0], extra = 0, most = Infinity, whole = false } = {}) {
     let step = this.coarsest;
     while (step > 1 && this.coarsest / step < scale) step /= 2;
     for (; step < this.coarsest; step *= 2) {
@@ -24,8 +26,9 @@ export class Finer {
       });
       if (tiles.some(([first, last]) => first > last)) return null;
       const sides = tiles.map(([first, last], k) => Math.min((last + 1) * this.tile, Math.ceil(this.size[k] / step)) - first * this.tile);
-      const area = sides[0] * sides[1];
-      if (area * (pictures.length * this.bytes + extra) <= BUDGET && area * pictures.length <= most) return { step, tiles, sides, pictures };
+      const drawn = sides.map((side, k) => (whole ? side : Math.min(side, ((high[k] - low[k] + 2 * margin[k]) * this.coarsest) / step + 2 * BLOCK)));
+      const area = sides[0] * sides[1], samples = drawn[0] * drawn[1] * pictures.length;
+      if (area * (pictures.length * this.bytes + extra) <= BUDGET && samples <= most) return { step, tiles, sides, pictures, samples };
     }
     return null;
   }
@@ -50,11 +53,15 @@ export class Finer {
     this.load(times > 1 ? { ...plan, step, tiles, sides: grown } : { ...plan, sides }, begin, this.stop.signal);
   }
 
+  /** A window that no tile has come into yet. */
+  empty({ step, tiles, sides, pictures, ...rest }, begin) {
+    return Object.assign(begin({ step, tiles, sides, pictures, ...rest }), { step, tiles, sides, kept: new Set(pictures), span });
+  }
+
   async load(plan, begin, signal) {
-    const window = (this.loading = Object.assign(begin(plan), { step: plan.step, tiles: plan.tiles, sides: plan.sides, kept: new Set(plan.pictures), span }));
+    const window = (this.loading = this.empty(plan, begin));
     try {
       await this.fill(window, plan, signal);
-      if (signal.aborted) throw new DOMException("left", "AbortError");
       this.window?.release();
       this.window = window;
       this.error = "";
@@ -74,6 +81,7 @@ export class Finer {
       for (let file = files.shift(); file && !signal.aborted; file = files.shift()) await this.file(window, step, file, signal);
     };
     await Promise.all(Array.from({ length: AT_ONCE }, one));
+    signal.throwIfAborted();
   }
 
   async file(window, step, [j, i, pack], signal) {
@@ -90,13 +98,23 @@ export class Finer {
     }
   }
 
+  /** The part of a window, in its own samples from its first, that shows what is seen, in blocks: {start, end}. */
+  part({ step, tiles, sides }, { low, high }) {
+    const sample = (place, k) => (place * this.coarsest) / step - tiles[k][0] * this.tile;
+    return {
+      start: low.map((place, k) => Math.max(0, BLOCK * Math.floor((sample(place, k) - 2) / BLOCK))),
+      end: high.map((place, k) => Math.min(sides[k], BLOCK * Math.ceil((sample(place, k) + 3) / BLOCK))),
+    };
+  }
+
   /** Where the window stands and what of it is exact, in samples of the coarsest: {origin, factor, low, high}. */
-  place({ step, tiles, sides }, margin = [0, 0]) {
+  place({ step, tiles, sides }, margin = [0, 0], part = { start: [0, 0], end: sides }) {
     const factor = step / this.coarsest, start = tiles.map(([first]) => first * this.tile * factor), end = start.map((s, k) => s + (sides[k] - 1) * factor);
     const whole = this.size.map((n, k) => end[k] / factor >= Math.ceil(n / step) - 1.5);
     return {
       origin: start, factor,
-      low: start.map((s, k) => (s > 0 ? s + margin[k] : -factor / 2)), high: end.map((e, k) => (whole[k] ? e + factor / 2 : e - margin[k])),
+      low: start.map((s, k) => Math.max(s > 0 ? s + margin[k] : -factor / 2, s + (part.start[k] - 0.5) * factor)),
+      high: end.map((e, k) => Math.min(whole[k] ? e + factor / 2 : e - margin[k], start[k] + (part.end[k] - 0.5) * factor)),
     };
   }
 }
@@ -132,22 +150,32 @@ export class ViewsWindow {
     this.refocuser.addPart(at, corner, size, numbers, masks ? this.refocuser.mask : this.refocuser.array);
   }
 
-  /** The picture focused on alpha with the weights of all views; drawn afresh only where they differ. */
-  picture(alpha, weights, alone) {
+  /** The picture focused on alpha with the weights of all views, in a part; null while `patient` drawing goes on from frame to frame. */
+  picture(alpha, weights, alone, { part, patient = false } = {}) {
     const [v0, v1, u0, u1] = this.rect, nu = this.kind.shape[1], own = new Float32Array((v1 - v0 + 1) * (u1 - u0 + 1));
     for (let v = v0, k = 0; v <= v1; v++) for (let u = u0; u <= u1; u++, k++) own[k] = weights[v * nu + u];
-    const key = `${alpha}/${alone}/${own.join()}`;
+    const key = JSON.stringify([alpha, alone, part, ...own]);
     if (key !== this.key) {
-      this.key = key;
-      const start = performance.now();
-      this.drawn = this.refocuser.picture(alpha, own, 1, alone);
-      this.device.finish();
-      this.took = performance.now() - start;
+      this.work?.return();
+      Object.assign(this, { key, work: this.refocuser.drawing(alpha, own, 1, alone, part), took: 0 });
     }
-    return { white: this.kind.white, scale: this.views.scale, offset: this.views.offset, bits: this.views.bits, ...this.drawn };
+    if (this.work) this.draw(patient ? SLICE : Infinity);
+    return this.work ? null : { white: this.kind.white, scale: this.views.scale, offset: this.views.offset, bits: this.views.bits, ...this.drawn };
+  }
+
+  /** Goes on with what is being drawn, for some time [ms]. */
+  draw(longest) {
+    const start = performance.now();
+    while (this.work && performance.now() - start < longest) {
+      const { done, value } = this.work.next();
+      if (done) [this.drawn, this.work] = [value, null];
+      this.device.finish();
+    }
+    this.took += performance.now() - start;
   }
 
   release() {
+    this.work?.return();
     this.refocuser?.release();
   }
 }

@@ -8,19 +8,27 @@ import { layoutOf, sectionNumbers } from "./sections.js";
 import { loadArray } from "./source.js";
 import { cachedMap } from "./tone.js";
 
-const PATIENCE = 1500; // ms that a finer picture may take at rest
+const PATIENCE = 1500, LONGEST = 15000; // ms that a finer picture may take at rest: at once, and from frame to frame
+export const WIDEST = 1920; // pixels across a film
 const SLOW = 45; // ms for one refocused picture, above which a focal stack is shown while the focus moves
 
 export class Model {
   constructor(number, about, changed) {
     Object.assign(this, { number, about, changed, arrays: {}, finer: {}, wanted: new Set(), errors: {}, turns: true, slow: false, complete: false });
     this.views = about.views ? { ...about.views } : null;
+    if (about.views && !about.views.metric && about.depth && !about.depth.metres) about.depth.shift = this.shift();
     for (const what of ["views", "volume"]) if (about[what]?.finer) this.finer[what] = new Finer(`${number}/${what}-tiles`, about[what].finer, bytesOf(about, what), changed);
   }
 
   /** Samples of the file for one of the pictures that the page has from the start. */
   get factor() {
     return (this.finer.views ?? this.finer.volume)?.coarsest ?? 1;
+  }
+
+  /** The shift from view to view [samples of the file] for a refocus factor of 0, and what those samples are. */
+  shift() {
+    const { aperture, lenslets } = this.about.views, coarsest = this.about.views.finer?.coarsest ?? 1;
+    return { per: (coarsest * aperture.pitch[1]) / lenslets.pitch[1], word: this.about.raw ? "lenslets" : "px" };
   }
 
   /** What the samples of a mode's picture are, lenslets of a decoded raw image or pixels, and how many of the file one stands for. */
@@ -125,16 +133,39 @@ export class Model {
     return shown ?? null;
   }
 
+  /** What a film of these settings can be drawn from that is finer than what the page has; null where nothing is. */
+  filmPlan(states) {
+    const { views, finer: { views: finer } } = this;
+    if (!finer || !this.complete || !this.refocuser || states[0].mode !== "picture" || states[0].renderer === "stack") return null;
+    const [nv, nu, nt, ns] = views.shape, all = states.map((state) => used(views, viewWeights(views, state), state.focus));
+    const rect = [0, 1, 2, 3].map((k) => Math[k % 2 ? "max" : "min"](...all.map((one) => one.rect[k]))), margin = [0, 1].map((k) => Math.max(...all.map((one) => one.margin[k])));
+    const pictures = Array.from({ length: nv * nu }, (_, k) => k).filter((k) => k >= rect[0] * nu && k < (rect[1] + 1) * nu && k % nu >= rect[2] && k % nu <= rect[3]);
+    const most = (PATIENCE / Math.max(this.took, 1)) * nv * nu * nt * ns * views.detail, seen = { low: [0, 0], high: [nt - 1, ns - 1], scale: WIDEST / ns };
+    const plan = finer.plan(seen, pictures, { margin, most, whole: true, extra: 16 * (rect[1] - rect[0] + 2) });
+    return plan && { ...plan, rect, margin };
+  }
+
+  /** The window of a film's plan, and a function of its settings that gives their finer pictures. */
+  async filmWindow(plan, device, signal) {
+    const { views, finer: { views: finer } } = this, window = finer.empty(plan, (found) => new ViewsWindow(device, views, found, finer.coarsest));
+    try { await finer.fill(window, plan, signal); } catch (error) { window.release(); throw error; }
+    const place = finer.place(window, plan.margin);
+    return { release: () => window.release(), at: (state) => ({ ...place, image: window.picture(state.focus, viewWeights(views, state), isAlone(views, state)) }) };
+  }
+
   fineViews(state, device, seen, settled) {
     const { views, finer: { views: finer } } = this;
     if (!finer || !this.complete || !this.refocuser || state.renderer === "stack") return null;
     const weights = viewWeights(views, state), { rect, pictures, margin } = used(views, weights, state.focus);
     const [nv, nu, nt, ns] = views.shape;
-    const most = (PATIENCE / Math.max(this.took, 1)) * nv * nu * nt * ns * views.detail, plan = finer.plan(seen, pictures, { margin, most, extra: 16 * (rect[1] - rect[0] + 2) });
+    const each = Math.max(this.took, 1) / (nv * nu * nt * ns * views.detail), longest = views.masked ? PATIENCE : LONGEST;
+    const plan = finer.plan(seen, pictures, { margin, most: longest / each, whole: views.masked, extra: 16 * (rect[1] - rect[0] + 2) });
     if (settled && plan) finer.want({ ...plan, rect }, (found) => new ViewsWindow(device, views, { ...found, rect }, finer.coarsest));
     const { window } = finer;
     if (!plan || !window || !pictures.every((index) => window.kept.has(index)) || (!settled && (this.slow || window.took > SLOW))) return null;
-    return { ...finer.place(window, margin), image: window.picture(state.focus, weights, isAlone(views, state)) };
+    const part = finer.part(window, seen), image = window.picture(state.focus, weights, isAlone(views, state), { part, patient: plan.samples * each > PATIENCE });
+    if (!image) this.changed();
+    return image && { ...finer.place(window, margin, views.masked ? undefined : part), image };
   }
 
   finePlane(state, device, seen, settled) {
@@ -161,13 +192,21 @@ export class Model {
     const forced = state.renderer === "stack", whole = state.aperture === 1;
     if (this.complete && this.refocuser && !forced && (settled || !this.slow || !whole || !this.arrays.stack)) {
       const weights = viewWeights(views, state), detail = state.detail ?? views.detail;
-      return this.seen({ ...this.refocuser.picture(state.focus, weights, detail, isAlone(views, state)), detail, exact: true });
+      return this.seen({ ...this.refocused(state, weights, detail), detail, exact: true });
     }
     if (this.complete && (!this.refocuser || forced || this.slow) && whole) {
       const plane = this.plane(state.focus);
       if (plane) return plane;
     }
     return this.oneView(middleView(views, state.aperture, state.view).map(Math.round));
+  }
+
+  /** The refocused picture; drawn afresh only where the last one was another. */
+  refocused({ focus, aperture, shape, view }, weights, detail) {
+    const { refocuser, views } = this, key = JSON.stringify([focus, aperture, shape, view, detail]);
+    if (refocuser.key !== key) this.drawn = refocuser.picture(focus, weights, detail, isAlone(views, { aperture }));
+    refocuser.key = key;
+    return this.drawn;
   }
 
   seen(image) {

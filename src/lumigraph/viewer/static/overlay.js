@@ -88,12 +88,12 @@ export function drawScaleBar(context, metresPerPixel, { width, height }) {
   context.fillText(lengthText(length), x + pixels / 2, y - 7);
 }
 
-/** A length [m] for people. */
-export function lengthText(metres) {
+/** A length [m] for people; in the unit that suits another one. */
+export function lengthText(metres, digits = 4, like = metres) {
   if (Math.abs(metres) < 1e-12) return "0 µm";
-  const size = Math.abs(metres);
+  const size = Math.abs(like);
   const [unit, value] = size >= 1 ? ["m", 1] : size >= 1e-3 ? ["mm", 1e3] : size >= 1e-6 ? ["µm", 1e6] : ["nm", 1e9];
-  return `${Number((metres * value).toPrecision(4))} ${unit}`;
+  return `${Number((metres * value).toPrecision(digits))} ${unit}`;
 }
 
 /** Depth from the focused plane [m] of a refocus factor, from the table of a camera; null beyond infinity. */
@@ -102,22 +102,29 @@ export function metresOf({ metres: [alphas, depths] }, alpha) {
   return alphas.length < 2 || alpha < alphas[0] || alpha > alphas.at(-1) ? null : depths[k - 1] + part * (depths[k] - depths[k - 1]);
 }
 
-/** A depth as its map counts it; in metres where the camera is known. */
+/** A depth as its map counts it: in metres where the camera is known, as a shift per view where that is all that has a meaning. */
 export function depthText(about, value, digits = 3) {
-  const { unit, metres } = about, depth = metres ? metresOf(about, value) : null;
-  if (metres) return depth === null ? "beyond" : `${depth > 0 ? "+" : ""}${lengthText(depth)}`;
+  const { unit, metres, shift } = about, depth = metres ? metresOf(about, value) : null;
+  if (metres) return depth === null ? "beyond infinity" : signed(depth, lengthText);
+  if (shift) return signed((1 - value) * shift.per, (x) => `${x.toFixed(2)} ${shift.word} per view`);
   return unit === "m" ? lengthText(value) : `${value.toFixed(digits)} ${unit}`.trim();
 }
 
-/** An error of a refocus factor as one of the depth. */
+/** A number with its sign in front. */
+export function signed(value, text) {
+  return `${value > 0 ? "+" : value < 0 ? "−" : ""}${text(Math.abs(value))}`;
+}
+
+/** An error of a depth as its map counts it, with the digits that an error has. */
 function errorText(about, value, error) {
+  if (about.shift || !about.metres) return `${Number((error * (about.shift?.per ?? 1)).toPrecision(2))} ${about.shift ? "" : about.unit}`.trim();
   const ends = [-1, 1].map((sign) => metresOf(about, value + sign * error));
-  return ends.includes(null) ? "?" : lengthText(Math.abs(ends[1] - ends[0]) / 2);
+  return ends.includes(null) ? "?" : lengthText(Math.abs(ends[1] - ends[0]) / 2, 2, metresOf(about, value));
 }
 
 /** What a place of a depth map says: value, the error to expect, confidence. */
 export function depthTexts(about, { value, error, confidence }) {
-  const label = about.metres ? "depth" : about.label === "Focus α′" ? "α′" : about.label.toLowerCase();
-  const spread = error === null ? "" : ` ± ${about.metres ? errorText(about, value, error) : depthText(about, error)}`;
+  const label = about.metres ? "depth" : about.shift ? "disparity" : about.label === "Focus α′" ? "α′" : about.label.toLowerCase();
+  const spread = error === null ? "" : ` ± ${errorText(about, value, error)}`;
   return [`${label} ${depthText(about, value, 4)}${spread}`, `confidence ${confidence.toFixed(2)}`];
 }

@@ -348,8 +348,8 @@ export class Pane {
   }
 
   /** The picture that settings ask for in its own size: bytes, and where places of the exhibit lie in it. */
-  pixels(state = this.app.state) {
-    if (this.finest && state === this.app.state) return this.finePixels(this.finest);
+  pixels(state = this.app.state, finest = state === this.app.state ? this.finest : null) {
+    if (finest) return this.finePixels(finest);
     const image = this.model.image(state, this.device, true);
     if (!image) return image;
     const { nx: width, ny: height, aspect, unit, detail } = image, place = Object.assign((y, x) => [y * detail, x * detail], { step: detail });

@@ -60,6 +60,13 @@ export class Refocuser {
 
   /** The picture focused on alpha: {nx, ny, channels, texture}; `alone`: of one view, which has no black edge. */
   picture(alpha, weights, detail, alone = false) {
+    const work = this.drawing(alpha, weights, detail, alone);
+    this.key = null;
+    for (;;) { const { done, value } = work.next(); if (done) return value; }
+  }
+
+  /** The same in steps, one for each row of the aperture; of valid views, only a part {start, end} of the picture. */
+  *drawing(alpha, weights, detail, alone = false, part = null) {
     const { device, views } = this, [nv, nu, nt, ns] = views.shape;
     const nx = (ns - 1) * detail + 1, ny = (nt - 1) * detail + 1;
     this.prepare(nx, ny);
@@ -67,35 +74,48 @@ export class Refocuser {
     for (let v = 0; v < nv; v++) used[v] = weights.subarray(v * nu, (v + 1) * nu).some((w) => w > 0) ? 1 : 0;
     const all = this.weights(weights, nu, nv), rows = this.weights(used, nv, 1);
     const across = viewShifts(views, alpha, 1), along = viewShifts(views, alpha, 0);
-    const shear = device.program("shear-row", SHEAR_ROW);
-    for (let v = 0; v < nv; v++) if (used[v]) device.draw(shear, [nx, nt], this.rows, (at, gl) => {
-      device.bind(0, gl.TEXTURE_2D_ARRAY, this.array.texture, at.views);
-      device.bind(1, gl.TEXTURE_2D, all, at.weights);
-      device.bind(2, gl.TEXTURE_2D_ARRAY, this.mask.texture, at.valid);
-      gl.uniform1i(at.masked, views.masked ? 1 : 0);
-      gl.uniform1i(at.alone, alone ? 1 : 0);
-      gl.uniform1i(at.row, v);
-      gl.uniform1i(at.count, nu);
-      gl.uniform2i(at.size, ns, nt);
-      gl.uniform2i(at.tiles, ...this.tiles);
-      gl.uniform1f(at.first, across.first);
-      gl.uniform1f(at.step_, across.step);
-      gl.uniform1f(at.detail, detail);
-    }, v);
-    const shares = views.masked ? this.weights(rowShares(weights, [nv, nu, nx, ns], across, detail, alone), nx, nv) : rows;
-    device.draw(device.program("shear-column", SHEAR_COLUMN), [nx, ny], this.target, (at, gl) => {
-      device.bind(0, gl.TEXTURE_2D_ARRAY, this.rows, at.rows);
-      device.bind(1, gl.TEXTURE_2D, rows, at.weights);
-      device.bind(2, gl.TEXTURE_2D, shares, at.shares);
-      gl.uniform1i(at.masked, views.masked ? 1 : 0);
-      gl.uniform1i(at.count, nv);
-      gl.uniform1i(at.alone, alone ? 1 : 0);
-      gl.uniform1i(at.height, nt);
-      gl.uniform1f(at.first, along.first);
-      gl.uniform1f(at.step_, along.step);
-      gl.uniform1f(at.detail, detail);
-    });
-    for (const texture of new Set([all, rows, shares])) device.gl.deleteTexture(texture);
+    const shear = device.program("shear-row", SHEAR_ROW), made = [all, rows];
+    const cut = !views.masked && part, reach = cut && 2 + Math.ceil(Math.max(...[0, nv - 1].map((v) => Math.abs(along.first + v * along.step))));
+    const within = (margin, draw) => {
+      if (cut) device.within([cut.start[1], cut.start[0] - margin], [cut.end[1], cut.end[0] + margin]);
+      draw();
+      if (cut) device.everywhere();
+    };
+    try {
+      for (let v = 0; v < nv; v++) if (used[v]) {
+        within(reach, () => device.draw(shear, [nx, nt], this.rows, (at, gl) => {
+        device.bind(0, gl.TEXTURE_2D_ARRAY, this.array.texture, at.views);
+        device.bind(1, gl.TEXTURE_2D, all, at.weights);
+        device.bind(2, gl.TEXTURE_2D_ARRAY, this.mask.texture, at.valid);
+        gl.uniform1i(at.masked, views.masked ? 1 : 0);
+        gl.uniform1i(at.alone, alone ? 1 : 0);
+        gl.uniform1i(at.row, v);
+        gl.uniform1i(at.count, nu);
+        gl.uniform2i(at.size, ns, nt);
+        gl.uniform2i(at.tiles, ...this.tiles);
+        gl.uniform1f(at.first, across.first);
+        gl.uniform1f(at.step_, across.step);
+        gl.uniform1f(at.detail, detail);
+      }, v));
+        yield;
+      }
+      const shares = views.masked ? this.weights(rowShares(weights, [nv, nu, nx, ns], across, detail, alone), nx, nv) : rows;
+      made.push(shares);
+      within(0, () => device.draw(device.program("shear-column", SHEAR_COLUMN), [nx, ny], this.target, (at, gl) => {
+        device.bind(0, gl.TEXTURE_2D_ARRAY, this.rows, at.rows);
+        device.bind(1, gl.TEXTURE_2D, rows, at.weights);
+        device.bind(2, gl.TEXTURE_2D, shares, at.shares);
+        gl.uniform1i(at.masked, views.masked ? 1 : 0);
+        gl.uniform1i(at.count, nv);
+        gl.uniform1i(at.alone, alone ? 1 : 0);
+        gl.uniform1i(at.height, nt);
+        gl.uniform1f(at.first, along.first);
+        gl.uniform1f(at.step_, along.step);
+        gl.uniform1f(at.detail, detail);
+      }));
+    } finally {
+      for (const texture of new Set(made)) device.gl.deleteTexture(texture);
+    }
     return { nx, ny, channels: views.channels, texture: views.masked ? this.closed(nx, ny) : this.target };
   }
 

@@ -39,9 +39,9 @@ function partCanvas({ width, height, data, aspect, unit, place, samples, over },
   return sheet;
 }
 
-/** Every pane's picture side by side. */
-export function pictureCanvas(app, state = app.state) {
-  const parts = app.panes.map((pane) => pane.pixels(state)).filter(Boolean).map((part) => partCanvas(part, state));
+/** Every pane's picture side by side; the first's of what is finer, where that is given. */
+export function pictureCanvas(app, state = app.state, finest = undefined) {
+  const parts = app.panes.map((pane, k) => pane.pixels(state, k ? undefined : finest)).filter(Boolean).map((part) => partCanvas(part, state));
   if (parts.length === 1) return parts[0];
   const sheet = document.createElement("canvas");
   sheet.width = parts.reduce((sum, { width }) => sum + width, 0);
