@@ -62,7 +62,7 @@ audit: $(READY)  ## known holes in the locked dependencies; fails where no advis
 		{ echo "audit: holes are listed above; if none are, the advisory service of PyPI did not answer"; exit 1; }
 
 docs: $(READY)  ## the site, with its gallery: site/index.html; strict, without a network once its tools are there
-	@$(BIN)/python -c "import furo, myst_nb, sphinx_gallery" 2>/dev/null || \
+	@$(BIN)/python -c "import furo, hypothesis, myst_nb, sphinx_gallery" 2>/dev/null || \
 		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r docs/requirements.lock
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html docs site
 

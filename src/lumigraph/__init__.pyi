@@ -35,6 +35,7 @@ from .errors import (
     FormatError as FormatError,
     GeometryError as GeometryError,
     LumigraphError as LumigraphError,
+    ParaxialWarning as ParaxialWarning,
     SamplingError as SamplingError,
     SamplingWarning as SamplingWarning,
 )

@@ -6,7 +6,8 @@
   point, and `BiasCurve`, which corrects what diffraction does to either
 - `correlation`: patch sizes of a plenoptic 2.0 camera's lenslets, from neighbouring micro-images;
   `dense`: of each sample of its picture, by `sightings`, what all micro-images show of it; `flat`: raw images
-  without the shading of micro-images; `of_pixels` is all of it, from a raw image to its picture's patches
+  without the shading of micro-images; `of_pixels` is all of it, from a raw image to its picture's patches,
+  `of_lenslets` the same for lenslets
 - `bias`: `unbiased`, a map corrected by planes of known depth
 - `fuse`: several maps as one, smooth but for kinks and jumps
 - `metric`: distances through the camera's geometry: metres, virtual depths, points in space
@@ -25,7 +26,7 @@ from lumigraph.depth.epi import epi
 from lumigraph.depth.from_focus import BiasCurve, from_focus, point_alpha, sharpness
 from lumigraph.depth.fuse import fuse
 from lumigraph.depth.metric import cloud, defocus, metric, virtual_depth
-from lumigraph.depth.of_pixels import PixelDepth, of_pixels
+from lumigraph.depth.of_pixels import PixelDepth, of_lenslets, of_pixels
 from lumigraph.depth.pictures import measurable
 from lumigraph.depth.quantities import alpha_of, disparity_of
 
@@ -44,6 +45,7 @@ __all__ = [
     "fuse",
     "measurable",
     "metric",
+    "of_lenslets",
     "of_pixels",
     "point_alpha",
     "sharpness",

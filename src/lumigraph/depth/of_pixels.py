@@ -35,6 +35,23 @@ class PixelDepth(NamedTuple):
 
 
 @of_raw
+def of_lenslets(
+    raw: RawImage | Array,
+    calibration: Calibration,
+    patches: tuple[float, float] | None = None,
+    *,
+    focus: Sequence[float] | None = None,
+    progress: Progress = silent,
+) -> tuple[DepthMap, tuple[float, ...] | None]:
+    """Patch [px] of each lenslet (`correlation`), and `focus` in the order that the raw image shows.
+
+    The arguments are those of `of_pixels`; both are what `lumigraph.render` takes.
+    """
+    lenslets = correlation(raw, calibration, patches, progress=progress)
+    return lenslets, None if focus is None else match_kinds(raw, calibration, lenslets.values, focus)
+
+
+@of_raw
 def of_pixels(
     raw: RawImage | Array,
     calibration: Calibration,
@@ -66,7 +83,8 @@ def of_pixels(
     CalibrationError, GeometryError, LumigraphError
         As `correlation`, `lumigraph.rendering.match_kinds` and `dense`.
     """
-    lenslets = correlation(raw, calibration, patches, progress=within(progress, 0, _LENSLETS))
-    order = None if focus is None else match_kinds(raw, calibration, lenslets.values, focus)
+    lenslets, order = of_lenslets(
+        raw, calibration, patches, focus=focus, progress=within(progress, 0, _LENSLETS)
+    )
     found = dense(raw, calibration, lenslets, focus=order, progress=within(progress, _LENSLETS, 1))
     return PixelDepth(found, lenslets, order)
