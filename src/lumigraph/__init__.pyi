@@ -8,6 +8,7 @@ from . import (
     metric as metric,
     plots as plots,
     samples as samples,
+    tolerance as tolerance,
     units as units,
 )
 from .calibration import calibrate as calibrate, devignette as devignette

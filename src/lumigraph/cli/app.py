@@ -35,6 +35,7 @@ from lumigraph.cli.reproduce import reproduce
 from lumigraph.cli.samples import samples
 from lumigraph.cli.simulate import simulate
 from lumigraph.cli.sweep import sweep
+from lumigraph.cli.tolerance import tolerance
 from lumigraph.cli.twin import twin
 from lumigraph.cli.view import view
 from lumigraph.errors import LumigraphError
@@ -46,7 +47,7 @@ _LONGEST = 400  # characters of a line on standard error
 
 VERBS = (
     demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure, batch, sweep,
-    dataset, board, datasheet, twin, view, samples, catalogue, reproduce,
+    tolerance, dataset, board, datasheet, twin, view, samples, catalogue, reproduce,
 )  # fmt: skip
 """In the order of their use."""
 

@@ -5,6 +5,7 @@
 - `plenoptic2`: `FocusedPlenopticCamera`, lenslets that relay the main-lens image
 - `microscope`: `LightFieldMicroscope` and its operator; `microscope_objective`: its `MicroscopeObjective`
 - `parts`: `MainLens`, `Lenslets`, `Pixels`: the tables of a camera file
+- `built`: `Built`, distances as built; `tolerances`: `Tolerance`, how far values may be off
 - `loading`: `load_camera` for every kind
 - `instrument`, `camera`, `lenslet_camera`: what the kinds share; `capabilities`: what some of them can do
 - `parameters`: what a designer can change; `point_view`: a point's image at once
@@ -14,6 +15,7 @@
 - `quantities`, `problems`, `files`: numbers with units, errors in one line, TOML and the `catalogue`
 """
 
+from lumigraph.instruments.built import Built
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.files import catalogue
@@ -27,8 +29,10 @@ from lumigraph.instruments.plenoptic1 import PlenopticCamera
 from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
 from lumigraph.instruments.row import Row
 from lumigraph.instruments.single_lens import SingleLensCamera
+from lumigraph.instruments.tolerances import Tolerance
 
 __all__ = [
+    "Built",
     "Camera",
     "Description",
     "FocusedPlenopticCamera",
@@ -42,6 +46,7 @@ __all__ = [
     "PlenopticCamera",
     "Row",
     "SingleLensCamera",
+    "Tolerance",
     "catalogue",
     "load_camera",
 ]

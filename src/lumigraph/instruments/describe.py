@@ -86,7 +86,7 @@ def plenoptic2(camera: "FocusedPlenopticCamera") -> Description:
 
 def _with_lenslets(camera: "LensletCamera", own: tuple[str, tuple[Row, ...]]) -> Description:
     sections = (
-        ("Geometry", tuple(_geometry(camera))),
+        ("Geometry", (*_geometry(camera), *_distances(camera))),
         ("Main lens", tuple(_main_lens(camera))),
         ("Lenslets", tuple(_lenslets(camera))),
         own,
@@ -102,19 +102,24 @@ def _title(camera: "Camera") -> str:
 
 
 def _geometry(camera: "Camera") -> Iterator[Row]:
-    z1, z2, length = camera.object_distance, camera.image_distance, camera.separation
+    z1, z2 = camera.object_distance, camera.image_distance
     yield Row("wavelength", camera.wavelength, "m", "given")
     yield Row("object distance", z1, "m", "z1, given")
     yield Row("image distance", z2, "m", "z2 = f z1 / (z1 - f)")
     yield Row("magnification", camera.magnification, "", "z2 / z1")
-    if camera.lenslet_distance is not None:
-        if length != z2:
-            yield Row("relay distance", length - z2, "m", "a = b/m, main-lens image to lenslets")
-        yield Row(
-            "separation", length, "m", "L = z2 + a, main lens to lenslets" if length != z2 else "F = z2"
-        )
-        source = "b = f_µ (1 + m)" if length != z2 else "b = f_µ"
-        yield Row("lenslet distance", camera.lenslet_distance, "m", f"{source}, lenslets to sensor")
+
+
+def _distances(camera: "LensletCamera") -> Iterator[Row]:
+    z2, length, built = camera.image_distance, camera.separation, camera.built
+    sources = ("F = z2", "b = f_µ")
+    if length != z2:
+        source = "a = L - z2" if built else "a = b/m"
+        yield Row("relay distance", length - z2, "m", f"{source}, main-lens image to lenslets")
+        sources = ("L = z2 + a, main lens to lenslets", "b = f_µ (1 + m)")
+    given = "as built, main lens to lenslets"
+    yield Row("separation", length, "m", given if built.separation else sources[0])
+    source = "as built" if built.lenslet_distance else sources[1]
+    yield Row("lenslet distance", camera.lenslet_distance, "m", f"{source}, lenslets to sensor")
 
 
 def _main_lens(camera: "Camera") -> Iterator[Row]:

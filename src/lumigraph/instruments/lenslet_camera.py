@@ -4,7 +4,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, Self
+
+from pydantic import Field
 
 from lumigraph.core import checks
 from lumigraph.core.calibration import Calibration
@@ -16,10 +18,12 @@ from lumigraph.design.layout import LensletLayout
 from lumigraph.elements import LensletArray, Train
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import grids, point_view
+from lumigraph.instruments.built import Built
 from lumigraph.instruments.camera import Camera, Making
 from lumigraph.instruments.parameters import Parameter, optional
 from lumigraph.instruments.parts import Lenslets
 from lumigraph.instruments.point_view import PointImage
+from lumigraph.instruments.tolerances import Tolerances
 from lumigraph.operators import CameraOptics, Model, is_possible, periodic_operator
 from lumigraph.propagation import Propagate
 
@@ -30,18 +34,39 @@ class LensletCamera(Camera):
     lenslets: Lenslets
     matching: Literal["views", "full"] = "views"
     model: Model = "paraxial"
+    built: Built = Field(default_factory=Built)
+    tolerances: Tolerances = Field(default_factory=dict)
+
+    @property
+    def described(self) -> Self:
+        """The camera as its description has it, whatever was `built`."""
+        return self.replace(built=Built()) if self.built else self
+
+    @property
+    def separation(self) -> float:
+        """Main lens to lenslets, L [m]."""
+        return self.built.separation or self._described_separation
+
+    @property
+    def _described_separation(self) -> float:
+        return self.image_distance
 
     @property
     def lenslet_distance(self) -> float:
         """Lenslets to sensor, b [m]."""
+        return self.built.lenslet_distance or self._described_lenslet_distance
+
+    @property
+    def _described_lenslet_distance(self) -> float:
         raise NotImplementedError
 
     @property
     def matched_diameter(self) -> float:
-        """Main-lens diameter that `matching` asks for [m]."""
+        """Main-lens diameter that `matching` asks for, before anything was built [m]."""
+        length, b = self._described_separation, self._described_lenslet_distance
         if self.matching == "full":
-            return plenoptic2.full_diameter(self.lenslets.pitch, self.separation, self.lenslet_distance)
-        return plenoptic2.views_diameter(self.lenslets.pitch, self.image_distance, self.lenslet_distance)
+            return plenoptic2.full_diameter(self.lenslets.pitch, length, b)
+        return plenoptic2.views_diameter(self.lenslets.pitch, self.image_distance, b)
 
     @property
     def pupil_diameter(self) -> float:
@@ -132,6 +157,8 @@ class LensletCamera(Camera):
         return Grid((shape[0], shape[1]), (step, step), (center[0], center[1]))
 
     def _covering_shape(self) -> tuple[int, int]:
+        if self.built:  # the sensor was bought for what is described
+            return self.described._covering_shape()
         spread = 1 + self.lenslet_distance / self.separation
         # Micro-images can be wider than their pitch, where the main lens is too large.
         excess = max(0.0, self.micro_image_width - self.micro_image_pitch) / 2

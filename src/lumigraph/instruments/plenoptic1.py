@@ -5,7 +5,7 @@ from typing import ClassVar
 from pydantic import model_validator
 
 from lumigraph.core.lightfield import LightField
-from lumigraph.design import plenoptic1
+from lumigraph.design import plenoptic1, thin_lens
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import describe, trade_offs
 from lumigraph.instruments.description import Description
@@ -39,6 +39,10 @@ class PlenopticCamera(LensletCamera):
         "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration and
         Rayleigh and Sommerfeld's integral, for square lenslets of one focal length; "auto": exact where the
         paraxial one misses the accuracy that is asked for.
+    built
+        `Built`: distances as built, where they are not the description's.
+    tolerances
+        How far values may be off, as `lumigraph.tolerance` takes them, such as "±0.05 mm" of "separation".
 
     Raises
     ------
@@ -77,9 +81,14 @@ class PlenopticCamera(LensletCamera):
         return self
 
     @property
-    def lenslet_distance(self) -> float:
-        """Lenslets to sensor, b = f_µ [m]."""
+    def _described_lenslet_distance(self) -> float:
         return self.lenslets.focal_length[0]
+
+    def alpha(self, dz: float) -> float:
+        """Refocus factor α' = L/F' that brings an object at depth `dz` into focus."""
+        if not self.built:
+            return super().alpha(dz)
+        return self.separation / thin_lens.image_distance(self.main_lens.focal_length, self.defocused(dz))
 
     def refocus_factor(self, dz: float, separation: float) -> float:
         """α' that focuses its views at a depth `dz` [m] from the focused plane, whatever their separation."""
@@ -89,7 +98,9 @@ class PlenopticCamera(LensletCamera):
         """Views of a textured plane at a refocus factor, by wave optics and a part of the lenslets."""
         count = tuple(min(n, _MOST_KNOWN) for n in self.lenslets.count)
         small = self.replace(lenslets={"count": count}, sensor={"shape": None})
-        dz = plenoptic1.defocus(self.main_lens.focal_length, self.object_distance, alpha)
+        focused = thin_lens.object_distance(self.main_lens.focal_length, self.separation)
+        dz = focused - self.object_distance
+        dz += plenoptic1.defocus(self.main_lens.focal_length, focused, alpha)
         return plane_views(small, small.calibration, dz)
 
     def _own_parameters(self) -> tuple[Parameter, ...]:

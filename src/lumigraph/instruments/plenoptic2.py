@@ -36,6 +36,10 @@ class FocusedPlenopticCamera(LensletCamera):
         "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration and
         Rayleigh and Sommerfeld's integral, for square lenslets of one focal length; "auto": exact where the
         paraxial one misses the accuracy that is asked for.
+    built
+        `Built`: distances as built, where they are not the description's.
+    tolerances
+        How far values may be off, as `lumigraph.tolerance` takes them, such as "±0.05 mm" of "separation".
 
     Raises
     ------
@@ -79,28 +83,44 @@ class FocusedPlenopticCamera(LensletCamera):
                 "lenslets that image infinity are kind 'plenoptic'."
             )
         self._check_lenslets_behind_lens()
+        if self.built:
+            self._check_built()
         return self
 
+    def _check_built(self) -> None:
+        """Refuse lenslets that were built where the main lens' image falls on them."""
+        if self.relay_distance == 0 or not 1e-3 <= abs(self.lenslet_magnification) <= 1e3:
+            raise GeometryError(
+                f"built.separation is {self.separation * 1e3:.6g} mm, where the main lens has its image "
+                f"(z2 = {self.image_distance * 1e3:.6g} mm): the lenslets have nothing to relay. Use another "
+                "distance, or kind 'plenoptic'."
+            )
+
     @property
-    def lenslet_magnification(self) -> float:
-        """Size of the sensor's image over the main lens', m = b/a; negative for a Galilean camera."""
+    def _magnification(self) -> float:
         assert self.lenslets.magnification is not None  # checked above
         return self.lenslets.magnification
 
     @property
-    def lenslet_distance(self) -> float:
-        """Lenslets to sensor, b = f_µ (1 + m) [m]."""
-        return closed_forms.lenslet_distance(self.lenslets.focal_length[0], self.lenslet_magnification)
+    def lenslet_magnification(self) -> float:
+        """Size of the sensor's image over the main lens', m = b/a; negative for a Galilean camera."""
+        return self.lenslet_distance / self.relay_distance if self.built else self._magnification
+
+    @property
+    def _described_lenslet_distance(self) -> float:
+        return closed_forms.lenslet_distance(self.lenslets.focal_length[0], self._magnification)
 
     @property
     def relay_distance(self) -> float:
         """Main-lens image to lenslets, a = b/m [m]; negative for a Galilean camera."""
-        return closed_forms.relay_distance(self.lenslets.focal_length[0], self.lenslet_magnification)
+        if self.built:
+            return self.separation - self.image_distance
+        return closed_forms.relay_distance(self.lenslets.focal_length[0], self._magnification)
 
     @property
-    def separation(self) -> float:
-        """Main lens to lenslets, L = z2 + a [m]."""
-        return self.image_distance + self.relay_distance
+    def _described_separation(self) -> float:
+        relay = closed_forms.relay_distance(self.lenslets.focal_length[0], self._magnification)
+        return self.image_distance + relay
 
     @property
     def patch(self) -> float:

@@ -37,7 +37,7 @@ from lumigraph.core.result import Quantity
 from lumigraph.design import thin_lens
 from lumigraph.elements import Train
 from lumigraph.errors import CalibrationError
-from lumigraph.instruments import LensletCamera
+from lumigraph.instruments import Built, LensletCamera
 from lumigraph.instruments.capabilities import Rendered
 from lumigraph.operators.white import white_image
 
@@ -227,6 +227,7 @@ def corrected(camera: LensletCamera, found: Twin) -> tuple[LensletCamera, tuple[
     lenslets: dict[str, Any] = {"rotation": camera.lenslets.rotation + found["turn"], "offset": tuple(offset)}
     diameter = camera.pupil_diameter * (1 + found["aperture"])
     changes: dict[str, Any] = {"main_lens": {"diameter": diameter}, "sensor": {"shape": camera.sensor.shape}}
+    changes["built"] = Built()  # its distances go into the description
     if isinstance(camera, Rendered):
         b = camera.lenslet_distance + found["height"]
         m = b / camera.lenslets.focal_length[0] - 1

@@ -1,0 +1,160 @@
+"""A camera with errors of making, and such errors by chance."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+
+from lumigraph.core import checks
+from lumigraph.errors import FormatError, GeometryError
+from lumigraph.instruments import Built, Instrument, LensletCamera, Tolerance
+from lumigraph.instruments.loading import AnyCamera
+from lumigraph.instruments.tolerances import check_name
+
+
+def check_camera(camera: AnyCamera | LensletCamera | Instrument) -> LensletCamera:
+    """The camera, if its errors of making are known.
+
+    Raises
+    ------
+    GeometryError
+        Another kind of instrument.
+    """
+    if not isinstance(camera, LensletCamera):
+        told = f"a {camera.noun} has no tolerances here yet. Give a plenoptic camera 1.0 or 2.0."
+        raise GeometryError(told)
+    return camera
+
+
+def _path(name: str) -> tuple[str | int, ...]:
+    """Where a value stands in the table of a camera as built."""
+    check_name(name)
+    if name in Built.model_fields:
+        return "built", name
+    if name.startswith("lenslets.offset_"):
+        return "lenslets", "offset", "yx".index(name[-1])
+    return tuple(int(part) if part.isdecimal() else part for part in name.split("."))
+
+
+def _meant(camera: LensletCamera) -> dict[str, Any]:
+    """The camera's table with all distances, so that one may change alone."""
+    table = camera.model_dump(by_alias=True)
+    table["built"] = {"separation": camera.separation, "lenslet_distance": camera.lenslet_distance}
+    table["main_lens"]["diameter"] = camera.pupil_diameter
+    table["sensor"]["shape"] = camera.sensor.shape
+    table["lenslets"]["offset"] = list(camera.lenslets.offset)
+    return table
+
+
+def _holder(table: Any, path: Sequence[str | int]) -> Any:
+    """What holds the last part of a path; an aberration that is not there is 0."""
+    for part in path[:-1]:
+        table = table[part]
+    if path[-1] not in table and isinstance(table, dict):
+        table[path[-1]] = 0.0
+    return table
+
+
+def value_of(camera: LensletCamera, name: str) -> float:
+    """A value that may be off, in SI; of several lenslet focal lengths the first.
+
+    Raises
+    ------
+    FormatError
+        A name without tolerance.
+    """
+    path = _path(name)
+    value = _holder(_meant(camera), path)[path[-1]]
+    return value[0] if isinstance(value, tuple) else value
+
+
+def built(camera: LensletCamera, errors: Mapping[str, float]) -> LensletCamera:
+    """The camera with errors of making: whatever has none stays where the description puts it.
+
+    A lenslet that is too strong moves no sensor, as it would if the camera were described with it: distances,
+    stop and sensor are those of the camera that was meant. A plane that is not in focus is seen blurred.
+
+    Parameters
+    ----------
+    camera
+        What is meant.
+    errors
+        What is added to its values, in SI, by the names of `Tolerance`; of several lenslet focal lengths to
+        each.
+
+    Raises
+    ------
+    FormatError
+        An unknown name.
+    GeometryError
+        Another kind of instrument, or values that no camera can have.
+
+    Examples
+    --------
+    >>> import lumigraph as lg
+    >>> camera = lg.FocusedPlenopticCamera.from_catalogue("thesis-plenoptic-2-m050")
+    >>> off = built(camera, {"lenslets.focal_length": 0.05e-3})
+    >>> off.lenslets.focal_length, off.lenslet_distance == camera.lenslet_distance
+    ((0.00525,), True)
+    """
+    table = _meant(check_camera(camera))
+    for name, error in errors.items():
+        path, added = _path(name), checks.finite(name, error)
+        holder = _holder(table, path)
+        old = holder[path[-1]]
+        holder[path[-1]] = tuple(f + added for f in old) if isinstance(old, tuple) else old + added
+    return type(camera)(**table)
+
+
+def tolerances_of(
+    camera: LensletCamera, given: Mapping[str, str | Tolerance] | None = None
+) -> tuple[Tolerance, ...]:
+    """Those of the camera file, and those given beside or instead of them.
+
+    Raises
+    ------
+    FormatError
+        There are none, or one that cannot be read.
+    GeometryError
+        A part of a value that is zero.
+    """
+    texts = {**camera.tolerances, **(given or {})}
+    found = tuple(
+        text if isinstance(text, Tolerance) else Tolerance.parse(name, text) for name, text in texts.items()
+    )
+    if not found:
+        raise FormatError(
+            "there are no tolerances. Add a table [tolerances] to the camera file, or give some, "
+            "such as separation = '±0.05 mm'."
+        )
+    for one in found:
+        one.deviation_of(value_of(camera, one.name))
+    return found
+
+
+def drawn(
+    tolerances: Sequence[Tolerance], deviations: Sequence[float], number: int, *, seed: int = 0
+) -> dict[str, float]:
+    """Errors [SI] by name of one camera of many, by chance.
+
+    Each tolerance has random numbers of its own: one more or less leaves those of the others.
+
+    Parameters
+    ----------
+    tolerances
+        How far values may be off.
+    deviations
+        Standard deviation of each, in SI.
+    number
+        Of the camera that is drawn.
+    seed
+        Of all draws.
+    """
+    errors = {}
+    for one, size in zip(tolerances, deviations, strict=True):
+        rng = np.random.default_rng([checks.whole("seed", seed, 0), number, crc32(one.name.encode())])
+        unit = math.sqrt(3) * rng.uniform(-1, 1) if one.shape == "uniform" else rng.normal()
+        errors[one.name] = float(size * unit)
+    return errors
