@@ -20,6 +20,7 @@ from lumigraph.cli.app import app as command_line
 
 project = "lumigraph"
 author = "The lumigraph developers"
+project_copyright = author
 release = version = _version("lumigraph")
 extensions = [
     "myst_nb",

@@ -19,7 +19,7 @@ def manifest():
     return npe2.PluginManifest.from_file(str(files("lumigraph.napari").joinpath("napari.yaml")))
 
 
-def until(condition, qtbot, seconds=20):
+def until(condition, qtbot, seconds=300):
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end

@@ -29,6 +29,8 @@ class Quantity:
     ('2 px (1.9 to 2.2)', '50 mm (49 mm to 52 mm)')
     >>> str(Quantity("shape", (5, 150, 150), "px")), str(Quantity("spacing", (5e-6, 3e-7, 3e-7), "m"))
     ('5 x 150 x 150 px', '5 µm, 300 nm, 300 nm')
+    >>> str(Quantity("magnification", 0.5, "1"))
+    '0.5'
     """
 
     name: str
@@ -58,7 +60,8 @@ class Quantity:
             from lumigraph.core import picture  # brings SciPy, which a command line's --help does without
 
             return picture.length(value)
-        return f"{self._bare(value)} {self.unit}".rstrip()
+        unit = "" if self.unit == "1" else self.unit
+        return f"{self._bare(value)} {unit}".rstrip()
 
     @staticmethod
     def _bare(value: Any) -> str:

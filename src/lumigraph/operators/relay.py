@@ -189,7 +189,9 @@ class Lines:
         """Amplitude (lines, samples, window) along x behind these lenslets of a row."""
         if members not in self._known:
             coefficients = self._lenslets.coefficients[1]
-            behind = np.sum([self._lenslets.member(*member) for member in members], axis=0)
+            behind = self._lenslets.member(*members[0]).copy()
+            for member in members[1:]:
+                behind += self._lenslets.member(*member)
             behind = behind.reshape(len(behind), self.optics.axes[1].samples, -1)
             self._known[members] = behind @ coefficients.astype(np.complex64)
         return self._known[members]

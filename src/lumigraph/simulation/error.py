@@ -57,7 +57,7 @@ ROUNDING = 1.5e-6
 
 
 def of_points(difference: float, accuracy: float) -> Reached:
-    """By how much a coarser or a finer image of one of them differs, as `points.points_error` has it."""
+    """By what `points.image_and_error` finds of the brightest."""
     return Reached(difference, f"points at accuracy {accuracy:g}, beside another image of one").and_also(
         ROUNDING
     )

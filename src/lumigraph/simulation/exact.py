@@ -35,8 +35,8 @@ def image_of(
         return part.intensity * image, reached.through(plain)
     plain = resolved(plain, accuracy)
     if isinstance(part, Points):
-        image = points.points_image(plain, part, accuracy)
-        reached = error.of_points(points.points_error(plain, part, accuracy), accuracy)
+        image, off = points.image_and_error(plain, part, accuracy)
+        reached = error.of_points(off, accuracy)
         return image, reached if plain.model == "exact" else reached.through(plain)
     part = part.trimmed()
     operator = periodic_operator(plain, part.grid, part.dz, accuracy=accuracy, progress=progress)
