@@ -50,6 +50,38 @@ def test_a_raw_image_is_what_the_camera_sees_of_the_truth(made):
         assert expected.max() == pytest.approx(fill * (sensor.levels - sensor.black_level), rel=0.02)
 
 
+@pytest.mark.long  # another set is made: 6 s
+def test_cameras_drawn_within_tolerances_take_turns(camera, tmp_path):
+    out = tmp_path / "t.zarr"
+    said = ["dataset", str(camera), "-n", "3", *DEPTHS, "-o", str(out), "--volume", "--workers", "1"]
+    said += [
+        "-t",
+        "separation=±1 mm",
+        "-t",
+        "lenslet_distance=±5 mm uniform",
+        "--cameras",
+        "2",
+        "--seed",
+        "7",
+    ]
+    assert main(said) == 0
+    given = {"separation": "±1 mm", "lenslet_distance": "±5 mm uniform"}
+    takers = lg.tolerance.cameras(focused(), given, 2, seed=7)
+    group = zarr.open_group(str(out), mode="r")
+    assert group["parameters"][:, 0].tolist() == [0, 1, 0]
+    for number, taken in enumerate((*takers, takers[0])):
+        spread = []
+        for other in (taken, focused()):
+            light = other.operator((-6e-3, 0.0, 6e-3), accuracy=1e-2).forward(group["intensity"][number])
+            expected = light * group["parameters"][number][4] * 4095 / taken.sensor.full_well
+            noise = np.sqrt(np.maximum(light, 0) * group["parameters"][number][4] + 25) * 4095 / 1e4
+            spread.append(((group["raw"][number] - expected) / np.hypot(noise, 0.3)).std())
+        assert 0.9 < spread[0] < 1.1
+        assert spread[1] > 1.5
+    card = out.with_name("t.zarr.md").read_text()
+    assert card.count("[built]") == 2
+
+
 def test_depth_and_picture_agree_with_the_planes(made):
     group = zarr.open_group(str(made), mode="r")
     depth, planes = group["depth"][:], group["intensity"][:]
@@ -99,6 +131,10 @@ def test_beads_and_photographs(camera, tmp_path):
         (["-n", "1", "--seed", "-1"], "--seed is -1"),
         (["-n", "1", "--layout", "beads", "--layout", "slanted"], "two data sets"),
         (["-n", "1", "--photographs", "none*.jpg"], "no file matches"),
+        (["-n", "1", "-t", "separation=±1 mm"], "--cameras is 0 but must be above 0"),
+        (["-n", "1", "--cameras", "2"], "there are no tolerances"),
+        (["-n", "1", "--cameras", "-1"], "--cameras is -1"),
+        (["-n", "1", "--cameras", "9", "-t", "lenslets.rotation=±30 deg"], "a data set has one shape"),
     ],
 )
 def test_what_cannot_be_is_refused(said, why, camera, tmp_path, capsys):

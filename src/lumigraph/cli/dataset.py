@@ -1,8 +1,9 @@
 """`lumigraph dataset`."""
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -13,8 +14,12 @@ from lumigraph.cli.deconvolve import depths
 from lumigraph.cli.options import COMMAND, COMMON, Common, Output
 from lumigraph.cli.standing import Standing
 from lumigraph.cli.sweep import changed, combinations, values
+from lumigraph.cli.tolerance import Tolerances, given_tolerances
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
+
+if TYPE_CHECKING:
+    from lumigraph.instruments import Instrument
 
 ALONE = Hands()
 
@@ -32,6 +37,8 @@ def dataset(
     layout: Annotated[list[Literal["patches", "slanted", "beads"]] | None, Parameter(negative="")] = None,
     photographs: str | None = None,
     vary: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True, negative="")] = None,
+    tolerance: Tolerances = None,
+    cameras: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0,
     seed: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0,
     accuracy: Annotated[float, Parameter(allow_leading_hyphen=True)] = 1e-2,
     volume: Annotated[bool, Parameter(negative="")] = False,
@@ -47,6 +54,8 @@ def dataset(
     Example: `lumigraph dataset thesis-plenoptic-1 -n 500 --z "-60 mm:60 mm:20 mm" -o train.zarr`
 
     Example: `lumigraph dataset lfm-guv -n 100 --layout beads --z "-8 um:8 um:4 um" --volume -o beads.zarr`
+
+    Example: `lumigraph dataset thesis-plenoptic-1 -n 500 --z "-60 mm:60 mm:20 mm" -t "separation=±0.2 mm" --cameras 20 -o train.zarr`
 
     Example: `lumigraph dataset camera.toml -n 2000 --z "-9 mm:9 mm:3 mm" --photographs "photos/*.jpg" --vary "object_distance=300 mm, 320 mm" -o train.zarr --workers 2`
 
@@ -67,6 +76,10 @@ def dataset(
         Files by a pattern in quotes, parts of which become textures.
     vary
         A key of the camera file and its values, as 'lumigraph sweep' takes them: samples take turns.
+    tolerance
+        A key of the camera file and how far it may be off, as 'lumigraph tolerance' takes them.
+    cameras
+        So many cameras are drawn within --tolerance and the camera file's [tolerances], and take turns.
     seed
         Of all that is drawn.
     accuracy
@@ -85,14 +98,15 @@ def dataset(
     if seed < 0:
         raise FormatError(f"--seed is {seed} but must be at least 0.")
     given, varied = load_camera(camera), dict(map(values, vary or []))
-    cameras = tuple(changed(given, one).to_toml() for one in combinations(varied))
+    meant = [changed(given, one) for one in combinations(varied)]
+    taking = tuple(one.to_toml() for one in _as_built(meant, tolerance, cameras, seed))
     layouts = tuple(dict.fromkeys(layout or ("patches", "slanted")))
     if "beads" in layouts and len(layouts) > 1:
         raise FormatError("--layout beads gives no depth of each place; the others do. Make two data sets.")
     found = tuple(str(Path(one).absolute()) for one in files.matching(photographs or ""))
     if photographs is not None and not found:
         raise FormatError(f"--photographs {photographs!r}: no file matches. Check the pattern.")
-    work = Draws(cameras, depths("--z", z), layouts, found, seed, accuracy, volume)
+    work = Draws(taking, depths("--z", z), layouts, found, seed, accuracy, volume)
     if hands.slurm is not None:
         return hands.submitted(output)
     with progress("dataset") as shown, kept(output):
@@ -104,7 +118,33 @@ def dataset(
     if made.failures:
         number, why = min(made.failures.items())
         raise LumigraphError(f"{len(made.failures)} of {made.count} samples failed; number {number}: {why}")
-    text = f"{made.done} of {made.count} samples, {len(cameras)} cameras"
-    counts = (Quantity("done", made.done), Quantity("samples", made.count), Quantity("cameras", len(cameras)))
+    text = f"{made.done} of {made.count} samples, {len(taking)} cameras"
+    counts = (Quantity("done", made.done), Quantity("samples", made.count), Quantity("cameras", len(taking)))
     card = output.with_name(f"{output.name}.md")
     return Result("Data set", "Raw images with truth.", made, (text,), counts, written=(output, card))
+
+
+def _as_built(
+    meant: "Sequence[Instrument]", tolerance: list[str] | None, count: int, seed: int
+) -> "Sequence[Instrument]":
+    """The cameras that take turns: as described, or so many drawn within the tolerances of each."""
+    if count < 0 or (tolerance and not count):
+        raise FormatError(
+            f"--cameras is {count} but must be above 0 with --tolerance: so many cameras are drawn."
+        )
+    if not count:
+        return meant
+    from lumigraph.tolerance import making
+
+    given = given_tolerances(tolerance or [])
+    found = [
+        made for one in meant
+        for made in making.cameras(making.check_camera(one), given, count, seed=seed)
+    ]  # fmt: skip
+    shapes = sorted({one.operator_grid().shape for one in found})
+    if len(shapes) > 1:
+        raise FormatError(
+            f"the cameras drawn see pictures of {shapes[0]} to {shapes[-1]} samples, and a data set has one "
+            "shape. Leave out the tolerances of lenslets.rotation and offset, or make others tighter."
+        )
+    return found

@@ -18,6 +18,11 @@ from lumigraph.errors import FormatError, LumigraphError
 if TYPE_CHECKING:
     from lumigraph.tolerance import Outcome, Study
 
+Tolerances = Annotated[
+    list[str] | None, Parameter(name=("--tolerance", "-t"), allow_leading_hyphen=True, negative="")
+]
+"""Option of keys and tolerances."""
+
 ALONE = Hands()
 
 _POINTS = 200
@@ -31,9 +36,7 @@ def tolerance(
     camera: str,
     /,
     *,
-    tolerance: Annotated[
-        list[str] | None, Parameter(name=("--tolerance", "-t"), allow_leading_hyphen=True, negative="")
-    ] = None,
+    tolerance: Tolerances = None,
     draws: Annotated[int, Parameter(name=("--draws", "-n"), allow_leading_hyphen=True)] = 1000,
     measure: str | None = None,
     seed: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0,
@@ -82,7 +85,7 @@ def tolerance(
     files.check_output(output, TABLES)
     require_table(output)
     names = None if measure is None else [name.strip() for name in measure.split(",")]
-    trials = Trials.of(check_camera(load_camera(camera)), _given(tolerance or []), names, seed=seed)
+    trials = Trials.of(check_camera(load_camera(camera)), given_tolerances(tolerance or []), names, seed=seed)
     items = trials.items(draws)
     if hands.slurm is not None:
         return hands.submitted(output)
@@ -102,7 +105,7 @@ def tolerance(
     return _result(study, output)
 
 
-def _given(texts: list[str]) -> dict[str, str]:
+def given_tolerances(texts: list[str]) -> dict[str, str]:
     """Keys and tolerances of an option."""
     given: dict[str, str] = {}
     for text in texts:

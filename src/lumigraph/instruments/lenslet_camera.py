@@ -131,7 +131,7 @@ class LensletCamera(Camera):
         self, optics: CameraOptics, depths: Sequence[float] | None, samples: int | None, making: Making
     ) -> Linear:
         return periodic_operator(
-            optics, self._lenslet_samples(samples), 0.0 if depths is None else depths,
+            optics, self.operator_grid(samples), 0.0 if depths is None else depths,
             accuracy=making.accuracy, folder=making.folder, progress=making.progress,
         )  # fmt: skip
 
@@ -146,8 +146,8 @@ class LensletCamera(Camera):
             )
         return plain
 
-    def _lenslet_samples(self, samples: int | None) -> Grid:
-        """Object samples over the array's field, so many along a lenslet's pitch."""
+    def operator_grid(self, samples: int | None = None) -> Grid:
+        """Object samples of its `operator` over the array's field, so many along a lenslet's pitch."""
         scale, pitch = self.object_distance / self.separation, self.lenslets.pitch
         finest = self.wavelength * self.separation / (2 * self.pupil_diameter)
         n = math.ceil(pitch / finest) if samples is None else checks.whole("samples_per_lenslet", samples)

@@ -158,3 +158,38 @@ def drawn(
         unit = math.sqrt(3) * rng.uniform(-1, 1) if one.shape == "uniform" else rng.normal()
         errors[one.name] = float(size * unit)
     return errors
+
+
+def cameras(
+    camera: LensletCamera,
+    tolerances: Mapping[str, str | Tolerance] | None = None,
+    count: int = 1,
+    *,
+    seed: int = 0,
+) -> tuple[LensletCamera, ...]:
+    """Cameras as built with errors by chance, the same ones for the same seed.
+
+    Parameters
+    ----------
+    camera
+        What is meant.
+    tolerances
+        Beside those of the camera file, or instead of them.
+    count
+        Of the cameras.
+    seed
+        Of all draws.
+
+    Raises
+    ------
+    FormatError
+        No tolerances, or one that cannot be read.
+    GeometryError
+        Another kind of instrument, or one of the draws is no camera.
+    """
+    found = tolerances_of(check_camera(camera), tolerances)
+    sizes = [one.deviation_of(value_of(camera, one.name)) for one in found]
+    return tuple(
+        built(camera, drawn(found, sizes, number, seed=seed))
+        for number in range(checks.whole("count", count))
+    )
