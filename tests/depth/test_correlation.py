@@ -95,8 +95,8 @@ def test_even_pictures_have_no_confidence_and_finite_patches():
     _, calibration = scene()
     found = correlation(np.ones(calibration.shape), calibration)
     assert np.asarray(found.confidence).max() < 0.05
-    assert np.isfinite(found.values).all()
-    assert np.abs(found.values).min() > 0
+    # Nothing is known: the middle of the sizes tried, 0.08 to 0.6 of the pitch of either sign, not their end.
+    np.testing.assert_allclose(np.abs(found.values), 0.34 * calibration.lattice.pitch, atol=0.5)
 
 
 def test_progress_reaches_the_total():

@@ -1,36 +1,29 @@
 """Patch size of each plenoptic 2.0 lenslet, from how its micro-image agrees with its neighbours'."""
 
-import math
-from dataclasses import dataclass
-
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
-from lumigraph.core import checks, memory
+from lumigraph.core import checks
 from lumigraph.core.arrays import Array, like
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.progress import Progress, silent, within
 from lumigraph.core.raw import RawImage
-from lumigraph.depth.flat import Flat, grey
+from lumigraph.depth.micro_images import MicroImages
 from lumigraph.depth.smooth import Stiffness, update
 from lumigraph.depth.volume import cheapest, semi_global
 from lumigraph.errors import CalibrationError, GeometryError
 from lumigraph.preparation import of_raw
 from lumigraph.rendering import lenslet_indices
 from lumigraph.rendering.decode import check_raw
-from lumigraph.rendering.interpolate import sample
 
 _STEP = 0.5  # between the sizes that are compared [px]
 WIDEST = 0.08, 0.6
 """Least and most size that is tried where nothing is known, of the pitch."""
 
-_REACH = 1.8  # pitches: nearest neighbours, and the next ones, which in a multi-focus array have one kind
-_LEAST_SEEN = 0.12  # part of a micro-image that both must show
 _FEWEST_LENSLETS = 3
 _FEWEST_PIXELS = 6  # pitch below which a micro-image has nothing to compare
+_TIE = 1e-6  # by which the ends of the range agree less: places that show nothing have its middle
 _BEND = 0.01  # of the correlation's peak: what a texture of waves 60 px long has [1/px²]
-_NOISE = 0.01  # of the picture's white
 
 
 @of_raw
@@ -100,7 +93,7 @@ def correlation(
             f"neighbours and needs {_FEWEST_LENSLETS} at least. Crop less."
         )
     ranges = _ranges(patches, pitch)
-    micro = _MicroImages.of(raw, calibration)
+    micro = MicroImages.of(raw, calibration)
     sizes = [np.arange(low, high + _STEP / 2, _STEP) for low, high in ranges]
     scores, done, total = [], 0, sum(map(len, sizes))
     for some in sizes:
@@ -133,7 +126,8 @@ def _overall(scores: np.ndarray) -> float:
 
 def _joined(scores: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sizes (rows, cols) of the best scores (n, rows, cols), smooth where the scores do not say; trust."""
-    cost = (1 - scores).astype(np.float32)
+    beside = np.abs(np.linspace(-_TIE, _TIE, len(sizes)))[:, None, None]
+    cost = (1 - scores + beside).astype(np.float32)
     flat = np.zeros(cost.shape[1:], np.float32)
     best, _ = cheapest(semi_global(cost, flat, 0.02, 0.1))
     values = sizes[0] + _STEP * best
@@ -151,113 +145,3 @@ def _joined(scores: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return update(
         values.astype(np.float64), information.astype(np.float64), pull.astype(np.float64), how
     ), trust
-
-
-@dataclass(frozen=True, slots=True)
-class _MicroImages:
-    """Micro-images (rows, cols, h, w), each about its own centre, and which of their pixels count (h, w)."""
-
-    data: np.ndarray
-    inside: np.ndarray
-    indices: np.ndarray
-    calibration: Calibration
-
-    @classmethod
-    def of(cls, raw: RawImage, calibration: Calibration) -> "_MicroImages":
-        indices = lenslet_indices(calibration)
-        half = int(calibration.lattice.pitch / 2)
-        size = (2 * half + 1) ** 2
-        memory.require(
-            40.0 * size * indices.shape[0] * indices.shape[1],
-            f"comparing {indices.shape[0]} x {indices.shape[1]} micro-images of {2 * half + 1} px",
-            "Crop the raw image to a part {factor:.1f}x smaller.",
-        )
-        image = gaussian_filter(grey(raw), 0.5)
-        steps = np.arange(-half, half + 1.0)
-        centers = calibration.position(indices)
-        y = centers[..., 0, None, None] + steps[:, None]
-        x = centers[..., 1, None, None] + steps
-        data = np.asarray(sample(image, y, x, "cubic"), np.float32)
-        radius = np.hypot(steps[:, None], steps)
-        inside = radius <= Flat.of(raw, calibration).radius
-        return cls(data, inside.astype(np.float32), indices, calibration)
-
-    def scores(self, sizes: np.ndarray, progress: Progress) -> np.ndarray:
-        """Agreement (n, rows, cols) with the neighbours at each size, at most 1."""
-        out = np.empty((len(sizes), *self.data.shape[:2]), np.float32)
-        neighbours = [(self._gathered(way), self._vector(way)) for way in self._ways()]
-        for k, size in enumerate(sizes):
-            found = [self._agreement(other, vector * size) for other, vector in neighbours]
-            out[k] = _better_half(np.stack(found))
-            progress((k + 1) / len(sizes))
-        return out
-
-    def _ways(self) -> list[tuple[int, int]]:
-        """Steps (di, dj) to the neighbours."""
-        reach = range(-2, 3)
-        near = [(i, j) for i in reach for j in reach if (i, j) != (0, 0)]
-        return [way for way in near if math.hypot(*self._vector(way)) < _REACH]
-
-    def _vector(self, way: tuple[int, int]) -> np.ndarray:
-        """To a neighbour (y, x), in pitches."""
-        return self.calibration.lattice.matrix @ way / self.calibration.lattice.pitch
-
-    def _gathered(self, way: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-        """The neighbour's micro-image of each lenslet, and whether there is one (rows, cols)."""
-        rows, columns = self.data.shape[:2]
-        i, j = self.indices[..., 0] + way[0], self.indices[..., 1] + way[1]
-        skew = self.calibration.lattice.layout == "hex"
-        first = self.indices[0, 0]
-        row = i - first[0]
-        column = j - first[1] + ((i // 2 - first[0] // 2) if skew else 0)
-        there = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-        return self.data[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)], there
-
-    def _agreement(self, other: tuple[np.ndarray, np.ndarray], move: np.ndarray) -> np.ndarray:
-        """Normalised correlation (rows, cols) with neighbours moved back; NaN where they share too little."""
-        data, there = other
-        weight = self.inside * _read(self.inside, move)
-        share = float(weight.sum() / self.inside.sum())
-        if share < _LEAST_SEEN:
-            return np.full(there.shape, np.nan, np.float32)
-        weight = weight / weight.sum()
-        mine, its = self.data, _read(data, move)
-        mean = np.einsum("rcyx,yx->rc", mine, weight), np.einsum("rcyx,yx->rc", its, weight)
-        mine, its = mine - mean[0][..., None, None], its - mean[1][..., None, None]
-        products = [
-            np.einsum("rcyx,rcyx,yx->rc", a, b, weight) for a, b in ((mine, its), (mine, mine), (its, its))
-        ]
-        score = products[0] / np.sqrt((products[1] + _NOISE**2) * (products[2] + _NOISE**2))
-        return np.where(there, score, np.nan)
-
-
-def _better_half(scores: np.ndarray) -> np.ndarray:
-    """Mean of the better half of the scores (k, rows, cols) of those neighbours that there are; else 0."""
-    ordered = -np.sort(-np.where(np.isnan(scores), -np.inf, scores), axis=0)
-    count = np.isfinite(ordered).sum(0)
-    used = np.arange(len(scores))[:, None, None] < (count + 1) // 2
-    total = np.where(used, np.where(np.isfinite(ordered), ordered, 0), 0).sum(0)
-    return total / np.maximum((count + 1) // 2, 1)
-
-
-def _read(images: np.ndarray, move: np.ndarray) -> np.ndarray:
-    """Images (..., h, w) read at positions moved by (dy, dx), linearly; 0 beyond the edge."""
-    for axis, distance in ((-2, float(move[0])), (-1, float(move[1]))):
-        below = math.floor(distance)
-        part = np.float32(distance - below)
-        first = _moved(images, below, axis)
-        images = first if part == 0 else first * (1 - part) + _moved(images, below + 1, axis) * part
-    return images
-
-
-def _moved(images: np.ndarray, steps: int, axis: int) -> np.ndarray:
-    out = np.zeros_like(images)
-    count = images.shape[axis]
-    target, source = (
-        slice(max(0, -steps), min(count, count - steps)),
-        slice(max(0, steps), min(count, count + steps)),
-    )
-    if target.start < target.stop:
-        left = (Ellipsis,) + (slice(None),) * (-axis - 1)
-        out[(left[0], target, *left[1:])] = images[(left[0], source, *left[1:])]
-    return out

@@ -163,7 +163,7 @@ def _swept(
     cost = np.empty((len(moves), *guide.shape), np.float32)
     for k, size in enumerate(sign * np.exp(moves / reach)):
         images = sights.alike(float(size))
-        for rows, part in sights.bands():
+        for rows, part in sights.bands:
             cost[k, rows] = part.disagreement(float(size), _MOST, images)
         progress((k + 1) / len(moves))
     cost = semi_global(guided(cost, guide, 3), guide, 0.2 * _MOST, _MOST)
@@ -197,4 +197,4 @@ def _asked(part: Sightings, rows: slice, sizes: np.ndarray, noise: float) -> np.
 
 def _joined(sights: Sightings, made: Callable[[Sightings, slice], np.ndarray]) -> np.ndarray:
     """Something that is made of each band of rows (y, ...)."""
-    return np.concatenate([made(part, rows) for rows, part in sights.bands()])
+    return np.concatenate([made(part, rows) for rows, part in sights.bands])

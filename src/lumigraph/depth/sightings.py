@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import gaussian_filter
 
 from lumigraph.core.calibration import Calibration
 from lumigraph.depth.flat import Flat
@@ -20,20 +20,22 @@ _MIDDLE = 0.15  # pitches: lenslets this near to a place stand on both of its si
 _SIGMA = 0.25  # standard deviation of a disc along an axis, over its diameter
 _COUNTS = 0.1  # weight of the kinds of lenslets whose blur the others are given, too
 _UNKNOWN, _FEW = 0.8, 0.05  # part of the most that lenslets differ by where no two see a place, its weight
-_BAND = 1 << 18  # samples handled at a time
+_BAND = 1 << 15  # samples handled at a time: what is read over and over stays in the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
 class Sight:
     """What one neighbour of the nearest lenslet shows of each place (y, x).
 
-    `away` is from the lenslet to the place, along y and x [px of the lattice]; `at` is where on the sensor it
-    is seen, and `weight` whether: 0 where it is not, and less for a kind of lenslet that blurs it.
+    `away` is from the lenslet to the place, along y and x [px of the lattice]. `weight` is 0 where it is not
+    seen, and less for a kind of lenslet that blurs it. `here` numbers the places (n,) within its reach, row
+    by row; `at` is where on the sensor they are seen, along y and x (n,).
     """
 
     weight: np.ndarray
     value: np.ndarray
     away: Pair
+    here: np.ndarray
     at: Pair
 
 
@@ -58,12 +60,15 @@ class Sightings:
     layout: Layout
     focus: np.ndarray | None
 
-    def bands(self) -> Iterator[tuple[slice, "Sightings"]]:
-        """Some rows at a time."""
+    @cached_property
+    def bands(self) -> list[tuple[slice, "Sightings"]]:
+        """Some rows at a time, each of which remembers what is around its places."""
         rows = max(1, _BAND // len(self.layout.x))
-        for k in range(0, len(self.layout.y), rows):
-            part = slice(k, k + rows)
-            yield part, Sightings(self.flat, self.calibration, self.layout.part(part), self.focus)
+        parts = [slice(k, k + rows) for k in range(0, len(self.layout.y), rows)]
+        return [
+            (part, Sightings(self.flat, self.calibration, self.layout.part(part), self.focus))
+            for part in parts
+        ]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -84,10 +89,29 @@ class Sightings:
         return self.calibration.lattice.index(self.layout.y[:, None], self.layout.x)
 
     @cached_property
+    def _kinds(self) -> np.ndarray:
+        """Of the lenslets nearest to each place (n,)."""
+        return self.calibration.lattice.kind(*self._index).astype(np.int8).ravel()
+
+    @cached_property
     def _nearest(self) -> Pair:
         """From the nearest lenslet to each place [px]."""
-        flat = self.calibration.lattice.position(np.stack(self._index, -1)).astype(np.float32)
-        return np.float32(self.layout.y[:, None]) - flat[..., 0], np.float32(self.layout.x) - flat[..., 1]
+        y, x = (middle.astype(np.float32).reshape(self.shape) for middle in self._middles)
+        return np.float32(self.layout.y[:, None]) - y, np.float32(self.layout.x) - x
+
+    @cached_property
+    def _middles(self) -> Pair:
+        """Of the lenslets nearest to each place (n,), in a regular lattice, along y and x [px]."""
+        points = self.calibration.lattice.position(np.stack(self._index, -1))
+        return points[..., 0].ravel(), points[..., 1].ravel()
+
+    def _centers(self, here: np.ndarray, step: tuple[int, int]) -> Pair:
+        """Of the micro-images that stand a step away from the nearest one of numbered places (n,) [px]."""
+        move, warp = self.calibration.lattice.matrix @ step, self.calibration.warp
+        y, x = (middle[here] + part for middle, part in zip(self._middles, move, strict=True))
+        if warp is not None:
+            y, x = warp.applied(np.stack([y, x], -1)).T
+        return y.astype(np.float32), x.astype(np.float32)
 
     def alike(self, size: float) -> list[np.ndarray]:
         """The raw image (y, x) for each kind of lenslets, as blurred as the others' if patches have a size.
@@ -113,22 +137,35 @@ class Sightings:
         ratio, trust = np.asarray(size / lattice.pitch, np.float32), self._trust(size)
         half = lattice.pitch / 2
         for step in self._steps(reach + 0.75 * lattice.pitch):
-            index = self._index[0] + step[0], self._index[1] + step[1]
-            center = self.calibration.position(np.stack(index, -1))
-            cy, cx = center[..., 0].astype(np.float32), center[..., 1].astype(np.float32)
-            move = lattice.matrix @ step
-            away = self._nearest[0] - np.float32(move[0]), self._nearest[1] - np.float32(move[1])
+            move = (lattice.matrix @ step).astype(np.float32)
+            away = self._nearest[0] - move[0], self._nearest[1] - move[1]
             distance = np.hypot(*away) * np.abs(ratio)
+            here = np.flatnonzero(distance < self.flat.even)
+            distance = distance.ravel()[here]
+            cy, cx = self._centers(here, step)
             light = self.flat.light(distance / np.float32(half))
             whole = (cy >= half - 1) & (cy + half <= ny) & (cx >= half - 1) & (cx + half <= nx)
             weight = np.clip(self.flat.even - distance, 0, 1) * light**2 * whole
+            kind = np.mod(
+                self._kinds[here] + np.int8(lattice.kind(*map(np.asarray, step))), np.int8(lattice.kinds)
+            )
             if trust is not None:
-                kind = lattice.kind(*index)
-                weight *= np.choose(kind, [np.broadcast_to(part, kind.shape) for part in trust])
+                weight *= np.choose(kind, [self._some(part, here) for part in trust])
             if weight.any():
-                at = cy - ratio * away[0], cx - ratio * away[1]
-                value = _read(images, at, lattice.kind(*index))
-                yield Sight(weight, value, away, at)
+                slant = self._some(ratio, here)
+                at = cy - slant * away[0].ravel()[here], cx - slant * away[1].ravel()[here]
+                value = _read(images, at, kind)
+                yield Sight(self._spread(weight, here), self._spread(value, here), away, here, at)
+
+    def _some(self, values: np.ndarray, here: np.ndarray) -> np.ndarray:
+        """Values, one or (y, x), at numbered places (n,)."""
+        return np.broadcast_to(values, self.shape).ravel()[here] if values.ndim else values
+
+    def _spread(self, values: np.ndarray, here: np.ndarray) -> np.ndarray:
+        """Values (n,) at their numbered places of the picture (y, x), 0 elsewhere."""
+        whole = np.zeros(self.shape, np.float32)
+        whole.ravel()[here] = values
+        return whole
 
     def _steps(self, reach: float) -> list[tuple[int, int]]:
         lattice = self.calibration.lattice
@@ -196,23 +233,38 @@ class Sightings:
 
     def _slope(self, sight: Sight) -> np.ndarray:
         """How much a lenslet's value changes with the logarithm of the patch, over patch/pitch (y, x)."""
-        image = self.flat.image
-        total = np.zeros(self.shape, np.float32)
+        image, slope = self.flat.image, np.zeros(len(sight.here), np.float32)
         for axis, away in enumerate(sight.away):
             ends = []
             for half in (-0.5, 0.5):
-                at = [place + half * (k == axis) for k, place in enumerate(sight.at)]
-                ends.append(map_coordinates(image, at, order=1, mode="nearest"))
-            total -= away * (ends[1] - ends[0])
-        return total
+                at = [place + np.float32(half * (k == axis)) for k, place in enumerate(sight.at)]
+                ends.append(_linear(image, at))
+            slope -= away.ravel()[sight.here] * (ends[1] - ends[0])
+        return self._spread(slope, sight.here)
 
 
 def _read(images: Sequence[np.ndarray], at: Pair, kind: np.ndarray) -> np.ndarray:
-    """Values (y, x) of the image of each place's kind of lenslets."""
+    """Values (n,) at places of the image of each one's kind of lenslets."""
     if len(images) == 1:
-        return map_coordinates(images[0], at, order=1, mode="nearest")
+        return _linear(images[0], at)
     value = np.empty(kind.shape, np.float32)
     for number, image in enumerate(images):
         here = kind == number
-        value[here] = map_coordinates(image, [place[here] for place in at], order=1, mode="nearest")
+        value[here] = _linear(image, [place[here] for place in at])
     return value
+
+
+def _linear(image: np.ndarray, at: Sequence[np.ndarray]) -> np.ndarray:
+    """Values (n,) of an image between its pixels at places (y, x), two of (n,); the edge's beyond it."""
+    below, part = [], []
+    for place, count in zip(at, image.shape, strict=True):
+        place = np.clip(place, 0, count - 1)
+        start = np.minimum(place.astype(np.int32), count - 2)
+        below.append(start)
+        part.append(place - start.astype(np.float32))
+    width = image.shape[1]
+    flat, number = image.ravel(), below[0] * width + below[1]
+    upper, lower = (
+        flat[number + k] + part[1] * (flat[number + (k + 1)] - flat[number + k]) for k in (0, width)
+    )
+    return upper + part[0] * (lower - upper)
