@@ -15,7 +15,7 @@ CONTRACT = """
 LumigraphError SamplingError GeometryError CalibrationError FormatError
 Grid Field Lattice RawImage LightField Train Propagate ThinLens CircularAperture LensletArray Sensor
 propagate SingleLensCamera PlenopticCamera FocusedPlenopticCamera targets
-simulate Incoherent Coherent Snapshots TiltedWaves open save calibrate decode devignette
+simulate Incoherent Coherent PartiallyCoherent Snapshots TiltedWaves open save calibrate decode devignette
 view refocus refocus_stack reduce_aperture render plots
 """
 

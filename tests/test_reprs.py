@@ -23,6 +23,7 @@ SCOPE = lg.LightFieldMicroscope.from_catalogue("lfm-worm").replace(lenslets={"co
 LARGE = [
     lg.RawImage(PICTURE, 5e-6, metadata={"a long note": "word " * 999, "numbers": list(range(999))}),
     lg.Field(PICTURE + 0j, GRID, 5e-7),
+    lg.CoherentModes(lg.Field(PICTURE + 0j, GRID, 5e-7)),
     lg.LightField(PICTURE.reshape(7, 10, 70, 100), lg.Grid((7, 10), 1e-3), lg.Grid((70, 100), 1e-4), 0.1),
     lg.Volume(np.broadcast_to(PICTURE, (90, N, N)), GRID, np.linspace(0, 1e-3, 90)),
     lg.Stack(np.broadcast_to(PICTURE, (90, N, N)), np.linspace(0, 1, 90)),
@@ -42,7 +43,8 @@ LARGE = [
 ]  # fmt: skip
 SMALL = {
     lg.CircularAperture, lg.Coherent, lg.Grid, lg.Incoherent, lg.Lattice, lg.LensletArray, lg.Propagate,
-    lg.RectangularAperture, lg.Sensor, lg.Snapshots, lg.Spectrum, lg.ThinLens, lg.TiltedWaves, lg.Train,
+    lg.ExtendedSource, lg.GaussianSchell, lg.PartiallyCoherent, lg.RectangularAperture, lg.Sensor,
+    lg.SpectralLine, lg.Snapshots, lg.Spectrum, lg.ThinLens, lg.TiltedWaves, lg.Train,
     lg.ZernikePlate,
 }  # fmt: skip
 """Of numbers alone."""

@@ -19,6 +19,7 @@ from .core.field import Field as Field
 from .core.grid import Grid as Grid
 from .core.lattice import Lattice as Lattice
 from .core.lightfield import LightField as LightField
+from .core.modes import CoherentModes as CoherentModes
 from .core.raw import RawImage as RawImage
 from .core.stack import Stack as Stack
 from .core.volume import Volume as Volume
@@ -74,11 +75,20 @@ from .rendering import (
     view as view,
     view_path as view_path,
 )
-from .scene import Points as Points, Scene as Scene, Slice as Slice, targets as targets
+from .scene import (
+    ExtendedSource as ExtendedSource,
+    GaussianSchell as GaussianSchell,
+    Points as Points,
+    Scene as Scene,
+    Slice as Slice,
+    SpectralLine as SpectralLine,
+    targets as targets,
+)
 from .sensor import Sensor as Sensor, demosaic as demosaic
 from .simulation import (
     Coherent as Coherent,
     Incoherent as Incoherent,
+    PartiallyCoherent as PartiallyCoherent,
     Snapshots as Snapshots,
     Spectrum as Spectrum,
     TiltedWaves as TiltedWaves,

@@ -217,6 +217,11 @@ OPTIONS = {
     "negative seed": ((*SIMULATE, "--seed", "-1"), ["--seed is -1"]),
     "na of another light": ((*SIMULATE, "--na", "0.1"), ["--na", "tilted"]),
     "na too large": ((*SIMULATE, "--coherence", "tilted", "--na", "3"), ["na is 3"]),
+    "partial without na": ((*SIMULATE, "--coherence", "partial"), ["--na"]),
+    "count of partial": (
+        (*SIMULATE, "--coherence", "partial", "--na", "0.01", "--count", "3"),
+        ["--count has no meaning"],
+    ),
     "count of coherent light": ((*SIMULATE, "--coherence", "coherent", "--count", "3"), ["--count"]),
     "no calibration": (("decode", "raw.tiff", "-o", "v.zarr"), ["--calibration", "--white"]),
     "devignette without white": (

@@ -126,6 +126,10 @@ def test_simulate_adds_noise_that_the_seed_repeats(lumigraph, bench):
         (("--accuracy", "1e-4"), "Incoherent(accuracy=0.0001)"),
         (("--coherence", "snapshots"), "Snapshots(count=100, coherence_index=None, rng=7)"),
         (("--coherence", "tilted", "--na", "0.01", "--count", "5"), "TiltedWaves(count=5, na=0.01)"),
+        (
+            ("--coherence", "partial", "--na", "0.01", "--accuracy", "0.01"),
+            "PartiallyCoherent(source=ExtendedSource(lamp=Disc(radius=0.01), distance=-0.12), accuracy=0.01)",
+        ),
     ],
 )
 def test_simulate_passes_the_light_and_the_scene_on(lumigraph, bench, monkeypatch, words, expected):

@@ -7,10 +7,18 @@
 - `chart`: corners, edges and distortion of a chessboard on a picture, by `saddles` of the brightness
 - `pupil_edge`: how many directions lenslets tell apart, from the edges of micro-images
 - `photon_transfer`: gain, noise, dark signal and full well of a sensor, by EMVA 1288
+- `beams`: `beam_width`, `divergence`, `beam_quality` and degrees of coherence of light on a plane
 - `psf`: `centroid` and `encircled_energy` of a point image
 """
 
 from lumigraph.analysis import psf
+from lumigraph.analysis.beams import (
+    beam_quality,
+    beam_width,
+    degree_of_coherence,
+    divergence,
+    overall_coherence,
+)
 from lumigraph.analysis.chart import Chart, find_chart
 from lumigraph.analysis.photon_transfer import PhotonTransfer, photon_transfer
 from lumigraph.analysis.profiles import contrast, first_zero, full_width
@@ -25,14 +33,19 @@ __all__ = [
     "PhotonTransfer",
     "PupilEdge",
     "SlantedEdge",
+    "beam_quality",
+    "beam_width",
     "centroid",
     "contrast",
     "cutoff",
+    "degree_of_coherence",
+    "divergence",
     "encircled_energy",
     "find_chart",
     "first_zero",
     "full_width",
     "mtf",
+    "overall_coherence",
     "photon_transfer",
     "psf",
     "pupil_edge",

@@ -46,14 +46,15 @@ class Light:
     ----------
     coherence
         incoherent: like every lit scene; coherent: one plane wave; snapshots: random phases, many
-        times; tilted: plane waves from many directions.
+        times; tilted: plane waves from many directions; partial: a round lamp of aperture --na, whose light
+        converges on the main lens, by coherent modes.
     accuracy
-        Relative rms error to reach with incoherent light, 0.01 to 0.00001; 0.001 if left out. The raw image
-        records the error reached; a warning says when that is more.
+        Relative rms error to reach with incoherent light, 0.01 to 0.00001, or of the lamp's modes; 0.001 if
+        left out. The raw image records the error reached; a warning says when that is more.
     count
         Snapshots (100 if left out) or tilted waves (64) to add up: more of them, less speckle.
     na
-        Numerical aperture of the tilted waves; all directions if left out.
+        Numerical aperture of the tilted waves, all directions if left out; or of the lamp of partial.
     wavelength
         Wavelength instead of the camera's own, such as '550 nm'. May be repeated: the sensor sees the sum;
         with --colours three are red, green and blue.
@@ -61,7 +62,7 @@ class Light:
         rgb: a colour raw image; or a Bayer pattern, such as RGGB. The scene's pictures keep their colours.
     """
 
-    coherence: Literal["incoherent", "coherent", "snapshots", "tilted"] = "incoherent"
+    coherence: Literal["incoherent", "coherent", "snapshots", "tilted", "partial"] = "incoherent"
     accuracy: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
     count: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
     na: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
@@ -79,15 +80,17 @@ class Light:
             raise FormatError(f"--colours takes 3 --wavelength, red, green and blue, not {len(wavelengths)}.")
         return Spectrum.rgb(*wavelengths, bayer=None if self.colours == "rgb" else self.colours)
 
-    def chosen(self, seed: int) -> Any:
-        """The coherence that `lumigraph.simulate` takes."""
+    def chosen(self, seed: int, camera: "Instrument") -> Any:
+        """The coherence that `lumigraph.simulate` takes, before a camera."""
         from lumigraph import simulation
 
+        if self.coherence == "partial" and self.count is None:
+            return self._lamp(camera)
         if self.count is not None and self.coherence not in _COUNTS:
             raise FormatError(
                 f"--count has no meaning with --coherence {self.coherence}. Leave it out, or use snapshots."
             )
-        if self.accuracy is not None and self.coherence != "incoherent":
+        if self.accuracy is not None and self.coherence not in ("incoherent", "partial"):
             raise FormatError(f"--accuracy has no meaning with --coherence {self.coherence}. Leave it out.")
         if self.coherence == "coherent":
             return simulation.Coherent()
@@ -103,6 +106,19 @@ class Light:
         if self.coherence == "tilted":
             return simulation.TiltedWaves(count, self.na)
         return simulation.Snapshots(count, rng=seed)
+
+    def _lamp(self, camera: "Instrument") -> Any:
+        """A round lamp, imaged into the main lens."""
+        from lumigraph import simulation
+        from lumigraph.instruments.capabilities import WithMainLens
+        from lumigraph.scene import ExtendedSource
+
+        if self.na is None:
+            raise FormatError("--coherence partial needs --na, the numerical aperture of the lamp.")
+        if not isinstance(camera, WithMainLens):
+            raise FormatError("--coherence partial is for cameras: a microscope sees fluorescence.")
+        lamp = ExtendedSource.disc(self.na, -camera.object_distance)
+        return simulation.PartiallyCoherent(lamp, 1e-3 if self.accuracy is None else self.accuracy)
 
 
 @Parameter(name="*")
@@ -188,7 +204,8 @@ def simulate(
     stage.check()
     if seed < 0:
         raise FormatError(f"--seed is {seed} but must be at least 0.")
-    described, coherence, spectrum = load_camera(camera), light.chosen(seed), light.spectrum()
+    described = load_camera(camera)
+    coherence, spectrum = light.chosen(seed, described), light.spectrum()
     scene = stage.built(described.scene_grid)
     try:
         with progress("simulate") as shown:

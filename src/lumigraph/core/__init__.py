@@ -3,6 +3,7 @@
 - `grid`: `Grid`, where samples stand
 - `lattice`: `Lattice`, where lenslets stand, in a simulation [m] or on a white image [px]
 - `field`: `Field`, a complex scalar wave on a grid
+- `modes`: `CoherentModes`, partially coherent light as fields that never interfere
 - `raw`: `RawImage`, what a sensor read out
 - `calibration`: `Calibration`, the micro-images found on a raw image
 - `warp`: `Warp`, tilt and distortion of their lattice

@@ -9,6 +9,7 @@ and no edge is missed.
 """
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -43,36 +44,38 @@ def is_followed(camera: HasOptics) -> bool:
 def coherent_image(
     camera: HasOptics, amplitude: np.ndarray, grid: Grid, dz: float, accuracy: float
 ) -> np.ndarray:
-    """Raw image (ny, nx) of a plane's complex amplitude (y, x), which one wave along the axis has lit.
+    """Raw image (ny, nx) of a plane's complex amplitude (..., y, x), which one wave along the axis has lit.
 
     Parameters
     ----------
     camera
         One that `is_followed`.
     amplitude, grid, dz
-        Samples of the plane, where they stand, and its depth from the focused plane [m].
+        Samples of the plane, where they stand, and its depth from the focused plane [m]. Intensities of
+        leading axes add: they are coherent modes.
     accuracy
         How far lenslets' light is followed, as for incoherent light.
     """
     plain = camera.optics()
-    distance = plain.object_distance + dz
+    distance, modes = plain.object_distance + dz, np.reshape(amplitude, (-1, *grid.shape))
     if plain.lattice is None:
-        return _on_sensor(plain, amplitude, grid, distance)
+        return _on_sensor(plain, modes, grid, distance)
     optics = Optics.of(plain, distance, accuracy)
     lenslets, (rows, columns), (ky, kx) = relay(optics), optics.cells.image, optics.cells.samples
     y, x = lenslets.places(range(rows), range(columns))
     stop = _Stop(plain, distance, grid, _farthest(y, x))
-    light, image = stop.light(amplitude), np.zeros((rows * ky, columns * kx), np.float32)
+    lights, image = stop.lights(modes), np.zeros((rows * ky, columns * kx), np.float32)
     step = max(1, int(rows * TOGETHER / (len(y) * len(x))))
     for first in range(0, rows, step):
         mine = range(first, min(first + step, rows))
         y, x = lenslets.places(mine, range(columns))
-        field = lenslets.field(stop.behind(light, y, x), mine, range(columns))
-        image[mine.start * ky : mine.stop * ky] = np.abs(field) ** 2
+        for light in stop.behind(lights, y, x):
+            field = lenslets.field(light, mine, range(columns))
+            image[mine.start * ky : mine.stop * ky] += np.abs(field) ** 2
     return readout(optics).forward(image / np.float32(optics.image_scale**2))
 
 
-def _on_sensor(camera: CameraOptics, amplitude: np.ndarray, grid: Grid, distance: float) -> np.ndarray:
+def _on_sensor(camera: CameraOptics, modes: np.ndarray, grid: Grid, distance: float) -> np.ndarray:
     """Of a camera without lenslets."""
     pixels, pitch = camera.sensor.grid, _cells.airy(camera) / (2 * OVERSAMPLING)
     ny, nx = (math.ceil(size / pitch) + 2 * HALF_WIDTH + 2 for size in pixels.size)
@@ -80,10 +83,11 @@ def _on_sensor(camera: CameraOptics, amplitude: np.ndarray, grid: Grid, distance
         (ny, nx), (pitch, pitch), (-pixels.center[0], -pixels.center[1])
     )  # pixels are turned by 180°
     stop, image = _Stop(camera, distance, grid, _farthest(plane.y, plane.x)), np.zeros((ny, nx), np.float32)
-    light, step = stop.light(amplitude), max(1, int(TOGETHER / nx))
+    lights, step = stop.lights(modes), max(1, int(TOGETHER / nx))
     for first in range(0, ny, step):
         mine = slice(first, first + step)
-        image[mine] = np.abs(stop.behind(light, plane.y[mine], plane.x)) ** 2
+        for light in stop.behind(lights, plane.y[mine], plane.x):
+            image[mine] += np.abs(light) ** 2
     return averaged(plane, pixels).forward(image)
 
 
@@ -105,6 +109,14 @@ class _Stop:
         self.v, self.u = half * np.sin(angles), half * x
         self.weight = share * (math.pi * half**2)
 
+    def lights(self, modes: np.ndarray) -> list[np.ndarray]:
+        """Of each of several planes (modes, y, x), where they fit in memory."""
+        memory.require(
+            8.0 * len(modes) * len(self.v) * len(self.u), f"light of {len(modes)} modes in the stop",
+            "Use fewer modes, a smaller object or a smaller stop.", SamplingError,
+        )  # fmt: skip
+        return [self.light(mode) for mode in modes]
+
     def light(self, amplitude: np.ndarray) -> np.ndarray:
         """At the nodes, times their weights: for an even amplitude of 1, 1 arrives on the lenslets."""
         squared, grid = self.camera.wavelength * self.distance, self.grid
@@ -117,14 +129,15 @@ class _Stop:
         phase = _phase(self.camera, self.distance, self.v[:, None], self.u)
         return (found * np.exp(1j * phase) * (self.weight * scale)).astype(np.complex64)
 
-    def behind(self, light: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Amplitude at places (y, x) at the distance L behind the lens, without the phase exp(iπw²/(λL))."""
+    def behind(self, lights: list[np.ndarray], y: np.ndarray, x: np.ndarray) -> Iterator[np.ndarray]:
+        """Amplitudes at places (y, x) at the distance L behind the lens, without the phase exp(iπw²/(λL))."""
         squared = self.camera.wavelength * self.camera.separation
         down, across = (
             np.exp(-2j * np.pi / squared * np.multiply.outer(at, nodes)).astype(np.complex64)
             for at, nodes in ((y, self.v), (x, self.u))
         )
-        return down @ (light @ across.T) / np.float32(squared)
+        for light in lights:
+            yield down @ (light @ across.T) / np.float32(squared)
 
     def _count(self, farthest: float) -> int:
         """Nodes along each axis: as many as the phase has radians from the middle to the edge, and some."""

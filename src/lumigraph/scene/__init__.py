@@ -4,9 +4,26 @@
 - `targets`: test charts as scenes: pinhole, edge, USAF-1951, gratings, star, chessboard, photo
 - `usaf`: the chart USAF-1951
 - `sources`: waves: `plane_wave`, `point_source`, `gaussian_beam`
+- `schell`, `extended`: partially coherent light as modes: `GaussianSchell`, `ExtendedSource`
+- `lamps`: shapes of extended sources
+- `line`: `SpectralLine`, light of a finite bandwidth
 """
 
 from lumigraph.scene import sources, targets
+from lumigraph.scene.extended import ExtendedSource
+from lumigraph.scene.line import SpectralLine
+from lumigraph.scene.schell import GaussianSchell
 from lumigraph.scene.volumes import Diffuser, Part, Points, Scene, Slice
 
-__all__ = ["Diffuser", "Part", "Points", "Scene", "Slice", "sources", "targets"]
+__all__ = [
+    "Diffuser",
+    "ExtendedSource",
+    "GaussianSchell",
+    "Part",
+    "Points",
+    "Scene",
+    "Slice",
+    "SpectralLine",
+    "sources",
+    "targets",
+]

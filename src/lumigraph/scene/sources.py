@@ -46,7 +46,7 @@ def plane_wave(grid: Grid, wavelength: float, tilt: Pair = (0.0, 0.0), dtype: An
             f"tilt is ({tilt[0]:.4g}, {tilt[1]:.4g}) rad: its squared sines add to {np.sum(sines**2):.4g}, "
             "above 1. Use smaller angles."
         )
-    _warn_if_coarse("a tilted plane wave", grid, wavelength, (abs(sines[0]), abs(sines[1])))
+    warn_if_coarse("a tilted plane wave", grid, wavelength, (abs(sines[0]), abs(sines[1])))
     k = 2 * np.pi / wavelength
     data = np.outer(np.exp(1j * k * sines[0] * grid.y), np.exp(1j * k * sines[1] * grid.x))
     return Field(data.astype(dtype), grid, wavelength)
@@ -93,7 +93,7 @@ def point_source(
     center = checks.pair("position", position)
     dy, dx = grid.y - center[0], grid.x - center[1]
     sines = tuple(float(np.abs(d).max() / np.hypot(np.abs(d).max(), distance)) for d in (dy, dx))
-    _warn_if_coarse("a spherical wave", grid, wavelength, (sines[0], sines[1]))
+    warn_if_coarse("a spherical wave", grid, wavelength, (sines[0], sines[1]))
     k = np.copysign(2 * np.pi / wavelength, distance)
     z = abs(distance)
     if paraxial:
@@ -149,7 +149,7 @@ def _check(grid: Grid, wavelength: float) -> None:
     memory.require_plane(grid.shape, 32, "a wave")
 
 
-def _warn_if_coarse(what: str, grid: Grid, wavelength: float, sines: Pair) -> None:
+def warn_if_coarse(what: str, grid: Grid, wavelength: float, sines: Pair) -> None:
     """Warn where the phase turns by more than π from sample to sample: dx > λ / (2 sin θ)."""
     for name, pitch, sine in zip("yx", grid.pitch, sines, strict=True):
         if sine * pitch > wavelength / 2 * (1 + 1e-9):

@@ -6,12 +6,19 @@
 - `light`: what arrives on the sensor, and the raw image of it
 - `microscope_scene`: scenes before a light-field microscope
 - `spectrum`: `Spectrum`, light of several wavelengths, colour sensors
-- `coherence`: `Incoherent`, `Coherent`, `Snapshots`, `TiltedWaves`: how the scene's light interferes
+- `coherence`: `Incoherent`, `Coherent`, `PartiallyCoherent`, `Snapshots`, `TiltedWaves`: how light interferes
 - `known_planes`: `plane_views`, textured planes at known depths
 - `directions`: quasi-random directions of tilted waves, more of them where more light comes from
 """
 
-from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Snapshots, TiltedWaves
+from lumigraph.simulation.coherence import (
+    Coherence,
+    Coherent,
+    Incoherent,
+    PartiallyCoherent,
+    Snapshots,
+    TiltedWaves,
+)
 from lumigraph.simulation.imaging import Interrupted, simulate
 from lumigraph.simulation.known_planes import plane_views
 from lumigraph.simulation.spectrum import Spectrum
@@ -21,6 +28,7 @@ __all__ = [
     "Coherent",
     "Incoherent",
     "Interrupted",
+    "PartiallyCoherent",
     "Snapshots",
     "Spectrum",
     "TiltedWaves",

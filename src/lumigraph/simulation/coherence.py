@@ -7,15 +7,17 @@ intensities on the sensor are added, each with a weight.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.core.grid import Grid
+from lumigraph.core.modes import CoherentModes
 from lumigraph.elements import masks
-from lumigraph.errors import LumigraphError, SamplingError
+from lumigraph.errors import GeometryError, LumigraphError, SamplingError
 from lumigraph.operators.fineness import COARSEST, FINEST
+from lumigraph.propagation import propagate
 from lumigraph.simulation import directions
 
 Seed = int | np.random.Generator | None
@@ -307,3 +309,79 @@ class TiltedWaves:
         pupil = pupil_area / distance**2
         source = wavelength**2 / sample_area if self.na is None else math.pi * self.na**2
         return max(1.0, source / pupil) / self.count
+
+
+@runtime_checkable
+class Source(Protocol):
+    """Where partially coherent light comes from, such as `scene.GaussianSchell` or `scene.ExtendedSource`."""
+
+    def sampled(
+        self, grid: Grid, wavelength: float, distance: float, accuracy: float, dtype: Any
+    ) -> CoherentModes:
+        """The light on a grid at a distance behind the plane for which the source is described [m]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class PartiallyCoherent:
+    """Light of a source shines through each slice, as coherent modes whose images add.
+
+    The source is described on the focused plane; its light goes to slices at other depths by the source's
+    own formulas, and planes do not interfere or hide one another. Of a slice of intensity 1 where the source
+    gives 1, what enters the main lens arrives: to fill it from a wide slice, let the light converge, as in
+    ``ExtendedSource.disc(na, distance=-camera.object_distance)``. Quadratures follow each mode, as for
+    `Coherent`; not before lenslets that are turned.
+
+    Parameters
+    ----------
+    source
+        `GaussianSchell` or `ExtendedSource`; or `CoherentModes` of the camera's wavelength, with a sample
+        wherever a slice has one, in the focused plane.
+    accuracy
+        Of a source's mutual intensity, over the largest intensity; that of `CoherentModes` is their own. Its
+        share is part of ``metadata["error"]``.
+
+    Raises
+    ------
+    GeometryError
+        No source, or an accuracy that is not between 0 and 1.
+    """
+
+    source: Source | CoherentModes
+    accuracy: float = 1e-3
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.source, Source | CoherentModes):
+            raise GeometryError(
+                f"source is of type {type(self.source).__name__} but must be GaussianSchell(...), "
+                "ExtendedSource.disc(...) or CoherentModes."
+            )
+        if not 0 < checks.finite("accuracy", self.accuracy, "1") < 1:
+            raise GeometryError(f"accuracy is {self.accuracy:g} but must lie between 0 and 1.")
+
+    def on(self, grid: Grid, dz: float, wavelength: float) -> CoherentModes:
+        """Modes on a plane at a depth from the focused plane [m].
+
+        Raises
+        ------
+        GeometryError
+            `CoherentModes` of another wavelength, or without samples on the plane.
+        SamplingError
+            More modes than fit in memory.
+        """
+        if not isinstance(self.source, CoherentModes):
+            return self.source.sampled(grid, wavelength, -dz, self.accuracy, np.complex64)
+        known = self.source.grid
+        if any(abs(w - wavelength) > 1e-9 * wavelength for w in self.source.wavelengths):
+            told = ", ".join(f"{w * 1e9:.6g}" for w in self.source.wavelengths)
+            raise GeometryError(
+                f"the modes have {told} nm but the camera {wavelength * 1e9:.6g} nm. Give modes of its "
+                "wavelength, or camera.replace(wavelength=...)."
+            )
+        first = grid.samples_to(known)
+        if any(a < 0 or a + n > m for a, n, m in zip(first, grid.shape, known.shape, strict=True)):
+            raise GeometryError(
+                f"a slice of {grid.shape[0]} x {grid.shape[1]} samples reaches beyond the modes' grid of "
+                f"{known.shape[0]} x {known.shape[1]}. Give modes on a larger grid."
+            )
+        return self.source.through(lambda field: propagate(field, -dz, grid=grid))

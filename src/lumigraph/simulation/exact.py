@@ -6,27 +6,29 @@ import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.progress import Progress
-from lumigraph.operators import points, single_lens, white
+from lumigraph.operators import CameraOptics, points, single_lens, white
 from lumigraph.operators.coherent import coherent_image
 from lumigraph.operators.paraxial import left_by_field, resolved
 from lumigraph.operators.periodic import periodic_operator
 from lumigraph.scene import Diffuser, Points, Slice
 from lumigraph.simulation import error
 from lumigraph.simulation.camera import Camera
+from lumigraph.simulation.coherence import Coherent, PartiallyCoherent
 
 Part = Slice | Points | Diffuser
 
 
 def image_of(
-    camera: Camera, part: Part, accuracy: float, progress: Progress, *, coherent: bool = False
+    camera: Camera,
+    part: Part,
+    accuracy: float,
+    progress: Progress,
+    light: Coherent | PartiallyCoherent | None = None,
 ) -> tuple[np.ndarray, error.Reached]:
-    """Raw image of a part in incoherent light, or of a slice in coherent light, and how far off it is."""
+    """Image of a part in incoherent light, or of a slice in light that interferes; and how far off it is."""
     plain = camera.optics()
-    if coherent and isinstance(part, Slice):
-        plain = replace(plain, model="paraxial")
-        amplitude = np.sqrt(arrays.to_numpy(part.intensity))
-        image = coherent_image(plain, amplitude, part.grid, part.dz, accuracy)
-        return image, error.of_quadrature("coherent", accuracy).through(plain)
+    if light is not None and isinstance(part, Slice):
+        return _lit(replace(plain, model="paraxial"), part, accuracy, light)
     if camera.lattice is None:
         return _without_lenslets(camera, part), error.SINGLE_LENS
     if isinstance(part, Diffuser):
@@ -45,6 +47,20 @@ def image_of(
     if plain.model == "exact":
         return image, reached.and_also(left_by_field(plain, accuracy), ", alike over the field")
     return image, reached.through(plain)
+
+
+def _lit(
+    camera: CameraOptics, part: Slice, accuracy: float, light: Coherent | PartiallyCoherent
+) -> tuple[np.ndarray, error.Reached]:
+    """Of a slice in light that interferes, wholly or in part."""
+    reached = error.of_quadrature("coherent", accuracy).through(camera)
+    amplitude = np.sqrt(arrays.to_numpy(part.intensity))
+    if isinstance(light, PartiallyCoherent):
+        modes = light.on(part.grid, part.dz, camera.wavelength)
+        data = np.concatenate([arrays.to_numpy(field.data) for field in modes.fields])
+        reached = reached.and_also(modes.error, f", {modes.count} modes to {modes.error:.2g}")
+        amplitude = amplitude.astype(np.float32) * data
+    return coherent_image(camera, amplitude, part.grid, part.dz, accuracy), reached
 
 
 def _without_lenslets(camera: Camera, part: Part) -> np.ndarray:

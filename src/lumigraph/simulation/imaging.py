@@ -17,7 +17,14 @@ from lumigraph.operators.coherent import is_followed
 from lumigraph.scene import Points, Scene, Slice
 from lumigraph.simulation import error
 from lumigraph.simulation.camera import Camera, Imaging
-from lumigraph.simulation.coherence import Coherence, Coherent, Incoherent, Snapshots, TiltedWaves
+from lumigraph.simulation.coherence import (
+    Coherence,
+    Coherent,
+    Incoherent,
+    PartiallyCoherent,
+    Snapshots,
+    TiltedWaves,
+)
 from lumigraph.simulation.exact import image_of
 from lumigraph.simulation.light import Light, Shots, read_out
 from lumigraph.simulation.microscope_scene import Microscope, microscope_image
@@ -42,7 +49,7 @@ class Interrupted(KeyboardInterrupt):
 def simulate(
     camera: Camera | Microscope,
     scene: Scene | Volume,
-    coherence: Coherence | Incoherent | None = None,
+    coherence: Coherence | Incoherent | PartiallyCoherent | None = None,
     *,
     spectrum: Spectrum | None = None,
     progress: Progress | None = None,
@@ -62,9 +69,9 @@ def simulate(
     scene
         Slices, points and diffusers; see `lumigraph.targets`. Or a `Volume`, whose planes are slices.
     coherence
-        Of slices: `Incoherent` (default), `Coherent`, `Snapshots` or `TiltedWaves`. The last two leave the
-        raw image's relative rms error, estimated from the spread of blocks of their shots, in
-        ``metadata["estimated_error"]``.
+        Of slices: `Incoherent` (default), `Coherent`, `PartiallyCoherent`, `Snapshots` or `TiltedWaves`. The
+        last two leave the raw image's relative rms error, estimated from the spread of blocks of their
+        shots, in ``metadata["estimated_error"]``.
     spectrum
         Wavelengths that take the place of the camera's own, and the channels that see them. Then slices
         may be coloured, (y, x, 3), and the raw image is (ny, nx, 3) or a Bayer mosaic.
@@ -99,7 +106,7 @@ def simulate(
 def _imaged(
     camera: Camera,
     scene: Scene,
-    coherence: Coherence | Incoherent,
+    coherence: Coherence | Incoherent | PartiallyCoherent,
     progress: Progress | None,
     map: Callable[..., Iterable[Any]],  # noqa: A002 - as `simulate` names it
 ) -> RawImage:
@@ -107,10 +114,12 @@ def _imaged(
     light = Light(dark, Shots(camera, dark))
     slices, count, accuracy = [], 0, 1e-3
     fields: Iterable[Shot] = ()
-    coherent = isinstance(coherence, Coherent) and is_followed(camera)
+    followed = None
+    if isinstance(coherence, PartiallyCoherent) or (isinstance(coherence, Coherent) and is_followed(camera)):
+        followed = coherence
     if isinstance(coherence, Incoherent):
         accuracy = coherence.accuracy
-    elif coherent:
+    elif followed is not None or isinstance(coherence, PartiallyCoherent):
         accuracy = COHERENT
         scene = Scene(part.trimmed() if isinstance(part, Slice) else part for part in scene.parts)
     elif slices := [part.trimmed() for part in scene.parts if isinstance(part, Slice)]:
@@ -121,7 +130,7 @@ def _imaged(
     try:
         for part in exact:
             report = share(progress, light.done, total)
-            image, reached = image_of(camera, part, accuracy, report, coherent=coherent)
+            image, reached = image_of(camera, part, accuracy, report, followed)
             light.pixels = light.pixels + image
             light.reached.append((error.norm(image), reached))
             light.count(progress, total)
@@ -141,7 +150,7 @@ def _imaged(
 def _coloured(
     camera: Camera | Microscope,
     scene: Scene,
-    coherence: Coherence | Incoherent,
+    coherence: Coherence | Incoherent | PartiallyCoherent,
     spectrum: Spectrum,
     progress: Progress | None,
     map: Callable[..., Iterable[Any]],  # noqa: A002 - as `simulate` names it
@@ -154,17 +163,22 @@ def _coloured(
     return by_wavelength(camera, scene, spectrum, at_wavelength)
 
 
-def _check(camera: Camera, scene: Scene, coherence: Coherence | Incoherent) -> None:
+def _check(camera: Camera, scene: Scene, coherence: Coherence | Incoherent | PartiallyCoherent) -> None:
     """Refuse scenes that are empty or behind the lens, and propagations that do not fit in memory."""
     checks.instance("scene", scene, Scene)
-    if not isinstance(coherence, Incoherent | Coherent | Snapshots | TiltedWaves):
+    if not isinstance(coherence, Incoherent | Coherent | PartiallyCoherent | Snapshots | TiltedWaves):
         raise GeometryError(
             f"coherence is of type {type(coherence).__name__} but must be Incoherent(), Coherent(), "
-            "Snapshots(...) or TiltedWaves(...)."
+            "PartiallyCoherent(...), Snapshots(...) or TiltedWaves(...)."
         )
     if not isinstance(camera, Imaging):
         raise GeometryError(
             f"camera is of type {type(camera).__name__} but must be a camera, such as PlenopticCamera."
+        )
+    if isinstance(coherence, PartiallyCoherent) and not is_followed(camera):
+        raise GeometryError(
+            "coherence is PartiallyCoherent, whose modes are followed by lenses and plates to lenslets that "
+            "are not turned: this camera has others. Set rotation to 0, or use TiltedWaves(count, na=...)."
         )
     if not scene.parts:
         raise GeometryError("the scene is empty. Add targets, points or a diffuser.")

@@ -10,7 +10,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.sensor import integrate
 from lumigraph.simulation import error
 from lumigraph.simulation.camera import Camera
-from lumigraph.simulation.coherence import Coherence, Incoherent
+from lumigraph.simulation.coherence import Coherence, Incoherent, PartiallyCoherent
 
 
 @dataclass(slots=True)
@@ -88,7 +88,7 @@ class Light:
             progress(self.done / total)
 
 
-def read_out(camera: Camera, light: Light, coherence: Coherence | Incoherent) -> RawImage:
+def read_out(camera: Camera, light: Light, coherence: Coherence | Incoherent | PartiallyCoherent) -> RawImage:
     """Raw image of what has arrived, with what is known of its error."""
     shots, reached = light.shots, list(light.reached)
     shots.complete()
@@ -96,7 +96,7 @@ def read_out(camera: Camera, light: Light, coherence: Coherence | Incoherent) ->
     # A hard edge rings below zero when it is interpolated to pixels; a sensor counts no negative light.
     data = np.maximum(pixels, 0, dtype=np.float32)
     known = {"simulated": repr(coherence), "shots": light.done, "wavelength": camera.wavelength}
-    if shots.drawn and not isinstance(coherence, Incoherent):
+    if shots.drawn and not isinstance(coherence, Incoherent | PartiallyCoherent):
         there = error.of_grids(camera).through(camera.optics())
         if len(shots.drawn) > 1:
             drawn = shots.error(coherence.convergence)

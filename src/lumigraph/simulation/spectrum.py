@@ -9,7 +9,7 @@ import numpy as np
 from lumigraph.core import arrays, checks
 from lumigraph.core.raw import BAYER_PATTERNS, RawImage
 from lumigraph.errors import GeometryError
-from lumigraph.scene import Scene, Slice
+from lumigraph.scene import Scene, Slice, SpectralLine
 from lumigraph.sensor import mosaic
 
 
@@ -66,6 +66,16 @@ class Spectrum:
         """One channel that sees a band [m] evenly, by so many wavelengths."""
         count = checks.whole("count", count)
         return cls(tuple(np.linspace(shortest, longest, count).tolist()), ((1.0,),) * count)
+
+    @classmethod
+    def line(cls, line: SpectralLine, path_difference: float, accuracy: float = 1e-3) -> "Spectrum":
+        """One channel that sees a narrow line, as light of a largest path difference [m] shows it.
+
+        Its degree of coherence over that way is right to an accuracy.
+        """
+        checks.instance("line", line, SpectralLine)
+        wavelengths, weights, _ = line.nodes(path_difference, accuracy)
+        return cls(tuple(wavelengths.tolist()), tuple((w,) for w in weights.tolist()))
 
     @classmethod
     def rgb(
