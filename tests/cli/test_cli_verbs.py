@@ -128,7 +128,7 @@ def test_simulate_adds_noise_that_the_seed_repeats(lumigraph, bench):
         (("--coherence", "tilted", "--na", "0.01", "--count", "5"), "TiltedWaves(count=5, na=0.01)"),
         (
             ("--coherence", "partial", "--na", "0.01", "--accuracy", "0.01"),
-            "PartiallyCoherent(source=ExtendedSource(lamp=Disc(radius=0.01), distance=-0.12), accuracy=0.01)",
+            "PartiallyCoherent(source=ExtendedSource(lamp=Disc(radius=0.01), distance=-0.2), accuracy=0.01)",
         ),
     ],
 )
