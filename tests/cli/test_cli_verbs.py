@@ -38,6 +38,7 @@ VERBS = (
         "measure",
         "batch",
         "sweep",
+        "tolerance",
         "dataset",
         "board",
         "datasheet",
