@@ -5,6 +5,7 @@
 - `apertures`: `CircularAperture`, `RectangularAperture`
 - `lens`: `ThinLens`
 - `lenslets`: `LensletArray`, square or hexagonal, of one or three focal lengths
+- `scatter`: `Scatter`, how lenslets of an array differ from each other
 - `zernike`: Zernike polynomials in Noll's order and `ZernikePlate`
 - `masks`: white random phases and the thesis' random phase mask
 """
@@ -13,6 +14,7 @@ from lumigraph.elements.apertures import CircularAperture, RectangularAperture
 from lumigraph.elements.lens import ThinLens
 from lumigraph.elements.lenslets import LensletArray
 from lumigraph.elements.masks import random_phase_mask, white_phase
+from lumigraph.elements.scatter import Scatter
 from lumigraph.elements.train import Element, Train
 from lumigraph.elements.zernike import ZernikePlate, noll_to_nm, zernike
 
@@ -21,6 +23,7 @@ __all__ = [
     "Element",
     "LensletArray",
     "RectangularAperture",
+    "Scatter",
     "ThinLens",
     "Train",
     "ZernikePlate",

@@ -13,6 +13,7 @@ from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice, Vector
 from lumigraph.elements.lens import lens_phase
+from lumigraph.elements.scatter import Scatter
 from lumigraph.elements.transmission import Edge, check_edge, transmit, warn_if_coarse
 from lumigraph.errors import GeometryError
 
@@ -51,6 +52,8 @@ class LensletArray:
     stretch
         Factor of all distances of the lattice, about the axis: the pitch over the lattice's. As a 0-d array
         it is differentiated through, for lenslets that abut everywhere: the edges' own movement is not.
+    scatter
+        How single lenslets differ; not together with what is differentiated through.
 
     Raises
     ------
@@ -73,6 +76,7 @@ class LensletArray:
     extent: tuple[float, float] | None = field(default=None, kw_only=True)
     edge: Edge = field(default="grey", kw_only=True)
     stretch: float | Array = field(default=1.0, kw_only=True)
+    scatter: Scatter | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         checks.instance("lattice", self.lattice, Lattice)
@@ -93,6 +97,10 @@ class LensletArray:
             object.__setattr__(self, "extent", extent)
         check_edge(self.edge)
         self._stretched()
+        if self.scatter is not None and self._fixed() is not self:
+            raise GeometryError(
+                "lenslets that scatter are not differentiated through. Leave one of them out."
+            )
 
     def _stretched(self) -> None:
         """A plain stretch goes into the lattice; one to be differentiated stays."""
@@ -162,8 +170,14 @@ class LensletArray:
             center_y, center_x = self._position(i, j)
             dy, dx = y - center_y, grid.x - center_x
             focal_length = np.asarray(self._focal)[self.lattice.kind(i, j) % len(self._focal)]
+            opening = self._opening(i, j, dy, dx, grid.pitch)
+            if self.scatter is not None:
+                factor, down, across, _ = self.scatter.of(i, j)
+                sin, cos = coverage.sides(self.lattice.rotation)
+                focal_length = focal_length * factor
+                dy, dx = dy - (down * cos + across * sin), dx - (across * cos - down * sin)
             block = np.exp(-1j * np.pi * (dy**2 + dx**2) / (wavelength * focal_length))
-            result[first : first + rows] = block * self._opening(i, j, dy, dx, grid.pitch)
+            result[first : first + rows] = block * opening
         return result
 
     @property
@@ -174,11 +188,11 @@ class LensletArray:
     def _along_axes(self) -> bool:
         """Whether the transmission is a product of one factor along y and one along x."""
         straight = self.lattice.basis[0][0] == 0 == self.lattice.basis[1][1]
-        return straight and self.shape == "square" and len(self._focal) == 1
+        return self.scatter is None and straight and self.shape == "square" and len(self._focal) == 1
 
     @property
     def _open_everywhere(self) -> bool:
-        return self.extent is None and self._abutting
+        return self.extent is None and self._abutting and not (self.scatter and self.scatter.missing)
 
     @property
     def _abutting(self) -> bool:
@@ -210,12 +224,13 @@ class LensletArray:
         return self.lattice.origin[0] + i * y1 + j * y0, self.lattice.origin[1] + i * x1 + j * x0
 
     def _exists(self, i: np.ndarray, j: np.ndarray) -> np.ndarray | float:
+        present = 1.0 if self.scatter is None else self.scatter.of(i, j)[3] * 1.0
         if self.extent is None:
-            return 1.0
+            return present
         y, x = self._position(i, j)
         sin, cos = coverage.sides(self.lattice.rotation)
         height, width = self.extent[0] / 2 * (1 + 1e-9), self.extent[1] / 2 * (1 + 1e-9)
-        return ((np.abs(y * cos - x * sin) <= height) & (np.abs(y * sin + x * cos) <= width)) * 1.0
+        return present * ((np.abs(y * cos - x * sin) <= height) & (np.abs(y * sin + x * cos) <= width))
 
     def _opening(
         self, i: np.ndarray, j: np.ndarray, dy: np.ndarray, dx: np.ndarray, pitch: Vector

@@ -155,6 +155,10 @@ def _lenslets(camera: "LensletCamera") -> Iterator[Row]:
     for number, focal_length in enumerate(parts.focal_length):
         kind = "" if len(parts.focal_length) == 1 else f" {number + 1}"
         yield Row(f"lenslet focal length{kind}", focal_length, "m", "f_µ, given")
+    if camera.built.scatter is not None:
+        yield Row("focal length scatter", camera.built.focal_length_scatter, "", "rms part, as built")
+        yield Row("decentre scatter", camera.built.decentre_scatter, "m", "rms along each axis, as built")
+        yield Row("missing", camera.built.missing, "", "part of the lenslets, as built")
     yield Row("lenslet f-number", f_number, "", "b/p")
     yield Row(
         "lenslet cut-off",

@@ -105,7 +105,7 @@ def write(table: Mapping[str, Any]) -> str:
 _LENGTHS = (
     "wavelength", "object_distance", "focal_length", "diameter", "pitch", "pixel_pitch", "offset",
     "bandwidth", "tube_lens", "focus_depth", "lenslet_offset", "sensor_distance", "fourier_lens",
-    "separation", "lenslet_distance",
+    "separation", "lenslet_distance", "decentre_scatter",
 )  # fmt: skip
 
 

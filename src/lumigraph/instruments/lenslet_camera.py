@@ -210,6 +210,7 @@ class LensletCamera(Camera):
             shape=parts.shape,
             fill_factor=parts.fill_factor,
             extent=parts.extent,
+            scatter=self.built.scatter,
         )
 
     def image_train(self) -> Train:

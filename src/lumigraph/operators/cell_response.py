@@ -137,6 +137,10 @@ class Lenslets:
         """Matrices (m, window), along y and along x, to the numbers that hold band-limited light."""
         return self._bases[0][0], self._bases[1][0]
 
+    def values(self, which: int, at: np.ndarray) -> np.ndarray:
+        """Light (n, m) at positions along an axis, of the numbers that hold it."""
+        return self._bases[which][1](at)
+
     def response(
         self,
         center: Pair,

@@ -142,6 +142,22 @@ def lenslet_array(camera: CameraOptics) -> LensletArray:
     return replace(camera.array, lattice=straight(camera.array.lattice))
 
 
+def check_alike(camera: CameraOptics) -> None:
+    """Refuse lenslets that differ from each other: operators repeat from cell to cell.
+
+    Raises
+    ------
+    GeometryError
+        They differ.
+    """
+    if camera.array is not None and camera.array.scatter is not None:
+        raise GeometryError(
+            "lenslets that differ from each other have no operator, which repeats from lenslet to lenslet. "
+            "Simulate points, or slices in Coherent() light, or leave focal_length_scatter, "
+            "decentre_scatter and missing out of [built]."
+        )
+
+
 def straight(lattice: Lattice) -> Lattice:
     """The lattice turned about (0, 0) so that its rows lie along x; one for all turns, to the last bit."""
     sin, cos = math.sin(lattice.rotation), math.cos(lattice.rotation)

@@ -37,7 +37,7 @@ from lumigraph.operators.beyond import Beyond, beyond
 from lumigraph.operators.blocks import Part
 from lumigraph.operators.camera import HasOptics
 from lumigraph.operators.cell_response import Pair
-from lumigraph.operators.cells import Cells, blur
+from lumigraph.operators.cells import Cells, blur, check_alike
 from lumigraph.operators.kernels import Matrix, matrix
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.over_field import over_field
@@ -280,6 +280,7 @@ def periodic_operator(
     depths = tuple(float(d) for d in np.ravel(np.asarray(dz, np.float64)))
     if not depths:
         raise GeometryError("dz is empty. Give at least one depth.")
+    check_alike(camera.optics())
     plain, several = resolved(camera.optics(), accuracy), depths if np.ndim(dz) else None
 
     distances = [plain.object_distance + depth for depth in depths]

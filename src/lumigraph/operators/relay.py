@@ -11,13 +11,29 @@ from typing import Protocol
 
 import numpy as np
 
-from lumigraph.operators.cell_response import INFINITE, MIDDLE, STEP, Axis, Box, Lenslets, Limits, fresnel
+from lumigraph.errors import GeometryError
+from lumigraph.operators.cell_response import (
+    INFINITE,
+    MIDDLE,
+    STEP,
+    Axis,
+    Box,
+    Lenslets,
+    Limits,
+    focal_lengths,
+    fresnel,
+    legendre,
+    nodes,
+)
 from lumigraph.operators.exact import lenslets_of
 from lumigraph.operators.optics import Optics
 
 Pair = tuple[float, float]
 
 Members = tuple[Pair, ...]
+
+_STRONGEST = 0.2
+"""Of the focal length, what no lenslet falls below that differs from the others: it sets quadratures."""
 
 
 class Relay(Protocol):
@@ -36,6 +52,8 @@ class Relay(Protocol):
 
 def relay(optics: Optics) -> Relay:
     """Of a camera's lenslets, in the frame that turns with them."""
+    if optics.array.scatter is not None:
+        return Each(optics)
     return Straight(optics) if optics.straight else Lines(optics)
 
 
@@ -204,3 +222,79 @@ class Lines:
             spread *= weight * axis.fade(place + lines, self.optics.array.lattice.pitch)
             self._spreads[place] = spread.astype(np.complex64)
         return self._spreads[place]
+
+
+@dataclass(slots=True)
+class Each:
+    """Square lenslets that differ from each other, each a quadrature of its own on every cell."""
+
+    optics: Optics
+    _known: dict[tuple[int, float], tuple[np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=dict)
+    _lenslets: Lenslets = field(init=False)
+
+    def __post_init__(self) -> None:
+        if not self.optics.straight or self.optics.camera.model == "exact":
+            raise GeometryError(
+                "lenslets that differ from each other are simulated for square ones of one focal length and "
+                'model = "paraxial". Use those, or leave focal_length_scatter, decentre_scatter and missing '
+                "out of [built]."
+            )
+        self._lenslets = lenslets_of(self.optics)
+
+    def places(self, rows: range, columns: range) -> tuple[np.ndarray, np.ndarray]:
+        """As `Relay.places`."""
+        return _Cells(self.optics, 0).places(rows), _Cells(self.optics, 1).places(columns)
+
+    def field(self, light: np.ndarray, rows: range, columns: range) -> np.ndarray:
+        """As `Relay.field`."""
+        y, x = _Cells(self.optics, 0), _Cells(self.optics, 1)
+        lines = []
+        for k, row in enumerate(rows):
+            cells = (light[y.window(k), x.window(n)] for n in range(len(columns)))
+            pairs = zip(columns, cells, strict=True)
+            lines.append(np.hstack([self._cell(seen, (row, column)) for column, seen in pairs]))
+        return np.vstack(lines)
+
+    def _cell(self, light: np.ndarray, cell: tuple[int, int]) -> np.ndarray:
+        """Amplitude (y, x) on one cell's samples, of the light (y, x) in its window."""
+        mine = [_Cells(self.optics, which) for which in (0, 1)]
+        (down, ys), (across, xs) = (self._around(one, at) for one, at in zip(mine, cell, strict=True))
+        i, j = np.meshgrid(down, across, indexing="ij")
+        scatter = self.optics.array.scatter
+        assert scatter is not None  # `relay` has looked
+        factor, dy, dx, there = scatter.of(i, j)
+        total = np.zeros([axis.samples for axis in self.optics.axes], np.complex64)
+        for k, n in zip(*np.nonzero(there), strict=True):
+            bend = float(factor[k, n])
+            above = self._behind(0, ys[k], bend, float(dy[k, n]))
+            total += above @ light @ self._behind(1, xs[n], bend, float(dx[k, n])).T
+        return total
+
+    def _around(self, mine: _Cells, cell: int) -> tuple[np.ndarray, list[float]]:
+        """Numbers of the lenslets that light is followed to along an axis, and their places from the cell."""
+        lattice, axis, which = self.optics.array.lattice, mine.axis, mine.which
+        step, origin = lattice.basis[1 - which][which], lattice.origin[which] - mine.center(cell)
+        reach, (low, high) = axis.size / 2 + axis.neighbourhood, mine.limits(cell)
+        ends = sorted(((max(-reach, low) - origin) / step, (min(reach, high) - origin) / step))
+        numbers = np.arange(math.ceil(ends[0] - 1e-9), math.floor(ends[1] + 1e-9) + 1)
+        return numbers, (origin + numbers * step).round(12).tolist()
+
+    def _behind(self, which: int, middle: float, factor: float, decentre: float) -> np.ndarray:
+        """Amplitude (samples, window) along one axis behind one lenslet."""
+        wavelength, focal_length = self._lenslets.optics[0], focal_lengths(self.optics.array)[0] * factor
+        spread, at, light = self._quadrature(which, middle)
+        phase = np.exp(-1j * np.pi * (at - middle - decentre) ** 2 / (wavelength * focal_length))
+        return (spread * phase).astype(np.complex64) @ light
+
+    def _quadrature(self, which: int, middle: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of a lenslet's aperture: to the samples, its nodes from the cell, and of the window's light."""
+        if (which, middle) not in self._known:
+            axis, array, optics = self.optics.axes[which], self.optics.array, self._lenslets.optics
+            step = abs(array.lattice.basis[1 - which][which])
+            half = array.fill_factor * step / 2
+            count = nodes(half, _STRONGEST * focal_lengths(array)[0], axis, optics)
+            at, weight = legendre(middle - half, middle + half, count)
+            spread = fresnel(axis.image, at, math.prod(optics)) * (weight * axis.fade(at, step))
+            light = self._lenslets.values(which, at) @ self._lenslets.coefficients[which]
+            self._known[which, middle] = spread, at, light.astype(np.complex64)
+        return self._known[which, middle]

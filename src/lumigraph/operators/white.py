@@ -20,6 +20,7 @@ from scipy.special import j1
 from lumigraph.core import arrays
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import HasOptics
+from lumigraph.operators.cells import check_alike
 from lumigraph.operators.glare import fallen
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.tiles import readout
@@ -44,6 +45,7 @@ LARGEST = 2.0**25
 def white_image(camera: HasOptics, accuracy: float) -> tuple[np.ndarray, float]:
     """Raw image (ny, nx) of light of 1 on the lenslets, and the relative rms of the fringes that it lacks."""
     camera = camera.optics()
+    check_alike(camera)
     optics = Optics.of(camera, camera.object_distance, accuracy)
     pitches, cells = _pitches(optics), optics.cells
     wave = WaveImage.of(optics, pitches)

@@ -9,7 +9,7 @@ import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.errors import FormatError, GeometryError
-from lumigraph.instruments import Built, Instrument, LensletCamera, Tolerance
+from lumigraph.instruments import Instrument, LensletCamera, Tolerance
 from lumigraph.instruments.loading import AnyCamera
 from lumigraph.instruments.tolerances import check_name
 
@@ -31,7 +31,7 @@ def check_camera(camera: AnyCamera | LensletCamera | Instrument) -> LensletCamer
 def _path(name: str) -> tuple[str | int, ...]:
     """Where a value stands in the table of a camera as built."""
     check_name(name)
-    if name in Built.model_fields:
+    if name in ("separation", "lenslet_distance"):
         return "built", name
     if name.startswith("lenslets.offset_"):
         return "lenslets", "offset", "yx".index(name[-1])
@@ -41,7 +41,7 @@ def _path(name: str) -> tuple[str | int, ...]:
 def _meant(camera: LensletCamera) -> dict[str, Any]:
     """The camera's table with all distances, so that one may change alone."""
     table = camera.model_dump(by_alias=True)
-    table["built"] = {"separation": camera.separation, "lenslet_distance": camera.lenslet_distance}
+    table["built"] |= {"separation": camera.separation, "lenslet_distance": camera.lenslet_distance}
     table["main_lens"]["diameter"] = camera.pupil_diameter
     table["sensor"]["shape"] = camera.sensor.shape
     table["lenslets"]["offset"] = list(camera.lenslets.offset)

@@ -1,0 +1,66 @@
+"""`Scatter`: how lenslets of an array differ from each other, each by numbers of its own index."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtri
+
+from lumigraph.core import checks
+from lumigraph.errors import GeometryError
+
+_MULTIPLIERS = (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)  # splitmix64's
+
+
+@dataclass(frozen=True, slots=True)
+class Scatter:
+    """Errors of single lenslets, drawn by chance; the same seed draws the same for a lenslet.
+
+    Parameters
+    ----------
+    focal_length
+        Standard deviation, as a part of it.
+    decentre
+        Standard deviation of a lenslet's vertex from the middle of its aperture, along each axis of the
+        array [m]. Apertures stay where the lattice has them.
+    missing
+        Part of the lenslets that are opaque.
+    seed
+        Of all that is drawn.
+
+    Raises
+    ------
+    GeometryError
+        A negative value, or a part of 1 or more.
+    """
+
+    focal_length: float = 0.0
+    decentre: float = 0.0
+    missing: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        checks.whole("seed", self.seed, 0)
+        for name, most in (("focal_length", 0.2), ("decentre", 1.0), ("missing", 0.99)):
+            if not 0 <= checks.finite(name, getattr(self, name)) <= most:
+                raise GeometryError(
+                    f"the scatter's {name} is {getattr(self, name):g} but must be from 0 to {most:g}."
+                )
+
+    def of(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Of lenslets (i, j): factor of the focal length, decentres along columns and rows [m], presence."""
+        bend, down, across, there = (_uniform(i, j, self.seed, channel) for channel in range(4))
+        factor = 1 + self.focal_length * np.clip(ndtri(bend), -4, 4)
+        return factor, self.decentre * ndtri(down), self.decentre * ndtri(across), there >= self.missing
+
+
+def _uniform(i: np.ndarray, j: np.ndarray, seed: int, channel: int) -> np.ndarray:
+    """Numbers between 0 and 1 by an index: a hash, whichever other lenslets are asked for."""
+    golden, first, second = (np.uint64(one) for one in _MULTIPLIERS)
+    found = np.full(np.broadcast(i, j).shape, np.uint64(seed % 2**64))
+    with np.errstate(over="ignore"):
+        for number in (i, j, channel):
+            found = found * golden + np.asarray(number).astype(np.int64).astype(np.uint64) + golden
+            found = (found ^ (found >> np.uint64(30))) * first
+            found = (found ^ (found >> np.uint64(27))) * second
+            found = found ^ (found >> np.uint64(31))
+    return (found >> np.uint64(11)).astype(np.float64) * 2.0**-53 + 2.0**-54
