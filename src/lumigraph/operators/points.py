@@ -44,7 +44,7 @@ def points_image(
         mine = points.positions[:, 2] == dz
         positions, intensities = points.positions[mine, :2], points.intensities[mine]
         lenslets = _relay(camera, float(dz), max(SPARE * accuracy, FINEST), known)
-        within = _within(lenslets.optics, _on_lenslets(lenslets.optics, positions, lenslets.optics.distance))
+        within = _within(lenslets.optics, on_lenslets(lenslets.optics, positions, lenslets.optics.distance))
         if within.any():
             total += _plane_image(lenslets, positions[within], intensities[within])
         if not within.all():
@@ -60,7 +60,7 @@ def image_and_error(camera: HasOptics, points: Points, accuracy: float) -> tuple
     if not np.any(points.intensities):
         return image, 0.0
     optics = Optics.of(camera, camera.object_distance, accuracy)
-    places = _on_lenslets(optics, points.positions[:, :2], camera.object_distance + points.positions[:, 2])
+    places = on_lenslets(optics, points.positions[:, :2], camera.object_distance + points.positions[:, 2])
     k = int(np.argmax(np.where(_within(optics, places), points.intensities, 0)))  # some point, if none is
     one = Points(points.positions[k : k + 1], points.intensities[k : k + 1])
     coarser = min(accuracy * FINER, COARSEST / SPARE)
@@ -88,7 +88,7 @@ def _plane_image(lenslets: Relay, positions: np.ndarray, intensities: np.ndarray
     """Raw image (ny, nx) of points (n, 2) of one depth."""
     optics = lenslets.optics
     image = np.zeros([n * k for n, k in zip(optics.cells.image, optics.cells.samples, strict=True)])
-    places = _on_lenslets(optics, positions, optics.distance)
+    places = on_lenslets(optics, positions, optics.distance)
     farthest = _farthest(optics, places)
     light = point_light(optics.camera, optics.distance, farthest)
     for place, intensity in zip(places, intensities, strict=True):
@@ -98,7 +98,7 @@ def _plane_image(lenslets: Relay, positions: np.ndarray, intensities: np.ndarray
     return readout(optics).forward(image.astype(np.float32))
 
 
-def _on_lenslets(optics: Optics, positions: np.ndarray, distance: float | np.ndarray) -> np.ndarray:
+def on_lenslets(optics: Optics, positions: np.ndarray, distance: float | np.ndarray) -> np.ndarray:
     """Images (n, 2) in the lenslet plane of points (n, 2) [m], in the frame that turns with the lenslets."""
     sin, cos = math.sin(optics.rotation), math.cos(optics.rotation)
     y, x = -optics.camera.separation / distance * positions.T

@@ -112,8 +112,8 @@ class Straight:
     def field(self, light: np.ndarray, rows: range, columns: range) -> np.ndarray:
         """As `Relay.field`."""
         box = self._box(rows, columns) if self.optics.camera.model == "exact" else MIDDLE
-        down = self._along(0, light[None], rows, box)
-        return self._along(1, down.transpose(0, 2, 1), columns, box).sum(0).T
+        down = self.along(0, light[None], rows, box)
+        return self.along(1, down.transpose(0, 2, 1), columns, box).sum(0).T
 
     def _box(self, rows: range, columns: range) -> Box:
         ends = [
@@ -123,7 +123,7 @@ class Straight:
         (top, bottom), (left, right) = ends
         return ((top + bottom) / 2, (left + right) / 2), ((bottom - top) / 2, (right - left) / 2)
 
-    def _along(self, which: int, light: np.ndarray, cells: range, box: Box) -> np.ndarray:
+    def along(self, which: int, light: np.ndarray, cells: range, box: Box) -> np.ndarray:
         """Amplitudes (terms, samples, n) along one axis of light (1 or terms, places, n)."""
         mine = _Cells(self.optics, which)
         parts = [self._matrix(which, cell, box) @ light[:, mine.window(k)] for k, cell in enumerate(cells)]

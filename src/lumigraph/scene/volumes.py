@@ -28,11 +28,14 @@ class Slice:
         Where its samples stand [m].
     dz
         Depth from the focused plane [m], positive farther from the camera.
+    opacity
+        (y, x), 0 to 1: the part of a sample's area that hides what is farther away; None hides nothing, and
+        beside the grid nothing is hidden. What a slice gives off is its intensity alone, whatever it hides.
 
     Raises
     ------
     GeometryError
-        A shape that differs from the grid's.
+        A shape that differs from the grid's, or an opacity out of 0 to 1.
     LumigraphError
         Negative, complex, NaN or infinite intensities.
 
@@ -47,6 +50,7 @@ class Slice:
     intensity: Array
     grid: Grid
     dz: float = 0.0
+    opacity: np.ndarray | None = None
 
     __repr__ = brief
 
@@ -61,6 +65,8 @@ class Slice:
             )
         checks.finite("dz", self.dz)
         _check_intensity("a slice", self.intensity)
+        if self.opacity is not None:
+            object.__setattr__(self, "opacity", _opacity(self.opacity, self.grid))
 
     def _repr_html_(self) -> str:
         rows = [("samples", picture.sized(self.grid.shape)), *self._rows()]
@@ -75,10 +81,16 @@ class Slice:
         """Square root of the intensity: the amplitude behind a transparency in even light."""
         return namespace(self.intensity).sqrt(self.intensity)
 
+    @property
+    def hides(self) -> bool:
+        """Whether it hides anything."""
+        return self.opacity is not None and bool(self.opacity.any())
+
     def trimmed(self) -> "Slice":
-        """The slice cropped to the rows and columns that give light; one sample where none does."""
+        """The slice cropped to the rows and columns that give light or hide; one sample where none does."""
         lit = to_numpy(self.intensity) > 0
         lit = np.any(lit, axis=2) if lit.ndim == 3 else lit
+        lit = lit if self.opacity is None else lit | (self.opacity > 0)
         spans = []
         for axis in (0, 1):
             places = np.flatnonzero(np.any(lit, axis=1 - axis))
@@ -88,7 +100,8 @@ class Slice:
         shape = bottom - top, right - left
         center = self.grid.y[top + shape[0] // 2], self.grid.x[left + shape[1] // 2]
         grid = Grid(shape, self.grid.pitch, (float(center[0]), float(center[1])))
-        return replace(self, intensity=self.intensity[top:bottom, left:right], grid=grid)
+        covers = None if self.opacity is None else self.opacity[top:bottom, left:right]
+        return replace(self, intensity=self.intensity[top:bottom, left:right], grid=grid, opacity=covers)
 
     def at(self, dz: float) -> "Slice":
         """The slice moved by `dz` [m] away from the camera."""
@@ -191,7 +204,7 @@ def _about(part: Part) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """Parts that give off light together; ``+`` adds scenes. Parts do not hide one another.
+    """Parts that give off light together; ``+`` adds scenes. Slices with an opacity hide what is farther.
 
     Parameters
     ----------
@@ -246,6 +259,22 @@ class Scene:
     def scaled(self, factor: float) -> "Scene":
         """The scene with all intensities multiplied by `factor`."""
         return Scene(part.scaled(factor) for part in self.parts)
+
+
+def _opacity(opacity: Any, grid: Grid) -> np.ndarray:
+    """The opacity (y, x) of a slice, float32; one number stands for all samples."""
+    covers = np.asarray(to_numpy(opacity) if hasattr(opacity, "shape") else opacity)
+    if covers.shape not in ((), grid.shape):
+        raise GeometryError(
+            f"opacity has shape {covers.shape} but must be (y, x) = {grid.shape} of the slice's grid, or a "
+            "number."
+        )
+    checks.finite_array("opacity", covers, GeometryError)
+    if covers.min() < 0 or covers.max() > 1:
+        raise GeometryError(
+            f"opacity lies between {covers.min():g} and {covers.max():g} but must be 0 (clear) to 1 (opaque)."
+        )
+    return np.broadcast_to(covers.astype(np.float32), grid.shape)
 
 
 def _floats(name: str, values: Any) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Raw images by wave optics, from a camera and a scene; linear images are formed by `operators`.
 
 - `imaging`: `simulate`
-- `exact`: parts of a scene that need no shots
+- `exact`: parts of a scene that need no shots; `hiding`, those behind opaque slices
 - `shots`: slices in light that interferes, field after field
 - `light`: what arrives on the sensor, and the raw image of it
 - `microscope_scene`: scenes before a light-field microscope

@@ -1,5 +1,6 @@
 """Parts of a scene whose images need no shots: points, evenly lit stops, slices in light of one kind."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +11,12 @@ from lumigraph.operators import CameraOptics, points, single_lens, white
 from lumigraph.operators.coherent import coherent_image
 from lumigraph.operators.paraxial import left_by_field, resolved
 from lumigraph.operators.periodic import periodic_operator
+from lumigraph.operators.screens import Screen
 from lumigraph.scene import Diffuser, Points, Slice
 from lumigraph.simulation import error
 from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.coherence import Coherent, PartiallyCoherent
+from lumigraph.simulation.hiding import hidden_image
 
 Part = Slice | Points | Diffuser
 
@@ -24,9 +27,16 @@ def image_of(
     accuracy: float,
     progress: Progress,
     light: Coherent | PartiallyCoherent | None = None,
+    *,
+    screens: Sequence[Screen] = (),
 ) -> tuple[np.ndarray, error.Reached]:
-    """Image of a part in incoherent light, or of a slice in light that interferes; and how far off it is."""
+    """Image of a part in incoherent light, or of a slice in light that interferes; and how far off it is.
+
+    In incoherent light screens hide what stands behind them.
+    """
     plain = camera.optics()
+    if screens and not isinstance(part, Diffuser):
+        return hidden_image(plain, part, accuracy, progress, screens)
     if light is not None and isinstance(part, Slice):
         return _lit(replace(plain, model="paraxial"), part, accuracy, light)
     if camera.lattice is None:

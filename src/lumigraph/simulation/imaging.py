@@ -26,6 +26,7 @@ from lumigraph.simulation.coherence import (
     TiltedWaves,
 )
 from lumigraph.simulation.exact import image_of
+from lumigraph.simulation.hiding import screens_of
 from lumigraph.simulation.light import Light, Shots, read_out
 from lumigraph.simulation.microscope_scene import Microscope, microscope_image
 from lumigraph.simulation.shots import Shot, number_of_shots, shots
@@ -58,9 +59,13 @@ def simulate(
     """Raw image (ny, nx) of a scene, float32, turned by 180° so that pictures stand upright.
 
     Light goes from each plane of the scene to the main lens, through the camera's train to the sensor,
-    where its intensity is integrated over the pixels. Depths add up: planes do not hide one another. An
-    evenly lit, wide scene of intensity 1 gives a mean of about 1; a point of intensity 1 counts as one
-    sample of ``camera.object_grid``.
+    where its intensity is integrated over the pixels. An evenly lit, wide scene of intensity 1 gives a mean
+    of about 1; a point of intensity 1 counts as one sample of ``camera.object_grid``.
+
+    Depths add up, and slices with an opacity hide what stands behind them, before cameras with lenslets and
+    in incoherent light: each point that their edges hide in part sends its own wave past them (Kirchhoff's
+    and Fresnel's integrals, to 1e-2 rms of these points' light). Where edges of two slices stand within some
+    Fresnel zones of each other, as a point sees them, the product is taken. Lenses are paraxial then.
 
     Parameters
     ----------
@@ -112,7 +117,7 @@ def _imaged(
 ) -> RawImage:
     dark = np.zeros(camera.sensor.shape)
     light = Light(dark, Shots(camera, dark))
-    slices, count, accuracy = [], 0, 1e-3
+    slices, count, accuracy, screens = [], 0, 1e-3, screens_of(scene, camera, coherence)
     fields: Iterable[Shot] = ()
     followed = None
     if isinstance(coherence, PartiallyCoherent) or (isinstance(coherence, Coherent) and is_followed(camera)):
@@ -130,7 +135,7 @@ def _imaged(
     try:
         for part in exact:
             report = share(progress, light.done, total)
-            image, reached = image_of(camera, part, accuracy, report, followed)
+            image, reached = image_of(camera, part, accuracy, report, followed, screens=screens)
             light.pixels = light.pixels + image
             light.reached.append((error.norm(image), reached))
             light.count(progress, total)

@@ -84,6 +84,11 @@ def microscope_image(
         )
     if not scene.parts:
         raise GeometryError("the scene is empty. Add targets, points or a diffuser.")
+    if any(isinstance(part, Slice) and part.hides for part in scene.parts):
+        raise GeometryError(
+            "a slice is opaque but fluorescence shines through a sample: before a light-field microscope "
+            "nothing hides. Leave the opacity out."
+        )
     pixels, reached = np.zeros(scope.sensor.shape), []
     for done, part in enumerate(scene.parts):
         image, rms = _image(scope, part, coherence.accuracy)
