@@ -132,7 +132,13 @@ class Stage:
         white, usaf1951, siemens_star, gratings, slanted_edge, edge, pinhole, chessboard, photo, or a picture
         file; may be given several times.
     depth
-        Depth of each scene from the focused plane, such as '10 mm' (farther) or '-10 mm' (nearer).
+        Depth of each scene from the focused plane, such as '10 mm' (farther) or '-10 mm' (nearer). With
+        --depth-map two: of white, and of black.
+    depth_map
+        Depths of the one picture that is given as --scene, which then hides what is behind it: metres from
+        the focused plane (.pfm, .tiff), or a picture, white for the first --depth and black for the second.
+    planes
+        Opaque slices that --depth-map is sorted into, 1 to 64; 8 if left out.
     point
         A point of light at 'y, x' or 'y, x, depth' in object space, such as '0 mm, 1 mm, 5 mm'; may be
         given several times.
@@ -140,6 +146,8 @@ class Stage:
 
     scene: list[str] | None = None
     depth: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True)] = None
+    depth_map: Path | None = None
+    planes: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
     point: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True)] = None
 
     def check(self) -> None:
@@ -148,22 +156,63 @@ class Stage:
             raise FormatError(
                 f"nothing is in front of the camera. Give --scene ({', '.join(SCENES)}) or --point."
             )
-        if self.depth and len(self.depth) not in (1, len(self.scene or [])):
+        if self.planes is not None and self.depth_map is None:
+            raise FormatError("--planes has no meaning without --depth-map. Leave it out.")
+        if self.depth_map is not None:
+            if len(self.scene or []) != 1:
+                raise FormatError(f"--depth-map is of one --scene, not {len(self.scene or [])}. Give one.")
+            if len(self.depth or []) not in (0, 2):
+                raise FormatError(
+                    f"--depth-map takes 2 --depth, of white and of black, not {len(self.depth or [])}."
+                )
+        elif self.depth and len(self.depth) not in (1, len(self.scene or [])):
             raise FormatError(
                 f"there are {len(self.depth)} --depth for {len(self.scene or [])} --scene. Give one for each."
             )
 
-    def built(self, grid: "Grid") -> "Scene":
-        """Everything together."""
+    def built(self, camera: "Instrument") -> "Scene":
+        """Everything together, before a camera."""
         from lumigraph.scene import Scene, targets
 
-        names = self.scene or []
+        grid, names = camera.scene_grid, self.scene or []
+        if self.depth_map is not None:
+            lit = self._with_depths(camera, self.depth_map)
+            return lit + targets.points([_point(text) for text in self.point]) if self.point else lit
         texts = (self.depth or ["0 mm"]) * (len(names) if len(self.depth or [""]) == 1 else 1)
         depths = [length("--depth", text) or 0.0 for text in texts]
         parts = [_scene(name, grid).at(dz) for name, dz in zip(names, depths, strict=True)]
         if self.point:
             parts.append(targets.points([_point(text) for text in self.point]))
         return sum(parts, Scene())
+
+    def _with_depths(self, camera: "Instrument", path: Path) -> "Scene":
+        """The one picture as opaque slices at the depths of a map, which is resized with it."""
+        import numpy as np
+
+        from lumigraph.preparation import read_raw
+        from lumigraph.scene import Seeing, Slice, targets
+
+        (picture,) = (p for p in _scene((self.scene or [""])[0], camera.scene_grid).parts)
+        if not isinstance(picture, Slice) or not isinstance(camera, Seeing):
+            raise FormatError("--depth-map is of a picture before a camera with a main lens.")
+        values = read_raw(path).data
+        if values.ndim != 2:
+            raise FormatError(f"--depth-map {path} has shape {values.shape} but must be grey (y, x).")
+        if self.depth:
+            white, black = (length("--depth", text) or 0.0 for text in self.depth)
+            highest = np.iinfo(values.dtype).max if values.dtype.kind in "iu" else 1.0
+            values = black + (white - black) * (values / highest)
+        elif values.dtype.kind in "iu":
+            raise FormatError(
+                f"--depth-map {path} holds whole numbers, not metres. Give two --depth, of white and of "
+                "black."
+            )
+        rows, columns = (
+            np.floor((np.arange(n) + 0.5) * m / n).astype(int)
+            for n, m in zip(picture.grid.shape, values.shape, strict=True)
+        )
+        planes = 8 if self.planes is None else self.planes
+        return targets.rgbd(picture.intensity, values[np.ix_(rows, columns)], picture.grid, camera, planes)
 
 
 def simulate(
@@ -206,7 +255,7 @@ def simulate(
         raise FormatError(f"--seed is {seed} but must be at least 0.")
     described = load_camera(camera)
     coherence, spectrum = light.chosen(seed, described), light.spectrum()
-    scene = stage.built(described.scene_grid)
+    scene = stage.built(described)
     try:
         with progress("simulate") as shown:
             raw = simulate(described, scene, coherence, spectrum=spectrum, progress=shown)

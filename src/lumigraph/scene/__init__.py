@@ -2,7 +2,7 @@
 
 - `volumes`: `Scene` and its parts: `Slice`, `Points`, `Diffuser`
 - `targets`: test charts as scenes: pinhole, edge, USAF-1951, gratings, star, chessboard, photo
-- `usaf`: the chart USAF-1951
+- `usaf`: the chart USAF-1951; `rgbd`: pictures with depths as opaque slices
 - `sources`: waves: `plane_wave`, `point_source`, `gaussian_beam`
 - `schell`, `extended`: partially coherent light as modes: `GaussianSchell`, `ExtendedSource`
 - `lamps`: shapes of extended sources
@@ -12,6 +12,7 @@
 from lumigraph.scene import sources, targets
 from lumigraph.scene.extended import ExtendedSource
 from lumigraph.scene.line import SpectralLine
+from lumigraph.scene.rgbd import Seeing
 from lumigraph.scene.schell import GaussianSchell
 from lumigraph.scene.volumes import Diffuser, Part, Points, Scene, Slice
 
@@ -22,6 +23,7 @@ __all__ = [
     "Part",
     "Points",
     "Scene",
+    "Seeing",
     "Slice",
     "SpectralLine",
     "sources",

@@ -15,6 +15,7 @@ from lumigraph.core import checks, coverage
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, LumigraphError, SamplingWarning
+from lumigraph.scene.rgbd import rgbd
 from lumigraph.scene.usaf import bar_width, usaf1951, usaf_elements
 from lumigraph.scene.volumes import Diffuser, Points, Scene, Slice
 
@@ -33,6 +34,7 @@ __all__ = [
     "photo",
     "pinhole",
     "points",
+    "rgbd",
     "siemens_star",
     "slanted_edge",
     "texture",
