@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from lumigraph.analysis.chart import find_chart
+from lumigraph.analysis.chart import Chart, find_chart
 from lumigraph.analysis.pupil_edge import pupil_edge
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
@@ -49,6 +49,24 @@ def test_corners_are_found_to_a_hundredth_whatever_the_turn(turn):
     assert len(found) > 40
     assert np.abs(off).max() < 0.05
     assert len(np.unique(found.indices, axis=0)) == len(found)
+
+
+def test_the_width_of_squares_scatters_as_its_error_says():
+    rng, index = np.random.default_rng(4), np.stack(np.mgrid[:6, :7], -1).reshape(-1, 2)
+    corners = 10 + index @ np.array([[20.0, 2.5], [-2.5, 20.0]])
+    found = [
+        Chart(np.zeros((150, 170)), corners + rng.normal(0, 0.1, corners.shape), index) for _ in range(60)
+    ]
+    assert np.std([one.spacing for one in found]) == pytest.approx(
+        np.mean([one.spacing_error for one in found]), rel=0.25
+    )
+    assert np.mean([one.unevenness for one in found]) == pytest.approx(0.1 * math.sqrt(2) / 20.16, rel=0.1)
+
+
+def test_corners_near_the_border_can_be_left_out():
+    corners = np.array([[2.0, 30.0], [30.0, 30.0], [30.0, 45.5], [49.0, 30.0]])
+    inside = Chart(np.zeros((50, 50)), corners, np.eye(4, 2, dtype=int)).within(4.0)
+    assert inside.corners.tolist() == [[30.0, 30.0]]
 
 
 @pytest.mark.parametrize("bend", [-0.03, 0.0, 0.02])

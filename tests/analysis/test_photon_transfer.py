@@ -62,6 +62,20 @@ def test_the_error_of_the_gain_is_what_repeated_measurements_spread():
     assert np.mean(gains) == pytest.approx(sensor.gain, rel=4 * np.mean(errors) / sensor.gain / math.sqrt(60))
 
 
+def test_uneven_light_makes_the_gain_less_sure():
+    """Ten parts dark, one bright: taken as even, errors would be said 3 times too small."""
+    sensor, gains, errors = Sensor((40, 110), 5e-6, read_noise=2.0, black_level=80), [], []
+    light = np.where(np.arange(110) % 11 == 0, 0.6, 0.003) * np.ones((40, 1))
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        flats = [sensor.expose(light, photons=9000, rng=rng) for _ in range(2)]
+        darks = [sensor.expose(0 * light, photons=9000, rng=rng) for _ in range(2)]
+        measured = photon_transfer([flats], [darks])
+        gains.append(measured.gain)
+        errors.append(measured.gain_error)
+    assert np.std(gains) == pytest.approx(np.mean(errors), rel=0.35)
+
+
 def test_quantisation_is_no_noise_of_the_sensor(rng):
     """It would be 4 % of this one's."""
     quiet = replace(SENSOR, read_noise=3.0, dark_current=0.0)

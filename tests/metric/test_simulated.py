@@ -13,7 +13,7 @@ from lumigraph.samples.files import camera_file
 
 @pytest.mark.long  # 5 s: a camera's operator
 def test_contrast_is_that_of_a_lenslet_and_the_main_lens():
-    """Edges of few samples read up to 0.032 low; without the main lens it would be 0.065 and 0.08 more."""
+    """Light spilled into neighbours takes up to 0.032; without the main lens 0.065 and 0.08 would lack."""
     text = camera_file("plenoptic").replace("[71, 71]", "[41, 41]")
     camera = lg.PlenopticCamera.from_table(tomllib.loads(text)).replace(sensor={"pixel_pitch": "8 um"})
     names = ("mtf@3/mm", "mtf@5/mm", "mtf@60/mm", "mtf50_middle", "sample_on_chart")

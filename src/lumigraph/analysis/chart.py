@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, gaussian_filter1d, maximum_filter, spline_filter
@@ -51,12 +51,41 @@ class Chart:
     def __len__(self) -> int:
         return len(self.corners)
 
+    def within(self, margin: float) -> "Chart":
+        """The corners that are farther from the border of the picture than `margin` [samples]."""
+        high = np.array(self.picture.shape) - 1 - margin
+        kept = ((self.corners >= margin) & (self.corners <= high)).all(1)
+        return replace(self, corners=self.corners[kept], indices=self.indices[kept])
+
     @property
     def spacing(self) -> float:
         """Width of a square [samples]: the root of its mean area."""
-        design = np.column_stack([self.indices, np.ones(len(self))])
-        basis = np.linalg.lstsq(design, self.corners, rcond=None)[0][:2]
-        return float(np.sqrt(abs(np.linalg.det(basis))))
+        return float(np.sqrt(abs(np.linalg.det(self._squares()[0]))))
+
+    @property
+    def spacing_error(self) -> float:
+        """One standard deviation of `spacing`, from what the corners are off straight lines."""
+        basis, spread, _ = self._squares()
+        back = np.linalg.inv(basis)
+        return self.spacing * float(np.sqrt(np.trace(back.T @ spread @ back))) / 2
+
+    @property
+    def unevenness(self) -> float:
+        """Root mean square distance of the corners from straight lines, over the width of a square."""
+        return self._squares()[2] / self.spacing
+
+    def _squares(self) -> tuple[np.ndarray, np.ndarray, float]:
+        """Vectors (2, 2) of a square's sides, covariance (2, 2) along an axis, and rms of what is left."""
+        design = np.column_stack([self.indices - self.indices.mean(0), np.ones(len(self))])
+        fit = np.linalg.lstsq(design, self.corners, rcond=None)[0]
+        left = ((self.corners - design @ fit) ** 2).sum()
+        spread = np.linalg.pinv(design.T @ design)[:2, :2] * left / max(2 * len(self) - 6, 1)
+        return fit[:2], spread, float(np.sqrt(left / len(self)))
+
+    @property
+    def edge_length(self) -> int:
+        """Samples along and across an edge that are taken, of squares of the mean width."""
+        return min(int(_PART * self.spacing), _LONGEST)
 
     def edges(self) -> Iterator[tuple[np.ndarray, SlantedEdge]]:
         """(Middle (y, x), MTF in cycles per sample) of each edge between two corners that can be measured."""

@@ -77,13 +77,9 @@ class _Moments:
     mean: float
     variance: float
     covariance: float
+    spread: float  # standard deviation of the variance: under uneven light more than sqrt(2 / size) of it
     size: int
     saturated: float
-
-    @property
-    def spread(self) -> float:
-        """Standard deviation of the variance."""
-        return self.variance * math.sqrt(2 / self.size)
 
 
 def photon_transfer(
@@ -191,9 +187,11 @@ def _moments(pair: Pair, top: float) -> _Moments:
     for image in (a, b):
         checks.finite_array("an image", image, CalibrationError)
     covariance = float(np.mean((a - a.mean()) * (b - b.mean())))
+    off = (a - b - (a - b).mean()) ** 2 / 2
     return _Moments(
-        float(a.mean() + b.mean()) / 2, float(np.var(a - b)) / 2, covariance, a.size, float(np.mean(a >= top))
-    )
+        float(a.mean() + b.mean()) / 2, float(off.mean()), covariance, float(off.std()) / math.sqrt(a.size),
+        a.size, float(np.mean(a >= top)),
+    )  # fmt: skip
 
 
 def _check_dark(pair: Pair, dark: _Moments) -> None:

@@ -94,7 +94,14 @@ def placed(model: Calibration) -> Tried:
     return Tried(indices, model.position(indices), np.ones((len(indices), 3)), np.ones(len(indices), bool))
 
 
-def traced(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> Tried:
+def traced(
+    picture: np.ndarray,
+    model: Calibration,
+    *,
+    part: float = 1.0,
+    width: float = _FOLLOWED,
+    reach: float = 2.5,
+) -> Tried:
     """Centres by the phases of the lattice's first harmonics, each over a few lenslets around.
 
     For raw images: what the scene adds to one micro-image differs from the next, the gaps do not.
@@ -103,6 +110,8 @@ def traced(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> Tri
     ----------
     picture, model, part
         As for `measured`.
+    width, reach
+        Standard deviation [pitches] of the normal window, and how many of them it extends.
     """
     lattice, (ny, nx) = model.lattice, picture.shape
     u, v = _phases(model, (ny, nx))
@@ -110,7 +119,7 @@ def traced(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> Tri
     if lattice.layout == "hex" and float(np.dot(*lattice.basis)) < 0:
         waves[2] = u - v
     even = np.asarray(picture - picture.mean(), np.float32)
-    sigma = _FOLLOWED * lattice.pitch
+    sigma = width * lattice.pitch
     ranges = [((n - 1) * (1 - part) / 2, (n - 1) * (1 + part) / 2) for n in (ny, nx)]
     indices = model.indices_within(ranges[0], ranges[1])
     guess = model.position(indices)
@@ -120,7 +129,7 @@ def traced(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> Tri
     angles, sizes = [], []
     for wave in waves:
         turned = even * np.exp(2j * np.pi * wave).astype(np.complex64)
-        local = ndimage.gaussian_filter(turned, sigma, truncate=2.5)[rows, columns]
+        local = ndimage.gaussian_filter(turned, sigma, truncate=reach)[rows, columns]
         angles.append(np.angle(local) / (2 * np.pi))
         sizes.append(np.abs(local))
     steps = np.stack(angles[:2], -1)

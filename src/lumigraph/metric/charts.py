@@ -14,6 +14,7 @@ import numpy as np
 from lumigraph import io, store
 from lumigraph.core import checks
 from lumigraph.core.arrays import to_numpy
+from lumigraph.core.brief import brief
 from lumigraph.core.grid import Grid
 from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
@@ -294,31 +295,76 @@ def simulate_charts(
     GeometryError
         Another kind of camera, or a depth inside the focal length.
     """
-    camera = check_camera(camera)
     rng = np.random.default_rng(0) if rng is None else rng
-    depths = usual_depths(camera) if depths is None else tuple(depths)
-    light = to_numpy(simulate(camera, targets.white()).data)
-    progress(1 / (len(depths) + 1))
-    sensor, top = camera.sensor, float(np.quantile(light, 0.999))
+    return Lights.of(camera, depths, textured=textured, progress=progress).exposed(rng, name)
 
-    def exposed(light: np.ndarray, fill: float = FILL) -> RawImage:
-        return sensor.expose(light, reference=top, fill=fill, rng=rng)
 
-    spacing = float(f"{max(_CELL * _sample(camera, depth) for depth in depths):.3g}") if depths else None
-    boards = []
-    for k, depth in enumerate(depths, 2):
-        canvas = _canvas(camera, depth)
-        scenes = [_board(canvas, spacing or 1.0)]
-        if textured:
-            scenes.append(targets.texture(canvas, _GRAIN * _sample(camera, depth), seed=k))
-        pictures = [exposed(to_numpy(simulate(camera, scene.at(depth)).data)) for scene in scenes]
-        boards.append(Seen(pictures[0], pictures[1] if textured else None, depth))
-        progress(k / (len(depths) + 1))
-    return Charts(
-        name, tuple(exposed(light) for _ in range(2)), tuple(exposed(0 * light) for _ in range(2)),
-        tuple((exposed(light, fill), exposed(light, fill)) for fill in _FLATS), tuple(boards),
-        camera=camera, spacing=spacing,
-    )  # fmt: skip
+@dataclass(frozen=True, slots=True, eq=False)
+class Lights:
+    """What a camera's sensor would see of white images and charts, before its noise.
+
+    Parameters
+    ----------
+    camera
+        That they belong to.
+    white
+        Of an evenly lit diffuser (y, x).
+    charts
+        (depth [m], board, texture) of each distance; None in the place of a texture that is not wanted.
+    spacing
+        Width of the board's squares [m]; None without charts.
+    """
+
+    camera: LensletCamera
+    white: np.ndarray
+    charts: tuple[tuple[float, np.ndarray, np.ndarray | None], ...]
+    spacing: float | None
+
+    __repr__ = brief
+
+    @classmethod
+    def of(
+        cls,
+        camera: LensletCamera,
+        depths: Sequence[float] | None = None,
+        *,
+        textured: bool = True,
+        progress: Progress = silent,
+    ) -> "Lights":
+        """By wave optics; parameters and errors as of `simulate_charts`."""
+        camera = check_camera(camera)
+        depths = usual_depths(camera) if depths is None else tuple(depths)
+        white = np.asarray(to_numpy(simulate(camera, targets.white()).data))
+        progress(1 / (len(depths) + 1))
+        spacing = float(f"{max(_CELL * _sample(camera, depth) for depth in depths):.3g}") if depths else None
+        charts = []
+        for k, depth in enumerate(depths, 2):
+            canvas = _canvas(camera, depth)
+            scenes = [_board(canvas, spacing or 1.0)]
+            if textured:
+                scenes.append(targets.texture(canvas, _GRAIN * _sample(camera, depth), seed=k))
+            seen = [np.asarray(to_numpy(simulate(camera, one.at(depth)).data)) for one in scenes]
+            charts.append((depth, seen[0], seen[1] if textured else None))
+            progress(k / (len(depths) + 1))
+        return cls(camera, white, tuple(charts), spacing)
+
+    def exposed(self, rng: np.random.Generator, name: str = "camera") -> Charts:
+        """Raw images with the sensor's noise."""
+        sensor, top = self.camera.sensor, float(np.quantile(self.white, 0.999))
+
+        def one(light: np.ndarray, fill: float = FILL) -> RawImage:
+            return sensor.expose(light, reference=top, fill=fill, rng=rng)
+
+        boards = tuple(
+            Seen(one(board), None if texture is None else one(texture), depth)
+            for depth, board, texture in self.charts
+        )
+        white = self.white
+        return Charts(
+            name, (one(white), one(white)), (one(0 * white), one(0 * white)),
+            tuple((one(white, fill), one(white, fill)) for fill in _FLATS), boards,
+            camera=self.camera, spacing=self.spacing,
+        )  # fmt: skip
 
 
 def _sample(camera: LensletCamera, depth: float) -> float:

@@ -20,6 +20,7 @@ from lumigraph.errors import CalibrationError, LumigraphError
 from lumigraph.instruments import LensletCamera
 from lumigraph.metric import planes
 from lumigraph.metric.charts import Charts, Seen
+from lumigraph.metric.places import pitch_and_rotation, places
 from lumigraph.metric.planes import is_rendered
 from lumigraph.metric.sheet import Entry, Plane, Sheet
 from lumigraph.preparation import decode, prepare, render
@@ -66,7 +67,7 @@ def datasheet(charts: Charts, *, progress: Progress = silent) -> Sheet:
     """
     white, dark = mean_image(charts.whites), mean_image(charts.darks) if charts.darks else None
     camera = charts.camera
-    lattice = _lattice(white, camera)
+    lattice, grid = _grid(white, _lattice(white, camera))
     steps = len(charts.boards) + len(charts.scenes) + 2
     progress(1 / steps)
 
@@ -79,7 +80,7 @@ def datasheet(charts: Charts, *, progress: Progress = silent) -> Sheet:
     )  # fmt: skip
     bare = np.asarray(to_numpy(white.data), float) - (0.0 if dark is None else np.asarray(dark.data))
     edge, edge_entries = _edges(bare, lattice)
-    entries = [*_grid(lattice), *_vignetting(lattice), *_light(charts), *edge_entries]
+    entries = [*grid, *_vignetting(lattice), *_light(charts), *edge_entries]
     found: list[Plane] = []
     for k, seen in enumerate(charts.boards, 2):
         found.append(_plane(seen, ready, camera, charts.spacing, rendered=rendered))
@@ -135,18 +136,28 @@ def _missing(section: str, name: str, why: Exception | str) -> Entry:
     return Entry(section, Quantity(name, None), f"not measured: {why}")
 
 
-def _grid(lattice: Calibration) -> Iterator[Entry]:
-    """Pitch and rotation, with the errors of a straight line through the centres that were measured."""
-    off, index = lattice.residuals, lattice.indices - lattice.indices.mean(0)
-    spread = np.sqrt((off**2).sum() / max(2 * len(off) - 6, 1))
-    half = 1.96 * float(spread / np.sqrt((index**2).sum(0).min())) if lattice.measured else None
-    pitch, turn = lattice.lattice.pitch, lattice.lattice.rotation
-    how = f"straight lines through {len(off)} centres of micro-images on the white image"
-    yield _entry(GRID, "pitch_px", pitch, "px", how, half)
-    yield _entry(GRID, "rotation", 1e3 * turn, "mrad", how, None if half is None else 1e3 * half / pitch)
-    yield _entry(
+def _grid(white: RawImage, lattice: Calibration) -> tuple[Calibration, list[Entry]]:
+    """The lattice through the lenslets well inside the array, its pitch and its rotation."""
+    residual = _entry(
         GRID, "residual_px", lattice.residual_px, "px", "rms distance of the centres from the lattice"
     )
+    try:
+        found = places(np.asarray(to_numpy(white.data)), lattice)
+    except CalibrationError as error:
+        how = f"lattice of the white image; no interval: {error}"
+        return lattice, [
+            _entry(GRID, "pitch_px", lattice.lattice.pitch, "px", how),
+            _entry(GRID, "rotation", 1e3 * lattice.lattice.rotation, "mrad", how),
+            residual,
+        ]
+    (pitch, half), (turn, wide) = pitch_and_rotation(found)
+    count = len(found.spots.indices)
+    how = f"straight lines through the phases of {count} micro-images well inside the white image"
+    return replace(lattice, lattice=found.lattice, warp=found.warp), [
+        _entry(GRID, "pitch_px", pitch, "px", how, 1.96 * half),
+        _entry(GRID, "rotation", 1e3 * turn, "mrad", how, 1.96e3 * wide),
+        residual,
+    ]
 
 
 def _vignetting(lattice: Calibration) -> Iterator[Entry]:
@@ -174,13 +185,15 @@ def _light(charts: Charts) -> Iterator[Entry]:
         a, b = (np.asarray(to_numpy(one.data), float) for one in charts.whites[:2])
         dark = float(np.mean(np.asarray(charts.darks[0].data))) if charts.darks else 0.0
         level = (a + b) / 2 - dark
-        bright = level > level.max() / 2
-        noise = float(np.std((a - b)[bright])) / math.sqrt(2)
-        mean, n = float(level[bright].mean()), int(bright.sum())
-        if noise > 0:
-            snr = mean / noise
-            how = f"two white images, pixels above half of the brightest, {mean:.4g} counts in the mean"
-            yield _entry(LIGHT, "snr_of_pixels", snr, "", how, 1.96 * snr / math.sqrt(2 * n))
+        bright = level > np.median(level[level > level.max() / 2]) / 2
+        off, mean = (a - b)[bright], float(level[bright].mean())
+        square = (off - off.mean()) ** 2 / 2
+        if square.any():
+            snr = mean / math.sqrt(square.mean())
+            # Half the relative error of the variance, of pixels that are not equally bright.
+            part = float(square.std() / square.mean()) / math.sqrt(4 * square.size)
+            how = f"two white images, pixels above half of the bright ones, {mean:.4g} counts in the mean"
+            yield _entry(LIGHT, "snr_of_pixels", snr, "", how, 1.96 * snr * part)
     else:
         yield _missing(LIGHT, "snr_of_pixels", "there is one white image; two of the same light are needed")
     try:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,7 @@ from scipy.stats import t as student
 
 from lumigraph import depth
 from lumigraph.analysis import Chart, find_chart
+from lumigraph.analysis.chart import LEAST_BENT
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
@@ -34,6 +36,11 @@ _BLOCKS = 4
 
 _MIDDLE = 0.5  # part of the way to the corner up to which the field is called its middle
 _LEAST_EDGES = 2
+_PATCHES = (0.94, 0.96, 0.98, 1.0, 1.02, 1.04, 1.06)  # over that which depth measures
+_HIGH = 0.7
+"""Over the length of an edge in samples, the part by which MTF50 and MTF10 may read high: the line spread's
+tails lie outside. `benchmarks.edges` finds 0.46 ± 0.24."""
+_WHOLE = 0.8  # of the corners of the picture that shows most
 _TO_SIGMA = 1.4826  # of a normal distribution, over the median distance from its middle
 
 
@@ -63,14 +70,44 @@ def measured(ready: PreparedImage, *, rendered: bool) -> Found:
     return Found(ready.calibration, depth.epi(views), views)
 
 
-def _pictured(
-    ready: PreparedImage, views: LightField | None, value: float, camera: LensletCamera | None
-) -> np.ndarray:
-    """Picture (y, x) in focus at a disparity or a patch."""
-    if views is not None:
-        alpha = depth.alpha_of(_one(value, "disparity"), views)
-        return grey(refocus(views, float(to_numpy(alpha.values)[0, 0])))
-    return rendered_at(ready, value, camera)
+def _pictured(views: LightField, value: float) -> np.ndarray:
+    """Picture (y, x) of a camera 1.0 in focus at a disparity."""
+    alpha = depth.alpha_of(_one(value, "disparity"), views)
+    return grey(refocus(views, float(to_numpy(alpha.values)[0, 0])))
+
+
+def straightest(ready: PreparedImage, patch: float, camera: LensletCamera | None) -> tuple[Chart, float]:
+    """The chart on the picture whose patches fit together best, and its samples from lenslet to lenslet.
+
+    Diffraction biases the patch that depth measures by some per cent. Patches that are too wide or too narrow
+    move the corners to and fro within each lenslet's piece of the picture: the patch near the measured one
+    where they are straightest is the chart's own.
+
+    Parameters
+    ----------
+    ready
+        The raw image.
+    patch
+        As depth measured it [px].
+    camera
+        As `Charts` has it.
+
+    Raises
+    ------
+    SamplingError
+        No picture shows a chart.
+    """
+    charts = []
+    for part in _PATCHES:
+        with suppress(SamplingError):
+            charts.append((find_chart(rendered_at(ready, part * patch, camera)), part))
+    if not charts:
+        raise SamplingError("no corners of a chessboard are seen. Bring the chart into the picture.")
+    most = max(len(chart) for chart, _ in charts)
+    whole = [one for one in charts if len(one[0]) > _WHOLE * most]
+    told = most >= LEAST_BENT  # fewer corners are straight by chance
+    chart, part = min(whole, key=lambda one: one[0].unevenness if told else abs(one[1] - 1))
+    return chart, max(1.0, abs(round(part * patch)))
 
 
 def rendered_at(ready: PreparedImage, value: float, camera: LensletCamera | None) -> np.ndarray:
@@ -143,22 +180,29 @@ def plane(
     views, value = found.views, trusted_median(found.depth)
     if seen.texture is not None and not rendered:
         views = decode(board, found.calibration)
-    picture = _pictured(board, views, value, camera)
     entries = _depths(found, seen.depth, camera)
     try:
-        chart = find_chart(picture)
+        if views is None:
+            chart, lenslet = straightest(board, value, camera)
+        else:
+            chart, lenslet = find_chart(_pictured(views, value)), 1.0
     except SamplingError as error:
+        picture = rendered_at(board, value, camera) if views is None else _pictured(views, value)
         return Plane(seen.depth, (*entries, _not("mtf50_middle", error)), picture)
-    return Plane(seen.depth, (*_sharpness(chart, spacing), *_shape(chart, spacing), *entries), picture)
+    found_on = (*_sharpness(chart, spacing), *_shape(chart, spacing, lenslet))
+    return Plane(seen.depth, (*found_on, *entries), chart.picture)
 
 
 def _not(name: str, error: Exception | str) -> Entry:
     return Entry("", Quantity(name, None), f"not measured: {error}")
 
 
-def of_chart(chart: Chart, spacing: float | None) -> list[Quantity]:
-    """Sharpness, size and distortion of a picture of the chart, whose squares are `spacing` wide [m]."""
-    return [entry.quantity for entry in (*_sharpness(chart, spacing), *_shape(chart, spacing))]
+def of_chart(chart: Chart, spacing: float | None, lenslet: float = 1.0) -> list[Quantity]:
+    """Sharpness, size and distortion of a picture of the chart, whose squares are `spacing` wide [m].
+
+    `lenslet` is how far lenslets are apart on the picture [samples].
+    """
+    return [entry.quantity for entry in (*_sharpness(chart, spacing), *_shape(chart, spacing, lenslet))]
 
 
 def is_middle(at: np.ndarray, chart: Chart) -> bool:
@@ -184,22 +228,33 @@ def _sharpness(chart: Chart, spacing: float | None) -> list[Entry]:
             entries.append(_not(name, f"{len(values)} edges there, {_LEAST_EDGES} are needed; {width}"))
             continue
         value, interval = mean_within(values)
-        how = f"mean over {len(values)} slanted edges of the chart, ISO 12233, pixels' blur included"
+        if interval is not None:
+            interval = (interval[0] - _HIGH / chart.edge_length * value, interval[1])
+        how = (
+            f"mean over {len(values)} slanted edges of the chart, {chart.edge_length} samples long, "
+            "ISO 12233, pixels' blur included"
+        )
         entries.append(Entry("", Quantity(name, value, unit, interval), how))
     return entries
 
 
-def _shape(chart: Chart, spacing: float | None) -> list[Entry]:
-    entries = []
-    if spacing is not None:
+def _shape(chart: Chart, spacing: float | None, lenslet: float) -> list[Entry]:
+    """Size and distortion, by the corners that neighbours of their lenslet show, too."""
+    entries, inside = [], chart.within(lenslet)
+    if spacing is not None and len(inside) >= LEAST_BENT:
+        value, part = spacing / inside.spacing, 1.96 * inside.spacing_error / inside.spacing
+        how = f"width of the chart's squares over that of their picture, {len(inside)} corners"
+        ends = (value * (1 - part), value * (1 + part))
+        entries.append(Entry("", Quantity("sample_on_chart", value, "m", ends), how))
+    elif spacing is not None:
         how = f"width of the chart's squares over that of their picture, {len(chart)} corners"
         entries.append(Entry("", Quantity("sample_on_chart", spacing / chart.spacing, "m"), how))
     try:
-        bent, error = chart.distortion()
+        bent, error = inside.distortion()
     except SamplingError as problem:
         return [*entries, _not("distortion", problem)]
     interval = (100 * (bent - 1.96 * error), 100 * (bent + 1.96 * error))
-    how = f"radial, at the picture's corner, over the distance from its middle; {len(chart)} corners"
+    how = f"radial, at the picture's corner, over the distance from its middle; {len(inside)} corners"
     return [*entries, Entry("", Quantity("distortion", 100 * bent, "%", interval), how)]
 
 

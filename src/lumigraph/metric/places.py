@@ -1,0 +1,113 @@
+r"""Where lenslets stand on a white image, without the bias of pixels, and how well that gives the lattice.
+
+Micro-images that nearly touch show thin dark gaps, of which a window that ends on whole pixels sees more or
+less: centres found one by one are off by some 0.01 px, in a pattern that repeats with the pixels, and those
+at the array's border by more, since a neighbour's light is missing. Both lean on the pitch. The phase of the
+lattice's harmonics under a normal window of `WIDTH` pitches has neither, where it ends inside the array,
+
+.. math:: \phi_k = \arg \sum_x w(x - x_k)\, \big(I(x) - \bar I\big)\, e^{2 \pi i\, u(x)}
+
+with u the place in the lattice. What noise adds to it is shared by windows that overlap: on a square lattice
+
+.. math:: \sum_d e^{-d^2 / 4 \sigma^2} = 4 \pi \sigma^2
+
+lenslets err as one, `TOGETHER`, and errors of sums grow by the root of that.
+
+Pixels that are too coarse for the light alias it into the phase: none where the lenslets' f-number is above
+the pixels' width over the wavelength. Beyond, with pitches of nearly a whole number of pixels, the errors do
+not hold what aliasing does to the pitch (sharp discs of 12.02 px: 8e-4 px).
+"""
+
+import math
+
+import numpy as np
+
+from lumigraph.calibration.centres import Spots, traced
+from lumigraph.calibration.fitting import Fitted, fit
+from lumigraph.core.calibration import Calibration
+from lumigraph.errors import CalibrationError
+
+WIDTH = 0.7
+"""Standard deviation of the window [pitches]: the mean light leaks into the phase by exp(-2 pi² WIDTH²)."""
+
+TOGETHER = 4 * math.pi * WIDTH**2
+"""Lenslets whose places err as one."""
+
+_REACH = 4.0  # standard deviations at which the window ends
+_MARGIN = 3.0  # pitches from the array's border, and the picture's, within which windows reach beyond it
+_LEAST = 12
+
+
+def places(white: np.ndarray, calibration: Calibration) -> Fitted:
+    """Lenslets that have neighbours on all sides, where they stand, and the lattice and warp through them.
+
+    Parameters
+    ----------
+    white
+        (y, x[, c]), linear in light; an offset, such as the dark signal, does no harm.
+    calibration
+        Of that image.
+
+    Raises
+    ------
+    CalibrationError
+        Fewer than 12 lenslets that far from the border.
+    """
+    data = np.asarray(white, np.float64)
+    data = data.mean(-1) if data.ndim == 3 else data
+    # Windows stand on whole pixels, where the phase is the lenslet's own only if the model's pitch is right.
+    first = _traced(data, calibration, calibration)
+    return _traced(data, first.model(calibration.shape), calibration)
+
+
+def _traced(data: np.ndarray, model: Calibration, calibration: Calibration) -> Fitted:
+    """The lattice by the phases against that of a model."""
+    pitch, lit = calibration.lattice.pitch, calibration.centers
+    if calibration.light is not None:  # not what is found in the dark beside the array
+        lit = lit[calibration.light > np.median(calibration.light) / 2]
+    found = traced(data, model, width=WIDTH, reach=_REACH)
+    low = np.maximum(lit.min(0) - pitch / 2, 0) + _MARGIN * pitch
+    high = np.minimum(lit.max(0) + pitch / 2, np.array(data.shape) - 1) - _MARGIN * pitch
+    kept = found.near & ((found.centers > low) & (found.centers < high)).all(1)
+    if kept.sum() < _LEAST:
+        raise CalibrationError(
+            f"{int(kept.sum())} lenslets are {_MARGIN:g} pitches or more inside the array, but {_LEAST} are "
+            "needed to tell how exact its pitch is. Use a picture of more lenslets."
+        )
+    spots = Spots(found.indices[kept], found.centers[kept], found.light[kept, 0])
+    return fit(spots, model)
+
+
+def _covariance(fitted: Fitted) -> np.ndarray:
+    """Of the vectors (y, x) to the next row and to the next lenslet (4, 4) [px²], with the warp's in it."""
+    index, points = fitted.spots.indices, fitted.lattice.position(fitted.spots.indices)
+    ends = points if fitted.warp is None else fitted.warp.applied(points)
+    rest = fitted.spots.centers - ends
+    flat, none = np.column_stack([np.ones(len(index)), index - index.mean(0)]), np.zeros((len(index), 3))
+    design = np.concatenate([np.hstack([flat, none]), np.hstack([none, flat])])
+    if (warp := fitted.warp) is not None:
+        q, bent = points - warp.center, (*warp.tilt, warp.radial)
+        changes = [-q[:, [0]] * q, -q[:, [1]] * q, q * (q**2).sum(-1, keepdims=True)]
+        columns = [one.T.ravel() for one, part in zip(changes, bent, strict=True) if part]
+        design = np.column_stack([design, *columns])
+    scale = np.sqrt((design**2).sum(0))
+    freedom = max(rest.size - TOGETHER * design.shape[1], 1.0)
+    spread = np.linalg.inv((design / scale).T @ (design / scale)) * TOGETHER * (rest**2).sum() / freedom
+    spread /= np.outer(scale, scale)
+    vectors = [1, 4, 2, 5]  # (y, x) of a step in i, then in j
+    return spread[np.ix_(vectors, vectors)]
+
+
+def pitch_and_rotation(fitted: Fitted) -> tuple[tuple[float, float], tuple[float, float]]:
+    """(value, standard deviation) of the pitch [px] and of the rotation [rad], of what `places` found."""
+    lattice, spread = fitted.lattice, _covariance(fitted)
+    (row, column), (down, across) = lattice.basis[1], lattice.basis[0]
+    rows, columns = lattice.pitches
+    slopes = np.array(
+        [
+            [row / rows / 2, column / rows / 2, down / columns / 2, across / columns / 2],
+            [0, 0, across / columns**2, -down / columns**2],
+        ]
+    )
+    pitch, turn = np.sqrt(np.einsum("ka,ab,kb->k", slopes, spread, slopes))
+    return (lattice.pitch, float(pitch)), (lattice.rotation, float(turn))

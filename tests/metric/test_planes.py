@@ -1,0 +1,58 @@
+"""What pictures of a chart tell."""
+
+import numpy as np
+import pytest
+
+from lumigraph.analysis import find_chart
+from lumigraph.errors import SamplingError
+from lumigraph.metric import planes
+
+TURN, FINE = np.radians(7), 6
+
+
+def lens(frequency, cut):
+    """Contrast that a round aperture leaves."""
+    part = np.clip(np.abs(frequency) / cut, 0, 1)
+    return 2 / np.pi * (np.arccos(part) - part * np.sqrt(1 - part**2))
+
+
+def board(shape=106, cell=22.0, *, cut=None, wrong=0.0, tile=10):
+    """A chessboard through an aperture, of tiles `wrong` times too wide each, about their own middles."""
+    at = (np.arange(FINE * shape) + 0.5) / FINE
+    at = at + wrong * ((at % tile) - tile / 2) - shape / 2
+    y, x = at[:, None], at[None]
+    a, b = ((np.cos(TURN) * u + np.sin(TURN) * v) / cell + 0.5 for u, v in ((x, y), (y, -x)))
+    seen = (np.floor(a) + np.floor(b)) % 2
+    if cut is not None:
+        fine = np.fft.fftfreq(len(at), 1 / FINE)
+        seen = np.fft.ifft2(np.fft.fft2(seen) * lens(np.hypot(fine[:, None], fine), cut)).real
+    return seen.reshape(shape, FINE, shape, FINE).mean((1, 3))
+
+
+def test_the_patch_is_that_of_the_straightest_corners(monkeypatch):
+    """Depth says 10 where 10.4 is right: the picture at 10.4 is the one whose tiles fit."""
+    pictures = {part: board(wrong=part / 1.04 - 1) for part in (0.96, 1.0, 1.04)}
+    monkeypatch.setattr(planes, "_PATCHES", tuple(pictures))
+    monkeypatch.setattr(planes, "rendered_at", lambda ready, patch, camera: pictures[patch / 10])
+    chart, lenslet = planes.straightest(None, 10.0, None)
+    assert chart.picture is pictures[1.04]
+    assert lenslet == 10
+
+
+def test_no_chart_at_any_patch_is_refused(monkeypatch):
+    monkeypatch.setattr(planes, "rendered_at", lambda *_: np.ones((40, 40)))
+    with pytest.raises(SamplingError, match="no corners of a chessboard"):
+        planes.straightest(None, 10.0, None)
+
+
+@pytest.mark.parametrize("cut", [1.25, 5.0])
+def test_short_edges_read_high_within_their_interval(cut):
+    """Square samples and a lens: MTF50 by its closed form. The scatter of the edges alone would miss it."""
+    frequency = np.linspace(0, 1, 4001)
+    true = frequency[np.argmax(np.sinc(frequency) * lens(frequency, cut) < 0.5)]
+    chart = find_chart(board(cut=cut))
+    found = {q.name: q for q in planes.of_chart(chart, None)}["mtf50_middle"]
+    low, high = found.interval
+    assert low < true < high
+    assert low < true < 2 * found.value - high  # below what the scatter holds
+    assert found.value - low < 0.06 * true
