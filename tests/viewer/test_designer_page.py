@@ -34,7 +34,7 @@ def designer(name):
 
 
 def settle(page):
-    end = time.monotonic() + 30
+    end = time.monotonic() + 300
     while not page.evaluate(IDLE):
         assert time.monotonic() < end, page.inner_text("#status")
         time.sleep(0.02)
