@@ -57,6 +57,7 @@ def seen(page: Any, address: str) -> tuple[float, float]:
     began, painted = page.evaluate("[performance.timeOrigin / 1e3, lumigraph.app.first / 1e3]")
     box = page.evaluate("lumigraph.app.main.stage.getBoundingClientRect().toJSON()")
     session.send("Page.stopScreencast")
+    session.detach()
     part = [0.5 * (box["x"] + f * box["width"]) for f in (0.4, 0.6)]
     rows = [0.5 * (box["y"] + f * box["height"]) for f in (0.4, 0.6)]
     for when, data in shots:
