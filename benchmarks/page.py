@@ -62,7 +62,7 @@ def seen(page: Any, address: str) -> tuple[float, float]:
     rows = [0.5 * (box["y"] + f * box["height"]) for f in (0.4, 0.6)]
     for when, data in shots:
         picture = Image.open(io.BytesIO(base64.b64decode(data))).convert("L")
-        if np.std(picture.crop((part[0], rows[0], part[1], rows[1]))) > _CONTRAST:
+        if np.std(np.asarray(picture.crop((part[0], rows[0], part[1], rows[1])))) > _CONTRAST:
             return painted, when - began
     return painted, float("nan")
 

@@ -51,6 +51,8 @@ def test_messages_name_options_where_the_verb_has_them(monkeypatch):
         assert app._optional("or pass pitch= and layout=.") == "or pass --pitch and --layout."
         assert app._optional("pass pitch=14.2.") == "pass --pitch 14.2."
         assert app._optional("α'=1, accuracy=1e-3") == "α'=1, accuracy=1e-3"
+        COMMAND.set(("simulate", "camera.toml"))
+        assert app._optional("Give spectrum=Spectrum.rgb() for") == "Give --colours rgb for"
     finally:
         COMMAND.reset(token)
 
