@@ -128,7 +128,7 @@ def _optional(text: str) -> str:
         name, value = found.groups()
         return f"--{name}{' ' * bool(value)}{value}" if name in names else found[0]
 
-    if "colours" in names:
+    if verb is simulate:
         text = text.replace("spectrum=Spectrum.rgb()", "--colours rgb")
     return re.sub(r"\b([a-z_]+)=((?:[\w-]|\.\d)*)", option, text)
 
