@@ -11,8 +11,8 @@ import cluster_jobs as jobs
 import lumigraph as lg
 from cameras import focused
 from lumigraph.errors import FormatError, GeometryError
-from lumigraph.instruments import Built
-from lumigraph.tolerance import Outcome, Tolerance, Trials, built, drawn, study
+from lumigraph.instruments import Built, Tolerance
+from lumigraph.tolerance import Outcome, Trials, built, drawn, study
 
 UM = 1e-6
 SMALL = {
