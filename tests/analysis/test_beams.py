@@ -67,4 +67,4 @@ def test_what_has_no_measure_is_refused():
     with pytest.raises(LumigraphError, match="2 wavelengths but M² is that of one"):
         analysis.beam_quality(both)
     with pytest.raises(LumigraphError, match="light is of type ndarray"):
-        analysis.beam_width(np.ones((3, 3)))  # type: ignore[arg-type]
+        analysis.beam_width(np.ones((3, 3)))  # type: ignore[arg-type]  # it is refused

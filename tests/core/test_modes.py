@@ -36,7 +36,7 @@ def test_what_are_no_modes_is_refused():
     with pytest.raises(GeometryError, match="no fields"):
         CoherentModes([])
     with pytest.raises(GeometryError, match="must be a Field"):
-        CoherentModes([np.ones((2, 2))])  # type: ignore[list-item]
+        CoherentModes([np.ones((2, 2))])  # type: ignore[list-item]  # it is refused
     with pytest.raises(GeometryError, match="error is -1 but"):
         CoherentModes(waves(1), -1)
     with pytest.raises(GeometryError, match=r"\(1, 2, 4, 5\) but must be \(modes, y, x\)"):

@@ -80,7 +80,7 @@ def test_what_is_no_line_is_refused():
     with pytest.raises(GeometryError, match="accuracy is 0"):
         SpectralLine(600 * nm, 1 * nm).nodes(1e-3, 0.0)
     with pytest.raises(GeometryError, match="must be a CoherentModes"):
-        SpectralLine(600 * nm, 1 * nm).over(lambda wavelength: 3, 1e-3)  # type: ignore[return-value]
+        SpectralLine(600 * nm, 1 * nm).over(lambda wavelength: 3, 1e-3)  # type: ignore[return-value]  # it is refused
 
 
 def test_short_ways_need_one_wavelength():

@@ -130,14 +130,14 @@ def test_points_and_white_in_the_scene_stay_incoherent():
 def test_what_cannot_be_lit_is_refused():
     source = GaussianSchell(100 * um, 100 * um)
     with pytest.raises(GeometryError, match="source is of type int"):
-        PartiallyCoherent(3)  # type: ignore[arg-type]
+        PartiallyCoherent(3)  # type: ignore[arg-type]  # it is refused
     with pytest.raises(GeometryError, match="accuracy is 0"):
         PartiallyCoherent(source, 0)
     with pytest.raises(GeometryError, match="lenslets that are not turned"):
         simulate(focused(rotation=0.1), scene(), PartiallyCoherent(source))
     scope = LightFieldMicroscope.from_catalogue("lfm-worm")
     with pytest.raises(GeometryError, match="does not interfere"):
-        simulate(scope, scene(), PartiallyCoherent(source))  # type: ignore[arg-type]
+        simulate(scope, scene(), PartiallyCoherent(source))  # type: ignore[arg-type]  # it is refused
     few = source.modes(Grid((60, 60), 20 * um), 550 * nm)
     with pytest.raises(GeometryError, match="the modes have 550 nm but the camera 633 nm"):
         simulate(SINGLE, scene(), PartiallyCoherent(few))
