@@ -31,6 +31,17 @@ def test_transforms_agree_with_numpy_and_leave_their_input(xp, forward, back, rn
     np.testing.assert_allclose(arrays.to_numpy(back(result)), data, atol=1e-12)
 
 
+@pytest.mark.parametrize("shape", [(5, 4), (3, 5, 4)])
+def test_planes_one_at_a_time_give_what_all_at_once_give(xp, rng, shape):
+    one, other = (xp.asarray(rng.random(shape)) for _ in range(2))
+    found = arrays.by_plane(lambda a, b: xp.where(a > b, a - b, 0 * a), one, other)
+    expected = np.maximum(arrays.to_numpy(one) - arrays.to_numpy(other), 0)
+    np.testing.assert_array_equal(arrays.to_numpy(found), expected)
+    assert found.dtype == one.dtype
+    total = arrays.sum_by_plane(lambda a, b: a * b, one, other)
+    assert total == pytest.approx(np.vdot(arrays.to_numpy(one), arrays.to_numpy(other)), rel=1e-12)
+
+
 def test_nan_and_infinity_are_counted_and_located(xp):
     values = np.ones((3, 4))
     values[1, 2], values[2, 0] = np.nan, np.inf

@@ -85,8 +85,8 @@ def test_results_of_a_function_are_kept_by_its_arguments_within_the_shared_budge
     ("module", "name", "arguments"),
     [
         ("deconvolution.filters", "lanczos", (300, 2.5)),
-        ("operators.microscope_spectrum", "parts", (33,)),
-        ("operators.microscope_spectrum", "_factors", (15, 20)),
+        ("operators.microscope_patterns", "parts", (33,)),
+        ("operators.microscope_patterns", "all_patterns", (7,)),
     ],
 )
 def test_tables_that_grow_with_the_image_count_in_the_budget(module, name, arguments):

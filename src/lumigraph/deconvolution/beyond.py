@@ -54,9 +54,12 @@ def least_seen(operator: Linear) -> float:
 
 def cut(estimate: Array, inside: Inside, pictured: Array | None) -> Array:
     """What is asked for of an object (..., y, x); 0 beside the picture."""
-    if pictured is not None:
-        estimate = arrays.namespace(estimate).where(pictured, estimate, 0 * estimate)
-    return estimate[..., inside[0], inside[1]]
+    found = estimate[..., inside[0], inside[1]]
+    if pictured is None:
+        return found
+    where = arrays.namespace(estimate).where
+    kept = pictured[..., inside[0], inside[1]]
+    return arrays.by_plane(lambda values, kept: where(kept, values, 0 * values), found, kept)
 
 
 def continued(start: Array, shape: tuple[int, ...], inside: Inside) -> Array:

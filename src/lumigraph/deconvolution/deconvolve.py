@@ -403,6 +403,6 @@ def _require(operator: Linear, data: Array) -> None:
 
 
 def _change(before: Array, after: Array) -> float:
-    xp = arrays.namespace(after)
-    moved, whole = float(xp.sum((after - before) ** 2)), float(xp.sum(after**2))
+    moved = arrays.sum_by_plane(lambda one, other: (one - other) ** 2, after, before)
+    whole = arrays.sum_by_plane(lambda one: one**2, after)
     return math.sqrt(moved / whole) if whole > 0 else 0.0

@@ -82,15 +82,20 @@ class Scale:
     @property
     def mean_sensitivity(self) -> float:
         """Of the object samples that are seen."""
+        xp, dtype = arrays.namespace(self.sensitivity), self.sensitivity.dtype
+        return self.light_of_even / arrays.sum_by_plane(lambda seen: xp.astype(seen, dtype), self.seen)
+
+    @property
+    def light_of_even(self) -> float:
+        """On the pixels that count, of an object of intensity 1 where it is seen."""
         xp = arrays.namespace(self.sensitivity)
-        kept = xp.where(self.seen, self.sensitivity, 0 * self.sensitivity)
-        return float(xp.sum(kept)) / float(xp.sum(xp.astype(self.seen, kept.dtype)))
+        return arrays.sum_by_plane(
+            lambda light, seen: light * xp.astype(seen, light.dtype), self.sensitivity, self.seen
+        )
 
     def over_sensitivity(self, values: Array) -> Array:
         """`values` over the sensitivity; 0 where nothing is seen."""
-        xp = arrays.namespace(values)
-        safe = xp.where(self.seen, self.sensitivity, xp.ones_like(self.sensitivity))
-        return xp.where(self.seen, values / safe, xp.zeros_like(values))
+        return arrays.by_plane(_divided, values, self.sensitivity, self.seen)
 
     def back(self, residual: Array) -> Array:
         """Aᵀ(v w residual): an object from (ny, nx)."""
@@ -144,13 +149,15 @@ class Problem:
         """Intensity of the even object that sends as much light as was measured."""
         xp = arrays.namespace(self.data)
         light = self._weighted(self.data - self.scale.background)
-        total = float(xp.sum(self.scale.sensitivity * xp.astype(self.scale.seen, self.data.dtype)))
-        return max(float(xp.sum(light)), self.floor) / total
+        return max(float(xp.sum(light)), self.floor) / self.scale.light_of_even
 
     def flat(self) -> Array:
         """The even object of `level`, 0 where nothing is seen."""
-        zeros = arrays.namespace(self.data).zeros_like(self.scale.sensitivity)
-        return arrays.namespace(self.data).where(self.scale.seen, zeros + self.level, zeros)
+        xp, level = arrays.namespace(self.data), self.level
+        return arrays.by_plane(
+            lambda light, seen: xp.where(seen, xp.zeros_like(light) + level, xp.zeros_like(light)),
+            self.scale.sensitivity, self.scale.seen,
+        )  # fmt: skip
 
     def deviance(self, model: Array) -> float:
         r"""Poisson deviance of a model per pixel that counts, in electrons; near 1 where only noise is left.
@@ -192,6 +199,12 @@ def values(raw: RawImage | Array, operator: Linear, exposure: Exposure) -> Array
     if not xp.isdtype(data.dtype, "real floating") or str(data.dtype).endswith("float16"):
         data = xp.astype(data, xp.float32)
     return data
+
+
+def _divided(values: Array, by: Array, where: Array) -> Array:
+    """`values` over numbers where those count; 0 elsewhere."""
+    xp = arrays.namespace(values)
+    return xp.where(where, values / xp.where(where, by, xp.ones_like(by)), xp.zeros_like(values))
 
 
 def _plane(name: str, plane: Array | None, shape: tuple[int, ...], like: Array) -> Array | None:

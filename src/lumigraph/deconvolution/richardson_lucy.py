@@ -73,9 +73,8 @@ class RichardsonLucy:
     def _improved(self, problem: Problem, state: State) -> tuple[Array, dict[str, Array]]:
         factor = problem.scale.over_sensitivity(problem.scale.back(problem.data / state.model))
         if self.filter is not None:
-            xp = arrays.namespace(factor)
-            factor = self.filter(xp.where(problem.scale.seen, factor, xp.ones_like(factor)))
-        estimate = _positive(state.estimate * factor)
+            factor = self.filter(arrays.by_plane(_where_seen, factor, problem.scale.seen))
+        estimate = arrays.by_plane(lambda before, times: _positive(before * times), state.estimate, factor)
         memory: dict[str, Array] = {}
         if self.prior is not None:
             estimate, memory = self.prior.shrink(problem, estimate, state)
@@ -91,6 +90,11 @@ def _ahead(estimate: Array, change: Array, state: State) -> Array:
     whole = float(xp.sum(before * before))
     part = float(xp.sum(change * before)) / whole if whole > 0 else 0.0
     return _positive(estimate + min(max(part, 0.0), 1.0) * (estimate - last))
+
+
+def _where_seen(factor: Array, seen: Array) -> Array:
+    xp = arrays.namespace(factor)
+    return xp.where(seen, factor, xp.ones_like(factor))
 
 
 def _positive(values: Array) -> Array:

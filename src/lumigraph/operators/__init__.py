@@ -14,7 +14,8 @@
 - `microscope_operator`: volumes before a light-field microscope; `microscope_building`, how it is made;
   `microscope_cell`, a lenslet and its cell; `microscope_tiles`, lenslets in tiles;
   `microscope_kernels`, images of its points; `microscope_rays`, the same by rays; `microscope_spectrum`, the
-  lenslets' frequencies; `microscope_pixels`, real pixels; `fourier_microscope`
+  lenslets' frequencies; `microscope_patterns`, what they follow of a cell's points;
+  `microscope_pixels`, real pixels; `fourier_microscope`
 - `exact`: lenslets and distances beyond the paraxial; `paraxial`, how far off that is
 - `fineness`: what an accuracy asks for
 - `band`: band-limited samples along an axis, to and from points and pixels

@@ -19,6 +19,7 @@ from lumigraph.errors import FormatError, GeometryError, SamplingError
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_far import Far
 from lumigraph.operators.microscope_kernels import (
+    SHARES,
     Demand,
     SliceKernel,
     kernel_bytes,
@@ -125,9 +126,10 @@ def microscope_operator(
         kernels.append(_kept(objectives, lenslet, layout.sampling, dz, demand, folder))
         if progress is not None:
             progress((done + 1) / len(planes))
+    left_out = 0.0 if objectives[0].model == "rays" else SHARES["patterns"] * accuracy
     return MicroscopeOperator(
         tuple(kernels), layout.cells, layout.placement, -layout.frame,
-        suits_frequencies(kernels, layout.cells, -layout.frame),
+        suits_frequencies(kernels, layout.cells, -layout.frame, left_out), left_out,
         object_grid=_object_grid(lenslet, layout), depths=None if depths is None else planes,
     )  # fmt: skip
 

@@ -3,7 +3,6 @@
 Over lenslets that is one small convolution for each pattern, and a product of few columns.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,22 +75,25 @@ class FarLight:
     def forward(self, volume: Array, points: int) -> Array:
         """Light (N², rows, columns) from a volume (z, rows s, columns s)."""
         xp, (rows, columns) = arrays.namespace(volume), self.cells
-        cells = xp.sum(arrays.tiled(volume, (points, points)), axis=(3, 4))
+        cells = _summed(volume, points)
         spectrum = arrays.rfft2(cells, self.lengths, axes=(1, 2))[:, None, ...] * self.spectra
         light = arrays.irfft2(spectrum, self.lengths, axes=(2, 3))[..., :rows, :columns]
         light = xp.reshape(light, (self.images.shape[0], -1))
         return xp.reshape(xp.matrix_transpose(self.images) @ light, (-1, rows, columns))
 
-    def adjoint(self, light: Array, points: int) -> Array:
-        """Transpose of `forward`."""
+    def adjoint(self, light: Array) -> Array:
+        """What each point of a cell (z, rows, columns) sees of light (N², rows, columns)."""
         xp, (rows, columns) = arrays.namespace(light), self.cells
         parts = self.images @ xp.reshape(light, (light.shape[0], -1))
         parts = xp.reshape(parts, (*self.spectra.shape[:2], rows, columns))
         spectrum = arrays.rfft2(parts, self.lengths, axes=(2, 3)) * xp.conj(self.spectra)
         cells = arrays.irfft2(xp.sum(spectrum, axis=1), self.lengths, axes=(1, 2))
-        cells = cells[:, : self.seen[0], : self.seen[1]]
-        shape = (math.prod(cells.shape), 1)
-        whole = xp.reshape(cells, shape) * xp.ones(
-            (1, points**2), dtype=light.dtype, device=arrays.device(light)
-        )
-        return arrays.untiled(xp.reshape(whole, (*cells.shape, points, points)))
+        return cells[:, : self.seen[0], : self.seen[1]]
+
+
+def _summed(volume: Array, s: int) -> Array:
+    """Sums (z, rows, columns) over the s × s points of each cell."""
+    xp, (z, height, width) = arrays.namespace(volume), volume.shape
+    ones = xp.ones((s, 1), dtype=volume.dtype, device=arrays.device(volume))
+    along_x = xp.reshape(volume, (-1, s)) @ ones  # as a product: sums of short rows are slow
+    return xp.sum(xp.reshape(along_x, (z, height // s, s, width // s)), axis=2)

@@ -28,8 +28,8 @@ from lumigraph.operators.microscope_rays import ray_images
 SECTORS = 16
 """Directions of the patterns of far cells."""
 
-SHARES = {"near": 0.5, "window": 0.25}
-"""Of the accuracy, that cells treated as far and those beyond the window may take."""
+SHARES = {"near": 0.5, "window": 0.25, "patterns": 0.3}
+"""Of the accuracy, that cells treated as far, those beyond the window and patterns left out may take."""
 
 SPREAD = 8.0
 """How much more of a far lenslet's light than one spot is spread out.
@@ -106,10 +106,10 @@ class SliceKernel:
         s, n, N = self.sampling.points, len(self.offsets), self.sampling.pixels
         if not self.symmetric:
             return np.ascontiguousarray(self.blocks.transpose(1, 0, 2)).reshape(n * s * s, N * N)
-        whole = np.empty((n, s * s, N * N), np.float32)
+        whole, blocks = np.empty((n, s * s, N * N), np.float32), np.asarray(self.blocks)  # not a memmap
         for place, (flip_y, flip_x, swap), row in _expansion(s):
             moved = self._moved(flip_y, flip_x, swap)
-            block = self.blocks[row].reshape(n, N, N)
+            block = blocks[row].reshape(n, N, N)
             block = block.transpose(0, 2, 1) if swap else block
             block = block[:, ::-1] if flip_y else block
             block = block[:, :, ::-1] if flip_x else block

@@ -3,8 +3,8 @@
 With s × s points in each lenslet's cell and N × N samples of the image, a plane's raw image is the sum over
 the offsets between the points' cell and the image's of (cells × s²) · (s² × N²). All offsets of a depth are
 one product: the points of the neighbouring cells are gathered first. Where it takes less time, all of it goes
-through the lenslets' frequencies instead (`microscope_spectrum`), with the same result to rounding. What goes
-far is added by a few patterns (`microscope_far`).
+through the lenslets' frequencies instead (`microscope_spectrum`), with the same result to rounding and to
+`left_out`. What goes far is added by a few patterns (`microscope_far`).
 """
 
 import math
@@ -23,6 +23,7 @@ from lumigraph.core.matrix import Matrix
 from lumigraph.operators import microscope_spectrum
 from lumigraph.operators.microscope_far import FarLight
 from lumigraph.operators.microscope_kernels import SliceKernel
+from lumigraph.operators.microscope_patterns import Patterns, patterns
 from lumigraph.operators.microscope_tiles import Tiling
 
 GATHERED = 2**27
@@ -52,6 +53,9 @@ class MicroscopeOperator(Linear):
     by_frequency
         Whether `forward` and `adjoint` go through the lenslets' frequencies (`microscope_spectrum`), where
         rounding may leave -1e-6 of the highest value instead of 0; else by products over all offsets.
+    left_out
+        Relative rms of a point's image that fewer patterns may leave out there (`microscope_patterns`); 0 for
+        all patterns.
     """
 
     kernels: tuple[SliceKernel, ...]
@@ -59,6 +63,7 @@ class MicroscopeOperator(Linear):
     placement: Matrix | None = None
     margin: int = 0
     by_frequency: bool = False
+    left_out: float = 0.0
     _spectra: dict = field(default_factory=dict)
 
     title: ClassVar[str] = "Operator of a light-field microscope"
@@ -79,14 +84,17 @@ class MicroscopeOperator(Linear):
 
     @property
     def error(self) -> float:
-        """Relative rms of points' images, of the worst depth."""
-        return max(kernel.error for kernel in self.kernels)
+        """Relative rms of points' images, of the worst depth, with what is left out of them."""
+        if not self.by_frequency:
+            return max(kernel.error for kernel in self.kernels)
+        pairs = zip(self.kernels, self._points, strict=True)
+        return max(math.hypot(kernel.error, points.left_out) for kernel, points in pairs)
 
     @property
     def multiply_adds(self) -> int:
         """Of the matrix products of one application of `forward` or `adjoint`."""
         if self.by_frequency:
-            return 4 * self._tiling.count * microscope_spectrum.matrix_numbers(self.kernels, self._tiling)
+            return 4 * self._tiling.count * self._matrix_numbers
         rows = sum(len(kernel.offsets) * kernel.sampling.classes for kernel in self.kernels)
         return rows * self.kernels[0].sampling.pixels ** 2 * math.prod(self.cells)
 
@@ -98,7 +106,7 @@ class MicroscopeOperator(Linear):
     @property
     def memory_bytes(self) -> float:
         """Of the kernels, of the lenslets' frequencies where they are used, and of an image [bytes]."""
-        spectra = microscope_spectrum.matrix_numbers(self.kernels, self._tiling) if self.by_frequency else 0
+        spectra = self._matrix_numbers if self.by_frequency else 0
         return self.nbytes + 4.0 * (spectra + 3 * sum(math.prod(shape) for shape in self.shape))
 
     @property
@@ -135,18 +143,35 @@ class MicroscopeOperator(Linear):
             grid = Grid((ny, nx), grid.pitch, grid.center)
         return replace(
             self, margin=margin, object_grid=grid,
-            by_frequency=suits_frequencies(self.kernels, self.cells, margin), _spectra={},
+            by_frequency=suits_frequencies(self.kernels, self.cells, margin, self.left_out), _spectra={},
         )  # fmt: skip
 
     @property
     def _tiling(self) -> Tiling:
         if "tiling" not in self._spectra:
-            self._spectra["tiling"] = microscope_spectrum.tiling(self.kernels, self.cells, self.margin)
+            channels = _channels(self._points)
+            told = microscope_spectrum.tiling(self.kernels, self.cells, self.margin, channels)
+            self._spectra["tiling"] = told
         return self._spectra["tiling"]
+
+    @property
+    def _points(self) -> list[Patterns]:
+        """Patterns of each depth."""
+        if "points" not in self._spectra:
+            self._spectra["points"] = patterns(self.kernels, self.left_out)
+        return self._spectra["points"]
+
+    @property
+    def _matrix_numbers(self) -> int:
+        N = self.kernels[0].sampling.pixels
+        return microscope_spectrum.matrix_numbers(self._tiling, _channels(self._points), N)
 
     def _forward(self, intensity: Array) -> Array:
         volume = intensity if self.depths is not None else intensity[None, ...]
-        plane = self._light(volume) if self.by_frequency else self._by_offsets(volume)
+        if self.by_frequency:
+            plane = self._by_frequencies(volume).forward(volume)
+        else:
+            plane = self._by_offsets(volume)
         if (far := self._far(volume)) is not None:
             N = self.kernels[0].sampling.pixels
             plane = plane + _plane(far.forward(volume, self.kernels[0].sampling.points), N)
@@ -161,15 +186,12 @@ class MicroscopeOperator(Linear):
             self._spectra[key] = FarLight.of(fars, self.cells, self.margin, like)
         return self._spectra[key]
 
-    def _light(self, volume: Array) -> Array:
-        N = self.kernels[0].sampling.pixels
-        return microscope_spectrum.forward(self._matrix(volume), self._tiling, volume, N)
-
-    def _matrix(self, like: Array) -> Array:
+    def _by_frequencies(self, like: Array) -> microscope_spectrum.Spectra:
         key = arrays.placement(like)
         if key not in self._spectra:
-            found = microscope_spectrum.matrices(self.kernels, self._tiling)
-            self._spectra[key] = arrays.like(found, like)
+            self._spectra[key] = microscope_spectrum.Spectra.of(
+                self.kernels, self._points, self._tiling, like
+            )
         return self._spectra[key]
 
     def _by_offsets(self, volume: Array) -> Array:
@@ -192,15 +214,13 @@ class MicroscopeOperator(Linear):
         xp = arrays.namespace(raw)
         plane = raw if self.placement is None else self.placement._adjoint(raw)
         s, N = self.kernels[0].sampling.points, self.kernels[0].sampling.pixels
-        light = _class_first(plane, N)
+        light, far = _class_first(plane, N), self._far(raw)
+        even = None if far is None else far.adjoint(light)
         if self.by_frequency:
-            volume = microscope_spectrum.adjoint(self._matrix(raw), self._tiling, plane, s)
-        else:
-            flat = xp.reshape(light, (N * N, -1))
-            volume = xp.stack([self._back(kernel, flat) for kernel in self.kernels])
-        if (far := self._far(raw)) is not None:
-            volume = volume + far.adjoint(light, s)
-        return volume
+            return self._by_frequencies(raw).adjoint(plane, even)
+        flat = xp.reshape(light, (N * N, -1))
+        volume = xp.stack([self._back(kernel, flat) for kernel in self.kernels])
+        return volume if even is None else volume + xp.repeat(xp.repeat(even, s, axis=1), s, axis=2)
 
     def _of_point(self, point: np.ndarray) -> np.ndarray:
         volume, sampling = point.reshape(-1, *point.shape[-2:]), self.kernels[0].sampling
@@ -229,12 +249,21 @@ class MicroscopeOperator(Linear):
         return points[:, top : top + self.cells[0], left : left + self.cells[1]]
 
 
-def suits_frequencies(kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int) -> bool:
+def suits_frequencies(
+    kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int, left_out: float = 0.0
+) -> bool:
     """Whether the way through the lenslets' frequencies is faster, and its matrices leave memory free."""
-    told, free = microscope_spectrum.tiling(kernels, cells, margin), memory.available()
-    needed = 4.0 * microscope_spectrum.matrix_numbers(kernels, told)
+    if not all(kernel.symmetric for kernel in kernels):
+        return False
+    channels, free = _channels(patterns(kernels, left_out)), memory.available()
+    told = microscope_spectrum.tiling(kernels, cells, margin, channels)
+    needed = 4.0 * microscope_spectrum.matrix_numbers(told, channels, kernels[0].sampling.pixels)
     fits = free is None or needed < free * SHARE
-    return fits and microscope_spectrum.is_faster(kernels, told)
+    return fits and microscope_spectrum.is_faster(kernels, told, channels)
+
+
+def _channels(points: Sequence[Patterns]) -> int:
+    return sum(one.count for one in points)
 
 
 def _products(

@@ -7,21 +7,23 @@ blocks over the offsets d is real but for a factor, and the four frequencies (±
 .. math:: \hat y_q = (-i)^{|q|} R\, (-i)^{|c|} \hat x_c, \quad
           R = (-1)^{q \cdot c} \sum_d K_{qc}(d)\, \mathrm{tr}(2\pi f_y d_y)\, \mathrm{tr}(2\pi f_x d_x)
 
-with tr the cosine where q and c have the same parity along that axis, the sine where not. It takes the same
-time however many lenslets a point lights. Large arrays of lenslets are treated in tiles (`microscope_tiles`).
+with tr the cosine where q and c have the same parity along that axis, the sine where not. Of the points few
+patterns are followed where they hold all images (`microscope_patterns`). It takes the same time however many
+lenslets a point lights. Large arrays of lenslets are treated in tiles (`microscope_tiles`).
 """
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
-from lumigraph.core.cache import remembered
 from lumigraph.core.threads import each, single_products
 from lumigraph.operators.microscope_kernels import SliceKernel
+from lumigraph.operators.microscope_patterns import Patterns, all_patterns, quadrant
 from lumigraph.operators.microscope_tiles import Span, Tiling, tilings
 
 LEAST = 8
@@ -34,11 +36,12 @@ READ, PASSED = 24, 150
 """Multiply-adds of a matrix product in the time of reading one number of `R` from memory, and of what is done
 to one number of a tile (transforms, parts and copies). The former was measured, the latter is a guess."""
 
-GROUP = 2**26
-"""Numbers of the transforms of all tiles that are held at a time, at most, if one depth has fewer."""
+GROUP = 2**22
+"""Numbers of the transforms of all tiles that are treated at a time, at most, if one depth has fewer: they
+should stay in the processor's cache."""
 
 
-def tiling(kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int) -> Tiling:
+def tiling(kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int, channels: int) -> Tiling:
     """The fastest whose matrices are at most `MOST`; the fewest matrices where none is.
 
     Parameters
@@ -49,69 +52,146 @@ def tiling(kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int) 
         Lenslets (rows, columns) whose images are followed.
     margin
         Lenslets that the object reaches beyond them on each side.
+    channels
+        Patterns of all depths.
     """
     reach = max(int(np.abs(kernel.offsets).max()) for kernel in kernels)
-    least = min(LEAST, *cells)
+    least, N = min(LEAST, *cells), kernels[0].sampling.pixels
     found = list(tilings(cells, margin, reach, least))
-    fitting = [told for told in found if 4 * matrix_numbers(kernels, told) <= MOST]
+    fitting = [told for told in found if 4 * matrix_numbers(told, channels, N) <= MOST]
     if not fitting:
         return min(found, key=lambda told: told.frequencies)
-    return min(fitting, key=lambda told: cost(kernels, told))
+    return min(fitting, key=lambda told: cost(told, channels, N))
 
 
-def matrix_numbers(kernels: Sequence[SliceKernel], told: Tiling) -> int:
-    """How many `matrices` has."""
-    sampling = kernels[0].sampling
-    return told.frequencies * len(kernels) * sampling.classes * sampling.pixels**2
+def matrix_numbers(told: Tiling, channels: int, pixels: int) -> int:
+    """How many `matrices` has, for patterns of all depths and N × N pixels."""
+    return told.frequencies * channels * pixels**2
 
 
-def cost(kernels: Sequence[SliceKernel], told: Tiling) -> float:
+def cost(told: Tiling, channels: int, pixels: int) -> float:
     """Of one application of the operator or of its transpose [multiply-adds]."""
-    sampling = kernels[0].sampling
-    channels = len(kernels) * sampling.classes + sampling.pixels**2
-    passed = told.count * math.prod(told.lengths) * channels
-    return matrix_numbers(kernels, told) * (READ + 4.0 * told.count) + PASSED * passed
+    passed = told.count * math.prod(told.lengths) * (channels + pixels**2)
+    return matrix_numbers(told, channels, pixels) * (READ + 4.0 * told.count) + PASSED * passed
 
 
-def is_faster(kernels: Sequence[SliceKernel], told: Tiling) -> bool:
+def is_faster(kernels: Sequence[SliceKernel], told: Tiling, channels: int) -> bool:
     """Whether it takes less time than the products over all offsets."""
-    if not all(kernel.symmetric for kernel in kernels):
-        return False
     sampling = kernels[0].sampling
     products = sum(len(kernel.offsets) for kernel in kernels) * math.prod(told.cells) * sampling.classes
-    return products * sampling.pixels**2 > cost(kernels, told)
+    return products * sampling.pixels**2 > cost(told, channels, sampling.pixels)
 
 
-@single_products()
-def matrices(kernels: Sequence[SliceKernel], told: Tiling) -> np.ndarray:
-    """R (frequencies, depths s², N²) float32; the parts that are even over a cell come first."""
-    sampling = kernels[0].sampling
-    s, N = sampling.points, sampling.pixels
-    found = np.empty((told.frequencies, len(kernels), s, s, N, N), np.float32)
-    for k, kernel in enumerate(kernels):
-        first = np.asarray((kernel.offsets >= 0).all(1))  # the other quadrants follow by parity
-        whole = _in_parts(kernel, first)
-        waves = [_waves(length, kernel.offsets[first, axis]) for axis, length in enumerate(told.lengths)]
-        for cy, cx, qy, qx in itertools.product((0, 1), repeat=4):
-            place = (_part(s, cy), _part(s, cx), _part(N, qy), _part(N, qx))
-            trigonometric = waves[0][cy ^ qy][:, None] * waves[1][cx ^ qx]
-            part = whole[:, *place]
-            product = trigonometric.reshape(told.frequencies, -1) @ part.reshape(
-                len(part), math.prod(part.shape[1:])
-            )
-            sign = -1 if cy * qy ^ cx * qx else 1
-            found[:, k, *place] = sign * product.reshape(told.frequencies, *part.shape[1:])
-    return found.reshape(told.frequencies, len(kernels) * s * s, N * N)
+@dataclass(frozen=True, slots=True, eq=False)
+class Spectra:
+    """The operator between patterns of points and of pixels.
+
+    Parameters
+    ----------
+    told
+        Tiles of lenslets.
+    points
+        Patterns of each depth.
+    pixels
+        Patterns of the image.
+    matrices
+        R (frequencies, patterns of some depths, N²), of the depths of each of `groups`.
+    """
+
+    told: Tiling
+    points: Sequence[Patterns]
+    pixels: Patterns
+    matrices: Sequence[Array]
+
+    @classmethod
+    @single_products()
+    def of(
+        cls, kernels: Sequence[SliceKernel], points: Sequence[Patterns], told: Tiling, like: Array
+    ) -> "Spectra":
+        """In the library and precision of an array."""
+
+        def found(depths: slice) -> Array:
+            chosen = points[depths]
+            shape = told.frequencies, sum(one.count for one in chosen), pixels.count
+            matrix, first = np.empty(shape, np.float32), 0
+            for kernel, one in zip(kernels[depths], chosen, strict=True):
+                _fill(matrix[:, first : first + one.count], (kernel, one), told)
+                first += one.count
+            return arrays.like(matrix, like)
+
+        pixels = all_patterns(kernels[0].sampling.pixels)
+        return cls(told, points, pixels, list(each(found, groups(points, told))))
+
+    def forward(self, volume: Array) -> Array:
+        """Samples (rows N, columns N) of a volume (z, rows s, columns s)."""
+        xp, columns = arrays.namespace(volume), 0.0
+
+        def lit(group: tuple[slice, Array]) -> Array:
+            depths, matrix = group
+            chosen = self.points[depths]
+            cells = [_parted(volume[k + depths.start, ...], one) for k, one in enumerate(chosen)]
+            cells = cells[0] if len(cells) == 1 else xp.concat(cells, axis=-1)
+            return _columns(cells, self.told, _odd(chosen), of_image=False) @ matrix
+
+        for part in each(lit, zip(groups(self.points, self.told), self.matrices, strict=True)):
+            columns = columns + part
+        shape = (*self.told.cells, self.pixels.count)
+        image = xp.zeros(shape, dtype=volume.dtype, device=arrays.device(volume))
+        _add_cells(image, columns, self.told, self.pixels.odd, of_image=True)
+        return _whole(image, self.pixels)
+
+    def adjoint(self, image: Array, even: Array | None = None) -> Array:
+        """Transpose of `forward`: (z, rows s, columns s), and `even` (z, rows, columns) on all of a cell."""
+        xp, told = arrays.namespace(image), self.told
+        columns = _columns(_parted(image, self.pixels), told, self.pixels.odd, of_image=True)
+        shape = tuple(row.cells + 2 * row.margin for row in (told.rows, told.columns))
+        s, like = (
+            math.isqrt(len(self.points[0].basis)),
+            {"dtype": image.dtype, "device": arrays.device(image)},
+        )
+        volume = xp.empty((len(self.points), shape[0] * s, shape[1] * s), **like)
+
+        def seen(group: tuple[slice, Array]) -> None:
+            depths, matrix = group
+            chosen, first = self.points[depths], 0
+            cells = xp.zeros((*shape, matrix.shape[1]), **like)
+            _add_cells(cells, columns @ xp.matrix_transpose(matrix), told, _odd(chosen), of_image=False)
+            for k, one in enumerate(chosen, depths.start):
+                own = cells[..., first : first + one.count]
+                volume[k, ...] = _whole(own, one, None if even is None else even[k, ..., None])
+                first += one.count
+
+        for _ in each(seen, zip(groups(self.points, told), self.matrices, strict=True)):
+            pass
+        return volume
 
 
-def _in_parts(kernel: SliceKernel, chosen: np.ndarray) -> np.ndarray:
-    """Blocks (n, s, s, N, N) of the chosen offsets, between parts that are even and odd."""
-    s, N, n = kernel.sampling.points, kernel.sampling.pixels, int(chosen.sum())
-    points, pixels = (parts(k).astype(np.float32) for k in (s, N))
-    whole = kernel.matrix().reshape(len(chosen), s * s, N, N)[chosen]
-    whole = pixels @ whole.reshape(n * s * s, N, N) @ pixels.T
-    whole = points @ whole.reshape(n * s, s, N * N)
-    return (points @ whole.reshape(n, s, s * N * N)).reshape(n, s, s, N, N)
+def groups(points: Sequence[Patterns], told: Tiling) -> list[slice]:
+    """Depths that are treated together: some with few patterns, one with many."""
+    most, found, start, held = GROUP // (4 * told.frequencies * told.count), [], 0, 0
+    for k, one in enumerate(points):
+        if k > start and held + one.count > most:
+            found.append(slice(start, k))
+            start, held = k, 0
+        held += one.count
+    return [*found, slice(start, len(points))]
+
+
+def _fill(matrix: np.ndarray, depth: tuple[SliceKernel, Patterns], told: Tiling) -> None:
+    """Write R (frequencies, r, N²) of a depth."""
+    kernel, points = depth
+    pixels, blocks = all_patterns(kernel.sampling.pixels), quadrant(kernel)[0]
+    basis, onto = (one.basis.astype(np.float32) for one in (points, pixels))
+    whole = basis.T @ blocks @ onto
+    steps = kernel.offsets[(kernel.offsets >= 0).all(1)]
+    waves = [_waves(length, steps[:, axis]) for axis, length in enumerate(told.lengths)]
+    for cy, cx, qy, qx in itertools.product((0, 1), repeat=4):
+        place = points.of_parity(cy, cx), pixels.of_parity(qy, qx)
+        sign = np.float32(-1 if cy * qy ^ cx * qx else 1)
+        trigonometric = sign * waves[0][cy ^ qy][:, None] * waves[1][cx ^ qx]
+        part = whole[:, *place]
+        product = trigonometric.reshape(told.frequencies, -1) @ part.reshape(len(part), -1)
+        matrix[:, *place] = product.reshape(told.frequencies, *part.shape[1:])
 
 
 def _waves(length: int, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -119,67 +199,6 @@ def _waves(length: int, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     phase = 2 * np.pi * (np.arange(length // 2 + 1)[:, None] * offsets % length) / length
     both = np.where(offsets > 0, 2.0, 1.0)
     return (both * np.cos(phase)).astype(np.float32), (both * np.sin(phase)).astype(np.float32)
-
-
-def _part(n: int, odd: int) -> slice:
-    half = (n + 1) // 2
-    return slice(half, n) if odd else slice(0, half)
-
-
-@remembered
-def parts(n: int) -> np.ndarray:
-    """Orthonormal matrix (n, n) from n samples to their even parts, then their odd ones.
-
-    >>> (parts(3) @ [1.0, 0.0, -1.0]).round(6).tolist()
-    [0.0, 0.0, 1.414214]
-    """
-    found, half = np.zeros((n, n)), (n + 1) // 2
-    for k in range(half):
-        found[k, k] += 1
-        found[k, n - 1 - k] += 1
-    for k in range(n // 2):
-        found[half + k, k], found[half + k, n - 1 - k] = 1, -1
-    return found / np.linalg.norm(found, axis=1, keepdims=True)
-
-
-def forward(matrix: Array, told: Tiling, volume: Array, pixels: int) -> Array:
-    """Samples (rows N, columns N) of a volume (z, rows s, columns s), by `matrices`."""
-    s = volume.shape[1] // (told.rows.cells + 2 * told.rows.margin)
-    xp, columns = arrays.namespace(volume), 0.0
-
-    def lit(depths: slice) -> Array:
-        cells = _channels(volume[depths, ...], s)
-        held = _columns(cells, told, s, of_image=False)
-        return held @ matrix[:, depths.start * s * s : depths.stop * s * s, :]
-
-    for part in _all(lit, told, volume.shape[0], s):
-        columns = columns + part
-    image = xp.zeros((*told.cells, pixels**2), dtype=volume.dtype, device=arrays.device(volume))
-    _add_cells(image, columns, told, pixels, of_image=True)
-    return _planes(image, pixels)[0, ...]
-
-
-def adjoint(matrix: Array, told: Tiling, image: Array, points: int) -> Array:
-    """Transpose of `forward`: (z, rows s, columns s)."""
-    xp, s, N = arrays.namespace(image), points, image.shape[0] // told.rows.cells
-    columns = _columns(_channels(image[None, ...], N), told, N, of_image=True)
-    shape = tuple(row.cells + 2 * row.margin for row in (told.rows, told.columns))
-
-    def seen(depths: slice) -> Array:
-        rows = slice(depths.start * s * s, depths.stop * s * s)
-        held = columns @ xp.matrix_transpose(matrix[:, rows, :])
-        cells = xp.zeros((*shape, rows.stop - rows.start), dtype=image.dtype, device=arrays.device(image))
-        _add_cells(cells, held, told, s, of_image=False)
-        return _planes(cells, s)
-
-    return xp.concat(list(_all(seen, told, matrix.shape[1] // s**2, s)), axis=0)
-
-
-def _all(function: Callable[[slice], Array], told: Tiling, depths: int, s: int) -> Iterator[Array]:
-    """The function of all depths, of some at a time."""
-    step = max(1, GROUP // (4 * told.frequencies * told.count * s * s))
-    groups = [slice(k, min(k + step, depths)) for k in range(0, depths, step)]
-    return each(function, groups) if len(groups) > 1 else map(function, groups)
 
 
 def _places(spans: tuple[Span, Span], of_image: bool) -> tuple[tuple[slice, slice], tuple[int, int]]:
@@ -190,10 +209,15 @@ def _places(spans: tuple[Span, Span], of_image: bool) -> tuple[tuple[slice, slic
     return (y.points, x.points), (y.points_at, x.points_at)
 
 
-def _columns(cells: Array, told: Tiling, n: int, *, of_image: bool) -> Array:
+def _odd(points: Sequence[Patterns]) -> np.ndarray:
+    """Parities (2, r) of patterns of several depths, one after the other."""
+    return np.concatenate([one.odd for one in points], axis=1)
+
+
+def _columns(cells: Array, told: Tiling, odd: np.ndarray, *, of_image: bool) -> Array:
     """Real and imaginary parts at f_y and at -f_y of all tiles (frequencies, 4 tiles, channels)."""
     xp, (ly, lx), channels = arrays.namespace(cells), told.lengths, cells.shape[-1]
-    half, turn, sign = ly // 2 + 1, *_turns(n, channels // n**2, cells, back=of_image)
+    half, turn, sign = ly // 2 + 1, *_turns(odd, cells, back=of_image)
     shape = (half, lx // 2 + 1, told.count, 4, channels)
     found = xp.empty(shape, dtype=cells.dtype, device=arrays.device(cells))
     for k, spans in told.tiles():
@@ -226,10 +250,10 @@ def _along_y(spectrum: Array, first: int, length: int) -> Array:
     return arrays.fft(spectrum, length, axis=0, overwrite=True)
 
 
-def _add_cells(cells: Array, columns: Array, told: Tiling, n: int, *, of_image: bool) -> None:
+def _add_cells(cells: Array, columns: Array, told: Tiling, odd: np.ndarray, *, of_image: bool) -> None:
     """Add to cells (rows, columns, channels) what `_columns` of all tiles say of them."""
     xp, (ly, lx), channels = arrays.namespace(cells), told.lengths, cells.shape[-1]
-    half, turn, sign = ly // 2 + 1, *_turns(n, channels // n**2, cells, back=not of_image)
+    half, turn, sign = ly // 2 + 1, *_turns(odd, cells, back=not of_image)
     columns = xp.reshape(columns, (half, lx // 2 + 1, told.count, 4, channels))
     for k, spans in told.tiles():
         (rows, places), (y, x) = _places(spans, of_image)
@@ -244,30 +268,26 @@ def _add_cells(cells: Array, columns: Array, told: Tiling, n: int, *, of_image: 
         place += arrays.irfft(spectrum, lx, axis=1)[:, x : x + width, :]
 
 
-def _turns(n: int, planes: int, like: Array, *, back: bool) -> tuple[Array, Array]:
-    turn, sign = _factors(n, planes)
+def _turns(odd: np.ndarray, like: Array, *, back: bool) -> tuple[Array, Array]:
+    """(-i)^|c| and (-1)^c_y of channels of these parities."""
+    turn, sign = np.array([1, -1j, -1])[odd.sum(0)], np.where(odd[0], -1.0, 1.0)
     return arrays.like(turn.conj() if back else turn, like), arrays.like(sign, like)
 
 
-@remembered
-def _factors(n: int, planes: int) -> tuple[np.ndarray, np.ndarray]:
-    """(-i)^|c| and (-1)^c_y of each channel: planes of parts (even, odd) along y and x."""
-    odd = np.arange(n) >= (n + 1) // 2
-    turn = np.array([1, -1j, -1])[odd[:, None] * 1 + odd]
-    sign = np.where(odd, -1.0, 1.0)[:, None] * np.ones(n)
-    return np.tile(turn.ravel(), planes), np.tile(sign.ravel(), planes)
+def _parted(plane: Array, patterns: Patterns) -> Array:
+    """Plane (rows n, columns n) to patterns of each cell (rows, columns, r)."""
+    xp, n = arrays.namespace(plane), math.isqrt(len(patterns.basis))
+    cells = arrays.tiled(plane, (n, n))
+    shape = cells.shape[:2]
+    parts = xp.reshape(cells, (-1, n * n)) @ arrays.like(patterns.basis, plane)
+    return xp.reshape(parts, (*shape, patterns.count))
 
 
-def _channels(planes: Array, n: int) -> Array:
-    """Planes (z, rows n, columns n) to even and odd parts of each cell (rows, columns, z n²)."""
-    xp, basis = arrays.namespace(planes), arrays.like(parts(n), planes)
-    cells = xp.permute_dims(arrays.tiled(planes, (n, n)), (1, 2, 0, 3, 4))
-    return xp.reshape(basis @ cells @ xp.matrix_transpose(basis), (*cells.shape[:2], -1))
-
-
-def _planes(cells: Array, n: int) -> Array:
-    """Inverse of `_channels`."""
+def _whole(cells: Array, patterns: Patterns, even: Array | None = None) -> Array:
+    """Transpose of `_parted`, its inverse where all patterns are there; with `even` added to each cell."""
     xp, (rows, columns, channels) = arrays.namespace(cells), cells.shape
-    basis, z = arrays.like(parts(n), cells), channels // n**2
-    whole = xp.matrix_transpose(basis) @ xp.reshape(cells, (rows, columns, z, n, n)) @ basis
-    return arrays.untiled(xp.permute_dims(whole, (2, 0, 1, 3, 4)))
+    n, basis = math.isqrt(len(patterns.basis)), arrays.like(patterns.basis, cells)
+    whole = xp.reshape(cells, (-1, channels)) @ xp.matrix_transpose(basis)
+    whole = xp.reshape(whole, (rows, columns, n * n))
+    whole = whole if even is None else whole + even
+    return arrays.untiled(xp.reshape(whole, (rows, columns, n, n)))
