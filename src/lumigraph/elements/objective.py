@@ -25,6 +25,7 @@ from scipy.special import j0, j1, jv
 
 from lumigraph.core import checks
 from lumigraph.core.cache import remembered
+from lumigraph.elements.disc import disc, nodes_for, plane
 from lumigraph.elements.zernike import noll_to_nm, zernike
 from lumigraph.errors import GeometryError
 
@@ -34,7 +35,7 @@ PER_NYQUIST = 16
 """Steps of a radial table in half the smallest period of the field: cubic interpolation errs by 1e-5."""
 
 AZIMUTHS = 64
-"""Directions in which aberrations are sampled; harmonics up to half of them."""
+"""Directions in which aberrations are sampled, at least; harmonics up to half of them."""
 
 _WEAK = 1e-5
 """Harmonics below this part of the strongest are left out."""
@@ -157,6 +158,11 @@ class Objective:
         return tuple(dict(self.aberrations).items())
 
     @property
+    def orders(self) -> list[tuple[tuple[int, int], float]]:
+        """Radial and azimuthal order, and waves rms, of each aberration."""
+        return [(noll_to_nm(j), waves) for j, waves in self.terms]
+
+    @property
     def medium(self) -> float:
         """Refractive index around the object."""
         return self.index if self.mismatch is None else self.mismatch.sample_index
@@ -169,7 +175,7 @@ class Objective:
     @property
     def is_round(self) -> bool:
         """Whether the point's image is the same in every direction."""
-        return all(noll_to_nm(j)[1] == 0 for j, _ in self.terms)
+        return all(m == 0 for (_, m), _ in self.orders)
 
     @property
     def modes(self) -> int:
@@ -188,7 +194,10 @@ class Objective:
         """
         if self.model == "rays":
             raise GeometryError("model 'rays' has no field. Use 'scalar', 'vector' or 'paraxial'.")
-        y, x = np.broadcast_arrays(np.asarray(y, np.float64), np.asarray(x, np.float64))
+        y, x = np.asarray(y, np.float64), np.asarray(x, np.float64)
+        if not self.is_round and y.ndim == x.ndim == 2 and y.shape[1] == x.shape[0] == 1:
+            return self._plane(y[:, 0], x[0], float(dz))
+        y, x = np.broadcast_arrays(y, x)
         radius = np.hypot(y, x)
         farthest = 2.0 ** math.ceil(math.log2(max(float(radius.max()), self.wavelength) * 1.0000001))
         step, tables = _tables(self, float(dz), farthest)
@@ -206,6 +215,58 @@ class Objective:
         """Intensity (...) at positions (y, x) in object space [m] of a point on the axis at `dz`."""
         fields = self.fields(y, x, dz)
         return np.asarray(np.square(np.abs(fields)).sum(0))
+
+    def _plane(self, y: np.ndarray, x: np.ndarray, dz: float) -> np.ndarray:
+        """Amplitudes (modes, y, x): harmonics of strong aberrations are many, rows of the pupil are few."""
+        count = nodes_for(self.steepest(math.hypot(np.abs(y).max(), np.abs(x).max()), dz))
+        qy, qx, area = (self.aperture * part for part in disc(count, count))
+        k = 2 * np.pi / self.wavelength
+        return plane(self.pupil(qy, qx, dz) * area * self.aperture, (k * qy, k * qx), y, x)
+
+    def steepest(self, radius: float, dz: float) -> float:
+        """Bound of how much the pupil's phase and the wave to a point within `radius` [m] change per pupil's
+        radius [rad].
+        """
+        k, ray = 2 * math.pi / self.wavelength, self.aperture / math.sqrt(self.medium**2 - self.aperture**2)
+        q = np.linspace(0, self.aperture, 64)
+        extra = np.abs(np.gradient(_extra_path(self, q), q)).max()
+        return k * self.aperture * (radius + abs(dz) * ray + float(extra)) + self.spread() * k * self.aperture
+
+    def spread(self, part: float = 1.0) -> float:
+        """How far aberrations move this part of the rays at most, in object space [m]."""
+        return _slope(self.terms, part) * self.wavelength / self.numerical_aperture
+
+    def depth_path(self, qy: np.ndarray, qx: np.ndarray) -> np.ndarray:
+        """Optical path at (qy, qx) of a depth, over the depth: n (cos θ - 1)."""
+        sine = np.hypot(qy, qx) / self.medium
+        return _depth_path(self, sine, np.sqrt(1 - sine**2))
+
+    def pupil(self, qy: np.ndarray, qx: np.ndarray, dz: float) -> np.ndarray:
+        r"""Amplitudes (modes, ...) per unit area of the pupil at (qy, qx) = n sin θ of a point at `dz`.
+
+        .. math:: U(y, x) = \iint P(q_y, q_x)\, e^{i k (q_y y + q_x x)}\, dq_y\, dq_x
+
+        over q up to `aperture` is what `fields` interpolates.
+
+        Raises
+        ------
+        GeometryError
+            The model is "rays".
+        """
+        if self.model == "rays":
+            raise GeometryError("model 'rays' has no field. Use 'scalar', 'vector' or 'paraxial'.")
+        q, angle, k = np.hypot(qy, qx), np.arctan2(qy, qx), 2 * np.pi / self.wavelength
+        sine = q / self.medium
+        cosine = np.sqrt(1 - sine**2)
+        phase = k * (_depth_path(self, sine, cosine) * dz + _extra_path(self, q))
+        for j, waves in self.terms:
+            phase = phase + 2 * np.pi * waves * zernike(j, q / self.numerical_aperture, angle)
+        _, around, weight = nodes = _nodes(self, 0.0, 0.0)
+        scale = k / (
+            2 * np.pi * self.medium * math.sqrt(_power_of(_apodised(self, *nodes[:2]), around, weight))
+        )
+        wave = np.exp(1j * phase) * (scale / cosine)
+        return np.stack([wave * a * _turned(h, angle) for h, _, a in _apodised(self, sine, cosine)])
 
     def radius_of(self, part: float, dz: float) -> float:
         """Radius that holds this part of the light [m], for a round image; from 0 to below 1."""
@@ -311,6 +372,33 @@ def _apodised(
     ]  # fmt: skip
 
 
+@lru_cache(maxsize=256)
+def _slope(terms: tuple[tuple[int, float], ...], part: float) -> float:
+    """Of the wavefront over the pupil [waves per radius]: below it for a part of the pupil's area."""
+    if not terms:
+        return 0.0
+    rho, angle = np.sqrt(np.linspace(0, 1, 65))[1:, None], np.linspace(0, 2 * np.pi, 129)
+    waves = sum((w * zernike(j, rho, angle) for j, w in terms), np.zeros(1))
+    radial, around = np.gradient(waves, rho[:, 0], angle)
+    return float(np.quantile(np.hypot(radial, around / rho), part))
+
+
+def _depth_path(objective: Objective, sine: np.ndarray, cosine: np.ndarray) -> np.ndarray:
+    """Optical path of a depth, over the depth."""
+    n = objective.medium
+    return -n * sine**2 / 2 if objective.model == "paraxial" else n * (cosine - 1)
+
+
+def _turned(harmonic: int, angle: np.ndarray) -> np.ndarray:
+    """Of `_apodised`, over the azimuth."""
+    return np.cos(harmonic * angle) if harmonic >= 0 else np.sin(-harmonic * angle)
+
+
+def _power_of(apodised: list[tuple[int, int, np.ndarray]], cosine: np.ndarray, weight: np.ndarray) -> float:
+    """Of all modes together in the image, by the nodes' weights."""
+    return sum((2 if not h else 1) * np.pi * float((a**2 / cosine * weight).sum()) for h, _, a in apodised)
+
+
 @remembered
 def _tables(
     objective: Objective, dz: float, farthest: float
@@ -320,23 +408,23 @@ def _tables(
     steps = np.arange(math.ceil(farthest / nyquist * PER_NYQUIST) + 2) * (nyquist / PER_NYQUIST)
     sine, cosine, weight = _nodes(objective, farthest, dz)
     q, k = objective.medium * sine, 2 * np.pi / objective.wavelength
-    depth = (
-        -objective.medium * sine**2 / 2 if objective.model == "paraxial" else objective.medium * (cosine - 1)
-    )
-    wave = np.exp(1j * k * (depth * dz + _extra_path(objective, q)))
+    wave = np.exp(1j * k * (_depth_path(objective, sine, cosine) * dz + _extra_path(objective, q)))
     apodised = _apodised(objective, sine, cosine)
-    power = sum(
-        (2 if not h else 1) * np.pi * (a**2 / cosine**2 * cosine * weight).sum() for h, _, a in apodised
-    )
-    scale = k * objective.medium / math.sqrt(power)
-    angle = np.arange(AZIMUTHS) * (2 * np.pi / AZIMUTHS)
+    scale = k * objective.medium / math.sqrt(_power_of(apodised, cosine, weight))
+    count = _azimuths(objective)
+    angle = np.arange(count) * (2 * np.pi / count)
     waves = _aberrated(objective, q / objective.numerical_aperture, angle)
     tables = []
     for harmonic, _, amplitude in apodised:
-        shape = np.cos(harmonic * angle) if harmonic >= 0 else np.sin(-harmonic * angle)
-        spectrum = np.fft.fft(shape[:, None] * waves, axis=0) / AZIMUTHS
+        spectrum = np.fft.fft(_turned(harmonic, angle)[:, None] * waves, axis=0) / count
         tables.append(_harmonics(spectrum, amplitude * weight * wave * scale, k * q, steps))
     return float(steps[1]), tables
+
+
+def _azimuths(objective: Objective) -> int:
+    """Directions that hold the harmonics of the aberrations: more than their phase turns at the rim [rad]."""
+    turning = sum(2 * np.pi * abs(w) * abs(m) * math.sqrt(2 * (n + 1)) for (n, m), w in objective.orders)
+    return max(AZIMUTHS, 8 * math.ceil((turning + 4 * turning ** (1 / 3) + 12) / 4))
 
 
 def _aberrated(objective: Objective, rho: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -354,7 +442,7 @@ def _harmonics(
     strength = np.abs(spectrum).max(1)
     found = []
     for row in np.flatnonzero(strength > _WEAK * strength.max()):
-        order = int(row) if row < AZIMUTHS // 2 else int(row) - AZIMUTHS
+        order = int(row) if row < len(spectrum) // 2 else int(row) - len(spectrum)
         bessel = _bessel(abs(order), q, float(steps[1]), len(steps))
         wave = amplitude * spectrum[row]
         parts = bessel @ np.stack([wave.real, wave.imag], axis=1)

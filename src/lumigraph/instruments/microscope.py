@@ -33,6 +33,7 @@ from lumigraph.operators.microscope_bench import DEGREE, samples_needed
 from lumigraph.operators.microscope_building import Layout, microscope_operator, require_accuracy
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_pixels import narrowed, placement
+from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.points import OUTSIDE
 from lumigraph.sensor import Sensor
 from lumigraph.simulation.microscope_scene import SAMPLES, point_image
@@ -394,6 +395,40 @@ class LightFieldMicroscope(Instrument):
         layout = self._layout(SAMPLES, None, (dz,), finer)
         image, error = point_image(self.objectives, self.lenslet, layout, (y, x, dz), finer)
         return image, error * accuracy / finer
+
+    def pupil_images(
+        self,
+        terms: Sequence[int],
+        *,
+        farthest: float = 0.0,
+        accuracy: float = 1e-2,
+        pixels: int | Calibration | None = None,
+        double: bool = False,
+    ) -> PupilImages:
+        """Images of points as functions of Zernike terms of the pupil, with derivatives by them.
+
+        Parameters
+        ----------
+        terms
+            Noll indices; their coefficients, in waves rms, add to the description's aberrations.
+        farthest
+            Of the points from the focused plane [m]: how many samples pixels are interpolated from.
+        accuracy, pixels
+            As in `operator`.
+        double
+            Double precision, for checks of derivatives.
+
+        Raises
+        ------
+        GeometryError
+            A Fourier microscope, round lenslets, rays, a term that is no Noll index.
+        """
+        if self.configuration == "fourier":
+            raise GeometryError(
+                "derivatives by the pupil's phase need configuration '1.0' or '2.0', not 'fourier'."
+            )
+        layout = self._layout(SAMPLES, pixels, (checks.finite("farthest", farthest),), accuracy)
+        return PupilImages(self.objectives, self.lenslet, layout, tuple(terms), accuracy, double)
 
     def _layout(
         self, samples: int, pixels: int | Calibration | None, depths: Sequence[float], accuracy: float

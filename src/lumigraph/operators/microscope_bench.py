@@ -65,7 +65,7 @@ def spline_response(f: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]
 def transmission(lenslet: Lenslet, wavelength: float, finest: int, samples: int) -> np.ndarray:
     """Of a lenslet (samples, samples), of its Fourier series up to `finest` periods in a pitch."""
     if not lenslet.is_round:
-        line = _series(lenslet, wavelength, finest)
+        line = series(lenslet, wavelength, finest)
         line = _waves(finest, samples) @ line
         return np.outer(line, line)
     n = 4 * 2 ** math.ceil(math.log2(4 * finest + 64))
@@ -77,7 +77,7 @@ def transmission(lenslet: Lenslet, wavelength: float, finest: int, samples: int)
     return _waves(finest, samples) @ (back @ whole @ back.T) @ _waves(finest, samples).T
 
 
-def _series(lenslet: Lenslet, wavelength: float, finest: int) -> np.ndarray:
+def series(lenslet: Lenslet, wavelength: float, finest: int) -> np.ndarray:
     """Fourier series (2 finest + 1,) of a square lenslet along an axis, by quadrature with its edges."""
     turns = finest + lenslet.pitch**2 / (wavelength * abs(lenslet.focal_length))
     unit, weight = np.polynomial.legendre.leggauss(math.ceil(4 * turns) + 32)
@@ -196,16 +196,21 @@ class Bench:
         return image
 
     def responses(self, sampling: CellSampling) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Along an axis of the fine grid: factors of samples, and the parts of amplitudes that pixels average
-        and that samples hold, the latter squared.
-        """
-        f = np.fft.fftfreq(len(self.at)) * self.fine  # in periods of a pitch
-        shift = np.exp(1j * np.pi * f * (1 / sampling.pixels - 1 / self.fine))
-        averaged = np.sinc(f * sampling.width)
-        if sampling.degree == 0:
-            return (averaged * shift).astype(np.complex64), averaged, averaged**2
-        own, held = spline_response(f / sampling.pixels, sampling.degree)
-        return (averaged * own * shift).astype(np.complex64), averaged, averaged**2 * held
+        """As `responses`, on the whole fine grid."""
+        return responses(len(self.at), self.fine, sampling)
+
+
+def responses(count: int, fine: int, sampling: CellSampling) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Along an axis of `count` samples, `fine` to a lenslet: factors of samples, and the parts of amplitudes
+    that pixels average and that samples hold, the latter squared.
+    """
+    f = np.fft.fftfreq(count) * fine  # in periods of a pitch
+    shift = np.exp(1j * np.pi * f * (1 / sampling.pixels - 1 / fine))
+    averaged = np.sinc(f * sampling.width)
+    if sampling.degree == 0:
+        return (averaged * shift).astype(np.complex64), averaged, averaged**2
+    own, held = spline_response(f / sampling.pixels, sampling.degree)
+    return (averaged * own * shift).astype(np.complex64), averaged, averaged**2 * held
 
 
 def _averaged(light: np.ndarray, factors: np.ndarray, count: int) -> np.ndarray:

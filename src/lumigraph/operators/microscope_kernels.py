@@ -37,6 +37,9 @@ SPREAD = 8.0
 Measured: 60x/1.2 and 20x/0.5, three depths, with it windows are 0 to 4 cells larger than what comes out near.
 """
 
+RAYS = 0.95
+"""Part of the rays that aberrations leave within a window: beyond it they are few, and treated as far."""
+
 
 @dataclass(frozen=True, slots=True)
 class Demand:
@@ -177,7 +180,8 @@ def reach_of(objective: Objective, lenslet: Lenslet, dz: float, demand: Demand) 
 def _ray_radius(objective: Objective, dz: float) -> float:
     """Of what rays light, in object space [m]."""
     spread = objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
-    return abs(dz) * spread + abs(objective.image_defocus) * objective.numerical_aperture
+    straight = abs(dz) * spread + abs(objective.image_defocus) * objective.numerical_aperture
+    return straight + objective.spread(RAYS)
 
 
 @single_products()

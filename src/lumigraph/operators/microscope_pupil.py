@@ -1,0 +1,373 @@
+r"""Images of points behind the lenslets of a microscope as functions of its pupil's phase, with derivatives.
+
+Before a lattice of square lenslets a plane wave of the pupil becomes a Bloch wave along each axis,
+
+.. math:: b(X; q) = \sum_n T_n\, e^{2\pi i (\nu + n/d) X}\, e^{-i \pi \lambda b (\nu + n/d)^2},
+          \quad \nu = q / (\lambda M)
+
+with T_n a lenslet's Fourier series. The field on the sensor is then one product of small matrices with the
+pupil, U = B_y P B_x, and so is what follows when the pupil's phase changes by φ: dU = B_y (i φ P) B_x, and
+d|U|² = 2 Re(U* dU). Moving a point changes the phase as well, so that its place has derivatives too.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from lumigraph.core import checks, memory
+from lumigraph.core.cache import remembered
+from lumigraph.elements.disc import disc, nodes_for
+from lumigraph.elements.objective import Objective
+from lumigraph.elements.zernike import noll_to_nm, zernike
+from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.operators.microscope_bench import fineness, guard, responses, series
+from lumigraph.operators.microscope_building import Layout
+from lumigraph.operators.microscope_cell import CellSampling, Lenslet
+from lumigraph.operators.microscope_kernels import Demand, reach_of
+from lumigraph.scene import Points
+
+BLOCK = 2**22
+"""Numbers of fields that are held at a time."""
+
+PLACES = 3
+"""Derivatives by a point's place: y, x, dz."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Waves:
+    """What the plane waves of a pupil become behind the lenslets of a window, and how it is sampled.
+
+    Parameters
+    ----------
+    q
+        Of the nodes (rows, nodes), along y and x.
+    area
+        (rows, nodes).
+    down, across
+        Bloch waves (samples, rows) and (rows, nodes, samples).
+    sampled
+        From the fine grid to samples of the image (count, samples), along an axis.
+    """
+
+    q: tuple[np.ndarray, np.ndarray]
+    area: np.ndarray
+    down: np.ndarray
+    across: np.ndarray
+    sampled: np.ndarray
+
+    @property
+    def nbytes(self) -> int:
+        """Of all arrays."""
+        return self.down.nbytes + self.across.nbytes + self.sampled.nbytes + 3 * self.area.nbytes
+
+    def fields(self, pupils: np.ndarray) -> np.ndarray:
+        """On the fine grid (k, n, n), of pupils (k, rows, nodes)."""
+        rows = pupils.transpose(1, 0, 2) @ self.across
+        return self.down @ rows.transpose(1, 0, 2)
+
+    def back(self, fields: np.ndarray) -> np.ndarray:
+        """Conjugate transpose of `fields`."""
+        rows = self.down.T @ fields.conj()  # the waves are large: not they are conjugated
+        return (rows.transpose(1, 0, 2) @ self.across.transpose(0, 2, 1)).transpose(1, 0, 2).conj()
+
+    def samples(self, light: np.ndarray) -> np.ndarray:
+        """Of intensities (..., n, n) on the fine grid: (..., count, count)."""
+        return self.sampled @ light @ self.sampled.T
+
+    def spread(self, samples: np.ndarray) -> np.ndarray:
+        """Transpose of `samples`."""
+        return self.sampled.T @ samples @ self.sampled
+
+
+@remembered
+def _waves(
+    objective: Objective, lenslet: Lenslet, sampling: CellSampling, told: tuple[int, int, int, str]
+) -> Waves:
+    """For (cells, samples of the light along a lenslet, nodes along a diameter, precision) of a window."""
+    cells, fine, count, dtype = told
+    qy, qx, area = disc(count, count)
+    n, wave, d = cells * fine, objective.wavelength, lenslet.pitch
+    steepest = objective.numerical_aperture / lenslet.magnification / wave
+    finest = math.floor(fine / 2 - steepest * d)
+    orders, factors = np.arange(-finest, finest + 1), series(lenslet, wave, finest)
+    at, own = (np.arange(fine) - (fine - 1) / 2) / fine, np.arange(cells) - cells // 2  # [pitches]
+    inside = np.exp(2j * np.pi * np.outer(orders, at))
+
+    def bloch(q: np.ndarray) -> np.ndarray:
+        turns = q[:, None] * (d / (wave * lenslet.magnification))  # per pitch
+        paths = np.exp(-1j * np.pi * wave * lenslet.distance / d**2 * (turns + orders) ** 2) * factors
+        cell = ((paths @ inside) * np.exp(2j * np.pi * turns * at)).astype(dtype)
+        moves = np.exp(2j * np.pi * turns * own).astype(dtype)
+        return (moves[:, :, None] * cell[:, None, :]).reshape(len(q), n)
+
+    a = objective.aperture
+    across = np.stack([bloch(row) for row in a * qx])
+    places = np.broadcast_to(a * qy, qx.shape), a * qx
+    return Waves(
+        (places[0], places[1]), area * a**2, np.ascontiguousarray(bloch(a * qy[:, 0]).T), across,
+        _sampling(cells, fine, sampling).astype(np.real(across).dtype),
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=8)
+def _sampling(cells: int, fine: int, sampling: CellSampling) -> np.ndarray:
+    """Matrix (cells N, cells fine) of what samples make of light; dark beyond the window."""
+    wide = cells + 2
+    n, count = wide * fine, wide * sampling.pixels
+    spectrum = responses(n, fine, sampling)[0][:, None] * np.fft.fft(np.eye(n), axis=0)
+    folded = np.zeros((count, n), np.complex128)
+    np.add.at(folded, np.rint(np.fft.fftfreq(n) * n).astype(int) % count, spectrum)
+    whole = np.fft.ifft(folded, axis=0).real * (count / n)
+    return whole[sampling.pixels : -sampling.pixels, fine:-fine]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lit:
+    """A point's image in the window around its own cell, and its derivatives.
+
+    Parameters
+    ----------
+    image
+        (count, count).
+    changes
+        (directions, count, count): by each coefficient [1/waves rms], then by y, x and dz [1/m].
+    cell
+        Row and column of the point's own cell, in the window's middle; may lie beside the layout's.
+    """
+
+    image: np.ndarray
+    changes: np.ndarray
+    cell: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PupilImages:
+    r"""How a microscope sees points, for any Zernike terms c_j of its pupil, with derivatives by c_j.
+
+    .. math:: I(c) = \sum_p o_p |U_p(c)|^2, \quad
+              \frac{\partial I}{\partial c_j} = \sum_p o_p\, 2 \mathrm{Re}(U_p^* \partial_j U_p)
+
+    Points shine as samples of `object_grid` of intensity 1 do. What light leaves a window of cells around the
+    point's own is left out: a share of the accuracy.
+
+    Parameters
+    ----------
+    objectives
+        One for each wavelength, with the aberrations that are known already.
+    lenslet, layout
+        The array, of square lenslets, and the pixels.
+    terms
+        Noll indices of the coefficients.
+    accuracy
+        Relative rms error of points' images.
+    double
+        Whether to compute in double precision; for checks.
+
+    Raises
+    ------
+    GeometryError
+        Round lenslets, rays, terms that repeat.
+    """
+
+    objectives: tuple[Objective, ...]
+    lenslet: Lenslet
+    layout: Layout
+    terms: tuple[int, ...]
+    accuracy: float = 1e-2
+    double: bool = False
+
+    def __post_init__(self) -> None:
+        if self.lenslet.is_round:
+            raise GeometryError("lenslets are round but derivatives by the pupil's phase need square ones.")
+        if any(one.model == "rays" for one in self.objectives):
+            raise GeometryError("model 'rays' has no phase. Use 'scalar', 'vector' or 'paraxial'.")
+        for j in self.terms:
+            noll_to_nm(j)
+        if len(set(self.terms)) < len(self.terms):
+            raise GeometryError(f"terms are {self.terms} but each must stand once.")
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of a raw image."""
+        if self.layout.placement is not None:
+            return self.layout.placement.raw_shape[0], self.layout.placement.raw_shape[1]
+        return self._samples
+
+    @property
+    def _samples(self) -> tuple[int, int]:
+        N = self.layout.sampling.pixels
+        return self.layout.cells[0] * N, self.layout.cells[1] * N
+
+    def forward(self, points: Points, coefficients: np.ndarray) -> np.ndarray:
+        """Raw image (ny, nx) of points, for coefficients (terms,) [waves rms]."""
+        whole = np.zeros(self._samples)
+        for light, lit in self._each(points, coefficients, np.zeros((0, 0))):
+            self._add(whole, light * lit.image, lit.cell)
+        return self.placed(whole)
+
+    def derivative(self, points: Points, coefficients: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Change (ny, nx) of `forward` per unit of a change (terms,) of the coefficients."""
+        direction = np.append(self._checked("change", change), np.zeros(PLACES))
+        whole = np.zeros(self._samples)
+        for light, lit in self._each(points, coefficients, direction[None]):
+            self._add(whole, light * lit.changes[0], lit.cell)
+        return self.placed(whole)
+
+    def gradient(self, points: Points, coefficients: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Transpose of `derivative`: (terms,) from weights (ny, nx) of the raw image's pixels."""
+        if weights.shape != self.shape:
+            raise GeometryError(f"weights have shape {weights.shape} but the raw image {self.shape}.")
+        plane = weights if self.layout.placement is None else self.layout.placement.adjoint(weights)
+        found = np.zeros(len(self.terms))
+        for waves, pupil, phases, numbers in self._groups(points, coefficients):
+            for p in numbers:
+                place, cell = self._place(points.positions[p])
+                own = _moved(pupil, phases, place)
+                seen = self._cut(plane, cell, len(waves.sampled))
+                fields = waves.fields(own)
+                fields *= waves.spread(seen.astype(np.real(fields).dtype))
+                # Re(conj(G) i φ P) = φ Im(G conj(P)): the phases are real.
+                turned = np.imag(waves.back(fields) * own.conj()).sum(0, dtype=np.float64)
+                light = 2 * self._unit * points.intensities[p]
+                found += light * np.tensordot(phases[: len(found)], turned, 2)
+        return found
+
+    def lit(self, points: Points, coefficients: np.ndarray) -> Iterator[Lit]:
+        """Image and all derivatives of each point of intensity 1, in order of the points."""
+        directions = np.eye(len(self.terms) + PLACES)
+        return (lit for _, lit in self._each(points, coefficients, directions))
+
+    def placed(self, samples: np.ndarray) -> np.ndarray:
+        """Raw image (ny, nx) of samples of the layout."""
+        return samples if self.layout.placement is None else self.layout.placement.forward(samples)
+
+    def whole(self, image: np.ndarray, cell: tuple[int, int]) -> np.ndarray:
+        """Images (..., count, count) of a window around a cell among all samples of the layout."""
+        plane = np.zeros((*image.shape[:-2], *self._samples))
+        self._add(plane, image, cell)
+        return plane
+
+    def _each(
+        self, points: Points, coefficients: np.ndarray, directions: np.ndarray
+    ) -> Iterator[tuple[float, Lit]]:
+        found: list[Lit | None] = [None] * len(points.intensities)
+        for waves, pupil, phases, numbers in self._groups(points, coefficients):
+            combined = np.tensordot(directions, phases, 1) if directions.size else phases[:0]
+            for p in numbers:
+                place, cell = self._place(points.positions[p])
+                one = self._one(waves, _moved(pupil, phases, place), combined)
+                image, changes = (part * self._unit for part in one)
+                before = found[p]
+                if before is not None:
+                    image, changes = before.image + image, before.changes + changes
+                found[p] = Lit(image, changes, cell)
+        return ((float(light), lit) for light, lit in zip(points.intensities, found, strict=True) if lit)
+
+    def _one(self, waves: Waves, pupil: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Image of a pupil (modes, rows, nodes) and its derivatives by phases (k, rows, nodes)."""
+        fields = waves.fields(pupil)
+        image = waves.samples(np.square(np.abs(fields)).sum(0))
+        changes = np.zeros((len(phases), *image.shape), image.dtype)
+        step = max(1, BLOCK // fields.size)
+        for first in range(0, len(phases), step):
+            some = (1j * phases[first : first + step]).astype(pupil.dtype)
+            for field, mode in zip(fields, pupil, strict=True):
+                moved = waves.fields(some * mode)
+                changes[first : first + step] += waves.samples(2 * (field.conj() * moved).real)
+        return image, changes
+
+    def _groups(
+        self, points: Points, coefficients: np.ndarray
+    ) -> Iterator[tuple[Waves, np.ndarray, np.ndarray, list[int]]]:
+        """Of points whose windows are alike: waves, pupil (modes, rows, nodes), phases that change it."""
+        c = self._checked("coefficients", coefficients)
+        for objective in self.objectives:
+            known = dict(objective.aberrations)
+            for j, waves in zip(self.terms, c, strict=True):
+                known[j] = known.get(j, 0.0) + float(waves)
+            bent = replace(objective, aberrations=known)
+            alike: dict[tuple[int, int], list[int]] = {}
+            for p, (_, _, dz) in enumerate(points.positions):
+                alike.setdefault(self._size(bent, float(dz)), []).append(p)
+            for size, numbers in alike.items():
+                waves = self._waves(objective, *size)
+                pupil = bent.pupil(*waves.q, 0.0) * waves.area
+                yield waves, pupil.astype(waves.across.dtype), self._phases(objective, waves), numbers
+
+    def _size(self, objective: Objective, dz: float) -> tuple[int, int]:
+        """Cells along a window and nodes along the pupil's diameter."""
+        limit = math.ceil(1.5 * max(self.layout.cells))
+        cells = 2 * reach_of(objective, self.lenslet, dz, Demand(self.accuracy, limit)) + 1
+        away = (cells / 2 + guard(objective, self.lenslet)) * self.lenslet.pitch / self.lenslet.magnification
+        nodes = nodes_for(objective.steepest(away * math.sqrt(2), dz))
+        return cells, 24 * math.ceil(nodes / 24)
+
+    def _waves(self, objective: Objective, cells: int, nodes: int) -> Waves:
+        dtype = "complex128" if self.double else "complex64"
+        fine = fineness(objective, self.lenslet, Demand(self.accuracy, 1).margin)
+        needed = (
+            np.dtype(dtype).itemsize
+            * 3.0
+            * (nodes**2 * cells * fine + 4 * objective.modes * (cells * fine) ** 2)
+        )
+        what = f"the pupil's waves behind {cells} x {cells} lenslets"
+        memory.require(needed, what, "Use points nearer to the focused plane.", SamplingError)
+        plain = replace(objective, aberrations=())
+        return _waves(plain, self.lenslet, self.layout.sampling, (cells, fine, nodes, dtype))
+
+    def _phases(self, objective: Objective, waves: Waves) -> np.ndarray:
+        """Phase [rad] per unit of each term, of y, x and dz (k, rows, nodes)."""
+        qy, qx = waves.q
+        rho, angle = np.hypot(qy, qx) / objective.numerical_aperture, np.arctan2(qy, qx)
+        k = 2 * np.pi / objective.wavelength
+        terms = [2 * np.pi * zernike(j, rho, angle) for j in self.terms]
+        return np.stack([*terms, -k * qy, -k * qx, k * objective.depth_path(qy, qx)])
+
+    @property
+    def _unit(self) -> float:
+        """Area of a sample of the object, shared among wavelengths [m²]."""
+        pitch = self.lenslet.pitch / self.lenslet.magnification / self.layout.sampling.points
+        return pitch**2 / len(self.objectives)
+
+    def _place(self, position: np.ndarray) -> tuple[np.ndarray, tuple[int, int]]:
+        """A point (y, x) from its cell's middle and dz [m], and that cell's (row, column)."""
+        size, center = self.lenslet.pitch / self.lenslet.magnification, np.array(self.layout.center)
+        cells = (position[:2] - center) / size + (np.array(self.layout.cells) - 1) / 2
+        own = np.floor(cells + 0.5)
+        return np.append((cells - own) * size, position[2]), (int(own[0]), int(own[1]))
+
+    def _window(self, cell: tuple[int, int], count: int) -> list[tuple[slice, slice]]:
+        """Of a window around a cell, along y and x: which of the layout's samples, which of its own."""
+        found, N = [], self.layout.sampling.pixels
+        for k, n in zip(cell, self._samples, strict=True):
+            first = k * N - (count - N) // 2
+            start, stop = (min(max(at, 0), n) for at in (first, first + count))
+            found.append((slice(start, stop), slice(start - first, stop - first)))
+        return found
+
+    def _add(self, whole: np.ndarray, image: np.ndarray, cell: tuple[int, int]) -> None:
+        (rows, own_rows), (columns, own_columns) = self._window(cell, image.shape[-1])
+        whole[..., rows, columns] += image[..., own_rows, own_columns]
+
+    def _cut(self, whole: np.ndarray, cell: tuple[int, int], count: int) -> np.ndarray:
+        """Transpose of `_add`."""
+        (rows, own_rows), (columns, own_columns) = self._window(cell, count)
+        found = np.zeros((count, count))
+        found[own_rows, own_columns] = whole[rows, columns]
+        return found
+
+    def _checked(self, name: str, values: np.ndarray) -> np.ndarray:
+        found = np.asarray(values, np.float64)
+        if found.shape != (len(self.terms),):
+            raise GeometryError(f"{name} have shape {found.shape} but there are {len(self.terms)} terms.")
+        checks.finite_array(name, found, GeometryError)
+        return found
+
+
+def _moved(pupil: np.ndarray, phases: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """The pupil of a point at a place (y, x, dz)."""
+    turn = np.tensordot(place, phases[-PLACES:], 1)
+    return (pupil * np.exp(1j * turn)).astype(pupil.dtype)

@@ -1,0 +1,134 @@
+"""Images of points by the pupil's phase, against the simulation, and their derivatives."""
+
+import numpy as np
+import pytest
+
+import lumigraph as lg
+from lumigraph.operators.microscope_pupil import PLACES
+
+TERMS = tuple(range(4, 16))
+SCOPE = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
+    wavelength="525 nm",
+    objective={
+        "magnification": 20.0, "numerical_aperture": 0.5, "immersion_index": 1.0, "model": "scalar",
+        "maker": None, "tube_lens": None,
+    },
+    lenslets={"pitch": "125 um", "count": (5, 5)},
+    sensor={"shape": (95, 95)},
+)  # fmt: skip
+POINTS = lg.Points(np.array([[1e-6, -3e-6, 5e-6], [8.2e-6, 5e-6, -7e-6]]), np.array([1.0, 2.0]))
+SOME = 0.4 * np.random.default_rng(0).normal(size=len(TERMS)) / np.sqrt(len(TERMS))
+
+
+def images(scope=SCOPE, terms=TERMS, **options):
+    return scope.pupil_images(terms, **{"farthest": 7e-6, "accuracy": 0.1, "double": True, **options})
+
+
+def off(found, true):
+    return np.linalg.norm(found - true) / np.linalg.norm(true)
+
+
+@pytest.mark.parametrize("waves", [pytest.param(w, marks=pytest.mark.long) for w in (0.0, 1.0, 2.5)])
+def test_images_are_those_of_the_simulation_which_propagates_on_a_grid(waves):
+    bent = SCOPE.replace(objective={"aberrations": dict(zip(TERMS, waves * SOME, strict=True))})
+    scene, how = lg.Scene((POINTS,)), lg.Incoherent(accuracy=5e-3)
+    true = np.asarray(lg.simulate(bent, scene, coherence=how).data)
+    # Their own accuracies add. A wrong sign of the lenslet's distance or of the aberrations is off by 0.5.
+    assert off(images(accuracy=1e-2, double=False).forward(POINTS, waves * SOME), true) < 1.5e-2
+
+
+def test_images_of_an_aberrated_point_are_those_of_the_simulation():
+    bent, one = SCOPE.replace(objective={"aberrations": {7: 0.2, 9: -0.1}}), POINTS.positions[:1]
+    true = bent.point_image(*one[0], accuracy=3e-2)
+    found = images(terms=(7, 9), accuracy=3e-2).forward(lg.Points(one, np.ones(1)), np.array([0.2, -0.1]))
+    assert off(found, true) < 4e-2
+
+
+def test_known_aberrations_and_coefficients_add_up():
+    bent = SCOPE.replace(objective={"aberrations": {7: 0.2, 30: 0.1}})
+    both = SCOPE.replace(objective={"aberrations": {7: 0.3, 30: 0.1}})
+    found = images(bent, (7,)).forward(POINTS, np.array([0.1]))
+    np.testing.assert_allclose(
+        found, images(both, (7,)).forward(POINTS, np.zeros(1)), atol=1e-9 * found.max()
+    )
+
+
+def test_every_terms_derivative_is_that_of_central_differences():
+    model, h = images(), 1e-4
+    for direction in np.eye(len(TERMS)):
+        ahead, behind = (model.forward(POINTS, SOME + s * h * direction) for s in (1, -1))
+        # The differences' own error is h² times the third derivative, 1e-6 here.
+        assert off(model.derivative(POINTS, SOME, direction), (ahead - behind) / (2 * h)) < 1e-5
+
+
+@pytest.mark.parametrize("axis", range(PLACES))
+def test_derivatives_by_a_points_place_are_those_of_central_differences(axis):
+    model, step = images(), 1e-9 * np.eye(PLACES)[axis]
+    for p, lit in enumerate(model.lit(POINTS, SOME)):
+        ahead, behind = (
+            model.forward(lg.Points(POINTS.positions[p : p + 1] + s * step, np.ones(1)), SOME)
+            for s in (1, -1)
+        )
+        found = model.placed(model.whole(lit.changes[len(TERMS) + axis], lit.cell))
+        assert off(found, (ahead - behind) / 2e-9) < 1e-4
+
+
+@pytest.mark.parametrize(
+    "objective",
+    [{}, {"model": "vector"}, {"numerical_aperture": 1.2, "immersion_index": 1.33, "magnification": 60.0}],
+    ids=["scalar", "vector", "60x/1.2"],
+)
+def test_gradient_is_the_derivatives_transpose(objective):
+    scope, rng = SCOPE.replace(objective=objective, bandwidth="30 nm"), np.random.default_rng(1)
+    model = images(scope, (4, 6, 8))
+    points = lg.Points(POINTS.positions / 4, POINTS.intensities)
+    c, change, weights = rng.normal(size=3) / 10, rng.normal(size=3), rng.normal(size=model.shape)
+    there = float((model.derivative(points, c, change) * weights).sum())
+    assert float(model.gradient(points, c, weights) @ change) == pytest.approx(there, rel=1e-9)
+
+
+def test_piston_changes_nothing_and_tilt_is_a_place():
+    model = images(terms=(1, 2))
+    piston, tilt = (model.derivative(POINTS, np.zeros(2), d) for d in np.eye(2))
+    assert np.abs(piston).max() < 1e-12 * np.abs(tilt).max()
+    moved = [model.whole(lit.changes[3] * light, lit.cell) for light, lit in
+             zip(POINTS.intensities, model.lit(POINTS, np.zeros(2)), strict=True)]  # fmt: skip
+    # Z2 = 2 ρ cos θ: one wave rms moves a point by -2 λ/NA along x.
+    assert off(tilt, -2 * 525e-9 / 0.5 * model.placed(sum(moved))) < 1e-9
+
+
+def test_light_beside_the_sensor_is_cut():
+    beside = lg.Points(np.array([[0.0, 17e-6, 2e-6], [0.0, 90e-6, 2e-6]]), np.ones(2))
+    inside = lg.Points(np.array([[0.0, 0.0, 2e-6]]), np.ones(1))
+    model = images(terms=())
+    found = [
+        model.forward(lg.Points(beside.positions[k : k + 1], np.ones(1)), np.zeros(0)).sum() for k in (0, 1)
+    ]
+    assert 0.01 < found[0] / model.forward(inside, np.zeros(0)).sum() < 0.6
+    assert found[1] == 0
+
+
+@pytest.mark.parametrize(
+    ("scope", "terms", "message"),
+    [
+        (SCOPE.replace(lenslets={"shape": "round"}), (4,), "lenslets are round"),
+        (SCOPE.replace(objective={"model": "rays"}), (4,), "model 'rays' has no phase"),
+        (SCOPE, (4, 4), r"terms are \(4, 4\) but each"),
+        (SCOPE, (0,), "Noll's index is 0"),
+        (lg.LightFieldMicroscope.from_catalogue("lfm-fourier"), (4,), "configuration '1.0' or '2.0'"),
+    ],
+)
+def test_what_has_no_such_derivatives_is_refused(scope, terms, message):
+    with pytest.raises(lg.GeometryError, match=message):
+        scope.pupil_images(terms)
+
+
+@pytest.mark.parametrize("c", [np.zeros(3), np.array([np.nan])])
+def test_coefficients_that_are_not_one_number_for_each_term_are_refused(c):
+    with pytest.raises(lg.GeometryError, match="coefficients"):
+        images(terms=(4,)).forward(POINTS, c)
+
+
+def test_weights_of_another_picture_are_refused():
+    with pytest.raises(lg.GeometryError, match=r"weights have shape \(3, 3\)"):
+        images(terms=(4,)).gradient(POINTS, np.zeros(1), np.zeros((3, 3)))
