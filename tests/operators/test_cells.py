@@ -164,10 +164,12 @@ def test_a_straightened_lattice_has_its_rows_along_x(lattice):
 
 def test_more_accuracy_asks_for_more_of_everything():
     coarse, fine = Fineness(1e-2), Fineness(1e-4)
-    for name in ("neighbours", "border", "corner"):
-        assert getattr(fine, name)(3.0) > getattr(coarse, name)(3.0)
-        assert getattr(fine, name)(3.0) > getattr(fine, name)(9.0), "less goes aside from wide lenslets"
+    for name, more in (("neighbours", (1.0,)), ("border", (1.0,)), ("corner", ())):
+        assert getattr(fine, name)(3.0, *more) > getattr(coarse, name)(3.0, *more)
+        assert getattr(fine, name)(3.0, *more) > getattr(fine, name)(9.0, *more), "wide: less goes aside"
     assert fine.samples(3.0, 1.0) > coarse.samples(3.0, 1.0)
+    for name in ("neighbours", "border", "samples"):
+        assert getattr(fine, name)(3.0, 4.0) > getattr(fine, name)(3.0, 2.0), "more lenslets are lit"
     assert fine.reach(1.0, 1.0) > coarse.reach(1.0, 1.0)
     assert fine.near(1.0, 1.0) > coarse.near(1.0, 1.0)
     assert fine.rank < coarse.rank

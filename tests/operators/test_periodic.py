@@ -18,7 +18,7 @@ from lumigraph.operators.optics import Optics
 from lumigraph.operators.streamed import stream_bytes
 from lumigraph.operators.white import endless, white_image
 from lumigraph.scene import targets
-from lumigraph.simulation import Snapshots, simulate
+from lumigraph.simulation import Incoherent, Snapshots, simulate
 from lumigraph.units import mm, nm, um
 
 focused = partial(cameras.focused, count=(9, 9))
@@ -247,6 +247,21 @@ def test_points_behind_lenslets_with_opaque_rims_are_as_exact_as_asked():
         grid = Grid((1, 1), 1 * um, point)
         image = periodic_operator(camera, grid, accuracy=1e-2).forward(np.ones((1, 1))) / share
         assert relative(image, expected) < 1e-2
+
+
+def test_where_a_point_lights_ten_lenslets_the_light_of_all_of_them_is_followed():
+    """With as many neighbours as elsewhere, off by 2.1 and 2.2 times what was asked."""
+    camera = focused(magnification=0.1, count=(13, 13), pixel_pitch=1.67 * um)
+    camera = camera.replace(sensor={"shape": (121, 121)})
+    step = camera.lenslets.pitch * camera.object_distance / camera.separation
+    at = (0.1 * step, -0.23 * step)
+    (truth,) = references.points(camera, 0.0, [at], references.Fineness(72, 3, 900, 64))
+    truth *= (camera.separation / camera.object_distance) ** 2
+    grid = Grid((1, 1), camera.optics().object_pitch, at)
+    sample = periodic_operator(camera, grid, accuracy=1e-2).forward(np.ones((1, 1)))
+    assert relative(sample / grid.pitch[0] ** 2, truth) < 1e-2
+    point = simulate(camera, targets.points([(*at, 0.0)]), Incoherent(accuracy=1e-3)).data
+    assert relative(point / grid.pitch[0] ** 2, truth) < 1e-3
 
 
 @pytest.mark.long  # all of the border of discs at 1e-3

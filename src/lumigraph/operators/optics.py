@@ -13,7 +13,7 @@ from lumigraph.operators.cell_response import SLACK, Axis
 from lumigraph.operators.cells import Cells
 from lumigraph.operators.fineness import Fineness
 
-VERSION = 13
+VERSION = 14
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 
@@ -89,10 +89,17 @@ class Optics:
         return _cells.spill(self.camera)
 
     @property
+    def blur(self) -> float:
+        """Radius of a point's geometric image [pitches]."""
+        return _cells.blur(self.camera, self.distance) / self.array.lattice.pitch
+
+    @property
     def axes(self) -> tuple[Axis, Axis]:
         """Sampling of a cell along y and along x."""
         band = SLACK / 2 / _cells.airy(self.camera)
-        neighbours = self.fineness.neighbours(_cells.fresnel_number(self.camera), _cells.edges(self.array))
+        neighbours = self.fineness.neighbours(
+            _cells.fresnel_number(self.camera), self.blur, _cells.edges(self.array)
+        )
         neighbourhood = neighbours * self.array.lattice.pitch + self.spill
         y, x = (
             Axis(size, points, samples, neighbourhood, band)
@@ -139,9 +146,9 @@ class Optics:
 
         An edge between lenslets that cuts a sharp image spreads it over micro-images, however small it is.
         """
-        blur, pitch = _cells.blur(self.camera, self.distance), self.array.lattice.pitch
-        cut = pitch / 4 * max(0.0, 1 - 2 * blur / pitch)
-        return blur + self.spill, max(_cells.diffraction(self.camera), cut)
+        pitch = self.array.lattice.pitch
+        cut = pitch / 4 * max(0.0, 1 - 2 * self.blur)
+        return self.blur * pitch + self.spill, max(_cells.diffraction(self.camera), cut)
 
     def images_bytes(self, reach: tuple[int, int]) -> float:
         """Memory that images of points `reach` cells around square lenslets are made from [bytes]."""

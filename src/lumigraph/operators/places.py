@@ -87,7 +87,7 @@ def bands(optics: Optics, axis: int, parity: int = 0) -> list[Band]:
     result = [Band((first, first + n), INFINITE)]
     if extent is None:
         return result
-    far = optics.fineness.border(_cells.fresnel_number(optics.camera))
+    far = optics.fineness.border(_cells.fresnel_number(optics.camera), optics.blur)
     far = size / 2 + far * pitch * (1 + 1e-9) + optics.spill
     for row in range(cells.image[axis]):
         middle = cells.edge[axis] + (row - first + 0.5 + axis * parity / 2) * size

@@ -83,7 +83,7 @@ def endless(optics: Optics) -> tuple[np.ndarray, float]:
 def _pitches(optics: Optics) -> float:
     """How far light is followed: as the accuracy asks, and no farther than the image or the memory reach."""
     array, cells = optics.array, optics.cells
-    pitches = FARTHER * optics.fineness.neighbours(_cells.fresnel_number(optics.camera))
+    pitches = FARTHER * optics.fineness.neighbours(_cells.fresnel_number(optics.camera), 0.0)
     pitches += optics.spill / array.lattice.pitch
     pitches = max(pitches, FRINGES * _aside(optics, 1.0) / (PROMISED * optics.fineness.accuracy))
     if array.extent:
