@@ -47,7 +47,9 @@ from .instruments import (
     PlenopticCamera as PlenopticCamera,
     SingleLensCamera as SingleLensCamera,
     catalogue as catalogue,
+    joint_operator as joint_operator,
     load_camera as load_camera,
+    scan as scan,
 )
 from .io import contents as contents, open as open, save as save
 from .preparation import (

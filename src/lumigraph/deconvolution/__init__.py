@@ -1,6 +1,8 @@
 """Objects from raw images: what a camera must have seen, from a model of how it sees, a `core.linear.Linear`.
 
-- `deconvolve`: `deconvolve`; for time series `deconvolve_series`, `Deconvolver`; `Step`, `Interrupted`
+- `deconvolve`: `deconvolve`; for time series `deconvolve_series`, `Deconvolver`
+- `run`: from the first state to the last; `Step`, `Interrupted`
+- `together`: several raw images of one object
 - `beyond`: objects that reach beyond the picture, as far as light comes from
 - `exposure`: `Exposure`, what is known of the raw image besides its values
 - `problem`: the three put together: model, sensitivity, deviance
@@ -13,12 +15,13 @@
 """
 
 from lumigraph.deconvolution.checkpoint import Checkpoint
-from lumigraph.deconvolution.deconvolve import Deconvolver, Interrupted, Step, deconvolve, deconvolve_series
+from lumigraph.deconvolution.deconvolve import Deconvolver, deconvolve, deconvolve_series
 from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.filters import LowPass
 from lumigraph.deconvolution.least_squares import LeastSquares
 from lumigraph.deconvolution.methods import Stop
 from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
+from lumigraph.deconvolution.run import Interrupted, Step
 from lumigraph.deconvolution.total_variation import TotalVariation
 from lumigraph.deconvolution.wavelets import Wavelets
 

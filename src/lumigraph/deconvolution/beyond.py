@@ -1,12 +1,13 @@
 """Objects that reach beyond the picture, as far as light comes from, and are cut afterwards."""
 
-from typing import Protocol, runtime_checkable
+from dataclasses import dataclass
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
-from lumigraph.core.linear import Linear
+from lumigraph.core.linear import Joint, Linear, Shape
 from lumigraph.deconvolution.problem import UNSEEN
 
 BARELY = 0.1
@@ -38,8 +39,16 @@ class Widening(Protocol):
         ...
 
 
+def looks_beyond(operator: Linear) -> bool:
+    """Whether an operator, or one of several of an object, can look beyond the picture."""
+    parts = operator.maps if isinstance(operator, Joint) else (operator,)
+    return any(isinstance(part, Widening) for part in parts)
+
+
 def beyond(operator: Linear) -> tuple[Linear, Inside]:
     """The operator of the object that light on the picture comes from, and what of it is asked for."""
+    if isinstance(operator, Joint):
+        return _all_beyond(operator)
     if isinstance(operator, Widening):
         return operator.widened(
             BARELY / 2
@@ -47,9 +56,74 @@ def beyond(operator: Linear) -> tuple[Linear, Inside]:
     return operator, (slice(None), slice(None))
 
 
+def _all_beyond(operator: Joint) -> tuple[Linear, Inside]:
+    """Of several raw images: the object reaches as far as that of any of them."""
+    if not looks_beyond(operator):
+        return operator, (slice(None), slice(None))
+    wide = [beyond(part) for part in operator.maps]
+    asked = operator.shape[1][-2:]
+    befores = [tuple(side.start or 0 for side in inside) for _, inside in wide]
+    afters = [
+        tuple(n - b - k for n, b, k in zip(one.shape[1][-2:], before, asked, strict=True))
+        for (one, _), before in zip(wide, befores, strict=True)
+    ]
+    before, after = ([max(sides) for sides in zip(*some, strict=True)] for some in (befores, afters))
+    shape = (before[0] + asked[0] + after[0], before[1] + asked[1] + after[1])
+    maps = [
+        one if one.shape[1][-2:] == shape else Inner(one, shape, (before[0] - mine[0], before[1] - mine[1]))
+        for (one, _), mine in zip(wide, befores, strict=True)
+    ]
+    rows, columns = (slice(b, b + n) for b, n in zip(before, asked, strict=True))
+    return Joint(tuple(maps)), (rows, columns)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Inner(Linear):
+    """A map of the inner part of a larger object.
+
+    Parameters
+    ----------
+    of
+        The map.
+    whole
+        Samples (y, x) of the larger object.
+    first
+        Of its samples, the first one (y, x) that the map sees.
+    """
+
+    of: Linear
+    whole: tuple[int, int]
+    first: tuple[int, int]
+
+    title: ClassVar[str] = "A map of an object's inner part"
+
+    @property
+    def shape(self) -> tuple[Shape, Shape]:
+        """Of the raw image, and of the larger object."""
+        raw, inner = self.of.shape
+        return raw, (*inner[:-2], *self.whole)
+
+    def _forward(self, intensity: Array) -> Array:
+        y, x = (slice(f, f + n) for f, n in zip(self.first, self.of.shape[1][-2:], strict=True))
+        return self.of._forward(intensity[..., y, x])
+
+    def _adjoint(self, raw: Array) -> Array:
+        return arrays.framed(self.of._adjoint(raw), self.first, self.whole)
+
+    @property
+    def memory_bytes(self) -> float:
+        """Of the map [bytes]."""
+        return self.of.memory_bytes
+
+    @property
+    def error(self) -> float:
+        """Of the map."""
+        return self.of.error
+
+
 def least_seen(operator: Linear) -> float:
     """Part of the most light below which a sample counts as unseen: more where a border is followed."""
-    return BARELY if isinstance(operator, Widening) else UNSEEN
+    return BARELY if looks_beyond(operator) else UNSEEN
 
 
 def cut(estimate: Array, inside: Inside, pictured: Array | None) -> Array:

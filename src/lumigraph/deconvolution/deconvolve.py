@@ -2,74 +2,37 @@
 
 import math
 import os
-import time
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from typing import overload
-
-import numpy as np
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, overload
 
 from lumigraph.core import arrays, checks, memory
 from lumigraph.core.arrays import A, Array
-from lumigraph.core.linear import Linear
+from lumigraph.core.linear import Joint, Linear
 from lumigraph.core.raw import RawImage
 from lumigraph.core.threads import single_products
 from lumigraph.core.volume import Volume
-from lumigraph.deconvolution.beyond import BESIDE, Inside, Widening, beyond, continued, cut, least_seen
+from lumigraph.deconvolution.beyond import BESIDE, beyond, least_seen, looks_beyond
 from lumigraph.deconvolution.checkpoint import Checkpoint, fingerprint
 from lumigraph.deconvolution.exposure import Exposure
-from lumigraph.deconvolution.methods import Method, State, Stop, check_offers
+from lumigraph.deconvolution.methods import Method, Stop, check_offers
 from lumigraph.deconvolution.problem import Problem, Scale, values
 from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
-from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.deconvolution.run import Report, Result, Run, finished
+from lumigraph.deconvolution.together import (
+    Raws,
+    check_count,
+    exposures_of,
+    joined,
+    together,
+    warn_of_brightness,
+)
+from lumigraph.errors import CalibrationError, GeometryError, SamplingError
 
 FRESH = 0.05
 """Part of an even object in a warm start: where nothing was, something may be now."""
 
 COPIES = 12
 """Arrays of the object's size that an iteration holds at most, a prior's memory included."""
-
-Result = Array | Volume | RawImage
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """How a deconvolution goes on.
-
-    Parameters
-    ----------
-    iteration, iterations
-        Done, and at most to do.
-    deviance
-        Poisson deviance per pixel of the estimate: -2 ln of its likelihood over that of a perfect fit,
-        in electrons where the gain is known. See `Stop`.
-    change
-        Of the last step, ‖Δo‖/‖o‖.
-    elapsed, remaining
-        Time [s] so far, and still to go at the present pace.
-    stopped
-        Why it stops before the last iteration; empty while it goes on.
-    """
-
-    iteration: int
-    iterations: int
-    deviance: float
-    change: float
-    elapsed: float
-    remaining: float
-    stopped: str = ""
-
-
-Report = Callable[[Step], None]
-
-
-class Interrupted(KeyboardInterrupt):
-    """A deconvolution was interrupted; `partial` is what it had reached after `iterations`."""
-
-    def __init__(self, partial: Result, iterations: int) -> None:
-        super().__init__(f"interrupted after {iterations} iterations")
-        self.partial = partial
-        self.iterations = iterations
 
 
 @overload
@@ -80,6 +43,19 @@ def deconvolve(
     *,
     method: Method = ...,
     exposure: Exposure | None = None,
+    progress: Report | None = None,
+    checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
+) -> Volume[A] | RawImage[A] | A: ...
+
+
+@overload
+def deconvolve(
+    raw: Sequence[RawImage[A]],
+    operator: Linear | Sequence[Linear],
+    iterations: int | Stop = 30,
+    *,
+    method: Method = ...,
+    exposure: Exposure | Sequence[Exposure] | None = None,
     progress: Report | None = None,
     checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
 ) -> Volume[A] | RawImage[A] | A: ...
@@ -99,12 +75,12 @@ def deconvolve(
 
 
 def deconvolve(
-    raw: RawImage | Array,
-    operator: Linear,
+    raw: RawImage | Array | Raws,
+    operator: Linear | Sequence[Linear],
     iterations: int | Stop = 30,
     *,
     method: Method = RichardsonLucy(),  # noqa: B008 - frozen
-    exposure: Exposure | None = None,
+    exposure: Exposure | Sequence[Exposure] | None = None,
     progress: Report | None = None,
     checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
 ) -> Result:
@@ -113,18 +89,24 @@ def deconvolve(
     Where the operator can look beyond the picture (`beyond.Widening`), the object reaches as far as light
     comes from, and is cut to the operator's own afterwards: else its border would take up that light.
 
+    Several raw images of one object are explained together, each by its own operator: scanned light fields,
+    other exposures, or pictures by other cameras. Each counts by its electrons.
+
     Parameters
     ----------
     raw
-        What the camera saw (ny, nx), as it was read: dark and white images go into the exposure.
+        What the camera saw (ny, nx), as it was read: dark and white images go into the exposure. A list for
+        several raw images of one object.
     operator
-        How it sees, such as ``camera.operator()``.
+        How it sees, such as ``camera.operator()``. For several raw images `lumigraph.joint_operator`, or a
+        list of operators of one object, one for each.
     iterations
         At most; or a `Stop`, which ends them where the noise begins to be fitted.
     method
         `RichardsonLucy` (default) with or without a prior, or `LeastSquares`.
     exposure
-        Background, vignetting, dead pixels, noise; None for the noise that a `RawImage` records.
+        Background, vignetting, dead pixels, noise; None for the noise that a `RawImage` records. For several
+        raw images one for all of them, or a list; None takes their light from what `Sensor.expose` records.
     progress
         Called with a `Step` after each iteration.
     checkpoint
@@ -140,7 +122,8 @@ def deconvolve(
     Raises
     ------
     CalibrationError
-        A raw image of another shape than the operator's, a colour mosaic, NaN where pixels count, no light.
+        A raw image of another shape than the operator's, a colour mosaic, NaN where pixels count, no light;
+        not as many raw images as operators, or the gains of some of them only.
     GeometryError
         A start of the wrong shape, an operator without sensitivity, no operator, method or exposure at all.
     FormatError
@@ -148,17 +131,13 @@ def deconvolve(
     Interrupted
         A KeyboardInterrupt; it carries the estimate that was reached, and the checkpoint is written.
 
+    Warns
+    -----
+    SamplingWarning
+        One of several raw images is brighter or darker than the object that explains all of them sends.
     """
-    found = deconvolve_series(
-        [raw],
-        operator,
-        iterations,
-        method=method,
-        exposure=exposure,
-        progress=progress,
-        checkpoint=checkpoint,
-    )
-    return next(found)
+    engine = Deconvolver(operator, iterations, method=method)
+    return engine(raw, exposure, progress=progress, checkpoint=checkpoint)
 
 
 @overload
@@ -190,12 +169,12 @@ def deconvolve_series(
 
 
 def deconvolve_series(
-    frames: Iterable[RawImage | Array],
-    operator: Linear,
+    frames: Iterable[RawImage | Array | Raws],
+    operator: Linear | Sequence[Linear],
     iterations: int | Stop = 30,
     *,
     method: Method = RichardsonLucy(),  # noqa: B008 - frozen
-    exposure: Exposure | None = None,
+    exposure: Exposure | Sequence[Exposure] | None = None,
     progress: Report | None = None,
     checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
     warm: bool = False,
@@ -208,7 +187,8 @@ def deconvolve_series(
     Parameters
     ----------
     frames
-        Raw images, such as a generator that opens one file after the other.
+        Raw images, such as a generator that opens one file after the other; lists of them where several
+        show one object.
     operator, iterations, method, exposure, progress, checkpoint
         As in `deconvolve`; the exposure is that of the first frame for all of them, and a checkpoint keeps
         the frame that is being worked on.
@@ -218,7 +198,7 @@ def deconvolve_series(
     """
     engine = Deconvolver(operator, iterations, method=method, warm=warm)
     for raw in frames:
-        exposure = _known(raw, exposure)
+        exposure = engine.known(raw, exposure)
         yield engine(raw, exposure, progress=progress, checkpoint=checkpoint)
 
 
@@ -238,16 +218,16 @@ class Deconvolver:
 
     def __init__(
         self,
-        operator: Linear,
+        operator: Linear | Sequence[Linear],
         iterations: int | Stop = 30,
         *,
         method: Method = RichardsonLucy(),  # noqa: B008 - frozen
         warm: bool = False,
     ) -> None:
-        self.operator, self.method, self.warm = operator, method, warm
+        self.operator, self.method, self.warm = joined(operator), method, warm
         self.limits = iterations if isinstance(iterations, Stop) else Stop(iterations)
-        _check(operator, method)
-        self._wide, self._inside = beyond(operator)
+        _check(self.operator, method)
+        self._wide, self._inside = beyond(self.operator)
         self._scale: tuple[str, Scale] | None = None
         self._pictured: Array | None = None
         self._last: Array | None = None
@@ -255,24 +235,45 @@ class Deconvolver:
     @single_products()  # threads of small products spin: three times the work on a busy machine
     def __call__(
         self,
-        raw: RawImage | Array,
-        exposure: Exposure | None = None,
+        raw: RawImage | Array | Raws,
+        exposure: Exposure | Sequence[Exposure] | None = None,
         *,
         progress: Report | None = None,
         checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
     ) -> Result:
-        """The result of one raw image; parameters and errors are those of `deconvolve`."""
-        exposure = _known(raw, exposure)
+        """The result of one raw image, or of several; parameters and errors are those of `deconvolve`."""
+        like, raw, exposure = self._row(raw, self.known(raw, exposure))
         data = values(raw, self.operator, exposure)
         problem = Problem.of(raw, exposure, self._scaled(exposure, data))
         wanted = self.operator, self._inside, self._pictured
-        run = _Run(problem, self.method, self.limits, progress, wanted, start=self._begun(problem))
+        run = Run(problem, self.method, self.limits, progress, wanted, start=self._begun(problem))
         if checkpoint is not None:
             run.checkpoint = Checkpoint.of(checkpoint)
             run.key = fingerprint(data, exposure, self.method, run.start)
-        state = _finished(run, raw)
+        state = finished(run, like)
+        if isinstance(self.operator, Joint):
+            warn_of_brightness(problem, state.model, self.operator)
         self._last = state.estimate if self.warm else None
-        return run.result(state, raw)
+        return run.result(state, like)
+
+    def known(
+        self, raw: RawImage | Array | Raws, exposure: Exposure | Sequence[Exposure] | None
+    ) -> Exposure | tuple[Exposure, ...]:
+        """The exposure as given, or as raw images record it; one for each of several."""
+        if isinstance(self.operator, Joint):
+            return exposures_of(check_count(raw, self.operator), exposure)
+        return _known(raw, exposure)
+
+    def _row(
+        self, raw: RawImage | Array | Raws, exposure: Exposure | tuple[Exposure, ...]
+    ) -> tuple[RawImage | Array, RawImage | Array, Exposure]:
+        """What tells where the result stands, and one raw image and its exposure; several in a row."""
+        if isinstance(self.operator, Joint) and isinstance(exposure, tuple):
+            raws = check_count(raw, self.operator)
+            return raws[0], *together(raws, self.operator, exposure)
+        assert isinstance(exposure, Exposure)  # see `known`
+        assert not isinstance(raw, list | tuple)
+        return raw, raw, exposure
 
     def forget(self) -> None:
         """Begin the next raw image as if it were the first one, though starts are warm."""
@@ -291,97 +292,18 @@ class Deconvolver:
             _require(self._wide, data)
             scale = Scale.of(self._wide, exposure, data, least_seen(self.operator))
             self._scale = key, scale
-            if isinstance(self.operator, Widening):
+            if looks_beyond(self.operator):
                 self._pictured = scale.pictured(BESIDE)
         return self._scale[1]
 
 
-@dataclass(slots=True)
-class _Run:
-    problem: Problem
-    method: Method
-    limits: Stop
-    progress: Report | None
-    wanted: tuple[Linear, Inside, Array | None]
-    checkpoint: Checkpoint | None = None
-    key: str = ""
-    began: float = 0.0
-    start: Array | None = None
-
-    def states(self) -> Iterator[State]:
-        """The first state and each that follows, until it is time to stop."""
-        self.began = time.perf_counter()
-        state = self._first()
-        first, change = state.done, np.inf
-        yield state
-        while not self.limits.reached(state.done, state.deviance, change):
-            before, state = state, self.method.step(self.problem, state)
-            change = _change(before.estimate, state.estimate)
-            if self.checkpoint is not None:
-                self.checkpoint.keep(self.problem, state, self.key)
-            yield state
-            self._tell(state, change, first)
-        if self.checkpoint is not None and state.done > first:
-            self.checkpoint.keep(self.problem, state, self.key, now=True)
-
-    def result(self, state: State, raw: RawImage | Array) -> Result:
-        """What is asked for of the object, with its place in space."""
-        operator, inside, pictured = self.wanted
-        return _placed(cut(state.estimate, inside, pictured), raw, operator)
-
-    def _first(self) -> State:
-        kept = None if self.checkpoint is None else self.checkpoint.found(self.problem, self.key)
-        if kept is not None:
-            return kept
-        if self.start is not None:
-            return State.at(self.problem, self.start)
-        if self.method.start is None:
-            return State.at(self.problem, self.problem.flat())
-        start, needed = self.method.start, tuple(self.wanted[0].shape[1])
-        if tuple(start.shape) != needed:
-            raise GeometryError(f"start has shape {tuple(start.shape)} but the object has {needed}.")
-        start = continued(start, tuple(self.problem.scale.sensitivity.shape), self.wanted[1])
-        return State.at(self.problem, arrays.like(np.asarray(arrays.to_numpy(start)), self.problem.data))
-
-    def _tell(self, state: State, change: float, first: int) -> None:
-        if self.progress is None:
-            return
-        elapsed = time.perf_counter() - self.began
-        stopped = self.limits.reached(state.done, state.deviance, change)
-        left = 0 if stopped else self.limits.iterations - state.done
-        remaining = left * elapsed / (state.done - first)
-        self.progress(
-            Step(state.done, self.limits.iterations, state.deviance, change, elapsed, remaining, stopped)
+def _known(raw: Any, exposure: Any) -> Exposure:
+    if isinstance(raw, list | tuple):
+        raise CalibrationError(
+            f"the raw image must be an array, not a {type(raw).__name__} of {len(raw)}. Several raw images "
+            "of one object need an operator for each, such as lumigraph.joint_operator(...); frames of a "
+            "time series go into deconvolve_series."
         )
-
-
-def _finished(run: _Run, raw: RawImage | Array) -> State:
-    reached: list[State] = []
-    try:
-        for state in run.states():
-            reached[:] = [state]
-    except KeyboardInterrupt:
-        if not reached:
-            raise
-        if run.checkpoint is not None:
-            run.checkpoint.keep(run.problem, reached[0], run.key, now=True)
-        raise Interrupted(run.result(reached[0], raw), reached[0].done) from None
-    return reached[0]
-
-
-def _placed(estimate: Array, raw: RawImage | Array, operator: Linear) -> Result:
-    """The estimate with its place in space, where the raw image is one and the operator knows it."""
-    grid = operator.object_grid
-    if not isinstance(raw, RawImage) or grid is None:
-        return estimate
-    if len(estimate.shape) == 3:
-        depths = operator.depths
-        return estimate if depths is None else Volume(estimate, grid, depths)
-    known = {"center": grid.center, "wavelength": raw.metadata.get("wavelength")}
-    return RawImage(estimate, float(np.mean(grid.pitch)), metadata=known)
-
-
-def _known(raw: RawImage | Array, exposure: Exposure | None) -> Exposure:
     if exposure is not None:
         checks.instance("exposure", exposure, Exposure)
         return exposure
@@ -400,9 +322,3 @@ def _require(operator: Linear, data: Array) -> None:
     size = math.prod(operator.shape[1]) * (4 if arrays.is_single(data) else 8)
     what = f"a deconvolution into {' x '.join(map(str, operator.shape[1]))} samples"
     memory.require(COPIES * size, what, "Use fewer planes, or coarser samples.", SamplingError)
-
-
-def _change(before: Array, after: Array) -> float:
-    moved = arrays.sum_by_plane(lambda one, other: (one - other) ** 2, after, before)
-    whole = arrays.sum_by_plane(lambda one: one**2, after)
-    return math.sqrt(moved / whole) if whole > 0 else 0.0

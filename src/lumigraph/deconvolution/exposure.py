@@ -17,7 +17,7 @@ from lumigraph.errors import CalibrationError
 class Exposure:
     r"""How a raw image r follows from the light A o on the pixels.
 
-    .. math:: g\,(r - r_0) \sim \mathrm{Poisson}(g\,(v \cdot A o + b - r_0)) + \mathcal N(0, \sigma^2)
+    .. math:: g\,(r - r_0) \sim \mathrm{Poisson}(g\,(t v \cdot A o + b - r_0)) + \mathcal N(0, \sigma^2)
 
     Nothing is subtracted from a raw image or divided out of it, which would spoil the noise's statistics:
     a dark image is given as `background`, a white image's vignetting as `response`.
@@ -37,6 +37,9 @@ class Exposure:
         σ, standard deviation of the reading [electrons]; needs the gain.
     black_level
         The part of the background that is no light and has no noise of its own, in the raw image's values.
+    light
+        t: light of this raw image over that of the others of the same object: the ratio of exposure times,
+        lamps or apertures, whatever the gains are.
 
     Raises
     ------
@@ -50,6 +53,7 @@ class Exposure:
     gain: float | None = None
     read_noise: float = 0.0
     black_level: float = 0.0
+    light: float = 1.0
 
     __repr__ = brief
 
@@ -59,6 +63,7 @@ class Exposure:
                 _check_plane(name, value, 1.0 if name == "weights" else None)
         if self.gain is not None:
             checks.positive("gain", self.gain, "electrons per value", CalibrationError)
+        checks.positive("light", self.light, "1", CalibrationError)
         noise = checks.finite("read_noise", self.read_noise, "electrons", CalibrationError)
         if noise < 0 or (noise > 0 and self.gain is None):
             raise CalibrationError(

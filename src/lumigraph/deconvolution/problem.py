@@ -27,7 +27,7 @@ class Scale:
     operator
         A.
     response, weights
-        v and w of `Exposure` (ny, nx), or None for 1.
+        t v and w of `Exposure` (ny, nx), or None for 1.
     background
         b + σ²/g, less the black level: a number or (ny, nx), at least 0.
     sensitivity
@@ -50,11 +50,13 @@ class Scale:
     def of(cls, operator: Linear, exposure: Exposure, like: Array, least: float = UNSEEN) -> "Scale":
         """Of an operator, in the library and precision of an array; see `UNSEEN` for `least`."""
         shape, xp = tuple(operator.shape[0]), arrays.namespace(like)
-        response = _plane("response", exposure.response, shape, like)
-        weights = _plane("weights", exposure.weights, shape, like)
+        response = pixels("response", exposure.response, shape, like)
+        if exposure.light != 1:
+            response = exposure.light * (xp.ones_like(like) if response is None else response)
+        weights = pixels("weights", exposure.weights, shape, like)
         background: Array = exposure.background
         if getattr(background, "shape", ()):  # not one number, be it a 0-d array
-            background = _plane("background", background, shape, like)
+            background = pixels("background", background, shape, like)
         ones = xp.ones(shape, dtype=like.dtype, device=arrays.device(like))
         for factor in (response, weights):
             ones = ones if factor is None else ones * factor
@@ -207,7 +209,8 @@ def _divided(values: Array, by: Array, where: Array) -> Array:
     return xp.where(where, values / xp.where(where, by, xp.ones_like(by)), xp.zeros_like(values))
 
 
-def _plane(name: str, plane: Array | None, shape: tuple[int, ...], like: Array) -> Array | None:
+def pixels(name: str, plane: Array | None, shape: tuple[int, ...], like: Array) -> Array | None:
+    """What is known of each pixel in the library and precision of an array; None where nothing is."""
     if plane is None:
         return None
     if tuple(plane.shape) != shape:

@@ -6,6 +6,7 @@
 - `microscope`: `LightFieldMicroscope` and its operator; `microscope_objective`: its `MicroscopeObjective`
 - `parts`: `MainLens`, `Lenslets`, `Pixels`: the tables of a camera file
 - `built`: `Built`, distances as built; `tolerances`: `Tolerance`, how far values may be off
+- `joint`: `joint_operator` of several raw images of one object, `scan`, shifts between them
 - `loading`: `load_camera` for every kind
 - `instrument`, `camera`, `lenslet_camera`: what the kinds share; `capabilities`: what some of them can do
 - `parameters`: what a designer can change; `point_view`: a point's image at once
@@ -20,6 +21,7 @@ from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.files import catalogue
 from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.joint import joint_operator, scan
 from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.loading import load_camera
 from lumigraph.instruments.microscope import LightFieldMicroscope
@@ -48,5 +50,7 @@ __all__ = [
     "SingleLensCamera",
     "Tolerance",
     "catalogue",
+    "joint_operator",
     "load_camera",
+    "scan",
 ]

@@ -249,23 +249,40 @@ class Camera(Instrument):
         """
         planes = None if depths is None else self._depths(depths)
         optics, making = self.optics(), Making(accuracy, folder, progress)
+        grid = self.operator_grid(samples_per_lenslet)
         if pixels is not None:
             checks.instance("pixels", pixels, Sensor)
             optics = replace(optics, sensor=pixels)
         if spectrum is None:
-            return self._planes(optics, planes, samples_per_lenslet, making)
+            return self._planes(optics, planes, grid, making)
         if len(spectrum.weights[0]) != 1:
             raise GeometryError("the operator has one channel but the spectrum has three. Take one of them.")
         maps, count = [], len(spectrum.wavelengths)
         for number, wavelength in enumerate(spectrum.wavelengths):
             told = replace(making, progress=part(progress, number, count))
             plain = replace(optics, wavelength=wavelength)
-            maps.append(self._planes(plain, planes, samples_per_lenslet, told))
+            maps.append(self._planes(plain, planes, grid, told))
         weights = tuple(weight for (weight,) in spectrum.weights)
         return Sum(tuple(maps), weights, object_grid=maps[0].object_grid, depths=maps[0].depths)
 
+    def operator_on(
+        self,
+        grid: Grid,
+        depths: Sequence[float] | None = None,
+        *,
+        accuracy: float = 1e-3,
+        progress: Progress | None = None,
+    ) -> Linear:
+        """As `operator`, of an object on any grid, such as one that was moved."""
+        planes = None if depths is None else self._depths(depths)
+        return self._planes(self.optics(), planes, grid, Making(accuracy, None, progress))
+
+    def operator_grid(self, samples: int | None = None) -> Grid:
+        """Object samples of its `operator`, so many along a lenslet's pitch where there are lenslets."""
+        raise NotImplementedError
+
     def _planes(
-        self, optics: CameraOptics, depths: Sequence[float] | None, samples: int | None, making: "Making"
+        self, optics: CameraOptics, depths: Sequence[float] | None, grid: Grid, making: "Making"
     ) -> Linear:
         raise NotImplementedError
 

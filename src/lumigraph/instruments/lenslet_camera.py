@@ -128,10 +128,10 @@ class LensletCamera(Camera):
         return point_view.of_camera(small, dz, count)
 
     def _planes(
-        self, optics: CameraOptics, depths: Sequence[float] | None, samples: int | None, making: Making
+        self, optics: CameraOptics, depths: Sequence[float] | None, grid: Grid, making: Making
     ) -> Linear:
         return periodic_operator(
-            optics, self.operator_grid(samples), 0.0 if depths is None else depths,
+            optics, grid, 0.0 if depths is None else depths,
             accuracy=making.accuracy, folder=making.folder, progress=making.progress,
         )  # fmt: skip
 

@@ -7,6 +7,7 @@ from typing import ClassVar
 from pydantic import model_validator
 
 from lumigraph.core import checks
+from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear, stack
 from lumigraph.core.progress import part
 from lumigraph.design import resolution
@@ -104,11 +105,15 @@ class SingleLensCamera(Camera):
             (self.lens_train(), Propagate(self.image_distance, "band_limited", grid=self.image_grid))
         )
 
-    def _planes(
-        self, optics: CameraOptics, depths: Sequence[float] | None, samples: int | None, making: Making
-    ) -> Linear:
+    def operator_grid(self, samples: int | None = None) -> Grid:
+        """Object samples of its `operator`: those of the focused plane."""
         if samples is not None:
             raise GeometryError("the camera has no lenslets to count by. Leave samples_per_lenslet out.")
+        return self.object_grid
+
+    def _planes(
+        self, optics: CameraOptics, depths: Sequence[float] | None, grid: Grid, making: Making
+    ) -> Linear:
         if not 1e-2 >= checks.finite("accuracy", making.accuracy, "1", SamplingError) >= ERROR:
             raise SamplingError(
                 f"accuracy is {making.accuracy:g} but a single lens is imaged to {ERROR:g}, relative rms. "
@@ -116,7 +121,7 @@ class SingleLensCamera(Camera):
             )
         maps, planes = [], (0.0,) if depths is None else depths
         for number, dz in enumerate(planes):
-            maps.append(single_lens_operator(optics, self.object_grid, dz))
+            maps.append(single_lens_operator(optics, grid, dz))
             part(making.progress, number, len(planes))(1.0)
         return maps[0] if depths is None else stack(maps, depths=depths)
 

@@ -9,6 +9,7 @@
 - `points`, `white`: single points, and the evenly lit main lens, before lenslets; `relay`, any light through
   lenslets, cell by cell; `point_light`, a point's light in their plane
 - `screens`: opaque sheets before the main lens; `partly`, planes whose points they hide in part
+- `regrid`: an operator of an object on another grid, moved or finer
 - `resampling`, `turning`: from an object's samples to points and from the image's samples to pixels
 - `single_lens`: `single_lens_operator`, incoherent planes and points before a camera without lenslets
 - `microscope_operator`: volumes before a light-field microscope; `microscope_building`, how it is made;
