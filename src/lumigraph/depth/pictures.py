@@ -24,6 +24,8 @@ _WINDOW, _SMOOTH = 4, 0.1  # px; part of the windows that show nothing but noise
 _OF_NOISE = 0.81  # of its mean: how rough the smoothest tenth of the windows of noise alone is
 _LIT = 0.1  # of a picture from 0 to 1: what is darker may be cut off
 _DARK = 0.05  # views darker than this part of the middle one lie outside the aperture
+_VIGNETTED = 2.25  # ratio of a view's brightness to the middle one's: more from place to place is no parallax
+_BROAD, _PEDESTAL = 10, 0.05  # windows to a side that brightness is compared in, each this much brighter
 
 
 def measurable(views: LightField) -> bool:
@@ -34,6 +36,9 @@ def measurable(views: LightField) -> bool:
 @dataclass(frozen=True, slots=True)
 class Pictures:
     """Views on a scale of 0 to 1, even in noise: square roots, matched in brightness to the middle view.
+
+    Where a view's brightness beside the middle one's varies over the picture by more than `_VIGNETTED`, as
+    without a white image behind lenses that vignette, it is matched in windows of a tenth of the picture.
 
     Parameters
     ----------
@@ -127,7 +132,24 @@ def _even(data: np.ndarray, middle: tuple[int, int]) -> tuple[np.ndarray, np.nda
     gain = np.where(lit, level[middle] / np.where(lit, level, 1), 0) / white
     for v, u in np.ndindex(lit.shape):
         data[v, u] = np.sqrt(data[v, u] * np.float32(gain[v, u])) if lit[v, u] else 0
+    center = _brightness(data[middle])
+    for v, u in zip(*np.nonzero(lit), strict=True):
+        _match(data[v, u], center)
     return data, lit
+
+
+def _brightness(picture: np.ndarray) -> np.ndarray:
+    """Of a picture (c, y, x), in windows (y, x) in which what moves from view to view counts little."""
+    radius = max(16, min(picture.shape[1:]) // _BROAD)
+    return box(picture.mean(0), radius) + np.float32(_PEDESTAL)
+
+
+def _match(picture: np.ndarray, center: np.ndarray) -> None:
+    """Make a vignetted picture (c, y, x) as bright as the middle view everywhere, in place."""
+    ratio = _brightness(picture) / center
+    low, high = np.percentile(ratio[::4, ::4], (5, 95))
+    if high > math.sqrt(_VIGNETTED) * low:
+        picture /= ratio
 
 
 def noise_of(picture: np.ndarray) -> float:
