@@ -7,10 +7,12 @@
 - `lenslets`: `LensletArray`, square or hexagonal, of one or three focal lengths
 - `scatter`: `Scatter`, how lenslets of an array differ from each other
 - `zernike`: Zernike polynomials in Noll's order and `ZernikePlate`
+- `field_plate`: Zernike terms that change over the field, and their plate
 - `masks`: white random phases and the thesis' random phase mask
 """
 
 from lumigraph.elements.apertures import CircularAperture, RectangularAperture
+from lumigraph.elements.field_plate import OF_ONE_LENS, FieldPlate, ZernikeMap
 from lumigraph.elements.lens import ThinLens
 from lumigraph.elements.lenslets import LensletArray
 from lumigraph.elements.masks import random_phase_mask, white_phase
@@ -19,13 +21,16 @@ from lumigraph.elements.train import Element, Train
 from lumigraph.elements.zernike import ZernikePlate, noll_to_nm, zernike
 
 __all__ = [
+    "OF_ONE_LENS",
     "CircularAperture",
     "Element",
+    "FieldPlate",
     "LensletArray",
     "RectangularAperture",
     "Scatter",
     "ThinLens",
     "Train",
+    "ZernikeMap",
     "ZernikePlate",
     "noll_to_nm",
     "random_phase_mask",

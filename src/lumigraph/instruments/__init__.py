@@ -26,6 +26,7 @@ from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.loading import load_camera
 from lumigraph.instruments.microscope import LightFieldMicroscope
 from lumigraph.instruments.microscope_objective import MicroscopeObjective
+from lumigraph.instruments.over_field import OverField
 from lumigraph.instruments.parts import Lenslets, MainLens, Pixels
 from lumigraph.instruments.plenoptic1 import PlenopticCamera
 from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
@@ -44,6 +45,7 @@ __all__ = [
     "LightFieldMicroscope",
     "MainLens",
     "MicroscopeObjective",
+    "OverField",
     "Pixels",
     "PlenopticCamera",
     "Row",

@@ -3,7 +3,7 @@
 from pydantic import model_validator
 
 from lumigraph.elements import Scatter
-from lumigraph.instruments.parts import Part
+from lumigraph.instruments.part import Part
 from lumigraph.instruments.quantities import Displacement, Length, NotNegative, Seed
 
 

@@ -16,7 +16,7 @@ from lumigraph.core.linear import Linear, Sum
 from lumigraph.core.progress import Progress, part
 from lumigraph.design import plenoptic1, resolution, thin_lens
 from lumigraph.design.layout import Layout, LensletLayout
-from lumigraph.elements import LensletArray, ThinLens, Train, ZernikePlate
+from lumigraph.elements import FieldPlate, LensletArray, ThinLens, Train, ZernikePlate
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import parameters, point_view
 from lumigraph.instruments.grids import Sampling
@@ -134,9 +134,12 @@ class Camera(Instrument):
     def lens_train(self) -> Train:
         """The main lens: its phase, its stop and its aberrations."""
         focal_length, diameter = self.main_lens.focal_length, self.pupil_diameter
-        if not self.main_lens.aberrations:
-            return Train((ThinLens(focal_length, diameter),))
         waves = self.main_lens.aberrations
+        if self.main_lens.over_field is not None:
+            plate = FieldPlate(self.main_lens.over_field.aberrations, diameter, tuple(waves.items()))
+            return Train((plate, ThinLens(focal_length)))
+        if not waves:
+            return Train((ThinLens(focal_length, diameter),))
         # The plate is also the stop: two grey edges would be darker than one.
         plate = ZernikePlate({j: 2 * math.pi * rms for j, rms in waves.items()}, diameter)
         return Train((plate, ThinLens(focal_length)))

@@ -15,6 +15,7 @@ from lumigraph.sensor import Sensor
 if TYPE_CHECKING:
     from lumigraph.instruments.camera import Camera
     from lumigraph.instruments.lenslet_camera import LensletCamera
+    from lumigraph.instruments.over_field import OverField
     from lumigraph.instruments.plenoptic1 import PlenopticCamera
     from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
     from lumigraph.instruments.single_lens import SingleLensCamera
@@ -138,6 +139,17 @@ def _main_lens(camera: "Camera") -> Iterator[Row]:
     yield Row("Airy radius", resolution.airy_first_zero(wavelength, f_number), "m", "1.22 λ F#, first zero")
     for index, waves in camera.main_lens.aberrations.items():
         yield Row(f"Noll {index}", float(waves), "waves rms", "given")
+    if camera.main_lens.over_field is not None:
+        yield from _over_field(camera.main_lens.over_field, wavelength)
+
+
+def _over_field(table: "OverField", wavelength: float) -> Iterator[Row]:
+    aberrations = table.aberrations
+    reach, per_wave = aberrations.reach, 1 / wavelength if aberrations.metres else 1.0
+    yield Row("field of the aberrations", math.degrees(math.atan(max(reach))), "deg", "given, from the axis")
+    for k, j in enumerate(aberrations.terms):
+        most = float(abs(aberrations.values[..., k]).max()) * per_wave
+        yield Row(f"Noll {j}, most over the field", most, "waves rms", "given")
 
 
 def _diameter_source(camera: "Camera") -> str:

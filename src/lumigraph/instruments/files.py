@@ -41,9 +41,19 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
             f"{str(path)!r} is larger than 1 MiB, too large for a camera file. Give a TOML file."
         )
     try:
-        return toml(path, content.decode("utf-8"))
+        return _beside(path, toml(path, content.decode("utf-8")))
     except UnicodeDecodeError:
         raise FormatError(f"{str(path)!r} is not text. Give a camera file in TOML.") from None
+
+
+def _beside(path: Path, table: dict[str, Any]) -> dict[str, Any]:
+    """The table, whose main lens names files from the camera file's folder on."""
+    lens = table.get("main_lens")
+    if isinstance(lens, dict):
+        for key in ("over_field",):
+            if isinstance(lens.get(key), str):
+                lens[key] = str(path.parent / lens[key])
+    return table
 
 
 _CATALOGUE = resources.files("lumigraph.instruments") / "catalogue"
@@ -105,13 +115,13 @@ def write(table: Mapping[str, Any]) -> str:
 _LENGTHS = (
     "wavelength", "object_distance", "focal_length", "diameter", "pitch", "pixel_pitch", "offset",
     "bandwidth", "tube_lens", "focus_depth", "lenslet_offset", "sensor_distance", "fourier_lens",
-    "separation", "lenslet_distance", "decentre_scatter",
+    "separation", "lenslet_distance", "decentre_scatter", "wavelengths",
 )  # fmt: skip
 
 
 def _table(name: str, values: Mapping[str, Any]) -> list[str]:
     plain = {key: value for key, value in values.items() if not isinstance(value, dict) and value is not None}
-    lines = [f"[{name}]", *(f"{key} = {_text(key, value)}" for key, value in plain.items())]
+    lines = [f"[{name}]", *(f"{key} = {_text(str(key), value)}" for key, value in plain.items())]
     for key, inner in values.items():
         if isinstance(inner, dict) and inner:
             lines += _table(f"{name}.{key}", inner)
@@ -120,12 +130,12 @@ def _table(name: str, values: Mapping[str, Any]) -> list[str]:
 
 def _text(key: str, value: Any) -> str:
     if isinstance(value, tuple | list):
-        if len(value) == 1:
+        if len(value) == 1 and key not in ("field", "y", "x", "wavelengths") and not str(key).isdecimal():
             return _text(key, value[0])
         return "[" + ", ".join(_text(key, each) for each in value) + "]"
     if isinstance(value, float) and key in _LENGTHS:
         return f'"{_metres(value)}"'
-    if isinstance(value, float) and key == "rotation":
+    if isinstance(value, float) and key in ("rotation", "field", "y", "x"):
         return f'"{value!r} rad"'
     if isinstance(value, float) and key == "exposure_time":
         return f'"{value!r} s"'

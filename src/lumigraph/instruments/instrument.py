@@ -17,7 +17,7 @@ from lumigraph.errors import FormatError
 from lumigraph.instruments import files
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.parameters import Parameter, changes
-from lumigraph.instruments.parts import Part
+from lumigraph.instruments.part import Part
 from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.problems import readable
 from lumigraph.instruments.quantities import FROM_FILE

@@ -138,6 +138,11 @@ class LensletCamera(Camera):
     def optics(self) -> CameraOptics:
         """What operators read of the camera, as plain values."""
         plain = replace(super().optics(), model=self.model)
+        if self.model == "exact" and self.main_lens.over_field is not None:
+            raise GeometryError(
+                'model is "exact" but the main lens changes over the field, which the paraxial model follows '
+                'alone. Use model = "paraxial" or "auto", or leave over_field out.'
+            )
         if self.model == "exact" and not is_possible(plain):
             raise GeometryError(
                 f'model is "exact" but the lenslets are {self.lenslets.shape or self.lenslets.layout}, of '

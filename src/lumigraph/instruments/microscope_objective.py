@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from lumigraph.design import microscope as closed_forms
 from lumigraph.errors import GeometryError
-from lumigraph.instruments.parts import Part
+from lumigraph.instruments.part import Part
 from lumigraph.instruments.quantities import Aberrations, Fraction, Length, Positive
 
 

@@ -4,14 +4,15 @@ Values are SI floats or text with a unit in Python; in a file, lengths carry the
 """
 
 import math
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import GeometryError
-from lumigraph.instruments.problems import readable
+from lumigraph.instruments.over_field import OverField, given
+from lumigraph.instruments.part import Part
 from lumigraph.instruments.quantities import (
     Aberrations,
     Angle,
@@ -35,21 +36,6 @@ MOST_LENSLETS = 2**20
 """Largest array: 1024 x 1024."""
 
 
-class Part(BaseModel):
-    """A table of a camera file. Whatever is wrong with it is one line that names the field."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, populate_by_name=True)
-
-    def __init__(self, **values: Any) -> None:
-        try:
-            self.__pydantic_validator__.validate_python(values, self_instance=self)
-        except ValidationError as error:
-            raise readable(error, type(self)) from None
-
-    # Parts inside a camera are validated by the camera, which knows their place and whether a file is read.
-    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
-
-
 class MainLens(Part):
     """The lens that forms the image: a thin lens with a round stop.
 
@@ -60,7 +46,9 @@ class MainLens(Part):
     diameter
         Of the stop; left out, it is matched to the lenslets.
     aberrations
-        Zernike terms: Noll index to waves rms.
+        Zernike terms: Noll index to waves rms, of all fields.
+    over_field
+        Terms that change over the field besides: `OverField`, its table, or the path of a CSV file.
 
     Examples
     --------
@@ -71,6 +59,7 @@ class MainLens(Part):
     focal_length: Length
     diameter: Length | None = None
     aberrations: Aberrations = Field(default_factory=dict)
+    over_field: Annotated[OverField | None, BeforeValidator(given)] = None
 
 
 class Lenslets(Part):

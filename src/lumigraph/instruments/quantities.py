@@ -4,7 +4,7 @@ A validator's message does not name the field: `problems.readable` puts the dott
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 from typing import Annotated, Any
 
@@ -167,12 +167,59 @@ def _aberrations(value: Any) -> dict[int, float]:
         raise FormatError(f"{value!r} is not a table. Write a Noll index and waves rms, such as 4 = 0.1.")
     table = {}
     for key, waves in value.items():
-        if not str(key).isdecimal() or not 1 <= int(key) <= 1000:
-            raise FormatError(f"{key!r} is not a Noll index. Write a whole number from 1 to 1000.")
+        noll_index(key)
         if abs(amount := _number(waves)) > 1000:
             raise GeometryError(f"Noll term {key} has {waves!r} waves rms. Give waves, at most 1000.")
         table[int(key)] = float(math.copysign(amount, waves))
     return table
+
+
+def noll_index(key: Any) -> int:
+    """Noll's index of a key.
+
+    Raises
+    ------
+    FormatError
+        It is none from 1 to 1000.
+    """
+    if not str(key).isdecimal() or not 1 <= int(key) <= 1000:
+        raise FormatError(f"{key!r} is not a Noll index. Write a whole number from 1 to 1000.")
+    return int(key)
+
+
+def numbers(value: Any) -> tuple[float, ...]:
+    """Of a list, finite.
+
+    Raises
+    ------
+    FormatError
+        It is no list of numbers.
+    GeometryError
+        A number that is not finite.
+    """
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise FormatError(f"{value!r} is not a list. Write one number for each field, such as [0, 0.1].")
+    return tuple(_number(each) for each in value)
+
+
+def angles(value: Any, info: ValidationInfo) -> tuple[float, ...] | None:
+    """Of a list [rad]."""
+    return _several(value, info, _angle, "['0 deg', '5 deg']")
+
+
+def wavelengths(value: Any, info: ValidationInfo) -> tuple[float, ...] | None:
+    """Of a list [m]."""
+    return _several(value, info, _wavelength, "['486 nm', '656 nm']")
+
+
+def _several(
+    value: Any, info: ValidationInfo, one: Callable[[Any, ValidationInfo], float], example: str
+) -> tuple[float, ...] | None:
+    if value is None:
+        return None
+    if isinstance(value, str) or not isinstance(value, Sequence) or not len(value):
+        raise FormatError(f"{value!r} is not a list. Write {example}.")
+    return tuple(one(each, info) for each in value)
 
 
 Length = Annotated[float, BeforeValidator(_length)]

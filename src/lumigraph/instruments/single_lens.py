@@ -121,7 +121,7 @@ class SingleLensCamera(Camera):
             )
         maps, planes = [], (0.0,) if depths is None else depths
         for number, dz in enumerate(planes):
-            maps.append(single_lens_operator(optics, grid, dz))
+            maps.append(single_lens_operator(optics, grid, dz, making.accuracy))
             part(making.progress, number, len(planes))(1.0)
         return maps[0] if depths is None else stack(maps, depths=depths)
 

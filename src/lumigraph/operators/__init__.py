@@ -18,6 +18,7 @@
   lenslets' frequencies; `microscope_patterns`, what they follow of a cell's points;
   `microscope_pixels`, real pixels; `fourier_microscope`
 - `exact`: lenslets and distances beyond the paraxial; `paraxial`, how far off that is
+- `varying`: main lenses whose aberrations change over the field; `let`, the share of each sample
 - `fineness`: what an accuracy asks for
 - `band`: band-limited samples along an axis, to and from points and pixels
 - `camera`: `CameraOptics`, what an operator reads of an instrument, as plain values

@@ -12,6 +12,7 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.elements import CircularAperture, LensletArray, ThinLens, Train, ZernikePlate, noll_to_nm
 from lumigraph.elements.train import Element
 from lumigraph.errors import GeometryError
+from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.fineness import Edges, Fineness
 
@@ -289,8 +290,9 @@ def lens(camera: CameraOptics) -> Train:
     Raises
     ------
     GeometryError
-        An element that is not known to be round, before a turned array.
+        An element that is not known to be round, before a turned array; a lens that changes over the field.
     """
+    varying.check_one(camera)
     train, rotation = camera.lens, 0.0 if camera.lattice is None else camera.lattice.rotation
     if not rotation:
         return train
@@ -329,7 +331,10 @@ def blur(camera: CameraOptics, distance: float) -> float:
 
     A ray through (y, x) of the pupil arrives at (y, x) (1 - L/f + L/z) + λL/(2π) ∇φ for plates of phase φ.
     Where they aberrate, it is √2 times the rms distance from the axis, as of an even disc: few go farther.
+    Where that changes over the field, it is the largest.
     """
+    if varying.plate_of(camera) is not None:
+        return max(blur(each, distance) for each in varying.some(camera))
     elements = camera.lens.elements
     (focal_length,) = (p.focal_length for p in elements if isinstance(p, ThinLens))
     spread = 1 - camera.separation * (1 / focal_length - 1 / distance)

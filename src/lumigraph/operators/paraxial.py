@@ -14,6 +14,7 @@ from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.cell_response import bent, focal_lengths, legendre, sphere
 from lumigraph.operators.exact_light import image_distance
+from lumigraph.operators.varying import plate_of
 
 NODE = math.cos(math.pi / 6)
 """Of half the array, where the field is known beside the middle: Chebyshev's three nodes."""
@@ -82,8 +83,10 @@ def resolved(camera: CameraOptics, accuracy: float) -> CameraOptics:
 
 
 def is_possible(camera: CameraOptics) -> bool:
-    """Whether lenslets can be exact: square ones of one focal length, or none."""
+    """Whether lenslets can be exact: square, of one focal length, or none; behind one lens for all fields."""
     array = camera.array
+    if plate_of(camera) is not None:
+        return False
     return array is None or (array.shape == "square" and len(focal_lengths(array)) == 1)
 
 

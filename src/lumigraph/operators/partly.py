@@ -8,21 +8,19 @@ image. All are mutually incoherent.
 import math
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
 
 import numpy as np
 
 from lumigraph.core import arrays
-from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
-from lumigraph.core.linear import Linear, Shape
 from lumigraph.core.progress import Progress
 from lumigraph.core.threads import each
 from lumigraph.errors import SamplingWarning
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.cell_response import MIDDLE
+from lumigraph.operators.let import Let
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.periodic import PeriodicOperator
 from lumigraph.operators.points import on_lenslets
@@ -50,31 +48,6 @@ _LOOKS = 4
 """Places in a sample, along each axis, that neighbouring points look past the screens from."""
 
 Pair = tuple[int, int]
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Let(Linear):
-    """Samples (y, x), each times how much of it is let through."""
-
-    through: np.ndarray
-
-    title: ClassVar[str] = "What is let through"
-
-    @property
-    def shape(self) -> tuple[Shape, Shape]:
-        """Of the samples, twice."""
-        return self.through.shape, self.through.shape
-
-    def _forward(self, intensity: Array) -> Array:
-        return intensity * arrays.like(self.through, intensity)
-
-    def _adjoint(self, raw: Array) -> Array:
-        return self._forward(raw)
-
-    @property
-    def memory_bytes(self) -> float:
-        """Of the shares [bytes]."""
-        return self.through.nbytes
 
 
 def plane_image(

@@ -29,19 +29,22 @@ import numpy as np
 from lumigraph.core import arrays, memory
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
-from lumigraph.core.linear import Linear, Shape
+from lumigraph.core.linear import Linear, Shape, stack
 from lumigraph.core.progress import Progress
 from lumigraph.core.progress import part as part_of
 from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.operators import varying
 from lumigraph.operators.beyond import Beyond, beyond
 from lumigraph.operators.blocks import Part
-from lumigraph.operators.camera import HasOptics
+from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.cell_response import Pair
 from lumigraph.operators.cells import Cells, blur, check_alike
-from lumigraph.operators.kernels import Matrix, matrix
+from lumigraph.operators.kernels import A_MINUTE, LONGEST, Matrix, matrix
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.over_field import over_field
 from lumigraph.operators.paraxial import field_matters, resolved
+from lumigraph.operators.points import seen
+from lumigraph.operators.sizes import build_operations
 from lumigraph.operators.streamed import Streamed
 from lumigraph.operators.tiles import as_plane, by_cell, readout, spread
 
@@ -282,6 +285,10 @@ def periodic_operator(
         raise GeometryError("dz is empty. Give at least one depth.")
     check_alike(camera.optics())
     plain, several = resolved(camera.optics(), accuracy), depths if np.ndim(dz) else None
+    if varying.plate_of(plain) is not None:
+        making = _Making(accuracy, folder, progress)
+        maps = [_varying(plain, grid, depth, making.of(k, len(depths))) for k, depth in enumerate(depths)]
+        return maps[0] if several is None else stack(maps, object_grid=grid, depths=several)
 
     distances = [plain.object_distance + depth for depth in depths]
     blurred = max([plain.object_distance, *distances], key=lambda z: blur(plain, z))
@@ -307,6 +314,53 @@ def periodic_operator(
         operator.memory_bytes, "the raw image", "Use fewer lenslets, or larger pixels.", SamplingError
     )
     return operator
+
+
+@dataclass(frozen=True, slots=True)
+class _Making:
+    """How an operator is made."""
+
+    accuracy: float
+    folder: str | PathLike[str] | None
+    progress: Progress | None
+
+    def of(self, number: int, count: int) -> "_Making":
+        """One of several."""
+        return replace(self, progress=part_of(self.progress, number, count))
+
+
+def _varying(camera: CameraOptics, grid: Grid, dz: float, making: _Making) -> Linear:
+    """Of a plane before a lens that changes over the field."""
+    distance, accuracy = camera.object_distance + dz, making.accuracy
+    found = varying.lenses(
+        camera, (grid.y / distance, grid.x / distance), seen(camera, distance, accuracy), accuracy
+    )
+    count, number = len(found.chosen), iter(range(len(found.chosen)))
+    _check_price(camera, distance, accuracy, count)
+
+    def of(one: CameraOptics) -> Linear:
+        mine = making.of(next(number), count)
+        result = periodic_operator(
+            one, grid, dz, accuracy=accuracy, folder=mine.folder, progress=mine.progress
+        )
+        memory.require(
+            count * result.memory_bytes, f"the operators of {count} lenses over the field",
+            "Use fewer lenslets, or a coarser accuracy.", SamplingError,
+        )  # fmt: skip
+        return result
+
+    return varying.operator(camera, grid, distance, found, of)
+
+
+def _check_price(camera: CameraOptics, distance: float, accuracy: float, count: int) -> None:
+    """Refuse what would take too long to build."""
+    optics = Optics.of(camera, distance, accuracy).bricks
+    if (operations := count * build_operations(optics)) > LONGEST:
+        raise SamplingError(
+            f"the operators of {count} lenses over the field take {operations:.0e} operations to build, "
+            f"{operations / A_MINUTE:.0f} min of a processor that does 1e11 a second; {LONGEST:.0e} are "
+            "allowed. Ask for a coarser accuracy, or use square lenslets."
+        )
 
 
 def _plane(optics: Optics, matrix: Matrix | Streamed, grid: Grid) -> Plane:

@@ -82,6 +82,7 @@ class Sampled:
     lens: Train
     distance: float
     widest: float
+    samples: int = PUPIL
     _pupil: list = field(default_factory=list, repr=False)
 
     def at(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -94,7 +95,7 @@ class Sampled:
         """The pupil's samples, for light of 1 behind it."""
         if not self._pupil:
             # Light comes again after as many λL/D as there are samples.
-            count = max(PUPIL, math.ceil(3 * self.widest / _cells.airy(self.camera)))
+            count = max(self.samples, math.ceil(3 * self.widest / _cells.airy(self.camera)))
             grid = Grid.square(count + 8, self.camera.pupil_diameter / count)
             with warnings.catch_warnings():  # what is sampled is the product of all phases
                 warnings.simplefilter("ignore", SamplingWarning)

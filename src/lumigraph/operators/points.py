@@ -4,13 +4,17 @@ A point lights few lenslets; cells of the image that get less than the accuracy 
 """
 
 import math
+from collections.abc import Iterator
+from itertools import repeat
 
 import numpy as np
 
+from lumigraph.operators import cells as _cells
+from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.fineness import COARSEST, FINEST
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.point_light import PointLight, point_light
+from lumigraph.operators.point_light import PointLight, Sampled, point_light
 from lumigraph.operators.relay import Relay, relay
 from lumigraph.operators.tiles import readout
 from lumigraph.scene import Points
@@ -29,6 +33,9 @@ OUTSIDE = 0.1
 
 SPARE = 0.5
 """Of the accuracy, what single points are computed to: they cost little, and stand near borders too."""
+
+TELLING = 1e-3
+"""Accuracy to which images are computed that tell lenses apart, at best: they are off alike."""
 
 _PER_CELL = 4
 """Samples along a cell that tell how bright it is."""
@@ -89,13 +96,24 @@ def _plane_image(lenslets: Relay, positions: np.ndarray, intensities: np.ndarray
     optics = lenslets.optics
     image = np.zeros([n * k for n, k in zip(optics.cells.image, optics.cells.samples, strict=True)])
     places = on_lenslets(optics, positions, optics.distance)
-    farthest = _farthest(optics, places)
-    light = point_light(optics.camera, optics.distance, farthest)
-    for place, intensity in zip(places, intensities, strict=True):
-        if optics.camera.model == "exact":
-            light = point_light(optics.camera, optics.distance, farthest, (float(place[0]), float(place[1])))
+    lights = _lights(optics, positions, places, _farthest(optics, places))
+    for light, place, intensity in zip(lights, places, intensities, strict=True):
         _add(image, lenslets, light, place, float(intensity))
     return readout(optics).forward(image.astype(np.float32))
+
+
+def _lights(
+    optics: Optics, positions: np.ndarray, places: np.ndarray, farthest: float
+) -> Iterator[PointLight]:
+    """Of each point (n, 2), imaged at its place: as exactly oblique, or aberrated, as it is there."""
+    camera, distance = optics.camera, optics.distance
+    varies = varying.plate_of(camera) is not None
+    if camera.model != "exact" and not varies:
+        yield from repeat(point_light(camera, distance, farthest), len(places))
+        return
+    for position, place in zip(positions.tolist(), places.tolist(), strict=True):
+        mine = varying.at(camera, position[0] / distance, position[1] / distance) if varies else camera
+        yield point_light(mine, distance, farthest, (place[0], place[1]))
 
 
 def on_lenslets(optics: Optics, positions: np.ndarray, distance: float | np.ndarray) -> np.ndarray:
@@ -153,3 +171,35 @@ def _lit(optics: Optics, light: PointLight, place: np.ndarray) -> tuple[range, r
         last = n - 1 - int(np.searchsorted(np.cumsum(line[::-1]), budget))
         far.append(range(max(0, first - spill), min(n, last + spill + 1)))
     return far[0], far[1]
+
+
+TOLD = ((0.13, -0.21), (-0.38, 0.44))
+"""Places in a lenslet, of its pitch, of the points whose images tell lenses apart."""
+
+COARSE_PUPIL = 256
+"""Samples across lenses that are set beside each other: all are sampled alike."""
+
+
+def seen(camera: CameraOptics, distance: float, accuracy: float) -> varying.Image:
+    """Images of two points amid the array by lenses of a camera; see `varying`."""
+    optics = Optics.of(camera, distance, max(accuracy, TELLING))
+    lenslets, pitch = relay(optics), optics.array.lattice.pitch
+    middle = np.array(optics.cells.middle(optics.cells.kind))
+    places = [middle + pitch * np.array(part) for part in TOLD]
+    farthest = _farthest(optics, np.array(places))
+
+    def light(one: CameraOptics) -> PointLight:
+        return Sampled(one, _cells.lens(one), distance, farthest, COARSE_PUPIL)  # all in one way
+
+    lit = [_lit(optics, light(one), places[0]) for one in varying.some(camera)]
+    rows, columns = (range(min(r[k].start for r in lit), max(r[k].stop for r in lit)) for k in (0, 1))
+    y, x = lenslets.places(rows, columns)
+
+    def image(one: CameraOptics) -> np.ndarray:
+        of = light(one)
+        fields = (
+            lenslets.field(of.at(y - p[0], x - p[1]).astype(np.complex64), rows, columns) for p in places
+        )
+        return np.concatenate([np.abs(field).ravel() ** 2 for field in fields])
+
+    return image

@@ -35,10 +35,12 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Chain, Linear, Shape
 from lumigraph.elements import ThinLens
 from lumigraph.errors import SamplingError, SamplingWarning
-from lumigraph.operators import band
+from lumigraph.operators import band, varying
+from lumigraph.operators import cells as _cells
 from lumigraph.operators.band import Span
 from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.resampling import Resampling, averaged, represented
+from lumigraph.operators.varying import FieldOperator
 from lumigraph.propagation import propagate
 from lumigraph.propagation.window import smooth_size
 from lumigraph.scene import Points, Slice, sources
@@ -53,6 +55,9 @@ PERIOD = 3.0
 """The pupil's samples make h repeat itself after this many times its largest offset from the axis."""
 
 _TRANSFERS = ByteCache()
+
+TOLD = 40.0
+"""How far around a point [λL/D] its images are set beside each other."""
 
 ERROR = 1e-4
 """Relative rms error of an image: kernels and pupil, against twice as much of each."""
@@ -116,7 +121,9 @@ class SingleLensOperator(Chain):
         return ERROR
 
 
-def single_lens_operator(camera: HasOptics, grid: Grid, dz: float = 0.0) -> SingleLensOperator:
+def single_lens_operator(
+    camera: HasOptics, grid: Grid, dz: float = 0.0, accuracy: float = 1e-3
+) -> SingleLensOperator | FieldOperator:
     """Operator from a plane at depth `dz`, sampled on `grid`, to the raw image; transfers are kept for reuse.
 
     Parameters
@@ -127,15 +134,24 @@ def single_lens_operator(camera: HasOptics, grid: Grid, dz: float = 0.0) -> Sing
         Samples of the object [m], each of them a point that stands for its area.
     dz
         Depth of the plane from the focused one [m], positive farther.
+    accuracy
+        Of a lens that changes over the field: how far off other fields may be, relative rms.
 
     Raises
     ------
+    GeometryError
+        Light from beyond the fields that a lens is known for.
     SamplingError
         The camera has lenslets, or the image's samples do not fit in memory.
     """
     plain = camera.optics()
     if plain.array is not None:
         raise SamplingError("the camera has lenslets: use periodic_operator.")
+    if varying.plate_of(plain) is not None:
+        distance = plain.object_distance + dz
+        fields = grid.y / distance, grid.x / distance
+        found = varying.lenses(plain, fields, _seen(plain, distance), accuracy)
+        return varying.operator(plain, grid, distance, found, lambda one: single_lens_operator(one, grid, dz))
     scale, pitch = -plain.separation / (plain.object_distance + dz), image_pitch(plain)
     here = _covering((scale * grid.y, scale * grid.x), pitch)
     points = [span.pitch / scale for span in here]  # descending in the object
@@ -148,24 +164,48 @@ def single_lens_operator(camera: HasOptics, grid: Grid, dz: float = 0.0) -> Sing
     return SingleLensOperator(maps, object_grid=grid)
 
 
-def slice_image(camera: HasOptics, part: Slice) -> np.ndarray:
-    """Raw image (ny, nx) of a slice."""
-    operator = single_lens_operator(camera, part.grid, part.dz)
-    return operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
+def _seen(camera: CameraOptics, distance: float) -> varying.Image:
+    """Images of a point by lenses of a camera; see `varying`."""
+    pitch, spot = image_pitch(camera), camera.wavelength * camera.separation / camera.pupil_diameter
+    reach = max(1.2 * _cells.blur(one, distance) for one in varying.some(camera)) + TOLD * spot
+    span = Span.around(-reach, reach, pitch)
+    return lambda one: _point_image(one, distance, [span, span], 1.0).ravel()
+
+
+def slice_image(camera: HasOptics, part: Slice, accuracy: float = 1e-3) -> tuple[np.ndarray, float]:
+    """Raw image (ny, nx) of a slice, and what fields between those of chosen lenses are off by."""
+    operator = single_lens_operator(camera, part.grid, part.dz, accuracy)
+    image = operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
+    return image, operator.left if isinstance(operator, FieldOperator) else 0.0
 
 
 def points_image(instrument: HasOptics, points: Points) -> np.ndarray:
-    """Raw image (ny, nx) of points, wherever they are: one convolution for each depth."""
+    """Raw image (ny, nx) of points, wherever they are.
+
+    One convolution for each depth or, where the lens changes over the field, for each point.
+    """
     camera = instrument.optics()
+    if varying.plate_of(camera) is None:
+        return _points_image(camera, points.positions, points.intensities)
     total = np.zeros(camera.sensor.shape, np.float32)
-    for dz in np.unique(points.positions[:, 2]):
-        chosen = points.positions[:, 2] == dz
+    for position, intensity in zip(points.positions, points.intensities, strict=True):
+        distance = camera.object_distance + float(position[2])
+        one = varying.at(camera, position[0] / distance, position[1] / distance)
+        total += _points_image(one, position[None], np.array([intensity]))
+    return total
+
+
+def _points_image(camera: CameraOptics, positions: np.ndarray, intensities: np.ndarray) -> np.ndarray:
+    """By one lens for all."""
+    total = np.zeros(camera.sensor.shape, np.float32)
+    for dz in np.unique(positions[:, 2]):
+        chosen = positions[:, 2] == dz
         scale, pitch = -camera.separation / (camera.object_distance + dz), image_pitch(camera)
-        y, x = scale * points.positions[chosen, :2].T
+        y, x = scale * positions[chosen, :2].T
         here = _covering((y, x), pitch)
         along_y, along_x = band.placed(y, here[0]), band.placed(x, here[1])
         # A point of intensity 1 counts as one sample of the camera's own object grid.
-        light = points.intensities[chosen] * camera.object_pitch**2 * (scale / pitch) ** 2
+        light = intensities[chosen] * camera.object_pitch**2 * (scale / pitch) ** 2
         samples = ((along_y * light) @ along_x.T).toarray().astype(np.float32)
         total += Chain(_imaging(camera, here, float(dz))).forward(samples)
     return total

@@ -12,6 +12,7 @@ from lumigraph.operators.coherent import coherent_image
 from lumigraph.operators.paraxial import left_by_field, resolved
 from lumigraph.operators.periodic import periodic_operator
 from lumigraph.operators.screens import Screen
+from lumigraph.operators.varying import FieldOperator
 from lumigraph.scene import Diffuser, Points, Slice
 from lumigraph.simulation import error
 from lumigraph.simulation.camera import Camera
@@ -40,7 +41,8 @@ def image_of(
     if light is not None and isinstance(part, Slice):
         return _lit(replace(plain, model="paraxial"), part, accuracy, light)
     if camera.lattice is None:
-        return _without_lenslets(camera, part), error.SINGLE_LENS
+        image, left = _without_lenslets(camera, part, accuracy)
+        return image, error.SINGLE_LENS.and_also(left, ", lenses over the field" if left else "")
     if isinstance(part, Diffuser):
         image, fringes = white.white_image(plain, accuracy)
         reached = error.of_quadrature("white image", accuracy).and_also(fringes)
@@ -56,6 +58,8 @@ def image_of(
     reached = error.of_quadrature("operator", accuracy)
     if plain.model == "exact":
         return image, reached.and_also(left_by_field(plain, accuracy), ", alike over the field")
+    if isinstance(operator, FieldOperator):
+        reached = reached.and_also(operator.left, f", {len(operator.maps)} lenses over the field")
     return image, reached.through(plain)
 
 
@@ -73,9 +77,9 @@ def _lit(
     return coherent_image(camera, amplitude, part.grid, part.dz, accuracy), reached
 
 
-def _without_lenslets(camera: Camera, part: Part) -> np.ndarray:
+def _without_lenslets(camera: Camera, part: Part, accuracy: float) -> tuple[np.ndarray, float]:
     if isinstance(part, Points):
-        return single_lens.points_image(camera, part)
+        return single_lens.points_image(camera, part), 0.0
     if isinstance(part, Diffuser):  # a sharp image of nothing: even light
-        return np.full(camera.sensor.shape, part.intensity)
-    return single_lens.slice_image(camera, part.trimmed())
+        return np.full(camera.sensor.shape, part.intensity), 0.0
+    return single_lens.slice_image(camera, part.trimmed(), accuracy)

@@ -9,7 +9,7 @@ from lumigraph.core import arrays
 from lumigraph.core.progress import Progress
 from lumigraph.core.progress import part as share_of
 from lumigraph.errors import GeometryError
-from lumigraph.operators import CameraOptics, partly, points
+from lumigraph.operators import CameraOptics, partly, points, varying
 from lumigraph.operators.periodic import PeriodicOperator, periodic_operator
 from lumigraph.operators.screens import Screen
 from lumigraph.scene import Points, Scene, Slice
@@ -29,7 +29,7 @@ def screens_of(scene: Scene, camera: Camera, coherence: object) -> list[Screen]:
     Raises
     ------
     GeometryError
-        Light that interferes, or a camera without lenslets.
+        Light that interferes, a camera without lenslets, or a lens that changes over the field.
     """
     opaque = [part for part in scene.parts if isinstance(part, Slice) and part.hides]
     if not opaque:
@@ -44,6 +44,7 @@ def screens_of(scene: Scene, camera: Camera, coherence: object) -> list[Screen]:
             f"a slice at {opaque[0].dz * 1e3:.4g} mm is opaque but the camera has no lenslets: what hides "
             "what is known of cameras with lenslets. Leave the opacity out, or use a plenoptic camera."
         )
+    varying.check_one(camera.optics())
     return [
         Screen(part.opacity, part.grid, camera.object_distance + part.dz)
         for part in opaque
