@@ -250,3 +250,76 @@ def test_a_batch_warms_up_in_runs_that_are_the_same_whoever_does_them(lumigraph,
     assert lumigraph(*batch, "-o", "v.ome.zarr").code == 0
     again = lg.open(tmp_path / "v.ome.zarr", page=1)
     np.testing.assert_array_equal(again.data, lg.open(tmp_path / "w-page-1.ome.zarr").data)
+
+
+PLENOPTIC = """
+kind = "plenoptic"
+wavelength = "550 nm"
+object_distance = "200 mm"
+[main_lens]
+focal_length = "100 mm"
+[lenslets]
+pitch = "100 um"
+focal_length = "2.5 mm"
+count = [3, 3]
+[sensor]
+pixel_pitch = "10 um"
+"""
+
+
+@pytest.fixture
+def scanned(lumigraph, tmp_path):
+    """A camera file and raw images of a blob, moved by halves of a lenslet, the last four times as long."""
+    (tmp_path / "camera.toml").write_text(PLENOPTIC)
+    camera = lg.load_camera(tmp_path / "camera.toml")
+    at = lg.Grid((25, 25), (4e-6, 4e-6))
+    blob = np.exp(-((at.y[:, None] ** 2 + at.x**2) / (2 * 12e-6**2)))
+    for number, (y, x) in enumerate(lg.scan(2, camera.lenslet_size)):
+        there = lg.Grid(at.shape, at.pitch, (30e-6 + y, -20e-6 + x))
+        light = lg.simulate(camera, lg.Scene([lg.Slice(blob, there)]), lg.Incoherent(1e-2)).data
+        raw = camera.sensor.expose(np.maximum(light, 0), photons=4000 if number == 3 else 1000)
+        tifffile.imwrite(tmp_path / f"raw{number}.tif", raw.data)
+    return lumigraph
+
+
+FILES = [f"raw{k}.tif" for k in range(4)]
+
+
+def test_raw_images_of_a_moved_object_are_deconvolved_together(scanned, tmp_path):
+    said = ("deconvolve", *FILES, "--camera", "camera.toml", "--iterations", 10)
+    found = scanned(*said, "--shifts", "2x2", "--light", "1,1,1,4", "-o", "picture.tiff")
+    assert found.code == 0, found.err
+    assert "times as bright" not in found.err
+    picture = lg.open(tmp_path / "picture.tiff")
+    pairs = "; ".join(f"{y} um, {x} um" for y in (-25, 25) for x in (-25, 25))
+    assert scanned(*said, "--shifts", pairs, "--light", "1,1,1,4", "-o", "pairs.tiff").code == 0
+    np.testing.assert_allclose(lg.open(tmp_path / "pairs.tiff").data, picture.data, rtol=1e-4, atol=1e-3)
+    camera = lg.load_camera(tmp_path / "camera.toml")
+    grid = lg.joint_operator(camera, shifts=lg.scan(2, camera.lenslet_size)).object_grid
+    light = picture.data / picture.data.sum()
+    assert (light.sum(1) @ grid.y, light.sum(0) @ grid.x) == pytest.approx((30e-6, -20e-6), abs=3e-6)
+    dim = scanned(*said, "--shifts", "2x2", "-o", "dim.tiff")
+    assert "times as bright" in dim.err + dim.out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([*FILES[:3], "--shifts", "2x2"], "--shifts is for 4 raw images, but there are 3"),
+        ([*FILES[:1], "--shifts", "1x1"], "are of several raw images"),
+        ([*FILES[:2], "--shifts", "2x3"], "a scan is square"),
+        ([*FILES[:2], "--shifts", "1 um; 2 um"], "must be pairs"),
+        ([*FILES[:2], "--shifts", "1 kg, 0 um; 0 um, 0 um"], "--shifts"),
+        ([*FILES[:2], "--light", "1,0"], "numbers above 0"),
+        ([*FILES[:2], "--light", "1,1,1"], "--light is for 3 raw images"),
+        ([FILES[0], "film.tif", "--page", "all"], "film.tif has 2 pages, a time series"),
+    ],
+)
+def test_what_is_no_set_of_raw_images_is_refused(lumigraph, tmp_path, words, message):
+    (tmp_path / "camera.toml").write_text(PLENOPTIC)
+    for name in FILES:
+        tifffile.imwrite(tmp_path / name, np.ones((9, 9), np.uint16))
+    tifffile.imwrite(tmp_path / "film.tif", np.ones((2, 9, 9), np.uint16))
+    found = lumigraph("deconvolve", *words, "--camera", "camera.toml", "-o", "picture.tiff")
+    assert found.code != 0
+    assert message in " ".join(found.err.split())

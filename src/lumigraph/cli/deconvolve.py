@@ -12,10 +12,12 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
+from lumigraph.cli.deconvolved import reached, result
 from lumigraph.cli.options import Output, above_zero, length, region
 from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.cli.several import SEVERAL, Several, Shifts
 from lumigraph.core.progress import Progress, Stage, silent, within
-from lumigraph.core.result import Figure, Quantity, Result
+from lumigraph.core.result import Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -139,7 +141,8 @@ class Way:
         Stop where the deviance per pixel falls to this: to 1 for raw images of 'simulate --noise', whose
         electrons are known; refused where they are not.
     raw_lattice
-        Leave out the low-pass that keeps squares as large as lenslets out of a microscope's volumes.
+        Leave out the low-pass that keeps squares as large as lenslets out of a microscope's volumes. Objects
+        that were moved between raw images have none.
     checkpoint
         File (.npz) from which a killed run goes on.
     warm
@@ -179,28 +182,34 @@ class Way:
 def deconvolve(
     raw: Path,
     /,
-    *,
+    *others: Path,
     output: Output,
     camera: str,
     seen: Seen = Seen(),
     wanted: Wanted = Wanted(),
     way: Way = Way(),
+    several: Several = SEVERAL,
     common: Reported = REPORTED,
 ) -> Result:
-    """Reconstruct what was in front of a microscope or a camera from one raw image, or a time series.
+    """Reconstruct what was in front of a microscope or a camera from raw images, or a time series.
 
     A light-field microscope gives a volume, a focused camera the picture of its main lens, or one for each
     of several depths. The object is followed as far beyond the picture as light comes from, and cut
-    afterwards. Ctrl-C writes what was reached.
+    afterwards. Ctrl-C writes what was reached. Several files are raw images of one object, deconvolved
+    together; several pages of one file are a time series, deconvolved one after the other.
 
     Example: `lumigraph deconvolve raw.tif --white white.tif --dark dark.tif --camera scope.toml --z "-20 um:20 um:2 um" -o volume.ome.tif`
 
     Example: `lumigraph deconvolve film.tif --page 0:9 --camera scope.toml --z "-20 um:20 um:2 um" -o volume.ome.tif`
 
+    Example: `lumigraph deconvolve a.tif b.tif c.tif d.tif --shifts 2x2 --camera camera.toml -o picture.tiff`
+
     Parameters
     ----------
     raw
         Raw image (TIFF, PNG, Zarr), as it was read, or a stack of them.
+    others
+        More raw images of the same object: scanned, or of other exposures.
     output
         Volume (.ome.tif, .ome.zarr, .h5) or picture (.tiff, .png, .zarr); of several pages one file each.
     camera
@@ -213,8 +222,12 @@ def deconvolve(
     for options in (common, seen, way):
         options.check()
     wanted.depths()  # refused before anything is read
+    several.check(1 + len(others))
     described = load_camera(camera)
     frames = seen.frames(raw)
+    more = [_only(seen.frames(path), path) for path in others]
+    if more:
+        _only(frames, raw)
     if len(frames) > 1 and way.checkpoint is not None:
         raise FormatError("--checkpoint keeps one run, not several pages. Give one --page.")
     if way.warm and len(frames) == 1 and _RUN.get() is None:
@@ -226,14 +239,27 @@ def deconvolve(
         ready = seen.prepared(frames[0][1], described)
         made = within(shown, 0.0, 1.0, "point images")
         made(0.0)
-        engine = _engine(_Asked.of(camera, wanted, way, ready.calibration, made))
+        shifts = several.moved(described, 1 + len(more)) if more else None
+        engine = _engine(_Asked.of(camera, wanted, way, ready.calibration, made, shifts))
         _begin(engine)
-        task = _Task(engine, way, output)
-        pages = [(name, replace(ready, data=frame.data)) for name, frame in frames]
+        task = _Task(engine, way, output, None if several.light is None else several.lights())
+        pages: list[tuple[str, Any]] = [(name, replace(ready, data=frame.data)) for name, frame in frames]
+        if more:
+            pages = [("", [ready, *(seen.prepared(frame, described) for frame in more)])]
         for name, found in task.run(pages, (steps, shown)):
             written.append(_named(output, name))
             io.save(found, written[-1])
-    return _result(found, pages[-1][1], steps, tuple(written))
+    return result(found, ready if more else pages[-1][1], steps, tuple(written))
+
+
+def _only(frames: "list[tuple[str, Any]]", path: Path) -> Any:
+    """The raw image of a file that is one of several."""
+    if len(frames) > 1:
+        raise FormatError(
+            f"{path} has {len(frames)} pages, a time series, but several files are raw images of one object. "
+            "Give one --page."
+        )
+    return frames[0][1]
 
 
 _RUN: ContextVar["list[Deconvolver] | None"] = ContextVar("run", default=None)
@@ -265,15 +291,25 @@ class _Task:
     engine: "Deconvolver"
     way: Way
     output: Path
+    lights: tuple[float, ...] | None = None
+
+    def _known(self, ready: Any) -> "tuple[Any, float | None]":
+        """The exposure of a page, or those of several raw images of one object; and the gain of the first."""
+        found = self.engine.known(ready, None)
+        if not isinstance(found, tuple):
+            return found, found.gain
+        if self.lights is not None:
+            found = tuple(replace(one, light=t) for one, t in zip(found, self.lights, strict=True))
+        return found, found[0].gain
 
     def run(
-        self, pages: "list[tuple[str, PreparedImage]]", followed: "tuple[list[Step], Progress]"
+        self, pages: "list[tuple[str, Any]]", followed: "tuple[list[Step], Progress]"
     ) -> "Iterator[tuple[str, Any]]":
         """The name and the object of each page; the steps of one are kept, and shown."""
         from lumigraph import deconvolution, io
 
-        exposure, (steps, shown), name = deconvolution.Exposure.of(pages[0][1]), followed, ""
-        if self.way.deviance is not None and exposure.gain is None:
+        (exposure, gain), (steps, shown), name = self._known(pages[0][1]), followed, ""
+        if self.way.deviance is not None and gain is None:
             raise FormatError(
                 "--deviance counts electrons, but the raw image does not say how many make a value. "
                 "Leave it out and use --iterations."
@@ -281,7 +317,7 @@ class _Task:
 
         def follow(step: "Step") -> None:
             steps.append(step)
-            what = f"{name[1:]} {_reached(step, exposure.gain)}".strip()
+            what = f"{name[1:]} {reached(step, gain)}".strip()
             shown(Stage(step.iteration / step.iterations, what))
 
         try:
@@ -302,30 +338,37 @@ class _Asked:
     wanted: Wanted
     way: Way
     lattice: str
+    shifts: Shifts | None
     camera: "Instrument" = field(compare=False)
     calibration: "Calibration | None" = field(compare=False)
     progress: Progress = field(compare=False)
 
     @classmethod
     def of(
-        cls, camera: str, wanted: Wanted, way: Way, calibration: "Calibration | None", progress: Progress
-    ) -> "_Asked":
+        cls, camera: str, wanted: Wanted, way: Way, calibration: "Calibration | None", progress: Progress,
+        shifts: Shifts | None = None,
+    ) -> "_Asked":  # fmt: skip
         """By the content of the camera's description and of the calibration."""
         from lumigraph.deconvolution.checkpoint import fingerprint
         from lumigraph.instruments import load_camera
 
         found = load_camera(camera)
-        return cls(found.to_toml(), wanted, way, fingerprint(calibration), found, calibration, progress)
+        return cls(
+            found.to_toml(), wanted, way, fingerprint(calibration), shifts, found, calibration, progress
+        )
 
 
 @lru_cache(1)  # the frames of a batch share it
 def _engine(asked: _Asked) -> "Deconvolver":
     from lumigraph.deconvolution import Deconvolver, Stop
 
-    operator = operator_of(
-        asked.camera, asked.wanted.depths(), asked.wanted.samples, asked.calibration, asked.progress
-    )
     way = asked.way
+    operator = operator_of(
+        asked.camera, asked.wanted.depths(), asked.wanted.samples, asked.calibration, asked.progress,
+        asked.shifts,
+    )  # fmt: skip
+    if asked.shifts is not None and len(set(asked.shifts)) > 1:  # finer than lenslets sample: no low-pass
+        way = replace(way, raw_lattice=True)
     return Deconvolver(
         operator, Stop(way.iterations, way.deviance), method=way.method(asked.camera, operator), warm=way.warm
     )
@@ -334,13 +377,6 @@ def _engine(asked: _Asked) -> "Deconvolver":
 def _named(output: Path, name: str) -> Path:
     """The output with something between its name and its endings."""
     return output.with_name(f"{output.name.split('.')[0]}{name}{''.join(output.suffixes)}")
-
-
-def _reached(step: "Step", gain: float | None) -> str:
-    """How well it fits: in electrons where they are counted, else how much the last step changed."""
-    if gain is None:
-        return f"the last step changed {100 * step.change:.2g} %"
-    return f"deviance {step.deviance:.4g} per pixel"
 
 
 def depths(option: str, text: str) -> tuple[float, ...]:
@@ -378,53 +414,13 @@ def depths(option: str, text: str) -> tuple[float, ...]:
 
 def operator_of(
     camera: "Instrument", planes: tuple[float, ...] | None, samples: int | None,
-    calibration: "Calibration | None", progress: Progress = silent,
+    calibration: "Calibration | None", progress: Progress = silent, shifts: Shifts | None = None,
 ) -> "Linear":  # fmt: skip
-    """The camera's model of how it sees planes [m]."""
+    """The camera's model of how it sees planes [m], or an object that was moved by shifts [m]."""
+    from lumigraph.instruments.joint import joint_operator_for
+
     if camera.calibration is None and samples is not None:
         raise FormatError(f"a {camera.noun} camera has no lenslets to count --samples by. Leave it out.")
+    if shifts is not None:
+        return joint_operator_for(camera, calibration, shifts, planes, samples, progress)
     return camera.operator_for(calibration, planes, samples, progress)
-
-
-def _result(found: Any, raw: "PreparedImage", steps: "list[Step]", written: tuple[Path, ...]) -> Result:
-    from lumigraph.core.volume import Volume
-    from lumigraph.deconvolution import Exposure
-
-    values = [Quantity("shape", tuple(found.data.shape), "samples")]
-    text = " x ".join(map(str, values[0].value)) + " samples"
-    if isinstance(found, Volume):
-        values += [Quantity("spacing", found.spacing, "m"), Quantity("depths", found.depths, "m")]
-        text += " of " + " x ".join(f"{1e6 * step:.4g}" for step in found.spacing) + " µm"
-    elif found.pixel_pitch:
-        values.append(Quantity("pixel_pitch", found.pixel_pitch, "m"))
-        text += f" of {1e6 * found.pixel_pitch:.4g} µm"
-    lines = [text, "the checkpoint was finished already"]
-    if steps:
-        last, gain = steps[-1], Exposure.of(raw).gain
-        values += [Quantity("iterations", last.iteration), Quantity("change", last.change)]
-        values += [] if gain is None else [Quantity("deviance", last.deviance)]
-        values.append(Quantity("stopped", last.stopped))
-        lines[1] = f"{last.iteration} iterations, {_reached(last, gain)}"
-    return Result(
-        "Deconvolution", "A raw image, and what was in front of the camera.", found, tuple(lines),
-        tuple(values), lambda: _figures(found, raw, steps), raw.notes, written,
-    )  # fmt: skip
-
-
-def _figures(found: Any, raw: "PreparedImage", steps: "list[Step]") -> "Iterator[Figure]":
-    from lumigraph import plots
-    from lumigraph.core.volume import Volume
-
-    if isinstance(found, Volume) and len(found.depths) > 1:
-        yield Figure(plots.projections(found), "The brightest sample along each axis.")
-        yield Figure(plots.slices(found), "Planes through the brightest sample.")
-    else:
-        yield Figure(found.data[0] if isinstance(found, Volume) else found, "Reconstructed picture.")
-    yield Figure(raw, "Raw image; white is its brightest pixel.", options={"white": float(raw.data.max())})
-    if len(steps) > 1:
-        numbers = [step.iteration for step in steps]
-        drawn = plots.curves(
-            numbers, {"": [step.deviance for step in steps]}, xlabel="iteration",
-            ylabel="Poisson deviance per pixel", log=True,
-        )  # fmt: skip
-        yield Figure(drawn, "Less deviance is likelier; its scale needs the gain.", "Convergence")

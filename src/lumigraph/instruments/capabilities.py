@@ -39,6 +39,16 @@ class Rendered(Protocol):
 
 
 @runtime_checkable
+class WithLenslets(Protocol):
+    """Its object is sampled by lenslets."""
+
+    @property
+    def lenslet_size(self) -> float:
+        """Of a lenslet in the focused plane [m]."""
+        ...
+
+
+@runtime_checkable
 class WithMainLens(Protocol):
     """A main lens forms its image: depths follow from the lens equation."""
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lumigraph.core import checks
+from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Joint, Linear
 from lumigraph.core.progress import Progress, part
@@ -42,8 +43,8 @@ def scan(steps: int, period: float | Sequence[float]) -> np.ndarray:
     steps
         Along each axis.
     period
-        What is divided (y, x) [m]: a lenslet's pitch where the array moves, `lenslet_size` of the camera's
-        object where the object does.
+        What is divided (y, x) [m]: a lenslet's pitch where the array moves, ``camera.lenslet_size`` where the
+        object does.
 
     Raises
     ------
@@ -115,6 +116,21 @@ def joint_operator(
         checks.instance("a camera", camera, Instrument)
     makers = _makers(some, depths, samples_per_lenslet, accuracy, progress)
     return joined(makers, moved, grid)
+
+
+def joint_operator_for(
+    camera: Instrument,
+    calibration: Calibration | None,
+    shifts: Sequence[Shift],
+    depths: Sequence[float] | None = None,
+    samples_per_lenslet: int | None = None,
+    progress: Progress | None = None,
+) -> Joint:
+    """As `joint_operator`, of a real camera's pixels, as `Instrument.operator_for` has them."""
+    if isinstance(camera, Camera):
+        return joint_operator(camera, depths, samples_per_lenslet, shifts=shifts, progress=progress)
+    own = camera.operator_for(calibration, depths, samples_per_lenslet, progress)
+    return joined([Maker.of(own)] * len(shifts), shifts)
 
 
 def joined(makers: Sequence[Maker], shifts: Sequence[Shift], grid: Grid | None = None) -> Joint:

@@ -79,6 +79,11 @@ class LensletCamera(Camera):
         return plenoptic1.micro_image_pitch(self.lenslets.pitch, self.separation, self.lenslet_distance)
 
     @property
+    def lenslet_size(self) -> float:
+        """Of a lenslet in the focused plane, p z1/L [m]."""
+        return self.lenslets.pitch * self.object_distance / self.separation
+
+    @property
     def micro_image_width(self) -> float:
         """Width of a micro-image by ray optics: the main lens seen through a lenslet, D b / L [m]."""
         return self.pupil_diameter * self.lenslet_distance / self.separation
