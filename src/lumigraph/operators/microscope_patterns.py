@@ -23,7 +23,7 @@ _FOUND = ByteCache()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patterns:
-    """Orthonormal patterns over the places of a cell, those of one parity side by side.
+    """Orthonormal patterns over the places of a cell.
 
     Parameters
     ----------
@@ -33,11 +33,14 @@ class Patterns:
         (2, r) of 0 and 1: whether a pattern is odd along y, and along x.
     left_out
         Relative rms of the image of a point as the sum of its patterns, the worst of all points.
+    along
+        (n, n), of which they are all products of two rows, one along y and one along x; None for others.
     """
 
     basis: np.ndarray
     odd: np.ndarray
     left_out: float = 0.0
+    along: np.ndarray | None = None
 
     @property
     def count(self) -> int:
@@ -49,24 +52,22 @@ class Patterns:
         """Of the arrays."""
         return self.basis.nbytes + self.odd.nbytes
 
-    def of_parity(self, odd_y: int, odd_x: int) -> slice:
-        """Where the patterns of a parity stand."""
-        places = np.flatnonzero((self.odd[0] == odd_y) & (self.odd[1] == odd_x))
-        return slice(int(places[0]), int(places[-1]) + 1) if len(places) else slice(0, 0)
+    def of_parity(self, odd_y: int, odd_x: int) -> np.ndarray:
+        """Numbers of the patterns of a parity."""
+        return np.flatnonzero((self.odd[0] == odd_y) & (self.odd[1] == odd_x))
 
 
 @remembered
 def all_patterns(n: int) -> Patterns:
     """As many patterns as a cell of n × n places has.
 
-    >>> all_patterns(3).count, all_patterns(3).of_parity(0, 1)
-    (9, slice(4, 6, None))
+    >>> all_patterns(3).count, all_patterns(3).of_parity(0, 1).tolist()
+    (9, [2, 5])
     """
     one, half = parts(n), (n + 1) // 2
     odd_y, odd_x = np.divmod(np.arange(n * n), n)
     odd = np.stack([odd_y >= half, odd_x >= half]).astype(np.int8)
-    order = np.argsort(2 * odd[0] + odd[1], kind="stable")
-    return Patterns(np.kron(one, one).T[:, order], odd[:, order])
+    return Patterns(np.kron(one, one).T, odd, along=one)
 
 
 @remembered
@@ -117,8 +118,7 @@ def few_patterns(kernel: SliceKernel, left_out: float) -> Patterns:
         return whole
     chosen = vectors[:, :kept]
     odd = whole.odd[:, np.abs(chosen).argmax(0)]
-    order = np.argsort(2 * odd[0] + odd[1], kind="stable")
-    return Patterns(whole.basis @ chosen[:, order], odd[:, order], float(missing[kept]))
+    return Patterns(whole.basis @ chosen, odd, float(missing[kept]))
 
 
 def _strongest_first(kernel: SliceKernel, whole: Patterns) -> tuple[np.ndarray, np.ndarray]:
@@ -126,10 +126,10 @@ def _strongest_first(kernel: SliceKernel, whole: Patterns) -> tuple[np.ndarray, 
     blocks, weights = quadrant(kernel)
     rows = whole.basis.T.astype(np.float32) @ blocks
     vectors, energy = np.zeros((whole.count, whole.count)), np.zeros(whole.count)
-    for place in {(s.start, s.stop): s for s in map(whole.of_parity, (0, 0, 1, 1), (0, 1, 0, 1))}.values():
-        part = rows[:, place].astype(np.float64)
+    for places in map(whole.of_parity, (0, 0, 1, 1), (0, 1, 0, 1)):
+        part = rows[:, places].astype(np.float64)
         products = np.tensordot(weights, part @ part.transpose(0, 2, 1), 1)
-        energy[place], vectors[place, place] = np.linalg.eigh(products)
+        energy[places], vectors[np.ix_(places, places)] = np.linalg.eigh(products)
     order = np.argsort(-energy, kind="stable")
     return vectors[:, order], np.maximum(energy[order], 0)
 

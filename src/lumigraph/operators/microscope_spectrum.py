@@ -36,6 +36,9 @@ READ, PASSED = 24, 150
 """Multiply-adds of a matrix product in the time of reading one number of `R` from memory, and of what is done
 to one number of a tile (transforms, parts and copies). The former was measured, the latter is a guess."""
 
+SEPARATE = 8
+"""Places along a side of a cell from which on patterns are taken along y and then along x."""
+
 GROUP = 2**22
 """Numbers of the transforms of all tiles that are treated at a time, at most, if one depth has fewer: they
 should stay in the processor's cache."""
@@ -186,12 +189,12 @@ def _fill(matrix: np.ndarray, depth: tuple[SliceKernel, Patterns], told: Tiling)
     steps = kernel.offsets[(kernel.offsets >= 0).all(1)]
     waves = [_waves(length, steps[:, axis]) for axis, length in enumerate(told.lengths)]
     for cy, cx, qy, qx in itertools.product((0, 1), repeat=4):
-        place = points.of_parity(cy, cx), pixels.of_parity(qy, qx)
+        rows, columns = points.of_parity(cy, cx), pixels.of_parity(qy, qx)
         sign = np.float32(-1 if cy * qy ^ cx * qx else 1)
         trigonometric = sign * waves[0][cy ^ qy][:, None] * waves[1][cx ^ qx]
-        part = whole[:, *place]
+        part = whole[:, rows[:, None], columns]
         product = trigonometric.reshape(told.frequencies, -1) @ part.reshape(len(part), -1)
-        matrix[:, *place] = product.reshape(told.frequencies, *part.shape[1:])
+        matrix[:, rows[:, None], columns] = product.reshape(told.frequencies, *part.shape[1:])
 
 
 def _waves(length: int, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -278,16 +281,28 @@ def _parted(plane: Array, patterns: Patterns) -> Array:
     """Plane (rows n, columns n) to patterns of each cell (rows, columns, r)."""
     xp, n = arrays.namespace(plane), math.isqrt(len(patterns.basis))
     cells = arrays.tiled(plane, (n, n))
-    shape = cells.shape[:2]
-    parts = xp.reshape(cells, (-1, n * n)) @ arrays.like(patterns.basis, plane)
-    return xp.reshape(parts, (*shape, patterns.count))
+    if (along := _along(patterns, plane)) is not None:
+        parts = along @ cells @ xp.matrix_transpose(along)
+    else:
+        parts = xp.reshape(cells, (-1, n * n)) @ arrays.like(patterns.basis, plane)
+    return xp.reshape(parts, (*cells.shape[:2], patterns.count))
 
 
 def _whole(cells: Array, patterns: Patterns, even: Array | None = None) -> Array:
     """Transpose of `_parted`, its inverse where all patterns are there; with `even` added to each cell."""
     xp, (rows, columns, channels) = arrays.namespace(cells), cells.shape
-    n, basis = math.isqrt(len(patterns.basis)), arrays.like(patterns.basis, cells)
-    whole = xp.reshape(cells, (-1, channels)) @ xp.matrix_transpose(basis)
-    whole = xp.reshape(whole, (rows, columns, n * n))
-    whole = whole if even is None else whole + even
-    return arrays.untiled(xp.reshape(whole, (rows, columns, n, n)))
+    n = math.isqrt(len(patterns.basis))
+    shape = rows, columns, n, n
+    if (along := _along(patterns, cells)) is not None:
+        whole = xp.matrix_transpose(along) @ xp.reshape(cells, shape) @ along
+    else:
+        basis = arrays.like(patterns.basis, cells)
+        whole = xp.reshape(xp.reshape(cells, (-1, channels)) @ xp.matrix_transpose(basis), shape)
+    return arrays.untiled(whole if even is None else whole + even[..., None])
+
+
+def _along(patterns: Patterns, like: Array) -> Array | None:
+    """What makes patterns axis by axis, where that takes less time than one product."""
+    if patterns.along is None or len(patterns.along) < SEPARATE:
+        return None
+    return arrays.like(patterns.along, like)
