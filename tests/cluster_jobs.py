@@ -32,6 +32,14 @@ def row(item):
     return cluster.Values({"seed": item["seed"], "square": item["seed"] ** 2})
 
 
+def spinning(item):
+    """Work for so many seconds of a processor."""
+    began = time.process_time()
+    while time.process_time() - began < item["busy"]:
+        pass
+    return cluster.Values(item)
+
+
 class Here:
     """Works in this process."""
 

@@ -212,6 +212,24 @@ def test_the_estimate_is_told_and_what_cannot_fit_is_refused(tmp_path):
         cluster.Estimate.of([Entry(0, 2.0, 1, 2**50)], 100, 4).require(4, tmp_path / "out.zarr")
 
 
+def test_the_estimate_counts_what_other_workers_make_first_and_shared_processors():
+    """Frames of 2 s after a first one of 12 s; a second worker starts in 1 s and makes the same first."""
+    first = [Entry(0, 12.0, 1, 1, busy=15.0), Entry(1, 2.0, 1, 1, busy=3.0)]
+    assert cluster.Estimate.of(first, 4, 1).seconds == 8
+    two = cluster.Estimate.of(first, 20, 2, starting=1.0)
+    assert two.seconds == 26  # 13 frames by the one, 7 after 11 s by the other: 25 s
+    assert cluster.Estimate.of(first, 100, 1000).seconds == 12  # those who start late do one each
+    shared = cluster.Estimate.of(first, 20, 2, processors=2)
+    assert shared.busy == 20 * 3 + 12
+    assert shared.seconds == 36  # each frame alone takes one and a half processors
+
+
+def test_an_entry_holds_the_processor_time_of_its_frame(tmp_path):
+    cluster.batch(jobs.spinning, [{"busy": 0.2}], tmp_path / "out.csv", workers=jobs.Here())
+    (entry,) = cluster.status(tmp_path / "out.csv").entries.values()
+    assert 0.2 <= entry.busy <= entry.seconds + 0.1
+
+
 def test_a_ledger_that_is_none_is_told(tmp_path):
     with pytest.raises(lg.FormatError, match="is not the ledger of a job"):
         cluster.status(tmp_path)

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.batch import TABLES, Hands, kept, require_table, save_table
-from lumigraph.cli.console import progress
+from lumigraph.cli.console import line, progress
 from lumigraph.cli.options import Output
 from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.cli.standing import Standing
@@ -88,6 +88,7 @@ def sweep(
         found = cluster.batch(
             Designs(source, tuple(names)), items, output, what={"camera": given.to_toml(), "measure": names},
             workers=Hands(workers).cluster(), progress=Standing(output, shown),
+            estimated=lambda needed: line(str(needed)),
         )  # fmt: skip
     save_table(output, axes)
     if found.failures:

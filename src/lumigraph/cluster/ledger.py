@@ -59,6 +59,8 @@ class Entry:
         Numbers by name, of jobs that give a table.
     notes
         Warnings.
+    busy
+        Processor time that it took [s].
     """
 
     number: int
@@ -69,6 +71,7 @@ class Entry:
     files: dict[str, tuple[int, int]] = field(default_factory=dict)
     values: dict[str, Any] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    busy: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,7 @@
 """`batch`: one piece of work for each of many items, on one machine or many, resumable at any time."""
 
+import heapq
+import math
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -11,7 +13,7 @@ from typing import Any, Protocol
 from lumigraph.cluster.ledger import LINK, PAGE, Entry, Ledger
 from lumigraph.cluster.pool import Outcome, Pool
 from lumigraph.cluster.task import BUSY, Task, Work
-from lumigraph.core import checks, memory
+from lumigraph.core import arrays, checks, memory
 from lumigraph.core.progress import Progress, Stage, silent
 from lumigraph.errors import LumigraphError, SamplingError
 
@@ -134,6 +136,8 @@ class Estimate:
         On the disk [bytes].
     noun
         What an item is.
+    busy
+        Processor time of all workers together [s].
     """
 
     frames: int
@@ -141,14 +145,41 @@ class Estimate:
     memory: int
     size: int
     noun: str = "frame"
+    busy: float = 0.0
 
     @classmethod
-    def of(cls, entries: Iterable[Entry], frames: int, workers: int) -> "Estimate":
-        """From entries of frames like those to come; the slower ones made what all of them share."""
+    def of(
+        cls,
+        entries: Iterable[Entry],
+        frames: int,
+        workers: int,
+        *,
+        processors: float = math.inf,
+        starting: float = 0.0,
+    ) -> "Estimate":
+        """From entries of frames like those to come, by one worker; the slower ones made what it keeps.
+
+        Parameters
+        ----------
+        entries
+            Of one worker.
+        frames
+            Still to do.
+        workers
+            Of which one is ready; the others make what they keep first.
+        processors
+            That all workers share: a frame alone may use several. Infinite where they are not known.
+        starting
+            Time until a worker begins [s].
+        """
         known = list(entries)
-        seconds = min(entry.seconds for entry in known)
-        size = max(entry.size for entry in known)
-        return cls(frames, frames * seconds / workers, max(entry.memory for entry in known), frames * size)
+        usual, slowest = (pick(known, key=lambda one: one.seconds) for pick in (min, max))
+        others = min(workers, frames) - 1
+        late = starting + slowest.seconds - usual.seconds
+        busy = frames * usual.busy + others * max(slowest.busy - usual.busy, 0.0)
+        seconds = max(_side_by_side(frames, usual.seconds, others * [late]), busy / processors)
+        memory, size = max(one.memory for one in known), max(one.size for one in known)
+        return cls(frames, seconds, memory, frames * size, busy=busy)
 
     def __str__(self) -> str:
         minutes = f"{self.seconds / 60:.1f} minutes" if self.seconds > 90 else f"{self.seconds:.0f} s"
@@ -243,9 +274,10 @@ def batch(
         left = list(_left(task, first, last, progress))
         with cluster.group(task) as group:
             if left:
+                began_first = time.perf_counter()
                 for done in range(min(_FIRST, len(left))):
                     _do(group, left[done : done + 1], done, len(left), progress)
-                _check(task, (cluster, group), left, estimated)
+                _check(task, (cluster, group), (left, time.perf_counter() - began_first), estimated)
                 _do(group, left[_FIRST:], _FIRST, len(left), progress)
     found = status(output)
     mine = {number: why for number, why in found.failures.items() if first <= number < last}
@@ -314,18 +346,38 @@ def _do(group: Group, numbers: list[int], done: int, total: int, progress: Progr
 
 
 def _check(
-    task: Task, who: tuple[Cluster, Group], left: list[int],
+    task: Task, who: tuple[Cluster, Group], begun: tuple[list[int], float],
     estimated: Callable[[Estimate], None] | None,
 ) -> None:  # fmt: skip
-    """Tell what the rest needs, by the first frames, and refuse what cannot fit."""
+    """Tell what the rest needs, by the first frames and their time, and refuse what cannot fit."""
+    left, elapsed = begun
     first = [entry for number in left[:_FIRST] if (entry := task.ledger.entry(number)) is not None]
     if not first or len(left) <= _FIRST:
         return
     cluster, group = who
-    needed = replace(Estimate.of(first, len(left) - _FIRST, group.count), noun=task.ledger.noun)
+    starting = max(elapsed - sum(entry.seconds for entry in first), 0.0)
+    processors = arrays.WORKERS if cluster.is_here else math.inf
+    rest = len(left) - _FIRST
+    needed = Estimate.of(first, rest, group.count, processors=processors, starting=starting)
+    needed = replace(needed, noun=task.ledger.noun)
     if estimated is not None:
         estimated(needed)
     needed.require(group.count if cluster.is_here else 1, task.output)
+
+
+def _side_by_side(frames: int, seconds: float, late: list[float]) -> float:
+    """When the last of so many frames ends, by one worker who is ready and others who begin late.
+
+    Each of them is given a frame at once, and the next one when it is done.
+
+    >>> _side_by_side(4, 2.0, [3.0]), _side_by_side(2, 1.0, [9.0])
+    (6.0, 10.0)
+    """
+    ends = [0.0, *(start + seconds for start in late)]
+    heapq.heapify(ends)
+    for _ in range(frames - len(late)):
+        heapq.heapreplace(ends, ends[0] + seconds)
+    return max(ends)
 
 
 def _many(noun: str, count: int) -> str:

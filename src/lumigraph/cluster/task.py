@@ -100,14 +100,14 @@ class Task:
         return entry is not None and series.is_whole(self.output, entry.files, content=content)
 
     def _made(self, number: int) -> Entry:
-        began = time.perf_counter()
+        began, busy = time.perf_counter(), time.process_time()
         with warnings.catch_warnings(record=True) as caught, single_products():
             warnings.simplefilter("default")
             files, values = self._done(number, self.work(self.items[number]))
         notes = list(dict.fromkeys(str(one.message)[:_LONGEST] for one in caught))
         return Entry(
             number, time.perf_counter() - began, peak(), sum(size for size, _ in files.values()),
-            f"{platform.node()}:{os.getpid()}", files, values, notes,
+            f"{platform.node()}:{os.getpid()}", files, values, notes, time.process_time() - busy,
         )  # fmt: skip
 
     def _done(self, number: int, found: Any) -> tuple[series.Checksums, dict[str, Any]]:

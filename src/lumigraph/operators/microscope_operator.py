@@ -105,9 +105,16 @@ class MicroscopeOperator(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of the kernels, of the lenslets' frequencies where they are used, and of an image [bytes]."""
-        spectra = self._matrix_numbers if self.by_frequency else 0
-        return self.nbytes + 4.0 * (spectra + 3 * sum(math.prod(shape) for shape in self.shape))
+        """Of the kernels, of the matrices, and of what `forward` or `adjoint` holds [bytes]."""
+        N, given = self.kernels[0].sampling.pixels, sum(math.prod(shape) for shape in self.shape)
+        if self.by_frequency:
+            held = microscope_spectrum.held_numbers(self._tiling, self._points, N)
+            return self.nbytes + 4.0 * (self._matrix_numbers + given + held)
+        most = max(len(kernel.offsets) * kernel.sampling.classes for kernel in self.kernels)
+        gathered = min(2 * most * math.prod(self.cells), 2 * GATHERED)
+        matrices = sum(len(kernel.offsets) * kernel.sampling.classes for kernel in self.kernels) * N * N
+        images = 3 * N * N * math.prod(self.cells)
+        return self.nbytes + 4.0 * (matrices + 2 * given + images + gathered)
 
     @property
     def reach(self) -> int:

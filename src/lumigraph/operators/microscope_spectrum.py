@@ -72,6 +72,17 @@ def matrix_numbers(told: Tiling, channels: int, pixels: int) -> int:
     return told.frequencies * channels * pixels**2
 
 
+def held_numbers(told: Tiling, points: Sequence[Patterns], pixels: int) -> int:
+    """How many one application holds at most, beside `matrices`, the object and the image."""
+    counts = [sum(one.count for one in points[depths]) for depths in groups(points, told)]
+    threads, columns = min(arrays.WORKERS, len(counts)), 4 * told.frequencies * told.count
+    cells = max(math.prod(row.cells + 2 * max(row.margin, 0) for row in (told.rows, told.columns)), 1)
+    transformed = 6 * told.lengths[0] * (told.lengths[1] // 2 + 1)  # three times real and imaginary parts
+    ahead = min(2 * threads, len(counts)) + 1
+    of_groups = threads * max(counts) * (2 * cells + columns + transformed) + ahead * columns * pixels**2
+    return max(of_groups, pixels**2 * (2 * columns + transformed + 3 * math.prod(told.cells)))
+
+
 def cost(told: Tiling, channels: int, pixels: int) -> float:
     """Of one application of the operator or of its transpose [multiply-adds]."""
     passed = told.count * math.prod(told.lengths) * (channels + pixels**2)

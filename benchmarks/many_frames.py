@@ -1,0 +1,266 @@
+"""Batches: what is said before beside what was used, memory over many frames, the ledger's part, kills.
+
+    python -m benchmarks.many_frames estimates [--frames 24]   ten jobs, said and used
+    python -m benchmarks.many_frames growth [--frames 2000]    the peak of a worker's memory
+    python -m benchmarks.many_frames ledger                    its part of a frame's processor time
+    python -m benchmarks.many_frames kills [--frames 500]      a data set killed five times, and one not
+    python -m benchmarks.many_frames standard                  25 planes as fine as 1463 x 1273 pixels
+
+Times are those of this machine as busy as it is; two workers.
+"""
+
+import argparse
+import cProfile
+import os
+import pstats
+import random
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tifffile
+
+import lumigraph as lg
+from benchmarks.periodic_operator import camera, plenoptic
+from lumigraph import cluster
+from lumigraph.cli import main as lumigraph
+from lumigraph.cluster import run
+from lumigraph.deconvolution.deconvolve import Deconvolver
+from lumigraph.units import um
+
+RAW = {"plenoptic": (31, 31), "focused": (21, 21)}
+SCOPE = ["batch", "deconvolve", "guv.tif", "--camera", "guv.toml"]
+DEEP = [*SCOPE, "--z", "-10 um:10 um:5 um", "--samples", "3", "--iterations"]
+JOBS: dict[str, list[str]] = {
+    "decode": ["batch", "decode", "plenoptic.tif", "--camera", "plenoptic.toml"],
+    "refocus": ["batch", "refocus", "plenoptic.tif", "--camera", "plenoptic.toml", "--alpha", "0.95"],
+    "depth": ["batch", "depth", "plenoptic.tif", "--camera", "plenoptic.toml"],
+    "render": ["batch", "render", "focused.tif", "--camera", "focused.toml"],
+    "deconvolve, 5 planes, 3 samples": [*DEEP, "8"],
+    "deconvolve, 3 planes, 5 samples": [
+        *SCOPE, "--z", "-4 um:4 um:4 um", "--samples", "5", "--iterations", "4",
+    ],
+    "deconvolve, 2.0": [
+        "batch", "deconvolve", "focused.tif", "--camera", "focused.toml", "--iterations", "4",
+    ],
+    "deconvolve, warm": [*DEEP, "2", "--warm", "--run", "3"],
+    "sweep": [
+        "sweep", "focused.toml", "--measure", "mtf50_middle",
+        "--vary", "lenslets.focal_length=5 mm:5.4 mm:{frames}",
+    ],
+    "dataset": ["dataset", "focused.toml", "-n", "{frames}", "--z", "-6 mm:6 mm:6 mm"],
+}  # fmt: skip
+"""Words of the command line, but for the output."""
+
+
+def inputs(folder: Path, frames: int) -> None:
+    """Camera files and stacks of noisy raw images."""
+    scope = lg.LightFieldMicroscope.from_catalogue("lfm-guv")
+    cameras: dict[str, Any] = {
+        "plenoptic": plenoptic().replace(lenslets={"count": RAW["plenoptic"]}),
+        "focused": camera(count=RAW["focused"]), "guv": scope,
+    }  # fmt: skip
+    rng = np.random.default_rng(0)
+    for name, found in cameras.items():
+        (folder / f"{name}.toml").write_text(found.to_toml())
+        scene = lg.targets.white() if name == "guv" else lg.targets.slanted_edge(found.object_grid)
+        light = lg.simulate(found, scene).data
+        light = 2000 * np.clip(light / light.max(), 0, 1) + 20
+        pages = np.stack([rng.poisson(light) for _ in range(frames)]).astype(np.uint16)
+        tifffile.imwrite(folder / f"{name}.tif", pages, photometric="minisblack")
+
+
+def estimate(name: str, frames: int, folder: Path) -> dict[str, float]:
+    """Used over said, of time, processor time, memory and disk."""
+    said: list[tuple[run.Estimate, float]] = []
+    require = run.Estimate.require
+
+    def noted(needed: run.Estimate, workers: int, output: Path) -> None:
+        said.append((needed, time.perf_counter()))
+        require(needed, workers, output)
+
+    output = folder / f"out{list(JOBS).index(name)}.{'csv' if name == 'sweep' else 'zarr'}"
+    run.Estimate.require = noted
+    try:
+        words = [word.format(frames=frames) for word in JOBS[name]]
+        if lumigraph([*words, "-o", str(output), "--workers", "2"]):
+            raise SystemExit(f"{name} failed")
+    finally:
+        run.Estimate.require = require
+    (needed, began), ended = said[0], max(p.stat().st_mtime for p in (ledger(output) / "done").iterdir())
+    entries = cluster.status(output).entries
+    later = [entries[k] for k in sorted(entries)[2:]]
+    used = time.perf_counter() - began - (time.time() - ended)
+    return {
+        "said [s]": needed.seconds, "used [s]": used, "time": used / needed.seconds,
+        "processor time": sum(one.busy for one in later) / needed.busy,
+        "memory": max(one.memory for one in entries.values()) / needed.memory,
+        "disk": sum(one.size for one in later) / needed.size if needed.size else float("nan"),
+    }  # fmt: skip
+
+
+def ledger(output: Path) -> Path:
+    """Folder of an output's ledger."""
+    return output.with_name(output.name + ".ledger")
+
+
+def estimates(frames: int, folder: Path) -> None:
+    """Table of ten jobs."""
+    inputs(folder, frames)
+    print("| job | said, s | used, s | used over said: time | processor time | memory | disk |", flush=True)
+    print("|---|---|---|---|---|---|---|")
+    for name in JOBS:
+        values = list(estimate(name, frames, folder).values())
+        cells = " | ".join(f"{value:.3g}" for value in values[:2]) + " | "
+        print(f"| {name} | {cells}{' | '.join(f'{value:.2f}' for value in values[2:])} |", flush=True)
+
+
+def growth(frames: int, folder: Path) -> None:
+    """Peak of one worker's memory after a twentieth of the frames, and in the end."""
+    raw = lg.RawImage(np.zeros((75, 75), np.uint16), 6.5 * um)
+    rng, path = np.random.default_rng(0), folder / "film.tif"
+    scope = lg.LightFieldMicroscope.from_catalogue("lfm-guv")
+    scope = scope.replace(lenslets={"count": (5, 5)}, sensor={"shape": raw.data.shape})
+    (folder / "small.toml").write_text(scope.to_toml())
+    pages = (rng.poisson(200, (75, 75)).astype(np.uint16) for _ in range(frames))
+    tifffile.imwrite(path, pages, shape=(frames, 75, 75), dtype=np.uint16, photometric="minisblack")
+    words = ["batch", "deconvolve", str(path), "--camera", "small.toml", "--z", "4 um", "--samples", "3"]
+    output = folder / "volumes.zarr"
+    lumigraph([*words, "--iterations", "2", "-o", str(output), "--workers", "1"])
+    peaks = [entry.memory for _, entry in sorted(cluster.status(output).entries.items())]
+    early = peaks[len(peaks) // 20]
+    print(f"{len(peaks)} frames: {early / 2**20:.1f} MiB after {len(peaks) // 20}, "
+          f"{peaks[-1] / 2**20:.1f} MiB in the end, {100 * (peaks[-1] / early - 1):.1f} % more")  # fmt: skip
+
+
+class Here:
+    """Works in this process, under a profiler."""
+
+    is_here, count = True, 1
+
+    def __init__(self) -> None:
+        self.profile = cProfile.Profile(time.process_time)
+
+    def group(self, task: Any) -> Any:
+        """Itself, with a task."""
+        self.task = task
+        return self
+
+    def __enter__(self) -> Any:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def each(self, numbers: Any) -> Any:
+        """How each frame ended; the first two, which make what is kept, are not profiled."""
+        for number in numbers:
+            yield number, self.profile.runcall(self.task.do, number) if number > 1 else self.task.do(number)
+
+
+def of_ledger(frames: int, folder: Path) -> None:
+    """Part of the processor time of `Task.do` outside the work: claims, shards and entries."""
+    inputs(folder, frames)
+    from lumigraph.cli.batch import Frames
+
+    words = JOBS["deconvolve, 5 planes, 3 samples"][3:]
+    path = folder / "guv.tif"
+    about = {"file": str(path), "size": path.stat().st_size, "modified": path.stat().st_mtime_ns}
+    items, here = [{**about, "page": k} for k in range(frames)], Here()
+    cluster.batch(Frames("deconvolve", tuple(words), str(folder)), items, folder / "v.zarr", workers=here)  # type: ignore[arg-type]
+    found = pstats.Stats(here.profile).stats  # type: ignore[attr-defined]
+    times = {
+        place[2]: times[3]
+        for place, times in found.items()
+        if "cluster" in place[0] or "cli/batch" in place[0]
+    }
+    outside = times["do"] - times["__call__"]
+    print(f"{outside / (frames - 2) * 1e3:.1f} ms of {times['do'] / (frames - 2) * 1e3:.0f} ms, "
+          f"{100 * outside / times['do']:.2f} %")  # fmt: skip
+
+
+def kills(frames: int, folder: Path) -> None:
+    """Whether a data set that was killed five times has the bits of one that was not."""
+    (folder / "focused.toml").write_text(camera(count=(4, 4)).to_toml())
+    words = [sys.executable, "-m", "lumigraph", "dataset", "focused.toml", "-n", str(frames)]
+    words += ["--z", "-6 mm:6 mm:6 mm", "--workers", "2", "-o"]
+    rng, killed = random.Random(4), 0
+    while killed < 5:
+        started = subprocess.Popen([*words, "killed.zarr"], start_new_session=True, stderr=subprocess.DEVNULL)
+        time.sleep(1 if killed else 5)
+        while not list((folder / "killed.zarr.ledger/done").glob("*.json"))[killed * frames // 6 :]:
+            time.sleep(0.1)
+        time.sleep(rng.uniform(0, 2))
+        if started.poll() is None:
+            os.killpg(started.pid, signal.SIGKILL)
+            killed += 1
+            print(f"killed at {len(cluster.status(folder / 'killed.zarr').entries)} of {frames}", flush=True)
+        started.wait()
+        time.sleep(1)
+    for name in ("killed.zarr", "whole.zarr"):
+        subprocess.run([*words, name], check=True, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    sums = [contents(folder / name) for name in ("killed.zarr", "whole.zarr")]
+    same = "the same bits" if sums[0] == sums[1] else "OTHER BITS"
+    print(f"{len(sums[1])} files, {cluster.status(folder / 'killed.zarr').done} samples: {same}")
+
+
+def contents(store: Path) -> dict[str, int]:
+    """CRC-32 of each file."""
+    files = (path for path in sorted(store.rglob("*")) if path.is_file())
+    return {str(path.relative_to(store)): zlib.crc32(path.read_bytes()) for path in files}
+
+
+def standard(frames: int, folder: Path) -> None:
+    """Processor seconds of the operator, of the first frame and of each further one, and peak memory."""
+    scope = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
+        wavelength="525 nm",
+        objective={
+            "magnification": 20.0,
+            "numerical_aperture": 0.5,
+            "immersion_index": 1.0,
+            "model": "scalar",
+        },
+        lenslets={"pitch": "125 um", "focal_length": "2.5 mm", "count": (77, 67)},
+        sensor={"shape": (1463, 1273), "pixel_pitch": "6.5789 um"},
+    )
+    times = [time.process_time()]
+    operator = scope.operator(tuple(np.linspace(-60e-6, 60e-6, 25)), 19, pixels=19, accuracy=1e-2)
+    engine, rng = Deconvolver(operator, 4), np.random.default_rng(0)
+    for _ in range(frames):
+        times.append(time.process_time())
+        engine(rng.poisson(200, operator.shape[0]).astype(np.float32))
+    times.append(time.process_time())
+    first, *others = np.diff(times)[1:]
+    print(f"operator {times[1] - times[0]:.1f} s, first frame {first:.1f} s, others "
+          f"{', '.join(f'{one:.1f}' for one in others)} s of processors; "
+          f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GiB")  # fmt: skip
+
+
+WHAT: dict[str, tuple[Callable[[int, Path], None], int]] = {
+    "estimates": (estimates, 24), "growth": (growth, 2000), "ledger": (of_ledger, 12),
+    "kills": (kills, 500), "standard": (standard, 3),
+}  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("what", choices=WHAT)
+    parser.add_argument("--frames", type=int)
+    options = parser.parse_args()
+    function, usual = WHAT[options.what]
+    with tempfile.TemporaryDirectory(prefix="lumigraph-") as folder:
+        os.chdir(folder)
+        function(options.frames or usual, Path(folder))
+        os.chdir("/")
+
+
+if __name__ == "__main__":
+    main()
