@@ -1,6 +1,7 @@
 """The everyday names and where they come from; `lazy_loader` reads this file, and so do type checkers."""
 
 from . import (
+    adaptive as adaptive,
     analysis as analysis,
     cluster as cluster,
     depth as depth,

@@ -8,6 +8,7 @@
 - `scatter`: `Scatter`, how lenslets of an array differ from each other
 - `zernike`: Zernike polynomials in Noll's order and `ZernikePlate`
 - `field_plate`: Zernike terms that change over the field, and their plate
+- `objective`: `Objective`, a microscope's, as points before it see it; `disc`, nodes of its pupil
 - `masks`: white random phases and the thesis' random phase mask
 """
 

@@ -5,6 +5,7 @@ from typing import Protocol, runtime_checkable
 
 from lumigraph.core.lightfield import LightField
 from lumigraph.instruments.parts import MainLens
+from lumigraph.operators.microscope_pupil import PupilImages
 
 
 @runtime_checkable
@@ -22,6 +23,20 @@ class Correctable(Protocol):
 
     def plane_views(self, alpha: float) -> LightField:
         """Views of a textured plane at a refocus factor."""
+        ...
+
+
+@runtime_checkable
+class WithPupil(Protocol):
+    """Images of points are known as functions of its pupil's phase."""
+
+    @property
+    def configuration(self) -> str:
+        """Where the lenslets stand."""
+        ...
+
+    def pupil_images(self, terms: Sequence[int]) -> PupilImages:
+        """Images of points, with derivatives by Zernike terms."""
         ...
 
 

@@ -1,0 +1,323 @@
+"""`estimate`: aberrations from the light field of beads, together with the beads."""
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lumigraph.adaptive.beads import brightest
+from lumigraph.adaptive.field import PRIOR, Nodes
+from lumigraph.adaptive.fit import OWN, PLACES, Around, Fit, Model, solved
+from lumigraph.adaptive.wavefront import Wavefront
+from lumigraph.core import checks, memory
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.raw import RawImage
+from lumigraph.deconvolution import Exposure, RichardsonLucy
+from lumigraph.deconvolution.methods import State
+from lumigraph.deconvolution.problem import Problem, Scale, values
+from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
+from lumigraph.instruments import LightFieldMicroscope
+from lumigraph.instruments.capabilities import WithPupil
+from lumigraph.scene import Points
+
+TERMS = tuple(range(5, 16))
+"""Noll indices up to the fourth order that the object cannot explain."""
+
+EXPLAINED = {
+    1: "a piston changes no image",
+    2: "the beads' places along x explain it",
+    3: "the beads' places along y explain it",
+    4: "the beads' depths explain it",
+}
+
+ACCURACY = 3e-2
+"""Of points' images: their errors are not alike from bead to bead, and less than noise."""
+
+SAMPLES = 3
+"""Of the volume in which beads are looked for, along a lenslet."""
+
+ITERATIONS = 30
+"""Of Richardson-Lucy, by which beads are looked for."""
+
+ROUNDS = 3
+"""How often beads are looked for at most: in the raw image, then in what those before leave."""
+
+STEPS = {"places": 4, "all": 40}
+"""Of the fit, at most."""
+
+APART = (1.6, 1.25)
+"""Half axes of the spheroids in which light is one bead's, in lenslets: at first, at whatever depth, for
+aberrations may spread it, and later."""
+
+FAINT = (0.15, 0.05)
+"""Light of a bead that counts, over the brightest's at first, and over the median of those found later."""
+
+BEYOND = 6e-6
+"""How far beyond the outermost depths beads may stand [m]."""
+
+UNKNOWN = "the light field holds too little information"
+
+MISFIT = 2.0
+"""Mean of (r - m)²/m above which the beads do not explain the raw image."""
+
+
+def estimate(
+    raw: RawImage | np.ndarray,
+    microscope: LightFieldMicroscope,
+    depths: Sequence[float],
+    terms: Sequence[int] = TERMS,
+    *,
+    regions: tuple[int, int] = (1, 1),
+    exposure: Exposure | None = None,
+    pixels: Calibration | None = None,
+) -> Wavefront:
+    """Aberrations of a light-field microscope from one raw image of beads, with the beads.
+
+    Richardson-Lucy finds the beads. Then their places and light and the Zernike coefficients are fitted
+    together, by Levenberg and Marquardt's steps on the Poisson likelihood, and Richardson-Lucy looks for more
+    beads in what is left. A term stays if it gains more log-likelihood than ½ ln N for N pixels (Schwarz's
+    criterion); the others are 0. What is known before: a coefficient is of the order of 1 wave rms.
+
+    Parameters
+    ----------
+    raw
+        Of sparse beads, as it was read.
+    microscope
+        Configuration "1.0", with square lenslets. Aberrations of its description are taken as known.
+    depths
+        Planes in which beads are looked for [m], such as each 6 µm.
+    terms
+        Noll indices. Piston, tilt and defocus cannot be told from the beads' places: see `Wavefront.untold`.
+    regions
+        Of the field along y and x, each with coefficients of its own at its middle; linear between.
+        Neighbours are expected to differ by 0.3 waves rms.
+    exposure
+        Background, gain, dead pixels; None for what a `RawImage` records. Without a gain a grey value
+        counts as one electron.
+    pixels
+        Calibration of a real camera.
+
+    Raises
+    ------
+    GeometryError
+        Another configuration, no terms, fewer than two depths, no beads.
+    CalibrationError
+        A raw image of another shape, or a dark one.
+    SamplingError
+        It does not fit in memory.
+
+    Warns
+    -----
+    SamplingWarning
+        The beads do not explain the raw image.
+
+    References
+    ----------
+    G. Schwarz, Ann. Stat. 6, 461 (1978).
+    """
+    given = _Given.of((raw, exposure, pixels), microscope, depths, terms)
+    model = given.model(_regions(regions))
+    first = Fit(given.beads(), np.zeros((len(model.nodes), len(given.terms))))
+    _require_memory(model, first)
+    every = np.ones(len(given.terms), bool)
+    plain = model.improved(first, ~every, STEPS["places"])
+    fit, rounds = _fitted(given, model, plain, every)
+    around = model.around(fit)
+    covariance = _covariance(model, around)[-fit.coefficients.size :, -fit.coefficients.size :]
+    free = _worth(covariance, fit.coefficients, model.counted)
+    if not free.all():
+        fit = model.improved(replace(fit, coefficients=fit.coefficients * free), free, STEPS["all"])
+        around = model.around(fit)
+    _warn_of_misfit(fit, around)
+    shape = (len(model.nodes.y), len(model.nodes.x), len(given.terms))
+    deviations = np.sqrt(np.diag(covariance)).reshape(shape)
+    unknown = {j: UNKNOWN for j, d in zip(given.terms, deviations.max((0, 1)), strict=True) if d > PRIOR / 2}
+    found = fit.coefficients.reshape(shape)
+    return Wavefront(
+        given.terms, found, deviations, (model.nodes.y, model.nodes.x), given.untold | unknown, fit.points,
+        (model.deviance(plain), model.deviance(fit)), around.pearson, rounds, fit.steps,
+        given.bent(found.mean((0, 1))),
+    )  # fmt: skip
+
+
+def _warn_of_misfit(fit: Fit, around: Around) -> None:
+    if around.pearson > MISFIT:
+        warnings.warn(
+            f"{len(fit.points.intensities)} beads leave {around.pearson:.3g} times the variance of noise in "
+            "the raw image: it holds more than beads, or more terms, or the gain is wrong. The wavefront may "
+            "be off.",
+            SamplingWarning,
+            stacklevel=3,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Given:
+    """What is given, put together."""
+
+    microscope: LightFieldMicroscope
+    operator: Any
+    problem: Problem
+    depths: np.ndarray
+    terms: tuple[int, ...]
+    untold: dict[int, str]
+    pixels: Calibration | None
+
+    @classmethod
+    def of(
+        cls,
+        given: tuple[RawImage | np.ndarray, Exposure | None, Calibration | None],
+        microscope: LightFieldMicroscope,
+        depths: Sequence[float],
+        terms: Sequence[int],
+    ) -> "_Given":
+        raw, exposure, pixels = given
+        if not isinstance(microscope, WithPupil) or microscope.configuration != "1.0":
+            raise GeometryError(
+                "aberrations are estimated for a LightFieldMicroscope of configuration '1.0'."
+            )
+        planes = np.unique([checks.finite("a depth", float(dz)) for dz in depths])
+        if len(planes) < 2:
+            raise GeometryError(
+                f"depths are {list(planes)} but beads need at least two planes to stand between."
+            )
+        asked = tuple(dict.fromkeys(int(j) for j in terms))
+        found = tuple(j for j in asked if j not in EXPLAINED)
+        if not found:
+            raise GeometryError(f"terms are {asked} but the beads explain 1 to 4 themselves. Give others.")
+        microscope.pupil_images(found)  # refuses what has no phase, and indices that are none
+        if exposure is None:
+            exposure = Exposure.of(raw) if isinstance(raw, RawImage) else Exposure()
+        operator = microscope.operator(tuple(planes), SAMPLES, accuracy=ACCURACY, pixels=pixels)
+        data = values(raw, operator, exposure)
+        problem = Problem.of(raw, exposure, Scale.of(operator, exposure, data))
+        untold = {j: reason for j, reason in EXPLAINED.items() if j in asked}
+        return cls(microscope, operator, problem, planes, found, untold, pixels)
+
+    def model(self, regions: tuple[int, int]) -> Model:
+        """Of the pixels."""
+        farthest = float(np.abs(self.depths).max())
+        images = self.microscope.pupil_images(
+            self.terms, farthest=farthest, accuracy=ACCURACY, pixels=self.pixels
+        )
+        grid, beside = self.operator.object_grid, self.microscope.lenslet_size
+        low, high = (
+            np.array([end(grid.y), end(grid.x), end(self.depths)]) + side * np.array([beside, beside, BEYOND])
+            for end, side in ((np.min, -1), (np.max, 1))
+        )
+        nodes = Nodes.of(grid, regions, len(self.terms))
+        return Model(images, self.problem, nodes, (low, high))
+
+    def bent(self, coefficients: np.ndarray) -> LightFieldMicroscope:
+        """The microscope with aberrations."""
+        known = dict(self.microscope.objective.aberrations)
+        for j, value in zip(self.terms, coefficients, strict=True):
+            if value:
+                known[j] = known.get(j, 0.0) + float(value)
+        return self.microscope.replace(objective={"aberrations": known})
+
+    def beads(self, shown: np.ndarray | None = None) -> Points:
+        """Beads by Richardson-Lucy; of what is brighter than `shown` where that is given."""
+        problem = self.problem
+        if shown is not None:
+            problem = replace(problem, scale=replace(problem.scale, background=shown))
+        method, state = RichardsonLucy(), State.at(problem, problem.flat())
+        for _ in range(ITERATIONS):
+            state = method.step(problem, state)
+        grid, part = self.operator.object_grid, self.microscope.objective
+        slope = part.numerical_aperture / math.sqrt(part.immersion_index**2 - part.numerical_aperture**2)
+        volume = np.asarray(state.estimate) * self.brighter
+        across = APART[shown is not None] * self.microscope.lenslet_size
+        along = float(np.ptp(self.depths)) * 10 if shown is None else across / slope
+        return brightest(volume, (self.depths, grid.y, grid.x), (across, along), FAINT[0])
+
+    @property
+    def brighter(self) -> float:
+        """Intensity of a point over that of a sample of the volume which sends as much light."""
+        count = round(self.microscope.lenslet_size / self.microscope.object_grid.pitch[0])
+        return (count / SAMPLES) ** 2
+
+    def more(self, shown: np.ndarray, fit: Fit) -> Points | None:
+        """Beads in what a fit leaves, if they are bright enough; None where there are none."""
+        found = self.beads(shown)
+        bright = found.intensities > FAINT[1] * float(np.median(fit.points.intensities))
+        return Points(found.positions[bright], found.intensities[bright]) if bright.any() else None
+
+
+def _fitted(given: _Given, model: Model, fit: Fit, free: np.ndarray) -> tuple[Fit, int]:
+    """The fit with all beads that are worth their unknowns, and how often they were looked for."""
+    fit = _without_faint(model, model.improved(fit, free, STEPS["all"]), free)
+    for done in range(1, ROUNDS):
+        more = given.more(model.expected(model.light(fit)), fit)
+        if more is None:
+            return fit, done
+        both = Points(*(np.concatenate(two) for two in zip(_parts(fit.points), _parts(more), strict=True)))
+        longer = _without_faint(model, model.improved(replace(fit, points=both), free, STEPS["all"]), free)
+        unknowns = OWN * (len(longer.points.intensities) - len(fit.points.intensities))
+        if fit.objective - longer.objective < max(unknowns, 1) * math.log(model.counted):
+            return fit, done
+        fit = longer
+    return fit, ROUNDS
+
+
+def _parts(points: Points) -> tuple[np.ndarray, np.ndarray]:
+    return points.positions, points.intensities
+
+
+def _without_faint(model: Model, fit: Fit, free: np.ndarray) -> Fit:
+    """The fit without beads whose light is not known well enough to be there."""
+    covariance = _covariance(model, model.around(fit))
+    light = np.diag(covariance)[PLACES : OWN * len(fit.points.intensities) : OWN]
+    kept = light < 1 / (OWN * math.log(model.counted))
+    if kept.all():
+        return fit
+    if not kept.any():
+        raise GeometryError("no bead stands out of the noise. Give a raw image with more light, or of beads.")
+    points = Points(fit.points.positions[kept], fit.points.intensities[kept])
+    return model.improved(replace(fit, points=points), free, STEPS["all"])
+
+
+def _covariance(model: Model, around: Around) -> np.ndarray:
+    """Of all unknowns; larger where the beads do not explain the raw image."""
+    whole, n = around.information / max(around.pearson, 1.0), len(model.nodes.information)
+    whole[-n:, -n:] += model.nodes.information
+    return solved(whole, np.eye(len(whole)))
+
+
+def _worth(covariance: np.ndarray, coefficients: np.ndarray, pixels: float) -> np.ndarray:
+    """Which terms (terms,) gain more log-likelihood than Schwarz's criterion asks for, without the others."""
+    nodes, count = coefficients.shape
+    free = np.ones(count, bool)
+    while free.any():
+        x, known = coefficients.copy(), np.tile(free, nodes)
+        if not free.all():  # where the others go if these are 0
+            inverse = np.linalg.inv(covariance)
+            change = np.linalg.solve(inverse[np.ix_(known, known)], inverse[np.ix_(known, ~known)])
+            x.ravel()[known] += change @ coefficients.ravel()[~known]
+            own = np.linalg.inv(inverse[np.ix_(known, known)])
+        else:
+            own = covariance
+        places = {j: np.flatnonzero(np.flatnonzero(known) % count == j) for j in np.flatnonzero(free)}
+        gains = {j: x[:, j] @ np.linalg.solve(own[np.ix_(at, at)], x[:, j]) for j, at in places.items()}
+        weakest = min(gains, key=lambda j: gains[j])
+        if gains[weakest] >= nodes * math.log(pixels):
+            break
+        free[weakest] = False
+    return free
+
+
+def _require_memory(model: Model, fit: Fit) -> None:
+    unknowns = OWN * len(fit.points.intensities) + fit.coefficients.size
+    needed = 10.0 * unknowns * math.prod(model.images.shape)
+    what = f"the derivatives of {model.images.shape} pixels by {unknowns} unknowns"
+    memory.require(needed, what, "Crop the raw image or use fewer regions.", SamplingError)
+
+
+def _regions(regions: tuple[int, int]) -> tuple[int, int]:
+    found = tuple(checks.whole("regions", n) for n in regions)
+    if len(found) != 2:
+        raise GeometryError(f"regions are {regions} but must be two whole numbers, along y and x.")
+    return found[0], found[1]

@@ -1,0 +1,213 @@
+r"""Beads and wavefronts together: the most likely ones, by Levenberg and Marquardt's steps.
+
+With the expected values m of the pixels, their derivatives J by all unknowns, gain g and weights w, Fisher's
+information of Poisson noise is F = Jᵀ diag(g w / m) J. A step solves
+(F + Q + μ diag) δ = Jᵀ g w (r/m - 1) - Q x with the prior's information Q. Unknowns x are each bead's place
+and the logarithm of its light, then the coefficients at each node of the field.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lumigraph.adaptive.field import Nodes
+from lumigraph.core import arrays
+from lumigraph.core.threads import each
+from lumigraph.deconvolution.problem import Problem
+from lumigraph.operators.microscope_pupil import PLACES, PupilImages
+from lumigraph.scene import Points
+
+OWN = PLACES + 1
+"""Unknowns of a bead: y, x, dz and the logarithm of its light."""
+
+LONGEST = (1.5e-6, 1.5e-6, 3e-6, 1.0, 0.25)
+"""Longest steps: of y, x, dz [m], of the logarithm of light, of a coefficient [waves rms]."""
+
+TRIES = 5
+"""Steps, each shorter than the one before, of which one must be likelier."""
+
+GAIN = 0.5
+"""Log-likelihood that a step must gain for another one to follow."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """Beads and coefficients that explain a raw image.
+
+    Parameters
+    ----------
+    points
+        The beads.
+    coefficients
+        (nodes, terms) [waves rms].
+    objective
+        What is minimised: deviance of all pixels [electrons] and the prior's.
+    steps
+        Taken so far.
+    """
+
+    points: Points
+    coefficients: np.ndarray
+    objective: float = np.inf
+    steps: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Around:
+    """The model around a fit.
+
+    Parameters
+    ----------
+    information
+        F (n, n), without the prior.
+    slope
+        Of the log-likelihood (n,), without the prior.
+    pearson
+        Mean of (r - m)²/m over the pixels that count: 1 where only noise is left.
+    """
+
+    information: np.ndarray
+    slope: np.ndarray
+    pearson: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Model:
+    """What pixels should read.
+
+    Parameters
+    ----------
+    images
+        Of points, by the pupil.
+    problem
+        Raw image, background and noise.
+    nodes
+        Of the field, where coefficients stand.
+    limits
+        Least and greatest (y, x, dz) of beads [m].
+    """
+
+    images: PupilImages
+    problem: Problem
+    nodes: Nodes
+    limits: tuple[np.ndarray, np.ndarray]
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Electrons that a unit of each pixel counts for (ny, nx)."""
+        scale = self.problem.scale
+        ones = np.ones(self.images.shape) if scale.weights is None else arrays.to_numpy(scale.weights)
+        return scale.gain * ones
+
+    @property
+    def counted(self) -> float:
+        """Pixels that count."""
+        return float(self.weights.sum()) / self.problem.scale.gain
+
+    def expected(self, light: np.ndarray) -> np.ndarray:
+        """Values of pixels (ny, nx) that receive this light."""
+        scale = self.problem.scale
+        if scale.response is not None:
+            light = light * arrays.to_numpy(scale.response)
+        return np.maximum(light, 0) + arrays.to_numpy(scale.background) + self.problem.floor
+
+    def light(self, fit: Fit) -> np.ndarray:
+        """On the pixels (ny, nx)."""
+        points, c = fit.points, self.nodes.at(fit.points) @ fit.coefficients
+        one_by_one = each(
+            lambda p: self.images.forward(_one(points, p), c[p]), range(len(points.intensities))
+        )
+        return sum(one_by_one, np.zeros(self.images.shape))
+
+    def judged(self, fit: Fit) -> Fit:
+        """The fit with its objective."""
+        deviance = self.problem.deviance(self.expected(self.light(fit))) * self.counted
+        return replace(fit, objective=deviance + self._prior(fit))
+
+    def deviance(self, fit: Fit) -> float:
+        """Poisson deviance per pixel that counts of a fit that was judged."""
+        return (fit.objective - self._prior(fit)) / self.counted
+
+    def _prior(self, fit: Fit) -> float:
+        x = fit.coefficients.ravel()
+        return float(x @ self.nodes.information @ x)
+
+    def around(self, fit: Fit) -> Around:
+        """Information and slope at a fit."""
+        points = fit.points
+        basis = self.nodes.at(points)
+        c, count = basis @ fit.coefficients, len(points.intensities) * OWN
+        columns = np.zeros((count + fit.coefficients.size, *self.images.shape), np.float32)
+        by_node = columns[count:].reshape(*fit.coefficients.shape, *self.images.shape)
+        found = each(lambda p: self._columns(_one(points, p), c[p]), range(len(points.intensities)))
+        for p, placed in enumerate(found):
+            columns[p * OWN :][:OWN] = placed[:OWN]
+            for node in np.flatnonzero(basis[p]):
+                by_node[node] += basis[p, node] * placed[OWN:]
+        shown = self.expected(columns[PLACES:count:OWN].sum(0, dtype=np.float64))
+        if self.problem.scale.response is not None:
+            columns *= arrays.to_numpy(self.problem.scale.response).astype(np.float32)
+        data, weights = arrays.to_numpy(self.problem.data), self.weights
+        flat, away = columns.reshape(len(columns), -1), data / shown - 1
+        weighted = flat * (weights / shown).ravel().astype(np.float32)
+        slope = flat @ (weights * away).ravel()
+        pearson = float((weights * away**2 * shown).sum() / self.counted)
+        return Around((weighted @ flat.T).astype(np.float64), slope.astype(np.float64), pearson)
+
+    def _columns(self, point: Points, c: np.ndarray) -> np.ndarray:
+        """Changes (OWN + terms, ny, nx) by a bead's place and light, and by its coefficients."""
+        lit = next(iter(self.images.lit(point, c)))
+        n = len(c)
+        own = np.concatenate([lit.changes[n:], lit.image[None], lit.changes[:n]]) * point.intensities[0]
+        return np.stack([self.images.placed(self.images.whole(one, lit.cell)) for one in own])
+
+    def improved(self, fit: Fit, free: np.ndarray, steps: int) -> Fit:
+        """The fit after at most some steps, with those coefficients free that are marked (terms,)."""
+        damping, fit = 1e-2, self.judged(fit)
+        for _ in range(steps):
+            around, found = self.around(fit), None
+            for _ in range(TRIES):
+                tried = self.judged(self._moved(fit, self._step(around, fit, free, damping)))
+                if tried.objective < fit.objective:
+                    found, damping = replace(tried, steps=fit.steps + 1), max(damping / 10, 1e-7)
+                    break
+                damping *= 10
+            if found is None:
+                return fit
+            gained, fit = (fit.objective - found.objective) / 2, found
+            if gained < GAIN:
+                return fit
+        return fit
+
+    def _step(self, around: Around, fit: Fit, free: np.ndarray, damping: float) -> np.ndarray:
+        c = fit.coefficients
+        first, n = len(around.slope) - c.size, len(around.slope)
+        prior = np.zeros((n, n))
+        prior[first:, first:] = self.nodes.information
+        slope = around.slope - prior[:, first:] @ c.ravel()
+        used = np.append(np.ones(first, bool), np.tile(free, len(c)))
+        step = np.zeros(n)
+        step[used] = solved((around.information + prior)[np.ix_(used, used)], slope[used], damping)
+        longest = np.append(np.tile(LONGEST[:OWN], first // OWN), np.full(c.size, LONGEST[OWN]))
+        return step / max(1.0, float(np.max(np.abs(step) / longest)))
+
+    def _moved(self, fit: Fit, step: np.ndarray) -> Fit:
+        count = len(fit.points.intensities)
+        own = step[: OWN * count].reshape(count, OWN)
+        places = np.clip(fit.points.positions + own[:, :PLACES], *self.limits)
+        points = Points(places, fit.points.intensities * np.exp(own[:, PLACES]))
+        change = step[OWN * count :].reshape(fit.coefficients.shape)
+        return replace(fit, points=points, coefficients=fit.coefficients + change)
+
+
+def solved(matrix: np.ndarray, right: np.ndarray, damping: float = 0.0) -> np.ndarray:
+    """Solution of a system whose unknowns are scaled to a diagonal of 1, and damped."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-12 * np.diag(matrix).max()))
+    whole = matrix / np.outer(scale, scale) + (damping + 1e-10) * np.eye(len(matrix))
+    right = right / (scale if right.ndim == 1 else scale[:, None])
+    found = np.linalg.solve(whole, right)
+    return found / (scale if right.ndim == 1 else scale[:, None])
+
+
+def _one(points: Points, p: int) -> Points:
+    return Points(points.positions[p : p + 1], points.intensities[p : p + 1])

@@ -1,0 +1,103 @@
+"""`Wavefront`: what a light field tells of its microscope's aberrations."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from lumigraph.core import checks
+from lumigraph.core.brief import brief
+from lumigraph.elements.zernike import zernike
+from lumigraph.instruments import LightFieldMicroscope
+from lumigraph.scene import Points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wavefront:
+    """Aberrations that were estimated together with beads, and how well they are known.
+
+    Parameters
+    ----------
+    terms
+        Noll indices.
+    values, deviations
+        Of each term at the nodes of the field (rows, columns, terms) [waves rms], beyond what the
+        microscope's description holds; standard deviations from Fisher's information. A term that explains
+        no more than noise has the value 0 and the deviation that it had.
+    nodes
+        Places (y, x) of the rows and of the columns of nodes [m].
+    untold
+        Terms that cannot be known here, and why.
+    beads
+        The object.
+    deviance
+        Poisson deviance per pixel with the beads alone, and with the wavefront.
+    pearson
+        Mean of (r - m)²/m, electrons: 1 where only noise is left.
+    rounds, steps
+        How often beads were looked for, and steps of the fit.
+    microscope
+        The description with the mean aberrations of the field.
+    """
+
+    terms: tuple[int, ...]
+    values: np.ndarray
+    deviations: np.ndarray
+    nodes: tuple[np.ndarray, np.ndarray]
+    untold: Mapping[int, str]
+    beads: Points
+    deviance: tuple[float, float]
+    pearson: float
+    rounds: int
+    steps: int
+    microscope: LightFieldMicroscope
+
+    __repr__ = brief
+
+    @property
+    def coefficients(self) -> dict[int, float]:
+        """Mean over the field of each term [waves rms]."""
+        means = self.values.mean((0, 1))
+        return {j: float(value) for j, value in zip(self.terms, means, strict=True)}
+
+    @property
+    def rms(self) -> float:
+        """Of the mean wavefront [waves]."""
+        return float(np.linalg.norm(self.values.mean((0, 1))))
+
+    def phase(self, samples: int = 129) -> np.ndarray:
+        """The mean wavefront (samples, samples) over the pupil [waves]; NaN outside.
+
+        Raises
+        ------
+        GeometryError
+            No whole number of samples above zero.
+        """
+        return wavefront_map(self.coefficients, samples)
+
+
+def wavefront_map(coefficients: Mapping[int, float], samples: int = 129) -> np.ndarray:
+    """Wavefront (samples, samples) of Zernike terms over the pupil [waves]; NaN outside.
+
+    Parameters
+    ----------
+    coefficients
+        Noll index to waves rms.
+    samples
+        Across the pupil.
+
+    Raises
+    ------
+    GeometryError
+        No whole number of samples above zero.
+
+    Examples
+    --------
+    >>> float(np.nanmax(wavefront_map({2: 0.5}, 3)).round(3))  # 2 ρ / 2 at ρ = 2/3
+    0.667
+    """
+    n = checks.whole("samples", samples)
+    at = (np.arange(n) - (n - 1) / 2) / (n / 2)
+    rho, angle = np.hypot(at[:, None], at), np.arctan2(at[:, None], at)
+    terms = (waves * zernike(j, np.minimum(rho, 1), angle) for j, waves in coefficients.items())
+    return np.where(rho <= 1, sum(terms, 0 * rho), np.nan)

@@ -1,0 +1,150 @@
+"""Aberrations from the light field of beads: raw images are simulated, not made by the model."""
+
+import numpy as np
+import pytest
+
+import lumigraph as lg
+from lumigraph.adaptive import estimate
+from lumigraph.adaptive.beads import brightest
+from lumigraph.adaptive.estimate import _warn_of_misfit, _worth
+from lumigraph.adaptive.field import ALIKE, PRIOR, Nodes
+from lumigraph.adaptive.fit import Around, Fit
+from lumigraph.deconvolution import Exposure
+
+SCOPE = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
+    wavelength="525 nm",
+    objective={
+        "magnification": 20.0, "numerical_aperture": 0.5, "immersion_index": 1.0, "model": "scalar",
+        "maker": None, "tube_lens": None,
+    },
+    lenslets={"pitch": "125 um", "count": (7, 7)},
+    sensor={"shape": (135, 135)},
+)  # fmt: skip
+EXPOSURE = Exposure(background=1.0, gain=1.0)
+DEPTHS = (-12e-6, -6e-6, 0.0, 6e-6, 12e-6)
+BEADS = np.array([[-8.3e-6, -7.1e-6, 7.7e-6], [9.2e-6, 6.4e-6, -8.9e-6]])
+UNIT = 14.6
+"""Photons of a point of intensity 1."""
+
+
+def exposed(aberrations, photons, beads=BEADS, seed=0):
+    bent = SCOPE.replace(objective={"aberrations": aberrations})
+    light = sum(bent.point_image(*place, accuracy=2e-2) for place in beads)
+    return np.random.default_rng(seed).poisson(light * photons / UNIT + 1).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def bent():
+    """What is found of 0.2 waves of astigmatism and -0.15 of coma, with two terms that are not there."""
+    return estimate(exposed({6: 0.2, 8: -0.15}, 2e4), SCOPE, DEPTHS, (4, 6, 8, 9, 11), exposure=EXPOSURE)
+
+
+def test_aberrations_come_back_with_the_beads(bent):
+    assert bent.coefficients == pytest.approx({6: 0.2, 8: -0.15, 9: 0, 11: 0}, abs=0.01)
+    away = np.linalg.norm(bent.beads.positions[:, None] - BEADS, axis=-1)
+    assert away.shape == (2, 2)
+    assert away.min(0).max() < 0.15e-6
+    np.testing.assert_allclose(bent.beads.intensities * UNIT, 2e4, rtol=0.03)
+
+
+def test_what_explains_the_picture_is_stated(bent):
+    before, after = bent.deviance
+    assert before > 1.3 * after
+    assert bent.pearson == pytest.approx(1, abs=0.1)
+    assert (bent.deviations < 0.01).all()
+    assert bent.untold == {4: "the beads' depths explain it"}
+    assert dict(bent.microscope.objective.aberrations) == pytest.approx({6: 0.2, 8: -0.15}, abs=0.01)
+    assert bent.rms == pytest.approx(0.25, abs=0.01)
+
+
+def test_the_phase_has_the_wavefronts_rms(bent):
+    phase = bent.phase(257)
+    assert np.isnan(phase[0, 0])
+    assert np.nanstd(phase) == pytest.approx(bent.rms, rel=0.02)
+    assert np.nanmean(phase) == pytest.approx(0, abs=2e-3)
+    with pytest.raises(lg.LumigraphError, match="samples"):
+        bent.phase(0)
+
+
+def test_no_aberration_is_invented():
+    found = estimate(exposed({}, 5e3), SCOPE, DEPTHS, (6, 7, 8, 11), exposure=EXPOSURE)
+    assert found.rms == 0
+    assert not found.microscope.objective.aberrations
+    assert (found.deviations > 0).all()
+
+
+def test_regions_of_the_field_have_aberrations_of_their_own():
+    sides = [SCOPE.replace(objective={"aberrations": {6: waves}}) for waves in (0.2, -0.1)]
+    light = sum(one.point_image(*place, accuracy=2e-2) for one, place in zip(sides, BEADS, strict=True))
+    raw = np.random.default_rng(3).poisson(light * 2e4 / UNIT + 1).astype(np.float32)
+    found = estimate(raw, SCOPE, DEPTHS, (6,), regions=(1, 2), exposure=EXPOSURE)
+    assert found.values.shape == (1, 2, 1)
+    at_beads = np.interp(BEADS[:, 1], found.nodes[1], found.values[0, :, 0])
+    np.testing.assert_allclose(at_beads, [0.2, -0.1], atol=0.02)
+    assert found.pearson < 1.1
+
+
+def test_beads_that_do_not_explain_the_picture_are_warned_of():
+    fit = Fit(lg.Points(BEADS, np.ones(2)), np.zeros((1, 1)))
+    with pytest.warns(lg.SamplingWarning, match="2 beads leave 3 times the variance of noise"):
+        _warn_of_misfit(fit, Around(np.eye(1), np.zeros(1), 3.0))
+
+
+RAW = np.ones((135, 135), np.float32)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"microscope": SCOPE.replace(configuration="2.0", lenslet_offset="1 mm")}, "configuration '1.0'"),
+        ({"microscope": lg.PlenopticCamera.from_catalogue("thesis-plenoptic-1")}, "configuration '1.0'"),
+        ({"terms": (1, 2, 3, 4)}, "beads explain 1 to 4 themselves"),
+        ({"terms": ()}, "Give others"),
+        ({"terms": (0,)}, "Noll's index is 0"),
+        ({"depths": (0.0,)}, "at least two planes"),
+        ({"depths": (0.0, np.nan)}, "a depth"),
+        ({"raw": RAW[:9]}, "the operator makes"),
+        ({"raw": RAW * np.nan}, "NaN"),
+        ({"raw": 0 * RAW}, "dark"),
+        ({"regions": (0, 1)}, "regions"),
+        ({"regions": (1, 1, 1)}, "two whole numbers"),
+    ],
+)
+def test_what_cannot_be_estimated_is_refused(given, message):
+    with pytest.raises(lg.LumigraphError, match=message):
+        estimate(**{"raw": RAW, "microscope": SCOPE, "depths": DEPTHS, "terms": (6,), **given})
+
+
+def test_the_beads_of_a_volume_are_its_highest_samples_with_what_is_around_them():
+    z, y, x = (np.arange(n) * 1e-6 for n in (9, 20, 30))
+    true = np.array([[5.3e-6, 7.8e-6, 4.0e-6], [14.0e-6, 22.4e-6, 5.0e-6]])
+    volume = np.zeros((9, 20, 30))
+    for light, (a, b, c) in zip((2.0, 1.0), true, strict=True):
+        away = (z[:, None, None] - c) ** 2 + (y[:, None] - a) ** 2 + (x - b) ** 2
+        spot = np.exp(-away / (2 * 1e-12))
+        volume += light * spot / spot.sum()
+    found = brightest(volume, (z, y, x), (5e-6, 5e-6), 0.05)
+    np.testing.assert_allclose(found.positions, true, atol=0.1e-6)
+    np.testing.assert_allclose(found.intensities, [2, 1], rtol=0.01)
+
+
+def test_between_nodes_coefficients_are_linear_and_beyond_them_constant():
+    nodes = Nodes(np.array([-1.0, 1.0]), np.array([0.0, 2.0]), 1)
+    values = np.array([0.0, 2.0, 10.0, 12.0])  # 5 (y + 1) + x
+    points = lg.Points(np.array([[0.0, 1.0, 3.0], [0.5, 0.5, 0.0], [9.0, -9.0, 0.0]]), np.ones(3))
+    np.testing.assert_allclose(nodes.at(points) @ values, [6.0, 8.0, 10.0])
+
+
+def test_the_prior_of_a_field_that_is_even_is_that_of_one_wavefront():
+    nodes = Nodes(np.arange(3.0), np.arange(2.0), 2)
+    even = np.tile([0.5, -1.0], 6)
+    assert even @ nodes.information @ even == pytest.approx(1.25 / PRIOR**2)
+    step = np.kron(np.repeat([0.0, 1.0, 1.0], 2), [1.0, 0.0])
+    assert step @ nodes.information @ step == pytest.approx(2 / ALIKE**2 + 4 / 6 / PRIOR**2)
+
+
+def test_a_term_that_another_one_explains_goes_and_the_other_stays():
+    # Each is 2.5 deviations from 0, and their sum 11: one of them is enough.
+    covariance = np.array([[1.0, -0.9], [-0.9, 1.0]])
+    assert _worth(covariance, np.array([[2.5, 2.4]]), 1e4).sum() == 1
+    assert _worth(np.eye(2), np.array([[3.6, 2.9]]), 1e4).tolist() == [True, False]
