@@ -107,6 +107,7 @@ def test_the_adjoint_of_a_moved_microscope_is_its_transpose(rng):
         x, y = rng.random(one.shape[1]), rng.random(one.shape[0])
         assert np.vdot(one.forward(x), y) == pytest.approx(np.vdot(x, one.adjoint(y)), rel=1e-5)
     wide, (rows, columns) = operator.maps[0].widened(0.05)
+    assert operator.maps[0].placed.samples_to(wide.placed) == (rows.start, columns.start) > (0, 0)
     base, inside = scope.operator((5e-6,), 3, accuracy=1e-2).widened(0.05)
     inner, moved = np.zeros(wide.shape[1]), np.zeros(base.shape[1])
     inner[:, rows.start + 5, columns.start + 5] = 1
