@@ -9,6 +9,7 @@ from itertools import repeat
 
 import numpy as np
 
+from lumigraph.core.threads import single_products
 from lumigraph.operators import cells as _cells
 from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics, HasOptics
@@ -41,6 +42,7 @@ _PER_CELL = 4
 """Samples along a cell that tell how bright it is."""
 
 
+@single_products()
 def points_image(
     camera: HasOptics, points: Points, accuracy: float, known: dict[tuple[float, float], Relay] | None = None
 ) -> np.ndarray:
