@@ -6,6 +6,7 @@ from . import (
     cluster as cluster,
     depth as depth,
     design as design,
+    information as information,
     metric as metric,
     plots as plots,
     samples as samples,

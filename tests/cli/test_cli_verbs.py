@@ -28,6 +28,7 @@ VERBS = (
     *(
         "demo",
         "design",
+        "information",
         "simulate",
         "calibrate",
         "decode",

@@ -26,6 +26,7 @@ from lumigraph.cli.deconvolve import deconvolve
 from lumigraph.cli.demo import demo
 from lumigraph.cli.depth import depth
 from lumigraph.cli.design import design
+from lumigraph.cli.information import information
 from lumigraph.cli.measure import measure
 from lumigraph.cli.options import COMMAND, PARAMETER, WARNED
 from lumigraph.cli.refocus import refocus
@@ -46,8 +47,8 @@ FAILED, USAGE, INTERRUPTED = 1, 2, 130
 _LONGEST = 400  # characters of a line on standard error
 
 VERBS = (
-    demo, design, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure, batch, sweep,
-    tolerance, dataset, board, datasheet, twin, view, samples, catalogue, reproduce,
+    demo, design, information, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure,
+    batch, sweep, tolerance, dataset, board, datasheet, twin, view, samples, catalogue, reproduce,
 )  # fmt: skip
 """In the order of their use."""
 

@@ -241,6 +241,14 @@ class Objective:
         sine = np.hypot(qy, qx) / self.medium
         return _depth_path(self, sine, np.sqrt(1 - sine**2))
 
+    def phase(self, qy: np.ndarray, qx: np.ndarray, dz: float) -> np.ndarray:
+        """Phase [rad] at (qy, qx) = n sin θ of a point at `dz`: its depth, layers and aberrations."""
+        q, angle, k = np.hypot(qy, qx), np.arctan2(qy, qx), 2 * np.pi / self.wavelength
+        phase = k * (self.depth_path(qy, qx) * dz + _extra_path(self, q))
+        for j, waves in self.terms:
+            phase = phase + 2 * np.pi * waves * zernike(j, q / self.numerical_aperture, angle)
+        return phase
+
     def pupil(self, qy: np.ndarray, qx: np.ndarray, dz: float) -> np.ndarray:
         r"""Amplitudes (modes, ...) per unit area of the pupil at (qy, qx) = n sin θ of a point at `dz`.
 
@@ -255,12 +263,8 @@ class Objective:
         """
         if self.model == "rays":
             raise GeometryError("model 'rays' has no field. Use 'scalar', 'vector' or 'paraxial'.")
-        q, angle, k = np.hypot(qy, qx), np.arctan2(qy, qx), 2 * np.pi / self.wavelength
-        sine = q / self.medium
-        cosine = np.sqrt(1 - sine**2)
-        phase = k * (_depth_path(self, sine, cosine) * dz + _extra_path(self, q))
-        for j, waves in self.terms:
-            phase = phase + 2 * np.pi * waves * zernike(j, q / self.numerical_aperture, angle)
+        angle, sine = np.arctan2(qy, qx), np.hypot(qy, qx) / self.medium
+        cosine, k, phase = np.sqrt(1 - sine**2), 2 * np.pi / self.wavelength, self.phase(qy, qx, dz)
         _, around, weight = nodes = _nodes(self, 0.0, 0.0)
         scale = k / (
             2 * np.pi * self.medium * math.sqrt(_power_of(_apodised(self, *nodes[:2]), around, weight))

@@ -29,6 +29,7 @@ from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.quantities import Displacement, Length, Positive, Wavelength
 from lumigraph.instruments.row import Row
 from lumigraph.operators.fourier_microscope import Mosaic, fourier_operator
+from lumigraph.operators.fourier_points import FourierPoints
 from lumigraph.operators.microscope_bench import DEGREE, samples_needed
 from lumigraph.operators.microscope_building import Layout, microscope_operator, require_accuracy
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
@@ -395,6 +396,18 @@ class LightFieldMicroscope(Instrument):
         layout = self._layout(SAMPLES, None, (dz,), finer)
         image, error = point_image(self.objectives, self.lenslet, layout, (y, x, dz), finer)
         return image, error * accuracy / finer
+
+    def fourier_points(self) -> FourierPoints:
+        """Images of points anywhere as a Fourier microscope sees them, with derivatives by their place.
+
+        Raises
+        ------
+        GeometryError
+            Another configuration.
+        """
+        if self.configuration != "fourier":
+            raise GeometryError(f"fourier_points needs configuration 'fourier', not {self.configuration!r}.")
+        return FourierPoints(self.objectives, self._mosaic())
 
     def pupil_images(
         self,

@@ -195,8 +195,8 @@ def fourier_operator(
     planes = (0.0,) if depths is None else tuple(checks.finite("a depth", dz) for dz in depths)
     if not planes:
         raise GeometryError("there are no depths. Give at least one, such as 0.0 for the focused plane.")
-    half = _half_window(objectives[0], mosaic, planes)
-    lit = _lit(objectives[0], mosaic)
+    half = half_window(objectives[0], mosaic, planes)
+    lit = lit_lenslets(objectives[0], mosaic)
     # Three times: as complex spectra of a window that holds the field too.
     needed = 24.0 * len(planes) * len(lit) * (2 * half + 1 + mosaic.field) ** 2
     memory.require(needed, "the images of points", "Use fewer slices or larger pixels.", SamplingError)
@@ -220,7 +220,7 @@ def fourier_operator(
     )  # fmt: skip
 
 
-def _lit(objective: Objective, mosaic: Mosaic) -> np.ndarray:
+def lit_lenslets(objective: Objective, mosaic: Mosaic) -> np.ndarray:
     """Centres of the lenslets that the pupil lights at least in part."""
     radius = mosaic.fourier_lens * objective.aperture / mosaic.magnification
     nearest = np.maximum(np.abs(mosaic.centers) - mosaic.width / 2, 0)
@@ -233,12 +233,70 @@ def _lit(objective: Objective, mosaic: Mosaic) -> np.ndarray:
     return lit
 
 
-def _half_window(objective: Objective, mosaic: Mosaic, depths: Sequence[float]) -> int:
+def half_window(objective: Objective, mosaic: Mosaic, depths: Sequence[float]) -> int:
     """Pixels to each side that hold a point's images at all depths."""
     tangent = objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
-    moved = max(abs(dz) for dz in depths) * tangent * mosaic.total_magnification
+    moved = max(abs(dz) for dz in depths) * tangent + objective.spread()
     spread = TAIL * objective.wavelength * mosaic.focal_length / mosaic.width
-    return math.ceil((moved + spread) / mosaic.pixel_pitch)
+    return math.ceil((moved * mosaic.total_magnification + spread) / mosaic.pixel_pitch)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """The pupil as a lenslet sees it, and pixels behind it.
+
+    Parameters
+    ----------
+    u
+        Samples across the lenslet, from its middle [m].
+    q
+        n sin θ along y and x of the rays that go through them.
+    amplitude
+        (n, n), of a point on the axis, of 1 in the pupil's middle.
+    turn
+        Phase over samples' place per pixel that the image is away [rad/m].
+    half, over
+        Pixels to each side, samples along each of them.
+    scale
+        Of intensities: a lenslet that is open all over, with cos θ = 1, gives 1 in all (Parseval).
+    """
+
+    u: np.ndarray
+    q: tuple[np.ndarray, np.ndarray]
+    amplitude: np.ndarray
+    turn: float
+    half: int
+    over: int
+    scale: float
+
+    @classmethod
+    def of(cls, objective: Objective, mosaic: Mosaic, center: np.ndarray, half: int) -> "View":
+        """That of the lenslet at a place."""
+        wave, f, width = objective.wavelength, mosaic.focal_length, mosaic.width
+        n = math.ceil(2.2 * (2 * half + 1) * mosaic.pixel_pitch * width / (wave * f)) + 8
+        u = ((np.arange(n) - (n - 1) / 2) / n) * width
+        # The pupil's image is upside down.
+        step = mosaic.magnification / mosaic.fourier_lens
+        qy, qx = -(center[0] + u[:, None]) * step, -(center[1] + u) * step
+        q = np.hypot(qy, qx)
+        inside = np.clip((objective.aperture - q) / (width / n * step) + 0.5, 0, 1)
+        within = np.minimum(1, objective.aperture / np.maximum(q, 1e-300))
+        cosine = np.sqrt(1 - (q * within / objective.medium) ** 2)
+        over = max(1, math.ceil(2.2 * mosaic.pixel_pitch * width / (wave * f)))
+        scale = (mosaic.pixel_pitch * width / (over * wave * f * n**2)) ** 2
+        turn = 2 * np.pi * mosaic.pixel_pitch / (wave * f)
+        return cls(u, (qy * within, qx * within), inside / np.sqrt(cosine), turn, half, over, scale)
+
+    def waves(self, middle: float) -> np.ndarray:
+        """From the samples to those of the pixels (pixels · over, n) around a place near a pixel [px]."""
+        count = 2 * self.half + 1
+        fine = (np.arange(count * self.over) + 0.5) / self.over - 0.5 - self.half
+        return np.exp(-1j * self.turn * np.outer(fine - middle, self.u))
+
+    def pixels(self, light: np.ndarray) -> np.ndarray:
+        """Of intensities on the pixels' samples."""
+        count = 2 * self.half + 1
+        return light.reshape(count, self.over, count, self.over).sum((1, 3)) * self.scale
 
 
 def _image(
@@ -246,20 +304,7 @@ def _image(
 ) -> np.ndarray:
     """Image (2 half + 1)² behind a lenslet, of a point that sends 1 through a whole one on the axis."""
     center, rest = place
-    wave, f, scale = objective.wavelength, mosaic.focal_length, mosaic.magnification / mosaic.fourier_lens
-    window = (2 * half + 1) * mosaic.pixel_pitch
-    n = math.ceil(2.2 * window * mosaic.width / (wave * f)) + 8
-    u = ((np.arange(n) - (n - 1) / 2) / n) * mosaic.width
-    q = np.hypot(center[0] + u[:, None], center[1] + u) * scale
-    step = mosaic.width / n * scale
-    inside = np.clip((objective.aperture - q) / step + 0.5, 0, 1)
-    cosine = np.sqrt(np.clip(1 - (q / objective.medium) ** 2, 1e-6, None))
-    phase = 2 * np.pi / wave * objective.medium * (cosine - 1) * dz
-    pupil = inside / np.sqrt(cosine) * np.exp(1j * phase)
-    over = max(1, math.ceil(2.2 * mosaic.pixel_pitch * mosaic.width / (wave * f)))
-    fine = (np.arange((2 * half + 1) * over) + 0.5) / over - 0.5 - half
-    waves = [np.exp(-2j * np.pi * np.outer((fine - r) * mosaic.pixel_pitch, u) / (wave * f)) for r in rest]
-    image = np.square(np.abs(waves[0] @ pupil @ waves[1].T))
-    pixels = image.reshape(2 * half + 1, over, 2 * half + 1, over).sum((1, 3))
-    # Parseval: a lenslet that is open all over, with cos θ = 1, gives 1 in all.
-    return pixels * (mosaic.pixel_pitch * mosaic.width / (over * wave * f * n**2)) ** 2
+    view = View.of(objective, mosaic, center, half)
+    pupil = view.amplitude * np.exp(1j * objective.phase(*view.q, dz))
+    field = view.waves(rest[0]) @ pupil @ view.waves(rest[1]).T
+    return view.pixels(np.square(np.abs(field)))

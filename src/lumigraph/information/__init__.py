@@ -1,0 +1,13 @@
+"""What a raw image tells of points of light: Fisher information, and the least errors of any estimate.
+
+- `bounds`: `bounds`, errors of place, depth and light over a volume; `Bounds`, the result
+- `points`: images of points and their derivatives by place, of any instrument
+- `noise`: information of a pixel with photon and read noise
+- `trials`: `trials`, errors of the most likely places in drawn noise, to set beside the bounds
+"""
+
+from lumigraph.information.bounds import Bounds, Light, bounds
+from lumigraph.information.noise import pixel_information
+from lumigraph.information.trials import Trials, trials
+
+__all__ = ["Bounds", "Light", "Trials", "bounds", "pixel_information", "trials"]

@@ -1,0 +1,282 @@
+"""Images of points of light and their derivatives by place, of any instrument, as parts of the light.
+
+Microscopes with square lenslets and Fourier microscopes have exact derivatives. Those of cameras, and of
+microscopes whose lenslets are round or whose images are traced by rays, are central differences.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from lumigraph.core.lattice import Lattice
+from lumigraph.errors import GeometryError
+from lumigraph.instruments import LensletCamera, LightFieldMicroscope, SingleLensCamera
+from lumigraph.instruments.camera import Camera
+from lumigraph.instruments.instrument import Instrument
+from lumigraph.operators import single_lens
+from lumigraph.operators.fourier_points import FourierPoints
+from lumigraph.operators.microscope_pupil import PupilImages
+from lumigraph.operators.paraxial import resolved
+from lumigraph.operators.points import points_image
+from lumigraph.operators.relay import Relay
+from lumigraph.scene import Points
+from lumigraph.simulation.microscope_scene import SAMPLES
+
+ACROSS, ALONG = 1 / 32, 1 / 4
+"""Steps of central differences: of the finest period λz/D that a stop lets through, and of λ(z/D)².
+
+They turn the phase at the stop's edge by 0.2 rad either way: a derivative is off by 0.6 % at most.
+"""
+
+SLIGHT = 0.02
+"""Change of an image by a step, over the image, to which errors of smaller changes are compared."""
+
+GOLDEN = (0.7548776662466927, 0.5698402909980532)
+"""Steps of places that fill a cell evenly, however many (R. Roberts' sequence)."""
+
+SPARE = 2
+"""Lenslets beside those that the light reaches, on each side."""
+
+
+class Source(Protocol):
+    """An instrument's images of points."""
+
+    @property
+    def pixels(self) -> int:
+        """Of each image."""
+        ...
+
+    def cell(self, dz: float) -> np.ndarray:
+        """Two vectors (y, x) [m] at a depth, by which points may move until their images are alike."""
+        ...
+
+    def image(self, place: np.ndarray) -> np.ndarray:
+        """Image (ny, nx) of a point (y, x, dz) [m], parts of the light that enters."""
+        ...
+
+    def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
+        """(4, ny, nx): the image and its derivatives by y, x and dz [1/m]; and the latter's error (3,).
+
+        The error is relative, rms; NaN where it was not `checked`, 0 of exact derivatives.
+        """
+        ...
+
+
+def source(instrument: Instrument, depths: np.ndarray, accuracy: float) -> Source:
+    """Of an instrument.
+
+    Raises
+    ------
+    GeometryError
+        A kind without images of points, a depth that it does not image.
+    """
+    if isinstance(instrument, LightFieldMicroscope):
+        return _of_microscope(instrument, depths, accuracy)
+    if isinstance(instrument, Camera):
+        for dz in depths:
+            instrument.defocused(float(dz))
+        return CameraSource(_small(instrument, depths), accuracy)
+    raise GeometryError(f"{type(instrument).__name__} has no images of points.")
+
+
+def spread(cell: np.ndarray, count: int) -> np.ndarray:
+    """So many places (count, 2) that fill a cell evenly, around its middle."""
+    steps = (0.5 + np.outer(np.arange(count), GOLDEN)) % 1 - 0.5
+    return steps @ cell
+
+
+def collected(instrument: Instrument) -> float:
+    """Part of a point's light that enters an instrument: of the sphere, on the axis, in focus."""
+    if isinstance(instrument, LightFieldMicroscope):
+        one = instrument.objectives[0]
+        return (1 - math.sqrt(1 - (one.aperture / one.medium) ** 2)) / 2
+    if isinstance(instrument, Camera):
+        return (1 - math.cos(math.atan(instrument.pupil_diameter / 2 / instrument.object_distance))) / 2
+    raise GeometryError(f"{type(instrument).__name__} has no aperture.")
+
+
+def differences(
+    image: Callable[[np.ndarray], np.ndarray], place: np.ndarray, steps: np.ndarray, checked: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `Source.lit`, by central differences; where they are checked, of two steps (Richardson)."""
+    found, errors = [image(place)], []
+    for axis, step in enumerate(steps):
+        move = np.eye(3)[axis] * step
+        slope = (image(place + move) - image(place - move)) / (2 * step)
+        if checked:
+            wide = (image(place + 2 * move) - image(place - 2 * move)) / (4 * step)
+            least = SLIGHT * float(np.linalg.norm(found[0])) / step  # in focus images stand still
+            size = max(float(np.linalg.norm(slope)), least) or 1.0
+            errors.append(float(np.linalg.norm(slope - wide)) / 3 / size)
+            slope = slope + (slope - wide) / 3
+        found.append(slope)
+    return np.stack(found), np.array(errors) if checked else np.full(3, np.nan)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraSource:
+    """Of a camera with a main lens.
+
+    Parameters
+    ----------
+    camera
+        With as many lenslets as the light reaches.
+    accuracy
+        Relative rms error of images.
+    """
+
+    camera: Camera
+    accuracy: float
+    _known: dict[tuple[float, float], Relay] = field(default_factory=dict)
+
+    @property
+    def pixels(self) -> int:
+        """As `Source.pixels`."""
+        return math.prod(self.camera.sensor.shape)
+
+    def cell(self, dz: float) -> np.ndarray:
+        """That of the lattice, as the main lens shows it; without lenslets a pixel's."""
+        scale = (self.camera.object_distance + dz) / self.camera.separation
+        lattice = self.camera.lattice
+        if lattice is None:
+            return np.eye(2) * self.camera.sensor.pixel_pitch * scale
+        return _cell(lattice) * scale
+
+    def image(self, place: np.ndarray) -> np.ndarray:
+        """As `Source.image`."""
+        points, optics = Points(place[None], np.ones(1)), resolved(self.camera.optics(), self.accuracy)
+        if isinstance(self.camera, SingleLensCamera):
+            found = single_lens.points_image(optics, points)
+        else:
+            found = points_image(optics, points, self.accuracy, self._kept(float(place[2])))
+        step = optics.object_pitch * optics.separation / (optics.object_distance + float(place[2]))
+        return np.asarray(found, np.float64) * (optics.sensor.pixel_pitch / step) ** 2
+
+    def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
+        """As `Source.lit`."""
+        ratio = (self.camera.object_distance + place[2]) / self.camera.pupil_diameter
+        across, along = ACROSS * self.camera.wavelength * ratio, ALONG * self.camera.wavelength * ratio**2
+        return differences(self.image, place, np.array([across, across, along]), checked)
+
+    def _kept(self, dz: float) -> dict[tuple[float, float], Relay]:
+        """Relays of this depth and of those just used; many would fill the memory."""
+        if len(self._known) > 8 and not any(dz == key[0] for key in self._known):
+            self._known.clear()
+        return self._known
+
+
+def _cell(lattice: Lattice) -> np.ndarray:
+    """Vectors (y, x) of a cell; in multi-focus arrays three lenslets wide."""
+    cell = np.array(lattice.basis)
+    cell[0] *= lattice.kinds
+    return cell
+
+
+def _small(camera: Camera, depths: np.ndarray) -> Camera:
+    """With only as many lenslets as light of these depths reaches, and some more."""
+    if not isinstance(camera, LensletCamera):
+        return camera
+    diameter, farthest = camera.pupil_diameter, 0.0
+    for dz in depths:
+        focus = 1 / camera.main_lens.focal_length - 1 / camera.defocused(float(dz))
+        blur = diameter * abs(1 - camera.separation * focus)
+        waves = 2.44 + 12 * sum(map(abs, camera.main_lens.aberrations.values()))
+        farthest = max(farthest, blur + 2 * waves * camera.wavelength * camera.separation / diameter)
+    pitch = camera.lenslets.pitch * (3 if camera.lattice.kinds > 1 else 1)  # points move by a cell
+    wanted = math.ceil((farthest + pitch) / camera.lenslets.row_pitch) + 2 * SPARE
+    count = tuple(min(n, wanted + (n - wanted) % 2) for n in camera.lenslets.count)
+    return camera.replace(lenslets={"count": count}, sensor={"shape": None}, main_lens={"diameter": diameter})
+
+
+def _of_microscope(scope: LightFieldMicroscope, depths: np.ndarray, accuracy: float) -> Source:
+    if scope.configuration == "fourier":
+        return FourierSource(scope, scope.fourier_points())
+    if scope.objective.model == "rays" or scope.lenslets.shape == "round":
+        return MicroscopeSource(scope, accuracy)
+    farthest = float(np.abs(depths).max())
+    return PupilSource(scope, scope.pupil_images((), farthest=farthest, accuracy=accuracy))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FourierSource:
+    """Of a Fourier microscope."""
+
+    scope: LightFieldMicroscope
+    points: FourierPoints
+
+    @property
+    def pixels(self) -> int:
+        """As `Source.pixels`."""
+        return math.prod(self.scope.sensor.shape)
+
+    def cell(self, dz: float) -> np.ndarray:
+        """A pixel's, in the object: behind every lenslet points move alike."""
+        return np.eye(2) * self.scope.object_grid.pitch[0]
+
+    def image(self, place: np.ndarray) -> np.ndarray:
+        """As `Source.image`."""
+        return self.lit(place, checked=False)[0][0]
+
+    def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
+        """As `Source.lit`."""
+        y, x, dz = place.tolist()
+        return self.points.lit(y, x, dz) / self.points.whole, np.zeros(3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MicroscopeSource:
+    """Of a microscope whose images are known as such."""
+
+    scope: LightFieldMicroscope
+    accuracy: float
+
+    @property
+    def pixels(self) -> int:
+        """As `Source.pixels`."""
+        return math.prod(self.scope.sensor.shape)
+
+    def cell(self, dz: float) -> np.ndarray:
+        """A lenslet's, in the object."""
+        return np.array(self.scope.lattice.basis) / self.scope.magnification
+
+    @property
+    def whole(self) -> float:
+        """Sum of the image of a point that is as bright as a sample of the object, if no light is lost."""
+        pixels = self.scope.micro_image_pitch / self.scope.sensor.pixel_pitch
+        return (pixels / SAMPLES) ** 2
+
+    def image(self, place: np.ndarray) -> np.ndarray:
+        """As `Source.image`."""
+        y, x, dz = place.tolist()
+        return self.scope.point_image(y, x, dz, accuracy=self.accuracy) / self.whole
+
+    def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
+        """As `Source.lit`."""
+        one = self.scope.objectives[0]
+        across = ACROSS * one.wavelength / (2 * one.aperture)
+        along = ALONG * one.wavelength * one.medium / (4 * one.aperture**2)
+        return differences(self.image, place, np.array([across, across, along]), checked)
+
+
+@dataclass(frozen=True, eq=False)
+class PupilSource(MicroscopeSource):
+    """Of a microscope whose images are known by its pupil."""
+
+    images: PupilImages
+
+    def __init__(self, scope: LightFieldMicroscope, images: PupilImages) -> None:
+        super().__init__(scope, images.accuracy)
+        object.__setattr__(self, "images", images)
+
+    def image(self, place: np.ndarray) -> np.ndarray:
+        """As `Source.image`."""
+        return self.images.forward(Points(place[None], np.ones(1)), np.zeros(0)) / self.whole
+
+    def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
+        """As `Source.lit`."""
+        (one,) = self.images.lit(Points(place[None], np.ones(1)), np.zeros(0))
+        planes = self.images.whole(np.concatenate([one.image[None], one.changes]), one.cell)
+        return np.stack([self.images.placed(plane) for plane in planes]) / self.whole, np.zeros(3)
