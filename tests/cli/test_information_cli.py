@@ -45,6 +45,6 @@ def test_a_table_of_bounds_is_printed_and_a_report_written(tmp_path, capsys):
 def test_nonsense_is_refused(capsys, words, said):
     assert main(["information", "lfm-fourier", *words]) == 1
     error = capsys.readouterr().err
-    assert error.startswith("error: ")
+    assert error.startswith("lumigraph: error: ")
     assert said in error
     assert error.count("\n") == 1

@@ -13,7 +13,6 @@ from lumigraph.cli.console import line, progress
 from lumigraph.cli.deconvolve import depths
 from lumigraph.cli.options import COMMAND, COMMON, Common, Output
 from lumigraph.cli.standing import Standing
-from lumigraph.cli.sweep import changed, combinations, values
 from lumigraph.cli.tolerance import Tolerances, given_tolerances
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
@@ -88,6 +87,7 @@ def dataset(
         Keep the intensity of every plane, too.
     """  # noqa: E501 - an example is one line
     from lumigraph.instruments import load_camera
+    from lumigraph.instruments.varied import changed, combinations, values
     from lumigraph.samples import Draws
     from lumigraph.samples import dataset as make
 

@@ -7,14 +7,14 @@ microscopes whose lenslets are round or whose images are traced by rays, are cen
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import LensletCamera, LightFieldMicroscope, SingleLensCamera
-from lumigraph.instruments.camera import Camera
+from lumigraph.instruments import Camera, LensletCamera, LightFieldMicroscope
+from lumigraph.instruments.capabilities import WithPupil
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.operators import single_lens
 from lumigraph.operators.fourier_points import FourierPoints
@@ -73,8 +73,8 @@ def source(instrument: Instrument, depths: np.ndarray, accuracy: float) -> Sourc
     GeometryError
         A kind without images of points, a depth that it does not image.
     """
-    if isinstance(instrument, LightFieldMicroscope):
-        return _of_microscope(instrument, depths, accuracy)
+    if isinstance(instrument, WithPupil):
+        return _of_microscope(cast(LightFieldMicroscope, instrument), depths, accuracy)
     if isinstance(instrument, Camera):
         for dz in depths:
             instrument.defocused(float(dz))
@@ -90,8 +90,8 @@ def spread(cell: np.ndarray, count: int) -> np.ndarray:
 
 def collected(instrument: Instrument) -> float:
     """Part of a point's light that enters an instrument: of the sphere, on the axis, in focus."""
-    if isinstance(instrument, LightFieldMicroscope):
-        one = instrument.objectives[0]
+    if isinstance(instrument, WithPupil):
+        one = cast(LightFieldMicroscope, instrument).objectives[0]
         return (1 - math.sqrt(1 - (one.aperture / one.medium) ** 2)) / 2
     if isinstance(instrument, Camera):
         return (1 - math.cos(math.atan(instrument.pupil_diameter / 2 / instrument.object_distance))) / 2
@@ -148,7 +148,7 @@ class CameraSource:
     def image(self, place: np.ndarray) -> np.ndarray:
         """As `Source.image`."""
         points, optics = Points(place[None], np.ones(1)), resolved(self.camera.optics(), self.accuracy)
-        if isinstance(self.camera, SingleLensCamera):
+        if self.camera.lattice is None:
             found = single_lens.points_image(optics, points)
         else:
             found = points_image(optics, points, self.accuracy, self._kept(float(place[2])))

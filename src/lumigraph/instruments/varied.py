@@ -1,0 +1,73 @@
+"""`--vary`: keys of a camera file with several values each, and the cameras that have them."""
+
+import itertools
+import re
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+from lumigraph.errors import FormatError
+from lumigraph.instruments.instrument import Instrument
+
+MOST = 100_000
+"""Combinations."""
+
+
+def values(text: str) -> tuple[str, list[Any]]:
+    """A key of the camera file and the values after it.
+
+    >>> values("lenslets.focal_length=4 mm:6 mm:3")
+    ('lenslets.focal_length', ['4 mm', '5 mm', '6 mm'])
+    >>> values("lenslets.layout=square, hex")[1], values("lenslets.magnification=0.3,0.5")[1]
+    (['square', 'hex'], [0.3, 0.5])
+    """
+    name, equals, words = text.partition("=")
+    parts = [word.strip() for word in words.split(":")]
+    if not (equals and name.strip() and all(parts)):
+        raise FormatError(f"--vary is {text!r} but must be like 'lenslets.focal_length=4 mm:6 mm:9'.")
+    if len(parts) == 1:
+        return name.strip(), [_number(word.strip()) for word in words.split(",")]
+    ends = [re.fullmatch(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\D*)", part) for part in parts[:2]]
+    if len(parts) != 3 or None in ends or not parts[2].isdecimal() or not 2 <= int(parts[2]) <= MOST:
+        raise FormatError(f"--vary {text!r} must be 'first:last:count', with a count from 2 to {MOST}.")
+    (first, unit), (last, other) = (end.groups() for end in ends if end)
+    if unit != other:
+        raise FormatError(f"--vary {text!r} has two units. Give first and last in the same one.")
+    steps = int(parts[2]) - 1
+    numbers = (float(first) + (float(last) - float(first)) * k / steps for k in range(steps + 1))
+    return name.strip(), [
+        f"{number:.10g} {unit}" if unit else _number(f"{number:.10g}") for number in numbers
+    ]
+
+
+def _number(word: str) -> Any:
+    for kind in (int, float):
+        try:
+            return kind(word)
+        except ValueError:
+            continue
+    return word
+
+
+def combinations(varied: Mapping[str, list[Any]]) -> list[dict[str, Any]]:
+    """Every combination of the values of some keys."""
+    count = 1
+    for some in varied.values():
+        count *= len(some)
+    if count > MOST:
+        raise FormatError(f"--vary asks for {count} combinations; at most {MOST} are taken.")
+    return [dict(zip(varied, one, strict=True)) for one in itertools.product(*varied.values())]
+
+
+def changed(camera: Instrument, item: Mapping[str, Any]) -> Instrument:
+    """The camera whose file has other values, by dotted keys; lengths carry a unit as in the file."""
+    table = tomllib.loads(camera.to_toml())
+    for name, value in item.items():
+        *path, last = name.split(".")
+        place: Any = table
+        for part in path:
+            place = place.setdefault(part, {})
+            if not isinstance(place, dict):
+                raise FormatError(f"--vary {name}: {part} is a value, which has no parts. Check the key.")
+        place[last] = value
+    return type(camera).from_table(table, "--vary")
