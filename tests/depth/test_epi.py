@@ -54,6 +54,35 @@ def test_vignetting_without_a_white_image_is_not_taken_for_depth(paint):
     assert np.percentile(error[found.confidence > 0.5], 99) < 0.4
 
 
+def test_what_vignetting_cuts_off_counts_for_nothing(paint):
+    """Matched in brightness only: off by 0.9 px in the mean, and nothing unknown."""
+    views, truth = views_of([(paint[0], lambda y, x: 0.8 * np.tanh(x / 20) + 0 * y, None)])
+    v, u, y, x = np.meshgrid(*(np.linspace(-1, 1, n) for n in views.data.shape), indexing="ij", sparse=True)
+    light = np.hypot(v - 1.2 * y, u - 1.2 * x) < 1.3
+    dark = LightField(views.data * light, views.aperture, views.lenslets, views.separation)
+    found = epi(noisy(dark, 0.004, np.random.default_rng(2)))
+    known = np.isfinite(found.values)
+    assert (known & ~light[3, 3]).sum() < 0.08 * (~light[3, 3]).sum()  # corners of a pixel or two
+    assert known.sum() > 0.9 * light[3, 3].sum()
+    error = np.abs(found.values - truth)[known]
+    assert error.mean() < 0.05
+    assert np.percentile(error, 98) < 0.2
+    assert np.asarray(found.confidence)[~known].max() == 0
+
+
+def test_black_things_are_not_taken_for_vignetting(paint):
+    def bar(y, x):
+        return np.abs(x - 10) < 6
+
+    light = 1 / (1 + np.exp((np.hypot(*np.ogrid[-3:4, -3:4])[..., None, None] - 0.1 * np.arange(72)) / 2))
+    views, _ = views_of([(lambda y, x: 0 * y, flat(1.0), bar), (paint[0], flat(0.0), None)])
+    dark = LightField(views.data * light, views.aperture, views.lenslets, views.separation)
+    found = Pictures.of(noisy(dark, 0.004, np.random.default_rng(2)))
+    assert found.seen is not None
+    assert found.seen[found.middle].all()
+    assert np.isfinite(epi(dark).values).all()
+
+
 def test_a_slanted_plane_is_not_a_staircase(paint):
     views, truth = views_of([(paint[0], lambda y, x: 0.02 * x + 0.01 * y, None)])
     found = np.asarray(epi(views).values)[4:-4, 4:-4]

@@ -84,7 +84,7 @@ def epi(
     found, error = found / pictures.reach, expected(found, evidence) / pictures.reach
     if disparities is not None:
         _check_ends(found, error, disparities, _STEP / pictures.reach)
-    known = _known(views)
+    known = _known(views) & (pictures.seen is None or pictures.seen[pictures.middle])
     found, error = np.where(known, found, np.nan), np.where(known, error, np.nan)
     trust = known * np.exp(-np.nan_to_num(error) / min(_DOUBT, _DOUBT * 4 / pictures.reach))
     found, trust, error = (like(part, views.data) for part in (found, trust, error))

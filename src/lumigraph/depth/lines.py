@@ -130,10 +130,7 @@ def _warped(
         stands = float(pictures.down[v]), float(pictures.right[u])
         at = [place + moves * w for place, w in zip(places, stands, strict=True)]
         view = map_coordinates(lines[v, u], at, order=3, mode="nearest", prefilter=False)
-        seen = (
-            seen & (at[0] >= 0) & (at[0] <= moves.shape[0] - 1) & (at[1] >= 0) & (at[1] <= moves.shape[1] - 1)
-        )
-        yield stands, seen, view
+        yield stands, seen & pictures.sees((v, u), at), view
 
 
 def visible(pictures: Pictures, moves: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:

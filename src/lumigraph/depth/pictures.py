@@ -1,6 +1,7 @@
 """The views of a light field as depth estimation needs them: few, even, and on a common scale."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.ndimage import convolve
 from lumigraph.core import checks, memory
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.lightfield import LightField
+from lumigraph.depth import vignetted
 from lumigraph.depth.quantities import disparity_per_alpha
 from lumigraph.depth.volume import box
 from lumigraph.errors import GeometryError
@@ -24,8 +26,6 @@ _WINDOW, _SMOOTH = 4, 0.1  # px; part of the windows that show nothing but noise
 _OF_NOISE = 0.81  # of its mean: how rough the smoothest tenth of the windows of noise alone is
 _LIT = 0.1  # of a picture from 0 to 1: what is darker may be cut off
 _DARK = 0.05  # views darker than this part of the middle one lie outside the aperture
-_VIGNETTED = 2.25  # ratio of a view's brightness to the middle one's: more from place to place is no parallax
-_BROAD, _PEDESTAL = 10, 0.05  # windows to a side that brightness is compared in, each this much brighter
 
 
 def measurable(views: LightField) -> bool:
@@ -37,8 +37,8 @@ def measurable(views: LightField) -> bool:
 class Pictures:
     """Views on a scale of 0 to 1, even in noise: square roots, matched in brightness to the middle view.
 
-    Where a view's brightness beside the middle one's varies over the picture by more than `_VIGNETTED`, as
-    without a white image behind lenses that vignette, it is matched in windows of a tenth of the picture.
+    Views that vignette, as without a white image behind most lenses, are matched in windows of a tenth of the
+    picture; where their light is cut off, they show what the middle one does, and are not `seen`.
 
     Parameters
     ----------
@@ -53,6 +53,8 @@ class Pictures:
         Standard deviation of the pixels' noise, estimated from the middle view.
     reach
         Views from the middle one to the outermost: disparities times reach are the engine's unit.
+    seen
+        Which places (v, u, y, x) are not cut off in a view; None for all.
     """
 
     data: np.ndarray
@@ -61,6 +63,7 @@ class Pictures:
     lit: np.ndarray
     noise: float
     reach: float
+    seen: np.ndarray | None = None
 
     @property
     def middle(self) -> tuple[int, int]:
@@ -71,6 +74,15 @@ class Pictures:
     def center(self) -> np.ndarray:
         """The middle view (c, y, x)."""
         return self.data[self.middle]
+
+    def sees(self, view: tuple[int, int], at: Sequence[np.ndarray]) -> np.ndarray:
+        """Whether a view shows places (...) of its own, along y and x: within it, and not cut off."""
+        ends = [n - 1 for n in self.data.shape[-2:]]
+        inside = (at[0] >= 0) & (at[0] <= ends[0]) & (at[1] >= 0) & (at[1] <= ends[1])
+        if self.seen is None:
+            return inside
+        nearest = [np.clip(np.rint(k), 0, end).astype(np.intp) for k, end in zip(at, ends, strict=True)]
+        return inside & self.seen[view][tuple(nearest)]
 
     @classmethod
     def of(cls, views: LightField) -> "Pictures":
@@ -99,13 +111,15 @@ class Pictures:
         data = to_numpy(views.data)[np.ix_(*chosen)].astype(np.float32)
         checks.finite_array("the light field", data, GeometryError)
         data = data[:, :, None] if data.ndim == 4 else np.moveaxis(data, 4, 2)
-        data, lit = _even(data, (len(chosen[0]) // 2, len(chosen[1]) // 2))
+        center = len(chosen[0]) // 2, len(chosen[1]) // 2
+        data, lit = _even(data, center)
+        seen = vignetted.even(data, lit, center)
         (per_t, per_s), middle = disparity_per_alpha(views), [n // 2 for n in views.aperture.shape]
         down = (chosen[0] - middle[0]) * (per_t / per_s)
         right = (chosen[1] - middle[1]).astype(float)
         reach = float(max(np.abs(down).max(), np.abs(right).max()))
-        center = data[len(chosen[0]) // 2, len(chosen[1]) // 2]
-        return cls(data, down / reach, right / reach, lit, noise_of(center.mean(0)), reach)
+        noise = noise_of(data[center].mean(0))
+        return cls(data, down / reach, right / reach, lit, noise, reach, seen)
 
 
 def _chosen(count: int) -> np.ndarray:
@@ -132,24 +146,7 @@ def _even(data: np.ndarray, middle: tuple[int, int]) -> tuple[np.ndarray, np.nda
     gain = np.where(lit, level[middle] / np.where(lit, level, 1), 0) / white
     for v, u in np.ndindex(lit.shape):
         data[v, u] = np.sqrt(data[v, u] * np.float32(gain[v, u])) if lit[v, u] else 0
-    center = _brightness(data[middle])
-    for v, u in zip(*np.nonzero(lit), strict=True):
-        _match(data[v, u], center)
     return data, lit
-
-
-def _brightness(picture: np.ndarray) -> np.ndarray:
-    """Of a picture (c, y, x), in windows (y, x) in which what moves from view to view counts little."""
-    radius = max(16, min(picture.shape[1:]) // _BROAD)
-    return box(picture.mean(0), radius) + np.float32(_PEDESTAL)
-
-
-def _match(picture: np.ndarray, center: np.ndarray) -> None:
-    """Make a vignetted picture (c, y, x) as bright as the middle view everywhere, in place."""
-    ratio = _brightness(picture) / center
-    low, high = np.percentile(ratio[::4, ::4], (5, 95))
-    if high > math.sqrt(_VIGNETTED) * low:
-        picture /= ratio
 
 
 def noise_of(picture: np.ndarray) -> float:

@@ -81,30 +81,39 @@ def costs(
 class _View:
     """A view of the cross, and the middle view as bright as it is seen from there (c, y, x).
 
-    `place` is where it stands along `axis` of its array; `data` goes on at its edges.
+    `place` is where it stands along `axis` of its array; `data` goes on at its edges, and so does `seen`
+    (y, x), which places are not cut off.
     """
 
     data: np.ndarray
     middle: np.ndarray
     place: float
     axis: int
+    seen: np.ndarray | None
 
     def difference(self, move: float, out: np.ndarray) -> np.ndarray:
         """From the middle view (c, y, x) if all places move by `move`, linearly between samples."""
         below = math.floor(move * self.place)
         part = np.float32(move * self.place - below)
-        first, second = self._read(below), self._read(below + 1)
+        first, second = self._read(self.data, below), self._read(self.data, below + 1)
         np.subtract(second, first, out=out)
         out *= part
         out += first
         out -= self.middle
         return np.abs(out, out=out)
 
-    def _read(self, start: int) -> np.ndarray:
+    def sees(self, move: float) -> np.ndarray | None:
+        """Which places (y, x) are not cut off if all places move by `move`; None for all."""
+        if self.seen is None:
+            return None
+        below = math.floor(move * self.place)
+        return (self._read(self.seen[None], below) & self._read(self.seen[None], below + 1))[0]
+
+    def _read(self, data: np.ndarray, start: int) -> np.ndarray:
         count = self.middle.shape[self.axis]
-        start += (self.data.shape[self.axis] - count) // 2
+        start += (data.shape[self.axis] - count) // 2
         places = slice(start, start + count)
-        return self.data[:, places] if self.axis == 1 else self.data[:, :, places]
+        return data[:, places] if self.axis == 1 else data[:, :, places]
 
 
 def _halves(pictures: Pictures, shading: Shading, pad: int) -> list[list[list[_View]]]:
@@ -131,16 +140,22 @@ def _view(
     pictures: Pictures, which: tuple[int, int], stands: tuple[float, int], shading: Shading, pad: int
 ) -> _View:
     place, axis = float(stands[0]), stands[1]
-    data = np.pad(pictures.data[which], [(pad, pad) if k == axis else (0, 0) for k in range(3)], "edge")
-    seen = shading.at(place, 0.0) if axis == 1 else shading.at(0.0, place)
-    return _View(data, pictures.center + seen, place, axis)
+    wider = [(pad, pad) if k == axis else (0, 0) for k in range(3)]
+    data = np.pad(pictures.data[which], wider, "edge")
+    seen = None if pictures.seen is None else np.pad(pictures.seen[which], wider[1:], "edge")
+    gloss = shading.at(place, 0.0) if axis == 1 else shading.at(0.0, place)
+    return _View(data, pictures.center + gloss, place, axis, seen)
 
 
 def _disagreement(
     side: list[_View], move: float, most: float, room: tuple[np.ndarray, np.ndarray]
 ) -> np.ndarray:
-    """Mean over the views of one side of how much they differ from the middle one (y, x)."""
+    """Mean over the views of one side of how much they differ from the middle one (y, x).
+
+    Where all of them are cut off, as much as counts.
+    """
     total = np.zeros(room[1].shape, np.float32)
+    count: np.ndarray | int = 0
     difference = room[1]
     for view in side:
         colours = view.difference(move, room[0])
@@ -150,9 +165,11 @@ def _disagreement(
         difference /= len(colours)
         np.minimum(difference, np.float32(most), out=difference)
         _outside(difference, move * view.place, view.axis - 1)[...] = most
-        total += difference
-    total /= len(side)
-    return total
+        sees = view.sees(move)
+        total += difference if sees is None else difference * sees
+        count = count + (1 if sees is None else sees)
+    total /= np.maximum(count, 1)
+    return np.where(np.equal(count, 0), np.float32(most), total)
 
 
 def _outside(image: np.ndarray, distance: float, axis: int) -> np.ndarray:
@@ -206,7 +223,7 @@ def _shading(pictures: Pictures, moves: np.ndarray, radius: int, most: float) ->
         down, right = float(pictures.down[k]), float(pictures.right[m])
         at = [places[0] + moves * np.float32(down), places[1] + moves * np.float32(right)]
         residual = map_coordinates(grey[k, m], at, order=1, mode="nearest") - grey[v, u]
-        inside = (at[0] >= 0) & (at[0] <= moves.shape[0] - 1) & (at[1] >= 0) & (at[1] <= moves.shape[1] - 1)
+        inside = pictures.sees((int(k), int(m)), at)
         gradient = np.float32(down) * slope[0] + np.float32(right) * slope[1]
         fit.add(residual, inside / (1 + (residual / most) ** 2) ** 2, gradient, down, right)
     return fit.solved(radius)
@@ -229,7 +246,10 @@ def _shrunk(pictures: Pictures, size: int) -> Pictures:
     ny, nx = (n // size for n in pictures.center.shape[1:])
     data = pictures.data[..., : ny * size, : nx * size]
     data = data.reshape(*data.shape[:3], ny, size, nx, size).mean((4, 6))
-    return replace(pictures, data=data)
+    seen = pictures.seen
+    if seen is not None:
+        seen = seen[..., : ny * size, : nx * size].reshape(*seen.shape[:2], ny, size, nx, size).all((3, 5))
+    return replace(pictures, data=data, seen=seen)
 
 
 def _quantiles(values: np.ndarray, weights: np.ndarray, parts: tuple[float, float]) -> tuple[float, float]:
