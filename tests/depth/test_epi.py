@@ -70,6 +70,17 @@ def test_what_vignetting_cuts_off_counts_for_nothing(paint):
     assert np.asarray(found.confidence)[~known].max() == 0
 
 
+def test_bright_things_before_a_dark_ground_are_not_taken_for_vignetting():
+    def bead(y, x):
+        return np.exp(-((y + 12) ** 2 + (x + 8) ** 2) / 18) + np.exp(-((y - 17) ** 2 + (x - 11) ** 2) / 8)
+
+    views, _ = views_of([(bead, flat(0.8), None)], shape=(45, 30))
+    found = Pictures.of(views)
+    assert found.seen is not None
+    assert found.seen[found.middle].all()
+    assert found.seen.mean() > 0.999
+
+
 def test_black_things_are_not_taken_for_vignetting(paint):
     def bar(y, x):
         return np.abs(x - 10) < 6

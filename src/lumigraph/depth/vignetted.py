@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from scipy.ndimage import maximum_filter
+from scipy.ndimage import maximum_filter, uniform_filter
 
 from lumigraph.depth.volume import box
 
@@ -14,6 +14,7 @@ _LEAST = 0.2  # ratio of square roots below which a view is not made brighter an
 _BLACK = 0.03  # of white: what is cut off has less, but for a camera's black level and scattered light
 _ALONE = 3  # px: smaller places are black, or in shadow
 _CHANGES = 0.25  # part of a window that is black in this view, but lit in others
+_LIT = 0.5  # part of it that may be black in all views
 _BESIDE = 2  # px beside what is cut off: light falls off there
 
 
@@ -59,16 +60,24 @@ def _varies(picture: np.ndarray, center: np.ndarray) -> bool:
 def _seen(data: np.ndarray, views: list[tuple[int, int]]) -> np.ndarray:
     """Which places (v, u, y, x) are not cut off: what is black in a view where others are lit.
 
-    Black things are black in all views, and move little within a window.
+    Black things are black in all views, and move little within a window; so does what stands before a dark
+    ground.
     """
     black = np.zeros((*data.shape[:2], *data.shape[-2:]), bool)
     share = np.ones(black.shape, np.float32)
-    radius, size = _radius(black.shape), 2 * _ALONE + 1
+    size, radius = 2 * _ALONE + 1, _radius(black.shape)
+    inside = _sum(np.ones(black.shape[-2:], np.float32), radius)
     for at in views:
         dark = maximum_filter(data[at].mean(0), size) < math.sqrt(_BLACK)
         black[at] = maximum_filter(dark, size + 2 * _BESIDE)
-        share[at] = box(black[at].astype(np.float32), radius)
-    return ~(black & (share - share.min((0, 1)) > _CHANGES))
+        share[at] = _sum(black[at].astype(np.float32), radius) / inside
+    least = share.min((0, 1))
+    return ~(black & (share - least > _CHANGES) & (least < _LIT))
+
+
+def _sum(image: np.ndarray, radius: int) -> np.ndarray:
+    """Over (2 radius + 1)² samples, 0 beyond the edges, as a part of them all."""
+    return uniform_filter(image, 2 * radius + 1, mode="constant")
 
 
 def _ratio(picture: np.ndarray, center: np.ndarray, used: np.ndarray) -> np.ndarray:
