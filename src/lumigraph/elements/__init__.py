@@ -13,7 +13,7 @@
 """
 
 from lumigraph.elements.apertures import CircularAperture, RectangularAperture
-from lumigraph.elements.field_plate import OF_ONE_LENS, FieldPlate, ZernikeMap
+from lumigraph.elements.field_plate import OF_ONE_LENS, FieldPlate, Openings, ZernikeMap
 from lumigraph.elements.lens import ThinLens
 from lumigraph.elements.lenslets import LensletArray
 from lumigraph.elements.masks import random_phase_mask, white_phase
@@ -27,6 +27,7 @@ __all__ = [
     "Element",
     "FieldPlate",
     "LensletArray",
+    "Openings",
     "RectangularAperture",
     "Scatter",
     "ThinLens",

@@ -5,7 +5,7 @@ point through the middle of the main lens, (y/z, x/z) of a point at (y, x) and a
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -201,8 +201,33 @@ def _through(nodes: Nodes, values: np.ndarray, at: float, parity: np.ndarray | N
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Openings:
+    """How wide a round lens is open, seen from the image: an ellipse for each field.
+
+    Parameters
+    ----------
+    x
+        Fields, tangents, ascending from 0.
+    wavelengths
+        Ascending [m].
+    axes
+        Widths (wavelengths, fields, 2) along the field and across it, over the stop's diameter.
+    """
+
+    x: Nodes
+    wavelengths: Nodes
+    axes: np.ndarray
+
+    def at(self, field: float, wavelength: float) -> tuple[float, float]:
+        """Of a field, a tangent, at a wavelength [m] that the lens' aberrations are known at."""
+        axes = _through(self.wavelengths, self.axes, wavelength, None)
+        along, across = _through(self.x, axes, min(field, self.x[-1]), np.ones(2))
+        return float(along), float(across)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class FieldPlate:
-    """Plate of a main lens whose aberrations change over the field, in a round stop.
+    """Plate of a main lens whose aberrations change over the field, in a stop that is round on the axis.
 
     One field of light behind the lens does not tell where each part came from: use the plate `at` a field.
 
@@ -214,11 +239,14 @@ class FieldPlate:
         Of the stop and of the unit disc [m].
     more
         Waves rms by Noll's index that all fields have besides.
+    openings
+        Of a round lens whose stop looks different from each field; None for one round stop.
     """
 
     aberrations: ZernikeMap
     diameter: float
     more: tuple[tuple[int, float], ...] = ()
+    openings: Openings | None = None
 
     def at(self, y: float, x: float, wavelength: float) -> ZernikePlate:
         """The plate for light from a field, tangents, of a wavelength [m].
@@ -231,7 +259,10 @@ class FieldPlate:
         waves = {j: rms for j, rms in self.aberrations.at(y, x, wavelength).items() if rms}
         for j, rms in self.more:
             waves[j] = waves.get(j, 0.0) + rms
-        return ZernikePlate({j: 2 * math.pi * rms for j, rms in waves.items()}, self.diameter)
+        plate = ZernikePlate({j: 2 * math.pi * rms for j, rms in waves.items()}, self.diameter)
+        if self.openings is None:
+            return plate
+        return replace(plate, axes=self.openings.at(math.hypot(y, x), wavelength), direction=math.atan2(y, x))
 
     def __call__(self, light: Field) -> Field:
         """Refused: what one plate does is not what this one does."""
@@ -240,5 +271,6 @@ class FieldPlate:
 
 OF_ONE_LENS = (
     "the main lens' aberrations change over the field, and light that interferes, snapshots, opaque slices "
-    "and trains go through one lens for all fields. Use Incoherent() light, or leave over_field out."
+    "and trains go through one lens for all fields. Use Incoherent() light, or leave over_field and "
+    "prescription out."
 )

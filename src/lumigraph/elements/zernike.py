@@ -82,9 +82,11 @@ def zernike(j: int, rho: np.ndarray, theta: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True)
 class ZernikePlate:
-    r"""Phase plate in a round stop: aberrations.
+    r"""Phase plate in a round or elliptic stop: aberrations.
 
     .. math:: t = \exp(i \sum_j c_j Z_j(2r/D, \theta)), \quad r < D/2
+
+    Of an elliptic stop, places are divided by its `axes` first.
 
     Parameters
     ----------
@@ -96,11 +98,15 @@ class ZernikePlate:
         (y, x) [m].
     edge
         Of the stop: "grey" or "hard".
+    axes
+        Of an elliptic stop, its widths along `direction` and across it over the diameter.
+    direction
+        From +x towards +y [rad].
 
     Raises
     ------
     GeometryError
-        A coefficient that is not finite, an index below 1, or a diameter that is not above zero.
+        A coefficient that is not finite, an index below 1, or a diameter or an axis that is not above zero.
 
     Examples
     --------
@@ -112,6 +118,8 @@ class ZernikePlate:
     diameter: float
     center: tuple[float, float] = (0.0, 0.0)
     edge: Edge = "grey"
+    axes: tuple[float, float] = (1.0, 1.0)
+    direction: float = 0.0
 
     def __post_init__(self) -> None:
         try:
@@ -130,15 +138,50 @@ class ZernikePlate:
         checks.positive("diameter", self.diameter)
         object.__setattr__(self, "center", checks.pair("center", self.center))
         check_edge(self.edge)
+        object.__setattr__(self, "axes", checks.pair("axes", self.axes))
+        for axis in self.axes:
+            checks.positive("an axis", axis, "1")
+        checks.finite("direction", self.direction, "rad")
+
+    @property
+    def reach(self) -> float:
+        """Farthest place of the stop from (0, 0), over the diameter's half."""
+        return max(self.axes) + 2 * math.hypot(*self.center) / self.diameter
+
+    @property
+    def area(self) -> float:
+        """Of the stop, over that of a round one of its diameter."""
+        return self.axes[0] * self.axes[1]
 
     def transmission(self, grid: Grid, wavelength: float) -> np.ndarray:
         """Complex factor (ny, nx) of each sample."""
-        stop = CircularAperture(self.diameter, self.center, self.edge).transmission(grid, wavelength)
-        return np.exp(1j * self.phase(grid.y[:, None], grid.x)) * stop
+        return np.exp(1j * self.phase(grid.y[:, None], grid.x)) * self._stop(grid, wavelength)
+
+    def _stop(self, grid: Grid, wavelength: float) -> np.ndarray:
+        if self.axes[0] == self.axes[1]:
+            round_one = CircularAperture(self.diameter * self.axes[0], self.center, self.edge)
+            return round_one.transmission(grid, wavelength)
+        half = self.diameter / 2
+        y, x = self._stretched(grid.y[:, None] - self.center[0], grid.x - self.center[1])
+        rho = np.hypot(y, x)
+        if self.edge == "hard":
+            return (rho <= half * (1 + 1e-12)).astype(np.float64)
+        # Distance from the edge, and how far a sample reaches along its normal.
+        down, across = (part / np.maximum(rho, 1e-300) for part in self._stretched(y, x))
+        slope = np.maximum(np.abs(down) * grid.pitch[0], np.abs(across) * grid.pitch[1])
+        return np.clip((half - rho) / np.maximum(slope, 1e-300) + 0.5, 0.0, 1.0)
+
+    def _stretched(self, y: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places, from the centre, at which the stop is round."""
+        if self.axes == (1.0, 1.0):
+            return y, x
+        sin, cos = math.sin(self.direction), math.cos(self.direction)
+        along, across = (x * cos + y * sin) / self.axes[0], (y * cos - x * sin) / self.axes[1]
+        return along * sin + across * cos, along * cos - across * sin
 
     def phase(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Phase [rad] at places that broadcast [m], whatever the stop lets through."""
-        y, x = y - self.center[0], x - self.center[1]
+        y, x = self._stretched(y - self.center[0], x - self.center[1])
         rho, theta = np.hypot(y, x) / (self.diameter / 2), np.arctan2(y, x)
         rho = np.minimum(rho, 1.5)  # high orders overflow far outside the stop
         phase = np.zeros(np.shape(rho))
@@ -157,7 +200,9 @@ class ZernikePlate:
                 partner = j + 1 if j < HIGHEST and noll_to_nm(j + 1) == (n, -m) else j - 1
                 table[partner] = table.get(partner, 0.0) + coefficient * other
         (y, x), sin, cos = self.center, math.sin(angle), math.cos(angle)
-        return replace(self, coefficients=table, center=(y * cos + x * sin, x * cos - y * sin))
+        center = y * cos + x * sin, x * cos - y * sin
+        direction = 0.0 if self.axes[0] == self.axes[1] else self.direction + angle
+        return replace(self, coefficients=table, center=center, direction=direction)
 
     def __call__(self, field: Field) -> Field:
         """The field just behind the plate."""

@@ -1,6 +1,7 @@
 """What all cameras have in common: distances, grids and trains."""
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,8 +18,9 @@ from lumigraph.core.progress import Progress, part
 from lumigraph.design import plenoptic1, resolution, thin_lens
 from lumigraph.design.layout import Layout, LensletLayout
 from lumigraph.elements import FieldPlate, LensletArray, ThinLens, Train, ZernikePlate
-from lumigraph.errors import GeometryError
-from lumigraph.instruments import parameters, point_view
+from lumigraph.errors import GeometryError, ParaxialWarning
+from lumigraph.instruments import describe_glass, parameters, point_view
+from lumigraph.instruments.glass import Glass, Wanted, glass
 from lumigraph.instruments.grids import Sampling
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.parameters import Parameter
@@ -135,6 +137,10 @@ class Camera(Instrument):
         """The main lens: its phase, its stop and its aberrations."""
         focal_length, diameter = self.main_lens.focal_length, self.pupil_diameter
         waves = self.main_lens.aberrations
+        if (glass := self.glass) is not None:
+            more = tuple(waves.items())
+            plate = FieldPlate(glass.aberrations, diameter, more, glass.openings)
+            return Train((plate, ThinLens(focal_length)))
         if self.main_lens.over_field is not None:
             plate = FieldPlate(self.main_lens.over_field.aberrations, diameter, tuple(waves.items()))
             return Train((plate, ThinLens(focal_length)))
@@ -143,6 +149,27 @@ class Camera(Instrument):
         # The plate is also the stop: two grey edges would be darker than one.
         plate = ZernikePlate({j: 2 * math.pi * rms for j, rms in waves.items()}, diameter)
         return Train((plate, ThinLens(focal_length)))
+
+    @cached_property
+    def glass(self) -> Glass | None:
+        """What the rays of the main lens' prescription say, at this camera's distances; None without one.
+
+        Raises
+        ------
+        FormatError
+            A file that is not read.
+        GeometryError
+            A prescription that contradicts the camera, or that is not followed.
+        LumigraphError
+            Optiland is not installed.
+        """
+        path = self.main_lens.prescription
+        if path is None:
+            return None
+        return glass(path, Wanted(
+            self.wavelength, self.object_distance, self.main_lens.focal_length, self.pupil_diameter,
+            math.hypot(*self.sampling.object_half) / self.object_distance,
+        ))  # fmt: skip
 
     def layout(self) -> Layout:
         """Distances and sizes that a ray diagram shows."""
@@ -201,6 +228,8 @@ class Camera(Instrument):
 
     def optics(self) -> CameraOptics:
         """What operators read of the camera, as plain values."""
+        for text in describe_glass.warnings(self):
+            warnings.warn(text, ParaxialWarning, stacklevel=2)
         return CameraOptics(
             self.wavelength, self.object_distance, self.separation, self.pupil_diameter, self.lens_train(),
             self.sensor, self.sampling.object_pitch, self.lenslet_array(), self.lenslet_distance,

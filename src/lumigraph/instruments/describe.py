@@ -8,6 +8,7 @@ from lumigraph.design import plenoptic1 as design1
 from lumigraph.design import plenoptic2 as design2
 from lumigraph.design import resolution
 from lumigraph.errors import SamplingError
+from lumigraph.instruments import describe_glass
 from lumigraph.instruments.description import TRADE_OFFS, Description
 from lumigraph.instruments.row import Row
 from lumigraph.sensor import Sensor
@@ -141,6 +142,7 @@ def _main_lens(camera: "Camera") -> Iterator[Row]:
         yield Row(f"Noll {index}", float(waves), "waves rms", "given")
     if camera.main_lens.over_field is not None:
         yield from _over_field(camera.main_lens.over_field, wavelength)
+    yield from describe_glass.rows(camera)
 
 
 def _over_field(table: "OverField", wavelength: float) -> Iterator[Row]:
@@ -248,6 +250,7 @@ def _warnings(camera: "Camera") -> Iterator[str]:
             getattr(camera.sampling, f"{name}_grid")
         except SamplingError as error:
             yield f"cannot be simulated: {error}"
+    yield from describe_glass.warnings(camera)
     if camera.f_number < 4:
         yield f"the main lens works at f/{camera.f_number:.3g}: below f/4 paraxial, scalar forms are rough."
     pixel, airy = camera.pixels.pixel_pitch, resolution.airy_first_zero(camera.wavelength, camera.f_number)

@@ -50,7 +50,7 @@ def _beside(path: Path, table: dict[str, Any]) -> dict[str, Any]:
     """The table, whose main lens names files from the camera file's folder on."""
     lens = table.get("main_lens")
     if isinstance(lens, dict):
-        for key in ("over_field",):
+        for key in ("over_field", "prescription"):
             if isinstance(lens.get(key), str):
                 lens[key] = str(path.parent / lens[key])
     return table

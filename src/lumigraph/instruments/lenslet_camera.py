@@ -143,10 +143,10 @@ class LensletCamera(Camera):
     def optics(self) -> CameraOptics:
         """What operators read of the camera, as plain values."""
         plain = replace(super().optics(), model=self.model)
-        if self.model == "exact" and self.main_lens.over_field is not None:
+        if self.model == "exact" and self.main_lens.varies:
             raise GeometryError(
                 'model is "exact" but the main lens changes over the field, which the paraxial model follows '
-                'alone. Use model = "paraxial" or "auto", or leave over_field out.'
+                'alone. Use model = "paraxial" or "auto", or leave over_field and prescription out.'
             )
         if self.model == "exact" and not is_possible(plain):
             raise GeometryError(

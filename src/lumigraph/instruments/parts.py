@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from lumigraph.core.lattice import Lattice
-from lumigraph.errors import GeometryError
+from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments.over_field import OverField, given
 from lumigraph.instruments.part import Part
 from lumigraph.instruments.quantities import (
@@ -18,6 +18,7 @@ from lumigraph.instruments.quantities import (
     Angle,
     Bits,
     Counts,
+    File,
     Fraction,
     Length,
     NotNegative,
@@ -49,6 +50,8 @@ class MainLens(Part):
         Zernike terms: Noll index to waves rms, of all fields.
     over_field
         Terms that change over the field besides: `OverField`, its table, or the path of a CSV file.
+    prescription
+        In its place, the path of a ZMX file or of Optiland's JSON: its rays tell the terms.
 
     Examples
     --------
@@ -60,6 +63,18 @@ class MainLens(Part):
     diameter: Length | None = None
     aberrations: Aberrations = Field(default_factory=dict)
     over_field: Annotated[OverField | None, BeforeValidator(given)] = None
+    prescription: File | None = None
+
+    @model_validator(mode="after")
+    def _has_one_source(self) -> "MainLens":
+        if self.over_field is not None and self.prescription is not None:
+            raise FormatError("over_field and prescription both give terms over the field. Leave one out.")
+        return self
+
+    @property
+    def varies(self) -> bool:
+        """Whether it changes over the field."""
+        return self.over_field is not None or self.prescription is not None
 
 
 class Lenslets(Part):

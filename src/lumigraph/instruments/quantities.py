@@ -6,6 +6,7 @@ A validator's message does not name the field: `problems.readable` puts the dott
 import math
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -221,6 +222,14 @@ def _several(
         raise FormatError(f"{value!r} is not a list. Write {example}.")
     return tuple(one(each, info) for each in value)
 
+
+def _file(value: Any) -> Path:
+    if not isinstance(value, str | Path) or not str(value):
+        raise FormatError(f"{value!r} is not the name of a file. Write it in quotes.")
+    return Path(value)
+
+
+File = Annotated[Path, BeforeValidator(_file), PlainSerializer(Path.as_posix)]
 
 Length = Annotated[float, BeforeValidator(_length)]
 """A length above zero [m]."""

@@ -316,9 +316,25 @@ def mirrored(camera: CameraOptics) -> bool:
     """Whether the main lens is known to be the same in a mirror along each axis of the straight array."""
     return all(
         isinstance(element, ThinLens | CircularAperture)
-        or (isinstance(element, ZernikePlate) and all(map(_even, *zip(*element.coefficients, strict=True))))
+        or (isinstance(element, ZernikePlate) and _upright(element))
         for element in lens(camera).elements
     )
+
+
+def _upright(plate: ZernikePlate) -> bool:
+    if plate.center != (0.0, 0.0) or plate.axes[0] != plate.axes[1]:
+        return False
+    return all(_even(j, coefficient) for j, coefficient in dict(plate.coefficients).items())
+
+
+def stop_reach(lens: Train) -> float:
+    """Farthest place of a lens' stop from the axis, over half of the camera's diameter; 1 of round ones."""
+    return max([1.0, *(p.reach for p in lens.elements if isinstance(p, ZernikePlate))])
+
+
+def stop_area(lens: Train) -> float:
+    """Of a lens' stop, over that of the camera's round one."""
+    return math.prod(p.area for p in lens.elements if isinstance(p, ZernikePlate))
 
 
 def _even(j: int, coefficient: float) -> bool:

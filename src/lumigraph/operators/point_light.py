@@ -92,11 +92,12 @@ class Sampled:
         return np.exp(turn * np.outer(y, grid.y)) @ (pupil @ np.exp(turn * np.outer(grid.x, x)))
 
     def _behind(self) -> tuple[Grid, np.ndarray]:
-        """The pupil's samples, for light of 1 behind it."""
+        """The pupil's samples, for light of 1 behind a round stop."""
         if not self._pupil:
             # Light comes again after as many λL/D as there are samples.
             count = max(self.samples, math.ceil(3 * self.widest / _cells.airy(self.camera)))
-            grid = Grid.square(count + 8, self.camera.pupil_diameter / count)
+            wide = math.ceil(count * _cells.stop_reach(self.lens))
+            grid = Grid.square(wide + 8, self.camera.pupil_diameter / count)
             with warnings.catch_warnings():  # what is sampled is the product of all phases
                 warnings.simplefilter("ignore", SamplingWarning)
                 point = sources.point_source(grid, self.camera.wavelength, self.distance, paraxial=True)
@@ -104,5 +105,5 @@ class Sampled:
             squared = self.camera.wavelength * self.camera.separation
             pupil = pupil * np.outer(*(np.exp(1j * np.pi * c**2 / squared) for c in (grid.y, grid.x)))
             light = (np.abs(pupil) ** 2).sum() * squared**2 / np.prod(grid.pitch)
-            self._pupil.extend((grid, pupil / np.sqrt(light)))
+            self._pupil.extend((grid, pupil * np.sqrt(_cells.stop_area(self.lens) / light)))
         return self._pupil[0], self._pupil[1]

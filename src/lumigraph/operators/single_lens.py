@@ -252,7 +252,8 @@ def _point_image(camera: CameraOptics, distance: float, offsets: list[Span], lig
     reach = min(wanted, max(FINEST_PUPIL * spot / PERIOD, 1.5 * blur + 50 * spot))
     near = [_cropped(span, reach) for span in offsets]
     across = max(COARSEST_PUPIL, math.ceil(PERIOD * reach / spot))
-    pupil = Grid.square(across + 3, camera.pupil_diameter / across)
+    wide = math.ceil(across * _cells.stop_reach(camera.lens))
+    pupil = Grid.square(wide + 3, camera.pupil_diameter / across)
     with warnings.catch_warnings():  # a smooth converging wave: its samples do not stand for points
         warnings.simplefilter("ignore", SamplingWarning)
         point = sources.point_source(pupil, camera.wavelength, distance, paraxial=True)

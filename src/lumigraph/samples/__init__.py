@@ -7,13 +7,13 @@
 - `bench`: white and raw image of a plenoptic camera (1.0 or 2.0), with camera, scene and depths
 - `volume`: raw image of a light-field microscope, with the volume that it shows
 - `drawn`: scenes drawn by chance, as a camera sees them; `dataset`: many of them in one store
-- `files`: their camera files; `folder`: all of them as files
+- `files`: their camera files, and a lens' prescription; `folder`: all of them as files
 """
 
 from lumigraph.samples.bench import BenchSample, bench
 from lumigraph.samples.dataset import Draws, dataset
 from lumigraph.samples.drawn import DrawnSample, drawn
-from lumigraph.samples.files import camera_file
+from lumigraph.samples.files import camera_file, lens_path
 from lumigraph.samples.folder import NAMES, write
 from lumigraph.samples.portrait import PortraitSample, glowing, portrait
 from lumigraph.samples.scene import SceneSample, scene
@@ -32,6 +32,7 @@ __all__ = [
     "dataset",
     "drawn",
     "glowing",
+    "lens_path",
     "portrait",
     "scene",
     "volume",

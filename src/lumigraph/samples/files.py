@@ -1,4 +1,4 @@
-"""The camera files of the samples."""
+"""The camera files of the samples, and a lens."""
 
 from contextlib import AbstractContextManager
 from importlib.resources import as_file, files
@@ -25,3 +25,8 @@ def camera_path(kind: str) -> AbstractContextManager[Path]:
     """
     checks.choice("kind", kind, KINDS)
     return as_file(files("lumigraph.samples").joinpath(f"{kind}.toml"))
+
+
+def lens_path() -> AbstractContextManager[Path]:
+    """Context that gives the path of a lens' prescription: a double Gauss of 50 mm, f/2.5, as a ZMX file."""
+    return as_file(files("lumigraph.samples").joinpath("speed-panchro.zmx"))

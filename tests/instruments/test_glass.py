@@ -1,0 +1,231 @@
+"""Main lenses from prescriptions: terms from rays of lenses that are known in closed form."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+
+import lumigraph as lg
+from lumigraph.elements import noll_to_nm
+from lumigraph.errors import FormatError, GeometryError, LumigraphError, ParaxialWarning
+from lumigraph.instruments import glass
+from lumigraph.io.prescription import FirstOrder, Rays
+
+F, Z1, D = 0.1, 1.0, 0.01
+Z2 = 1 / (1 / F - 1 / Z1)
+TURN, SHRINK, BARREL = 0.12, 8.0, -0.5
+"""Chief rays' slope by the image's height over z2; by the field's square, less stop, and distortion."""
+
+
+class Lens:
+    """Of known phases: a ray of direction d arrives where ∇(Φ + d·w) = 0, with the path Φ + d·w there."""
+
+    def __init__(self, path):
+        self.name, self.notes = "known.zmx", ("a note",)
+
+    def wavelengths(self):
+        return 4e-7, 8e-7
+
+    def first_order(self, wavelength):
+        return FirstOrder(F, 0.01, -0.02, -0.01, 1.25, 0.02)
+
+    def focus(self, object_distance, image_distance, diameter):
+        self.pupil = diameter
+
+    def trace(self, wavelength, heights, pupil):
+        field = heights[:, None] / Z1
+        half = D / 2 / Z2 * (1 + 0.1 * (wavelength / 550e-9 - 1))  # wider in red
+        chief = -field * F / Z2 * TURN
+        along = chief - half * (1 - SHRINK * field**2) * pupil[:, 0]
+        across = -half * np.ones_like(field) * pupil[:, 1]
+        u, v = (chief - along) / (D / 2 / Z2), -across / (D / 2 / Z2)  # places of the thin lens' stop
+        coma, bent, ball = 2e-6 * field, 20e-6 * field**2, 1e-7
+        r = u**2 + v**2
+        path = coma * r * u + bent * r + ball * r**2
+        slope = (coma * (3 * u**2 + v**2) + 2 * bent * u + 4 * ball * r * u,
+                 coma * 2 * u * v + 2 * bent * v + 4 * ball * r * v)  # fmt: skip
+        y, x = (part / (D / 2 / Z2) for part in slope)  # -∂Φ/∂l, as u falls with l
+        place = -field * Z2 * (1 + BARREL * field**2) + y
+        return Rays(along, across, place, x, path + 1.0 + along * y + across * x)
+
+
+@pytest.fixture
+def known(monkeypatch):
+    monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
+    monkeypatch.setattr(glass, "Prescription", Lens)
+    glass._glass.cache_clear()
+
+
+def single(path, **lens):
+    return lg.SingleLensCamera(
+        wavelength="550 nm", object_distance=Z1,
+        main_lens={"focal_length": F, "diameter": D, "prescription": path, **lens},
+        sensor={"pixel_pitch": "5 um", "shape": (2001, 2001)},
+    )  # fmt: skip
+
+
+@pytest.fixture
+def camera(known, tmp_path):
+    path = tmp_path / "known.zmx"
+    path.write_text("not read")
+    return single(path)
+
+
+def test_terms_are_those_of_the_wavefront(camera):
+    """Coma and field curvature, over the stop as each field sees it; what focus takes away is not in them."""
+    found, field = camera.glass, 0.05
+    assert found.rms(0.0, 550e-9) == pytest.approx(1e-7 / (6 * math.sqrt(5)) / 550e-9, rel=1e-3)
+    waves, (a, b) = found.aberrations.at(0.0, field, 550e-9), found.openings.at(field, 550e-9)
+    assert (a, b) == pytest.approx((1 - SHRINK * field**2, 1.0), abs=1e-6)
+    y, x = np.meshgrid(np.linspace(-1, 1, 301), np.linspace(-1, 1, 301), indexing="ij")
+    rho, theta = np.hypot(y, x), np.arctan2(y, x)
+    inside = rho <= 1
+    told = sum(c * lg.elements.zernike(j, rho, theta) for j, c in waves.items())[inside]
+    u, v = a * x[inside], b * y[inside]
+    focus = -1e-7  # the axis' own, of the mean over the stop: 6 ρ⁴ - 6 ρ² is Z11's
+    r = u**2 + v**2
+    path = 2e-6 * field * r * u + (20e-6 * field**2 + focus) * r + 1e-7 * r**2
+    off = told - path / 550e-9
+    assert np.std(off) < 2e-3
+    assert np.std(told) > 0.05
+
+
+def test_the_image_moves_and_the_pupil_turns_as_chief_rays_do(camera):
+    found, at = camera.glass, np.array(camera.glass.aberrations.x)
+    refocused = found.defocus * at * F / Z2 * TURN  # chief rays go on to another plane
+    assert found.moved == pytest.approx(BARREL * at**3 * Z2 + refocused, abs=1e-9)
+    assert found.turned == pytest.approx(at * F / Z2 * TURN - at, rel=1e-3, abs=1e-9)
+    text = str(camera.describe())
+    assert "known.zmx" in text
+    assert "a note." in text
+    assert "distortion of the main lens moves images by" in text
+    with pytest.warns(ParaxialWarning, match="distortion"):
+        camera.optics()
+
+
+def test_its_stop_is_wider_where_its_rays_are(camera):
+    assert camera.glass.openings.at(0.0, 605e-9) == pytest.approx((1.01, 1.01), rel=1e-6)
+    assert camera.glass.rim < 1e-6
+
+
+def test_the_entrance_pupil_has_the_aperture_of_the_thin_lens(camera):
+    m = Z2 / Z1
+    assert camera.glass.entrance_pupil == pytest.approx(D * (1.25 + m) / (1.25 * (1 + m)))
+
+
+def test_a_point_farther_out_is_imaged_by_an_ellipse(camera):
+    """It gets less light, by the area of its stop; within the window, which some light leaves."""
+    one = lg.operators.varying.at(camera.optics(), 0.0, 0.06)
+    plate = one.lens.elements[0]
+    assert plate.area == pytest.approx(1 - SHRINK * 0.06**2, rel=1e-6)
+    sums = []
+    for part in (one, lg.operators.varying.at(camera.optics(), 0.0, 0.0)):
+        span = lg.Grid.square(128, 2e-6)
+        light = lg.operators.point_light.point_light(part, Z1, 2e-4)
+        sums.append(float((np.abs(light.at(span.y, span.x)) ** 2).sum()))
+    assert sums[0] / sums[1] == pytest.approx(1 - SHRINK * 0.06**2, rel=3e-3)
+
+
+def test_simulated_points_take_it(camera):
+    small = camera.replace(sensor={"shape": (101, 101)})
+    raw = lg.simulate(small, lg.targets.points([(0.0, 0.0)]))
+    assert np.unravel_index(np.argmax(raw.data), raw.data.shape) == (50, 50)
+
+
+def test_terms_are_terms_of_a_round_lens():
+    assert all(noll_to_nm(j)[1] >= 0 for j in glass.TERMS)
+    assert glass.TERMS[:5] == (2, 4, 6, 8, 10)
+
+
+@pytest.mark.parametrize(
+    ("lens", "match"),
+    [
+        ({"focal_length": 0.102}, r"focal_length is 102 mm but .*known.zmx' has 100 mm at 550 nm"),
+        ({"diameter": 0.03}, "opens to .* Use a smaller diameter"),
+    ],
+)
+def test_what_contradicts_the_camera_is_refused(camera, lens, match):
+    with pytest.raises(GeometryError, match=match):
+        _ = camera.replace(main_lens=lens).glass
+
+
+def test_light_that_is_cut_off_is_refused(camera, monkeypatch):
+    whole = Lens.trace
+
+    def cut(self, wavelength, heights, pupil):
+        rays = whole(self, wavelength, heights, pupil)
+        rays.path[heights > 0.03, -1] = np.nan
+        return rays
+
+    monkeypatch.setattr(Lens, "trace", cut)
+    with pytest.raises(GeometryError, match=r"end at an aperture.* whole to 1\.\d+ degrees"):
+        _ = camera.glass
+
+
+def test_a_wavelength_that_no_glass_knows_is_refused(camera):
+    with pytest.raises(GeometryError, match=r"glasses of 'known\.zmx' are known from 400 to 800 nm"):
+        _ = camera.replace(wavelength="900 nm").glass
+
+
+def test_a_camera_file_names_it_from_where_it_stands(tmp_path):
+    (tmp_path / "lens.zmx").write_text("MODE SEQ")
+    text = single("lens.zmx").to_toml()
+    assert 'prescription = "lens.zmx"' in text
+    (tmp_path / "camera.toml").write_text(text)
+    camera = lg.load_camera(tmp_path / "camera.toml")
+    assert camera.main_lens.prescription == tmp_path / "lens.zmx"
+    assert type(camera).from_table(lg.io.source.toml("-", camera.to_toml())) == camera
+
+
+@pytest.mark.parametrize(
+    ("value", "others", "match"),
+    [
+        (3, {}, "main_lens.prescription: 3 is not the name of a file"),
+        (
+            "a.zmx",
+            {"over_field": {"field": [0, 0.1], "unit": "waves", "terms": {8: [0, 1]}}},
+            "Leave one out",
+        ),
+    ],
+)
+def test_what_is_no_prescription_is_one_line(value, others, match):
+    with pytest.raises(FormatError, match=match):
+        single(value, **others)
+
+
+def test_without_optiland_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
+    monkeypatch.setitem(sys.modules, "optiland", None)
+    path = tmp_path / "lens.zmx"
+    path.write_text("MODE SEQ\n")
+    with pytest.raises(LumigraphError, match=r"pip install 'lumigraph\[optiland\]'"):
+        _ = single(path).glass
+
+
+@pytest.mark.parametrize(
+    ("line", "match"),
+    [
+        ("UNIT IN X W X CM", "is in IN. Save it in mm"),
+        ("MNUM 3 1", "has 3 configurations, which is not followed"),
+        ("SURF 0\n  TYPE COORDBRK", "a surface 0 of type COORDBRK"),
+        ("SURF 0\n  TYPE BICONICX", "a surface 0 of type BICONICX"),
+        ("SURF 0\nSURF 1\n  GLAS MIRROR 0 0", "a mirror at surface 1"),
+        ("SURF 0\n  OBDC 0 1.5", "OBDC at surface 0"),
+        ("SURF 0\n  SQAP 1 1", "SQAP at surface 0"),
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_what_its_reader_passes_over_is_refused(tmp_path, line, match, encoding):
+    path = tmp_path / "lens.zmx"
+    path.write_text(f"MODE SEQ\n{line}\n", encoding=encoding)
+    with pytest.raises((FormatError, GeometryError), match=match):
+        _ = single(path).glass
+
+
+def test_other_files_are_refused(tmp_path):
+    with pytest.raises(FormatError, match="cannot be read"):
+        _ = single(tmp_path / "none.zmx").glass
+    (tmp_path / "lens.txt").write_text("x")
+    with pytest.raises(FormatError, match="is no prescription"):
+        _ = single(tmp_path / "lens.txt").glass

@@ -1,0 +1,130 @@
+"""The prescription of a double Gauss through Optiland, where that is installed."""
+
+import math
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import lumigraph as lg
+from lumigraph.errors import FormatError, GeometryError
+from lumigraph.io.prescription import Prescription
+from lumigraph.operators import varying
+from lumigraph.operators.point_light import point_light
+from lumigraph.samples import lens_path
+
+pytest.importorskip("optiland")
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+F, Z1, PIXEL, COUNT = 0.04996, 0.5, 0.35e-6, 64
+
+
+@pytest.fixture(scope="module")
+def camera():
+    """Sees 5.5 degrees from the axis."""
+    with lens_path() as path:
+        yield lg.SingleLensCamera(
+            wavelength="550 nm", object_distance=Z1,
+            main_lens={"focal_length": F, "diameter": 0.01, "prescription": path},
+            sensor={"pixel_pitch": "4 um", "shape": (1889, 1889)},
+        )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def lens(camera):
+    """As the camera has it: the same planes, the same stop."""
+    found = Prescription(camera.main_lens.prescription)
+    focal_length = found.first_order(550e-9).focal_length
+    found.focus(Z1, 1 / (1 / focal_length - 1 / Z1) + camera.glass.defocus, camera.glass.entrance_pupil)
+    return found
+
+
+@pytest.mark.parametrize("part", [0.0, 0.7, 1.0])
+@pytest.mark.parametrize("wavelength", [450e-9, 550e-9, 650e-9])
+def test_a_point_is_imaged_as_by_huygens(camera, lens, part, wavelength):
+    """Optiland's own sum over its rays, on its own places; another field or the ideal lens fails."""
+    from optiland.psf import HuygensPSF
+
+    far = camera.glass.aberrations.x[-1] / 1.05
+    at = lens.trace(550e-9, np.array([0.0, part * far * Z1, far * Z1]), np.zeros((1, 2))).height[1, 0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        psf = HuygensPSF(lens._lens, (0, part), wavelength * 1e6, 128, COUNT, pixel_pitch=PIXEL * 1e3)
+    middle = float(np.ravel(psf.cy)[0]) * 1e-3 - at
+    places = np.linspace(-COUNT / 2, COUNT / 2, COUNT) * PIXEL
+    one = replace(camera.optics(), wavelength=wavelength)
+
+    def off(field):
+        light = point_light(varying.at(one, 0.0, field), Z1, 4e-5)
+        found, expected = np.abs(light.at(places, places + middle)).T ** 2, np.asarray(psf.psf)
+        share = np.sum(found * expected) / np.sum(found**2)
+        return np.linalg.norm(share * found - expected) / np.linalg.norm(expected)
+
+    assert off(part * far) < 6e-3
+    if part:
+        assert off(0.0) > 0.05
+
+
+def test_wavelengths_between_those_that_were_traced(camera, lens):
+    """Terms at 480 nm by the spline over wavelengths, against a camera of 480 nm in the same plane."""
+    own = camera.replace(wavelength="480 nm")
+    refocused = own.glass.defocus - camera.glass.defocus
+    for field in (0.0, 0.06):
+        one, other = (c.glass.aberrations.at(0.0, field, 480e-9) for c in (camera, own))
+        assert {j for j in one if j != 4 and abs(one[j] - other[j]) > 0.02} <= {2}
+    assert abs(refocused) < 1e-3
+
+
+def test_the_patent_is_of_one_inch(lens):
+    first = lens.first_order(587.6e-9)
+    assert first.focal_length == pytest.approx(0.05, rel=2e-3)
+    assert first.pupil_magnification == pytest.approx(1.256, rel=1e-3)
+
+
+def test_optilands_json_is_the_same(camera, tmp_path):
+    from optiland.fileio import save_optiland_file
+
+    path = tmp_path / "lens.json"
+    save_optiland_file(Prescription(camera.main_lens.prescription)._lens, str(path))
+    other = camera.replace(main_lens={"prescription": path})
+    one, two = (c.glass.aberrations.at(0.01, 0.05, 550e-9) for c in (camera, other))
+    assert one == pytest.approx(two, abs=1e-9)
+
+
+def test_more_light_than_the_file_opens_to_is_refused(camera):
+    with pytest.raises(GeometryError, match="opens to"):
+        _ = camera.replace(main_lens={"diameter": 0.03}).glass
+
+
+def test_apertures_that_cut_light_off_are_refused(camera, tmp_path):
+    text = camera.main_lens.prescription.read_text().replace("SURF 11\n", "SURF 11\n  FLAP 0 5 0\n")
+    path = tmp_path / "cut.zmx"
+    path.write_text(text)
+    with pytest.raises(GeometryError, match="end at an aperture"):
+        _ = camera.replace(main_lens={"prescription": path}).glass
+
+
+@pytest.mark.parametrize("text", ["", "MODE SEQ\n", "ENPD 10\nSURF 0\n"])
+def test_files_that_are_no_lens_are_one_line(camera, tmp_path, text):
+    path = tmp_path / "none.zmx"
+    path.write_text(text)
+    with pytest.raises((FormatError, GeometryError), match=r"none\.zmx"):
+        _ = camera.replace(main_lens={"prescription": path}).glass
+
+
+def test_points_of_a_plenoptic_camera_take_the_lens(camera):
+    plenoptic = lg.PlenopticCamera(
+        wavelength="550 nm", object_distance=Z1,
+        main_lens={"focal_length": F, "diameter": 0.01, "prescription": camera.main_lens.prescription},
+        lenslets={"pitch": "100 um", "focal_length": "0.55 mm", "count": (41, 41)},
+        sensor={"pixel_pitch": "5 um"},
+    )  # fmt: skip
+    far = math.tan(math.radians(1.5)) * Z1
+    points = lg.targets.points([(0.0, 0.0), (far / 2, far)])
+    real, ideal = (
+        np.asarray(lg.simulate(c, points).data)
+        for c in (plenoptic, plenoptic.replace(main_lens={"prescription": None}))
+    )
+    assert real.sum() == pytest.approx(ideal.sum(), rel=0.02)
+    assert np.linalg.norm(real - ideal) > 1e-3 * np.linalg.norm(ideal)
