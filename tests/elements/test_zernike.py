@@ -80,3 +80,28 @@ def test_a_turned_plate_is_the_plate_seen_from_turned_axes(rng):
     sin, cos = math.sin(0.7), math.cos(0.7)
     turned = plate.turned(0.7).phase(y * cos + x * sin, x * cos - y * sin)
     np.testing.assert_allclose(turned, plate.phase(y, x), atol=1e-12)
+
+
+def test_an_elliptic_stop_is_as_wide_along_its_direction_as_its_axes_say():
+    """Moments of what it lets through: half axes a and b along and across 30 degrees, a²/4 and b²/4."""
+    grid, angle = Grid.square(400, 0.01), np.pi / 6
+    plate = ZernikePlate({}, 2.0, axes=(0.9, 0.5), direction=angle)
+    for each, turn in ((plate, angle), (plate.turned(0.4), angle + 0.4)):
+        light = np.abs(each.transmission(grid, 1e-6))
+        y, x = grid.y[:, None], grid.x
+        along, across = x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)
+        total = light.sum()
+        assert total * 1e-4 == pytest.approx(np.pi * 0.9 * 0.5, rel=1e-4)
+        moments = [(light * part**2).sum() / total for part in (along, across)]
+        assert moments == pytest.approx([0.9**2 / 4, 0.5**2 / 4], rel=1e-3)
+        assert abs((light * along * across).sum() / total) < 1e-6
+
+
+def test_terms_of_an_elliptic_stop_are_stretched_with_it():
+    plate = ZernikePlate({8: 0.3, 5: 0.1}, 2.0, axes=(0.9, 0.5))
+    round_one = ZernikePlate({8: 0.3, 5: 0.1}, 2.0)
+    y, x = np.array([0.1, -0.2]), np.array([0.3, 0.05])
+    assert plate.phase(y * 0.5, x * 0.9) == pytest.approx(round_one.phase(y, x))
+    turned = plate.turned(0.7)
+    sin, cos = np.sin(0.7), np.cos(0.7)
+    assert turned.phase(y * cos + x * sin, x * cos - y * sin) == pytest.approx(plate.phase(y, x))
