@@ -129,8 +129,11 @@ def test_an_exact_pitch_is_kept_by_calibrate(lumigraph, tmp_path):
     y, x = np.mgrid[:96, :115]
     white = (np.cos(np.pi * (y - 47) / 19.02) * np.cos(np.pi * (x - 57) / 19.02)) ** 2
     lg.save(lg.RawImage(np.uint8(200 * white)), tmp_path / "white.png")
-    result = lumigraph("calibrate", "white.png", "--pitch", "19", "--exact", "-o", "c.toml")
+    result = lumigraph("calibrate", "white.png", "--pitch", "19 px", "--exact", "-o", "c.toml")
     assert (result.code, lg.open(tmp_path / "c.toml").lattice.pitch) == (0, 19)
     result = lumigraph("calibrate", "white.png", "--exact", "-o", "c.toml")
     assert result.code == 1
     assert "--pitch 19" in result.err
+    result = lumigraph("calibrate", "white.png", "--pitch", "19 um", "-o", "c.toml")
+    assert result.code == 2
+    assert "--pitch: '19 um' must be a number of pixels, such as 15 or '15 px'" in result.err

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, above_zero, length
+from lumigraph.cli.options import Output, above_zero, length, pixels
 from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import CalibrationError
@@ -73,7 +73,7 @@ def calibrate(
     *white: Path,
     output: Output,
     layout: Literal["square", "hex"] | None = None,
-    pitch: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
+    pitch: Annotated[float | None, Parameter(allow_leading_hyphen=True, converter=pixels)] = None,
     rotation: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
     exact: Annotated[bool, Parameter(negative=())] = False,
     explain: Annotated[bool, Parameter(negative=())] = False,
@@ -95,7 +95,7 @@ def calibrate(
     layout
         Arrangement of the lenslets; found automatically if left out.
     pitch
-        Distance between micro-images in pixels, where the search needs it.
+        Distance between micro-images in pixels, such as 15 or '15 px', where the search needs it.
     rotation
         Angle of the rows of lenslets from +x towards +y [degrees], where the search needs it.
     exact

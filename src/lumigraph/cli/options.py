@@ -5,12 +5,17 @@ import re
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from lumigraph.errors import FormatError
 from lumigraph.units import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cyclopts import Token
 
 COMMAND: ContextVar[tuple[str, ...]] = ContextVar("COMMAND", default=())
 """Words after "lumigraph" of the command that runs."""
@@ -101,3 +106,18 @@ def above_zero(option: str, value: float | None, unit: str = "") -> float | None
     if value is not None and (not math.isfinite(value) or value <= 0):
         raise FormatError(f"{option} is {value:g}{unit and ' ' + unit} but must be a finite number above 0.")
     return value
+
+
+def pixels(_: object, tokens: "Sequence[Token]") -> float:
+    """A number of pixels on the command line, with its unit or without: '15' and '15 px'.
+
+    Raises
+    ------
+    ValueError
+        Another unit, or no number; the command line names the option.
+    """
+    text = tokens[0].value
+    try:
+        return float(text.removesuffix("px"))
+    except ValueError:
+        raise ValueError(f"{text!r} must be a number of pixels, such as 15 or '15 px'") from None
