@@ -105,3 +105,14 @@ def test_terms_of_an_elliptic_stop_are_stretched_with_it():
     turned = plate.turned(0.7)
     sin, cos = np.sin(0.7), np.cos(0.7)
     assert turned.phase(y * cos + x * sin, x * cos - y * sin) == pytest.approx(plate.phase(y, x))
+
+
+@pytest.mark.parametrize("highest", [66, 153, 171])
+def test_terms_summed_by_powers_are_their_sum(highest):
+    """Up to order 16 by powers, beyond one by one."""
+    rng = np.random.default_rng(1)
+    table = {j: float(c) for j, c in zip(range(2, highest + 1), rng.normal(size=highest), strict=False)}
+    rho, theta = rng.random(500), rng.random(500) * 2 * np.pi
+    expected = sum(c * zernike(j, rho, theta) for j, c in table.items())
+    found = ZernikePlate(table, 2.0).phase(rho * np.sin(theta), rho * np.cos(theta))
+    assert found == pytest.approx(expected, abs=1e-8)

@@ -18,6 +18,9 @@ from lumigraph.errors import GeometryError
 SLACK = 1e-6
 """How far beyond the last field light may come from, as a part of it: rounding."""
 
+NONE = 1e-6
+"""Waves rms that are none."""
+
 Nodes = tuple[float, ...]
 
 
@@ -256,7 +259,7 @@ class FieldPlate:
         GeometryError
             A field or a wavelength that lies beyond the map's.
         """
-        waves = {j: rms for j, rms in self.aberrations.at(y, x, wavelength).items() if rms}
+        waves = {j: rms for j, rms in self.aberrations.at(y, x, wavelength).items() if abs(rms) > NONE}
         for j, rms in self.more:
             waves[j] = waves.get(j, 0.0) + rms
         plate = ZernikePlate({j: 2 * math.pi * rms for j, rms in waves.items()}, self.diameter)

@@ -17,6 +17,9 @@ from lumigraph.errors import GeometryError
 HIGHEST = 1000
 """Highest Noll index: order 43."""
 
+STABLE = 16
+"""Highest order whose polynomials are summed by powers: to 1e-9."""
+
 
 def noll_to_nm(j: int) -> tuple[int, int]:
     """Radial order n and azimuthal order m of Noll's index j = 1, 2, ...; m < 0 is the sine.
@@ -78,6 +81,34 @@ def zernike(j: int, rho: np.ndarray, theta: np.ndarray) -> np.ndarray:
     if m == 0:
         return math.sqrt(n + 1) * radial * np.ones_like(theta)
     return math.sqrt(2 * (n + 1)) * radial * (np.cos(m * theta) if m > 0 else np.sin(order * theta))
+
+
+def _summed(table: Mapping[int, float], place: np.ndarray) -> np.ndarray:
+    """Sum of terms of few orders at places x + iy: a polynomial of ρ² times each power of the place."""
+    phase, squared, power = np.zeros(place.shape), np.abs(place) ** 2, np.ones_like(place)
+    for m, parts in enumerate(_powers(table)):
+        power = power * place if m else power
+        for own, along in zip(parts, (power.real, power.imag), strict=True):
+            if own.any():
+                radial = np.zeros(place.shape)
+                for coefficient in np.trim_zeros(own, "b")[::-1]:
+                    radial *= squared
+                    radial += coefficient
+                phase += radial * along
+    return phase
+
+
+def _powers(table: Mapping[int, float]) -> np.ndarray:
+    """Coefficients (m, cosine and sine, power of ρ²) of terms without their ρ^m."""
+    orders = [noll_to_nm(j) for j in table]
+    highest = max((n for n, _ in orders), default=0)
+    found = np.zeros((highest + 1, 2, highest // 2 + 1))
+    for (n, m), coefficient in zip(orders, table.values(), strict=True):
+        scale, half = coefficient * math.sqrt((n + 1) * (2 if m else 1)), (n - abs(m)) // 2
+        for k in range(half + 1):
+            ways = (-1) ** k * math.comb(n - k, k) * math.comb(n - 2 * k, half - k)
+            found[abs(m), int(m < 0), half - k] += scale * ways
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,10 +213,14 @@ class ZernikePlate:
     def phase(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Phase [rad] at places that broadcast [m], whatever the stop lets through."""
         y, x = self._stretched(y - self.center[0], x - self.center[1])
-        rho, theta = np.hypot(y, x) / (self.diameter / 2), np.arctan2(y, x)
-        rho = np.minimum(rho, 1.5)  # high orders overflow far outside the stop
+        place = (x + 1j * y) / (self.diameter / 2)
+        place = place / np.maximum(1.0, np.abs(place) / 1.5)  # high orders overflow far outside the stop
+        table = dict(self.coefficients)
+        if all(noll_to_nm(j)[0] <= STABLE for j in table):
+            return _summed(table, place)
+        rho, theta = np.abs(place), np.angle(place)
         phase = np.zeros(np.shape(rho))
-        for j, coefficient in dict(self.coefficients).items():
+        for j, coefficient in table.items():
             phase += coefficient * zernike(j, rho, theta)
         return phase
 
