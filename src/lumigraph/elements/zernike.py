@@ -88,7 +88,7 @@ def _summed(table: Mapping[int, float], place: np.ndarray) -> np.ndarray:
     phase, squared, power = np.zeros(place.shape), np.abs(place) ** 2, np.ones_like(place)
     for m, parts in enumerate(_powers(table)):
         power = power * place if m else power
-        for own, along in zip(parts, (power.real, power.imag), strict=True):
+        for own, along in zip(parts, (np.real(power), np.imag(power)), strict=True):
             if own.any():
                 radial = np.zeros(place.shape)
                 for coefficient in np.trim_zeros(own, "b")[::-1]:
