@@ -45,7 +45,7 @@ SMALL = {
     lg.CircularAperture, lg.Coherent, lg.Grid, lg.Incoherent, lg.Lattice, lg.LensletArray, lg.Propagate,
     lg.ExtendedSource, lg.GaussianSchell, lg.PartiallyCoherent, lg.RectangularAperture, lg.Sensor,
     lg.SpectralLine, lg.Snapshots, lg.Spectrum, lg.ThinLens, lg.TiltedWaves, lg.Train,
-    lg.ZernikePlate,
+    lg.Goal, lg.ZernikePlate,
 }  # fmt: skip
 """Of numbers alone."""
 

@@ -39,6 +39,7 @@ VERBS = (
         "measure",
         "batch",
         "sweep",
+        "optimise",
         "tolerance",
         "dataset",
         "board",

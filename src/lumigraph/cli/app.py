@@ -28,6 +28,7 @@ from lumigraph.cli.depth import depth
 from lumigraph.cli.design import design
 from lumigraph.cli.information import information
 from lumigraph.cli.measure import measure
+from lumigraph.cli.optimise import optimise
 from lumigraph.cli.options import COMMAND, PARAMETER, WARNED
 from lumigraph.cli.refocus import refocus
 from lumigraph.cli.render import render
@@ -48,7 +49,7 @@ _LONGEST = 400  # characters of a line on standard error
 
 VERBS = (
     demo, design, information, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure,
-    batch, sweep, tolerance, dataset, board, datasheet, twin, view, samples, catalogue, reproduce,
+    batch, sweep, optimise, tolerance, dataset, board, datasheet, twin, view, samples, catalogue, reproduce,
 )  # fmt: skip
 """In the order of their use."""
 

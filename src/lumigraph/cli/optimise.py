@@ -1,0 +1,181 @@
+"""`lumigraph optimise`: the camera that reaches a goal best, of all that can be made."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from lumigraph.cli import files
+from lumigraph.cli.console import line, progress
+from lumigraph.cli.deconvolve import depths as planes_of
+from lumigraph.cli.options import Output
+from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.core.result import Figure, Result
+
+if TYPE_CHECKING:
+    from lumigraph.optimisation import Goal, Optimum
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Aim:
+    """What is made best.
+
+    Parameters
+    ----------
+    goal
+        depth, lateral or brightness: bounds of a point's errors over --depths. Or 'largest' or 'least' and a
+        number's name: light caught, one that 'lumigraph design' prints, or a simulated one of 'lumigraph
+        sweep', such as 'largest mtf@10/mm'.
+    depths
+        From the focused plane, such as '-5 mm:5 mm:5 mm'.
+    photons
+        Of a point, that enter the camera as it is given; others get theirs by their aperture.
+    background
+        Photons of even light on each pixel.
+    places
+        Of points at each depth: more make the bound smoother over what varies, and take longer.
+    """
+
+    goal: str = "depth"
+    depths: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    photons: Annotated[float, Parameter(allow_leading_hyphen=True)] = 10_000.0
+    background: Annotated[float, Parameter(allow_leading_hyphen=True)] = 0.0
+    places: Annotated[int, Parameter(allow_leading_hyphen=True)] = 2
+
+    def read(self) -> "Goal":
+        """The goal; refuses nonsense."""
+        from lumigraph.information import Light
+        from lumigraph.optimisation import Goal
+
+        planes = () if self.depths is None else planes_of("--depths", self.depths)
+        return Goal.parse(self.goal, planes, Light(self.photons, self.background), self.places)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class How:
+    """How it is looked for.
+
+    Parameters
+    ----------
+    search
+        local: downhill from the best of the first values. global: over all of the ranges, by differential
+        evolution. grid: the first values alone.
+    evaluations
+        Cameras at most, beyond the first values.
+    seed
+        Of --search global.
+    """
+
+    search: Literal["local", "global", "grid"] = "local"
+    evaluations: Annotated[int, Parameter(allow_leading_hyphen=True)] = 200
+    seed: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0
+
+
+def optimise(
+    camera: str,
+    /,
+    *,
+    vary: Annotated[list[str], Parameter(allow_leading_hyphen=True)],
+    aim: Aim = Aim(),
+    how: How = How(),
+    output: Output,
+    common: Reported = REPORTED,
+) -> Result:
+    """Look for the camera that reaches a goal best, within ranges and a stock, and write its file.
+
+    All combinations of the first values are computed; then ranges are searched from the best of them. Killed
+    at any time, the same line goes on where it was, to the same camera.
+
+    Example: `lumigraph optimise lfm-fourier --vary "fourier_lens=60 mm:110 mm:3" --vary "lenslets.pitch=1 mm, 1.25 mm, 1.5 mm" --depths "-20 um:20 um:10 um" -o best.toml`
+
+    Example: `lumigraph optimise camera.toml --vary "lenslets.magnification=0.2:0.6:5" --goal "largest mtf@10/mm" -o best.toml --report best.html`
+
+    Parameters
+    ----------
+    camera
+        Camera file (TOML), or the name of a bundled one.
+    vary
+        A key of the camera file and its values, as in 'lumigraph sweep': 'first:last:count' is a range, of which
+        so many values are tried first; values separated by commas are a stock. May be repeated.
+    output
+        Camera file of the best (.toml).
+    """  # noqa: E501 - an example is one line
+    from lumigraph import store
+    from lumigraph.instruments import load_camera
+    from lumigraph.optimisation import optimise as best_of
+
+    common.check()
+    files.check_output(output, (".toml",))
+    goal = aim.read()
+    given = load_camera(camera)
+    with progress("optimise") as shown:
+        found = best_of(
+            given, vary, goal, search=how.search, evaluations=how.evaluations, seed=how.seed, output=output,
+            progress=shown, estimated=lambda seconds, count: line(_estimate(seconds, count)),
+        )  # fmt: skip
+    store.write_bytes(output, found.camera.to_toml().encode())
+    return Result(
+        "Optimum", "The camera that reaches a goal best, of all that can be made.", found,
+        tuple(_lines(found)), found.quantities(), lambda: _figures(found), tuple(_notes(found)), (output,),
+        {"best": found.best, "start": found.start, "swept": found.swept, "active": found.active,
+         "cameras computed": found.rows},
+    )  # fmt: skip
+
+
+def _estimate(seconds: float, count: int) -> str:
+    time = f"{seconds / 60:.1f} minutes" if seconds > 90 else f"{seconds:.0f} s"
+    return f"{count} cameras to do at most: about {time}, if all take as long as the first"
+
+
+def _lines(found: "Optimum") -> Iterator[str]:
+    shown = {one.name: str(one) for one in found.quantities()}
+    name = found.goal.name
+    before, swept, best = (shown[f"{name}, {which}"] for which in ("as given", "best of the grid", "best"))
+    yield f"{name}: {before} as given, {swept} the best of the first values, {best} the best"
+    gains = (
+        f"{found.gain(found.start):.1%} than as given",
+        f"{found.gain(found.swept):.1%} than the first values",
+    )
+    yield f"better by {gains[0]}, by {gains[1]}"
+    yield ", ".join(f"{key} = {value}" for key, value in _changed(found).items())
+
+
+def _changed(found: "Optimum") -> dict[str, Any]:
+    """What the best has of its own, without what follows from it."""
+    return {key: value for key, value in found.best.items() if key not in found.start}
+
+
+def _notes(found: "Optimum") -> Iterator[str]:
+    if found.gain(found.start) < 0:
+        yield "the camera as given is better than all of these: give other ranges"
+    if found.active:
+        ends = ", ".join(f"{key} = {value}" for key, value in found.active.items())
+        yield f"at an end of its range: {ends}; a wider range may give a better camera"
+    bad = [row["error"] for row in found.rows if "error" in row]
+    if bad:
+        yield f"{len(bad)} of {len(found.rows)} cameras cannot be, such as: {bad[0]}"
+
+
+def _figures(found: "Optimum") -> Iterator[Figure]:
+    import math
+
+    from lumigraph import plots
+
+    changes = _changed(found)
+    header = ("", *changes, found.goal.name)
+    rows: list[tuple[str, ...]] = [header]
+    for name, some in (("as given", found.start), ("first values", found.swept), ("best", found.best)):
+        rows.append(
+            (name, *(str(some.get(key, "")) for key in changes), f"{some.get(found.goal.name, math.nan):.4g}")
+        )
+    yield Figure(rows, section="Before and after")
+    costs = [found.goal.cost(row) for row in found.rows]
+    so_far = [min(costs[: k + 1]) for k in range(len(costs))]
+    sign = -1.0 if found.goal.largest else 1.0
+    curve = {"best so far": ([float(k) for k in range(len(so_far))], [sign * cost for cost in so_far])}
+    if all(map(math.isfinite, so_far)):
+        drawn = plots.curves([], curve, xlabel="camera", ylabel=found.goal.name)
+        yield Figure(drawn, "The best camera so far.", "Search")

@@ -1,0 +1,95 @@
+"""Cameras that a search asks for, each computed once and noted in a ledger."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from lumigraph.cluster.ledger import Entry, Ledger
+from lumigraph.errors import LumigraphError, SamplingWarning
+from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.varied import changed
+from lumigraph.optimisation.goals import Goal
+
+ERROR = "error"
+
+
+@dataclass(eq=False)
+class Evaluations:
+    """What is known of each camera, in the order in which a search asks.
+
+    Parameters
+    ----------
+    start
+        The camera as it is given.
+    goal
+        What is computed.
+    first
+        Part of the light that it collects.
+    ledger
+        Where it is noted; None for nowhere.
+    done
+        Called with the number of cameras so far.
+    """
+
+    start: Instrument
+    goal: Goal
+    first: float
+    ledger: Ledger | None
+    done: Callable[[int], None]
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    seconds: float = 0.0
+    computed: int = 0
+    _known: dict[str, int] = field(default_factory=dict)
+
+    def row(self, item: Mapping[str, Any]) -> dict[str, Any]:
+        """Values of the camera with an item's values, or why there is none."""
+        key = repr(sorted(item.items()))
+        if key not in self._known:
+            number = len(self.rows)
+            kept = None if self.ledger is None else self.ledger.entry(number)
+            # A search that is repeated asks for the same cameras in the same order.
+            if kept is None or {name: kept.values.get(name) for name in item} != dict(item):
+                row, seconds = self._computed(item)
+                if self.ledger is not None:
+                    self.ledger.record(Entry(number, seconds, values=row))
+            else:
+                row = kept.values
+            self.rows.append(row)
+            self._known[key] = number
+            self.done(len(self.rows))
+        return self.rows[self._known[key]]
+
+    def cost(self, item: Mapping[str, Any]) -> float:
+        """Of an item, as `Goal.cost`."""
+        return self.goal.cost(self.row(item))
+
+    def _computed(self, item: Mapping[str, Any]) -> tuple[dict[str, Any], float]:
+        began = time.perf_counter()
+        try:
+            row = {**item, **self.goal.values(changed(self.start, item), self.first)}
+        except (LumigraphError, SamplingWarning) as error:
+            row = {**item, ERROR: " ".join(str(error).split())}
+        seconds = time.perf_counter() - began
+        self.seconds, self.computed = self.seconds + seconds, self.computed + 1
+        return row, seconds
+
+
+@contextmanager
+def noted(output: Path | None, what: Mapping[str, Any]) -> Iterator[Ledger | None]:
+    """Context of a ledger beside an output, which no other run writes; None without an output.
+
+    Raises
+    ------
+    FormatError
+        Another search has begun this output, or another run works on it.
+    """
+    if output is None:
+        yield None
+        return
+    ledger = Ledger.beside(output)
+    ledger.open(what, [])
+    with ledger.started(0, 1):
+        yield ledger

@@ -1,0 +1,174 @@
+"""`optimise`: the best camera within what can be made."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any, get_args
+
+from lumigraph.core import checks
+from lumigraph.core.brief import brief
+from lumigraph.core.progress import Progress, Stage
+from lumigraph.core.result import Quantity
+from lumigraph.errors import GeometryError
+from lumigraph.information.points import collected
+from lumigraph.instruments import load_camera
+from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.varied import changed
+from lumigraph.optimisation.evaluations import ERROR, Evaluations, noted
+from lumigraph.optimisation.goals import BOUNDS, Goal
+from lumigraph.optimisation.search import Search, grid, refined
+from lumigraph.optimisation.space import Space
+
+MOST = 100_000
+"""Evaluations."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Optimum:
+    """The best camera that a search found, beside the one that was given and the best of a grid.
+
+    Parameters
+    ----------
+    goal
+        What was made best.
+    camera
+        The best.
+    start, swept, best
+        Values of the camera as given, of the best of the grid, and of the best of all.
+    active
+        Values of the best at an end of their range, by key: another range would give a better camera.
+    rows
+        All cameras, in the order of the search; those that cannot be have an "error".
+    """
+
+    goal: Goal
+    camera: Instrument
+    start: dict[str, Any]
+    swept: dict[str, Any]
+    best: dict[str, Any]
+    active: dict[str, Any]
+    rows: list[dict[str, Any]]
+
+    __repr__ = brief
+
+    def gain(self, beside: Mapping[str, Any]) -> float:
+        """By what part of it the goal is better than that of other values; NaN where those have none."""
+        other = beside.get(self.goal.name, float("nan"))
+        change = (self.best[self.goal.name] - other) / abs(other)
+        return change if self.goal.largest else -change
+
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The goal before, of the best of the grid, and of the best."""
+        name, unit = self.goal.name, BOUNDS.get(self.goal.name, "")
+        return (
+            Quantity(f"{name}, as given", self.start.get(name), unit),
+            Quantity(f"{name}, best of the grid", self.swept[name], unit),
+            Quantity(f"{name}, best", self.best[name], unit),
+            Quantity("cameras", len(self.rows)),
+            Quantity("impossible", sum(ERROR in row for row in self.rows)),
+        )  # fmt: skip
+
+
+def optimise(
+    instrument: Instrument | str | PathLike[str],
+    vary: Mapping[str, str] | Sequence[str],
+    goal: Goal | str = "depth",
+    *,
+    depths: Sequence[float] = (),
+    search: Search = "local",
+    evaluations: int = 200,
+    seed: int = 0,
+    output: str | PathLike[str] | None = None,
+    progress: Progress | None = None,
+    estimated: Callable[[float, int], None] | None = None,
+) -> Optimum:
+    """The camera that reaches a goal best, of those that ranges and a stock allow.
+
+    All combinations of the first values are computed. From the best of them a simplex goes downhill
+    ("local"), or a population by differential evolution looks over all of the ranges ("global"); values of
+    a stock stay as the best combination has them. What no camera can be is left out, with its reason.
+
+    Parameters
+    ----------
+    instrument
+        A camera, its file, or a name of the catalogue.
+    vary
+        By keys of the camera file: "0.3:0.6:4" or "4 mm:6 mm:3" is a range, of which so many values are tried
+        first; "100 um, 150 um" a stock.
+    goal
+        `Goal`, or its text: "depth" (default), "lateral", "brightness", "largest light caught", "largest
+        views per axis", "largest mtf@10/mm", ...
+    depths
+        Of the volume, for a goal that is a text [m].
+    search
+        "local", "global", or "grid" for none but the first values.
+    evaluations
+        Cameras at most, beyond the grid.
+    seed
+        Of the population.
+    output
+        File, beside which each camera is noted as it is done: the same call goes on after a kill, to the same
+        result. None for nowhere. The best camera is not written.
+    progress
+        Called as ``progress(fraction)``.
+    estimated
+        Called with the seconds that the rest may take, and how many cameras they are, after the first.
+
+    Raises
+    ------
+    FormatError
+        An unknown key or number, a range that does not go up, an output of another search.
+    GeometryError
+        A goal that the instrument has not, or none of the first values gives a camera.
+
+    Examples
+    --------
+    >>> import lumigraph as lg
+    >>> vary = {"fourier_lens": "60 mm:90 mm:2"}
+    >>> found = lg.optimise("lfm-fourier", vary, depths=[-1e-5, 1e-5], evaluations=4)
+    >>> found.best["depth"] <= found.swept["depth"]
+    True
+    """
+    start = instrument if isinstance(instrument, Instrument) else load_camera(instrument)
+    aim = Goal.parse(goal, depths) if isinstance(goal, str) else goal
+    checks.choice("search", search, get_args(Search))
+    most = checks.whole("evaluations", evaluations, 0)
+    if most > MOST:
+        raise GeometryError(f"evaluations are {most} but must be at most {MOST}.")
+    checks.whole("seed", seed, 0)
+    space = Space.of(vary)
+    items = space.combinations()
+    _check(start, items[0])
+    aim.check(start)
+    beyond = most if space.ranges and search != "grid" else 0
+    total = 1 + len(items) + beyond
+    what = {
+        "camera": start.to_toml(), "values": space.grid, "ranges": list(space.ranges), "goal": asdict(aim),
+        "search": [search, most, seed],
+    }  # fmt: skip
+
+    def done(count: int) -> None:
+        if estimated is not None and count == 1 and cameras.computed:
+            estimated(cameras.seconds * (total - 1), total - 1)
+        if progress is not None:
+            progress(Stage(min(count / total, 1.0), f"camera {count} of at most {total}"))
+
+    with noted(None if output is None else Path(output), what) as ledger:
+        cameras = Evaluations(start, aim, collected(start), ledger, done)
+        cameras.row({})
+        swept = grid(cameras, space)
+        if swept is None:
+            reason = cameras.rows[1].get(ERROR, f"{aim.name} is not known of it")
+            raise GeometryError(f"none of the first {len(items)} cameras can be, such as: {reason}")
+        best = refined(cameras, space, swept, (search, most, seed))
+        given, first, last = (dict(cameras.row(item)) for item in ({}, swept, best))
+    return Optimum(aim, changed(start, best), given, first, last, space.active(best), cameras.rows)
+
+
+def _check(start: Instrument, item: Mapping[str, Any]) -> None:
+    """Refuse an unknown key before any work; values that no camera has are left to the search."""
+    try:
+        changed(start, item)
+    except GeometryError:
+        return

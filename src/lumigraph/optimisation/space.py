@@ -1,0 +1,118 @@
+"""What may change of a camera: ranges, whose counts make a first grid, and values of a stock."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from lumigraph.errors import FormatError
+from lumigraph.instruments.varied import combinations, values
+
+ACTIVE = 1e-3
+"""Part of a range within which a value is at its end."""
+
+_NUMBER = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)")
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Values from a least to a largest one.
+
+    Parameters
+    ----------
+    low, high
+        Ends, in the unit.
+    unit
+        As in a camera file; empty for numbers.
+    """
+
+    low: float
+    high: float
+    unit: str = ""
+
+    def at(self, part: float) -> Any:
+        """The value at a part of the range, as a camera file has it."""
+        number = self.low + (self.high - self.low) * min(max(part, 0.0), 1.0)
+        return f"{number:.10g} {self.unit}" if self.unit else float(f"{number:.10g}")
+
+    def part(self, value: Any) -> float:
+        """Where in the range a value is, 0 to 1."""
+        found = _NUMBER.fullmatch(str(value))
+        assert found is not None
+        return (float(found[1]) - self.low) / (self.high - self.low)
+
+
+@dataclass(frozen=True, slots=True)
+class Space:
+    """All that may change.
+
+    Parameters
+    ----------
+    grid
+        First values of each key: of a range evenly spaced, of a stock all.
+    ranges
+        By key, of what changes continuously.
+    """
+
+    grid: Mapping[str, list[Any]]
+    ranges: Mapping[str, Range]
+
+    @classmethod
+    def of(cls, vary: Mapping[str, str] | Sequence[str]) -> "Space":
+        """From texts as `lumigraph sweep --vary` takes them: 'first:last:count' is a range, a list a stock.
+
+        Raises
+        ------
+        FormatError
+            Another text, no range that goes up, nothing to change, a key that stands twice.
+
+        >>> space = Space.of(["lenslets.magnification=0.3:0.5:3", "lenslets.pitch=100 um, 150 um"])
+        >>> len(space.combinations()), space.ranges["lenslets.magnification"].at(0.5)
+        (6, 0.4)
+        """
+        texts = [f"{k}={v}" for k, v in vary.items()] if isinstance(vary, Mapping) else list(vary)
+        grid: dict[str, list[Any]] = {}
+        ranges: dict[str, Range] = {}
+        for text in texts:
+            name, some = values(text)
+            if name in grid:
+                raise FormatError(f"--vary names {name} twice. Give all its values at once.")
+            grid[name] = some
+            if ":" in text:
+                ranges[name] = _range(text, some)
+        if not grid:
+            raise FormatError("there is nothing to vary. Give a key and its values.")
+        return cls(grid, ranges)
+
+    def combinations(self) -> list[dict[str, Any]]:
+        """Of the first values."""
+        return combinations(self.grid)
+
+    def moved(self, item: Mapping[str, Any], parts: Sequence[float]) -> dict[str, Any]:
+        """An item whose ranges stand at other parts, in their order."""
+        found = {
+            name: one.at(float(part)) for part, (name, one) in zip(parts, self.ranges.items(), strict=True)
+        }
+        return {**item, **found}
+
+    def parts(self, item: Mapping[str, Any]) -> list[float]:
+        """Where in its ranges an item is."""
+        return [one.part(item[name]) for name, one in self.ranges.items()]
+
+    def active(self, item: Mapping[str, Any]) -> dict[str, Any]:
+        """Values at an end of their range, by key."""
+        return {
+            name: item[name]
+            for name, part in zip(self.ranges, self.parts(item), strict=True)
+            if min(part, 1 - part) < ACTIVE
+        }
+
+
+def _range(text: str, some: list[Any]) -> Range:
+    ends = [_NUMBER.fullmatch(str(value)) for value in (some[0], some[-1])]
+    assert ends[0] is not None
+    assert ends[1] is not None
+    low, high = (float(one[1]) for one in ends if one)
+    if not low < high:
+        raise FormatError(f"--vary {text!r} must go up: its last value must be above its first.")
+    return Range(low, high, ends[0][2])

@@ -1,0 +1,156 @@
+"""Searches find optima that are known, go on after a kill to the same result, and refuse nonsense at once."""
+
+import json
+import math
+
+import pytest
+
+import lumigraph as lg
+from lumigraph.cli import main
+from lumigraph.errors import FormatError, GeometryError
+from lumigraph.information import Light
+from lumigraph.information.points import collected
+from lumigraph.optimisation import Goal
+from lumigraph.optimisation.search import grid, refined
+from lumigraph.optimisation.space import Space
+
+SCOPE, CAMERA = "lfm-fourier", "thesis-plenoptic-2-m050"
+DEPTHS = (-10e-6, 10e-6)
+VARY = {"fourier_lens": "60 mm:90 mm:2"}
+
+
+@pytest.mark.parametrize("search", ["local", "global"])
+def test_a_number_with_a_known_optimum_is_found(search):
+    """Cross-talk sqrt(2.44 λ b)/p falls with f: the least of b = f (1 + m) is at both ranges' low ends."""
+    vary = {
+        "lenslets.magnification": "0.3:0.6:3",
+        "lenslets.focal_length": "5 mm:6 mm:2",
+        "lenslets.pitch": "140 um, 150 um",
+    }
+    found = lg.optimise(CAMERA, vary, "least cross-talk", search=search, evaluations=60)
+    b = 5e-3 * 1.3
+    assert found.best["cross-talk"] == pytest.approx(math.sqrt(2.44 * 633e-9 * b) / 150e-6, rel=1e-3)
+    assert set(found.active) == {"lenslets.magnification", "lenslets.focal_length"}
+    assert found.gain(found.start) > 0.05
+    assert len(found.rows) <= 1 + 12 + 60
+
+
+class Known:
+    """Cameras whose cost is known: least at given parts of two ranges, and none beyond a border."""
+
+    def __init__(self, space, least):
+        self.space, self.least, self.rows, self.seen = space, least, [], {}
+
+    def cost(self, item):
+        y, x = self.space.parts(item)
+        if str(item) not in self.seen:
+            self.rows.append(item)
+            away = (
+                1 + (y - self.least[0]) ** 2 + 3 * (x - self.least[1]) ** 2 + (y - self.least[0]) * (x - 0.3)
+            )
+            self.seen[str(item)] = math.inf if y + x > 1.2 else away
+        return self.seen[str(item)]
+
+
+@pytest.mark.parametrize("search", ["local", "global"])
+def test_a_least_between_the_first_values_is_found_beside_what_cannot_be(search):
+    space = Space.of(["a=1 mm:3 mm:3", "b=0:1:3"])
+    known = Known(space, (0.63, 0.3))
+    first = grid(known, space)
+    found = refined(known, space, first, (search, 400, 1))
+    assert space.parts(found) == pytest.approx([0.63, 0.3], abs=5e-3)
+    few = Known(space, (0.63, 0.3))
+    refined(few, space, grid(few, space), (search, 7, 1))
+    assert len(few.rows) == 9 + 7
+
+
+def test_bounds_fall_and_the_best_is_a_camera_that_has_them():
+    goal = Goal("depth", depths=DEPTHS, light=Light(5000))
+    found = lg.optimise(SCOPE, VARY, goal, evaluations=8)
+    assert found.best["depth"] <= found.swept["depth"]
+    again = lg.information.bounds(found.camera, DEPTHS, Light(5000), places=goal.places)
+    assert again.depth == pytest.approx(found.best["depth"], rel=1e-6)
+
+
+def test_more_aperture_collects_more_of_the_same_points_light():
+    goal, scope = Goal("depth", depths=(1e-6,), light=Light(1000), places=1), lg.load_camera(SCOPE)
+    half = scope.replace(objective={"numerical_aperture": 0.25})
+    caps = [1 - math.sqrt(1 - aperture**2) for aperture in (0.5, 0.25)]
+    assert goal.values(half, collected(scope))["photons"] == pytest.approx(1000 * caps[1] / caps[0], rel=1e-9)
+
+
+def test_a_search_that_was_killed_goes_on_to_the_same_result(tmp_path, monkeypatch):
+    whole = lg.optimise(SCOPE, VARY, depths=DEPTHS, evaluations=6)
+    from lumigraph.optimisation import goals
+
+    plain, calls = goals.Goal.values, []
+
+    def dying(self, *given):
+        calls.append(given)
+        if len(calls) == 5:
+            raise KeyboardInterrupt
+        return plain(self, *given)
+
+    monkeypatch.setattr(goals.Goal, "values", dying)
+    with pytest.raises(KeyboardInterrupt):
+        lg.optimise(SCOPE, VARY, depths=DEPTHS, evaluations=6, output=tmp_path / "best.toml")
+    found = lg.optimise(SCOPE, VARY, depths=DEPTHS, evaluations=6, output=tmp_path / "best.toml")
+    assert found.rows == whole.rows
+    assert len(calls) == 5 + len(whole.rows) - 4
+    with pytest.raises(FormatError, match="belongs to another job"):
+        lg.optimise(SCOPE, VARY, depths=(-10e-6, 11e-6), evaluations=6, output=tmp_path / "best.toml")
+
+
+def test_ranges_and_stock_are_told_apart():
+    space = Space.of(["a=1 mm:3 mm:3", "b=4, 5"])
+    assert space.moved({"a": "1 mm", "b": 4}, [0.25]) == {"a": "1.5 mm", "b": 4}
+    assert space.parts({"a": "2 mm", "b": 5}) == [0.5]
+    assert space.active({"a": "3 mm", "b": 5}) == {"a": "3 mm"}
+
+
+@pytest.mark.parametrize(
+    ("vary", "goal", "said"),
+    [
+        ({"fourier_lens": "nan mm:90 mm:2"}, "depth", "first:last:count"),
+        ({"fourier_lens": "90 mm:60 mm:2"}, "depth", "must go up"),
+        ({"fourier_lense": "60 mm:90 mm:2"}, "depth", "fourier_lense"),
+        (VARY, "depht", "--goal is 'depht'"),
+        (VARY, "largest luck", "no number 'luck'"),
+        (VARY, "largest mtf@10/mm", "light-field-microscope"),
+        ({}, "depth", "nothing to vary"),
+        ({"lenslets.layout": "hex"}, "depth", "none of the first 1 cameras can be"),
+    ],
+)
+def test_nonsense_is_refused(vary, goal, said):
+    with pytest.raises((FormatError, GeometryError), match=said):
+        lg.optimise(SCOPE, vary, goal, depths=DEPTHS)
+
+
+def test_depths_are_needed_for_bounds():
+    with pytest.raises(GeometryError, match="needs depths"):
+        lg.optimise(SCOPE, VARY, "depth")
+
+
+def test_the_verb_writes_a_camera_and_says_before_and_after(tmp_path, capsys):
+    best = tmp_path / "best.toml"
+    words = [
+        "optimise",
+        SCOPE,
+        "--vary",
+        "fourier_lens=60 mm:90 mm:2",
+        "--depths",
+        "-10 um, 10 um",
+        "-o",
+        str(best),
+    ]
+    words += ["--evaluations", "3"]
+    assert main([*words, "--report", str(tmp_path / "r.html")]) == 0
+    said = capsys.readouterr().out
+    assert "as given" in said
+    assert "fourier_lens = " in said
+    assert main([*words, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    camera = lg.load_camera(best)
+    assert camera.fourier_lens == pytest.approx(lg.units.parse(told["best"]["fourier_lens"]), rel=1e-9)
+    assert main(["optimise", SCOPE, "--vary", "fourier_lens=60:90", "-o", str(best)]) == 1
+    assert capsys.readouterr().err.startswith("lumigraph: error: ")
