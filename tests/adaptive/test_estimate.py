@@ -6,9 +6,9 @@ import pytest
 import lumigraph as lg
 from lumigraph.adaptive import estimate
 from lumigraph.adaptive.beads import brightest
-from lumigraph.adaptive.estimate import _warn_of_misfit, _worth
+from lumigraph.adaptive.estimate import _warn_of_misfit
 from lumigraph.adaptive.field import ALIKE, PRIOR, Nodes
-from lumigraph.adaptive.fit import Around, Fit
+from lumigraph.adaptive.worth import worth
 from lumigraph.deconvolution import Exposure
 
 SCOPE = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
@@ -85,9 +85,8 @@ def test_regions_of_the_field_have_aberrations_of_their_own():
 
 
 def test_beads_that_do_not_explain_the_picture_are_warned_of():
-    fit = Fit(lg.Points(BEADS, np.ones(2)), np.zeros((1, 1)))
     with pytest.warns(lg.SamplingWarning, match="2 beads leave 3 times the variance of noise"):
-        _warn_of_misfit(fit, Around(np.eye(1), np.zeros(1), 3.0))
+        _warn_of_misfit(3.0, "2 beads leave")
 
 
 RAW = np.ones((135, 135), np.float32)
@@ -108,6 +107,11 @@ RAW = np.ones((135, 135), np.float32)
         ({"raw": 0 * RAW}, "dark"),
         ({"regions": (0, 1)}, "regions"),
         ({"regions": (1, 1, 1)}, "two whole numbers"),
+        ({"object": "cells"}, "'beads' or 'volume'"),
+        ({"object": "volume", "regions": (2, 2)}, "a volume has one"),
+        ({"object": "volume", "terms": (4,)}, "volume explains 1 to 4 itself"),
+        ({"object": "volume", "depths": ()}, "no depths"),
+        ({"object": "volume", "raw": RAW * np.nan}, "NaN"),
     ],
 )
 def test_what_cannot_be_estimated_is_refused(given, message):
@@ -146,5 +150,5 @@ def test_the_prior_of_a_field_that_is_even_is_that_of_one_wavefront():
 def test_a_term_that_another_one_explains_goes_and_the_other_stays():
     # Each is 2.5 deviations from 0, and their sum 11: one of them is enough.
     covariance = np.array([[1.0, -0.9], [-0.9, 1.0]])
-    assert _worth(covariance, np.array([[2.5, 2.4]]), 1e4).sum() == 1
-    assert _worth(np.eye(2), np.array([[3.6, 2.9]]), 1e4).tolist() == [True, False]
+    assert worth(covariance, np.array([[2.5, 2.4]]), 1e4).sum() == 1
+    assert worth(np.eye(2), np.array([[3.6, 2.9]]), 1e4).tolist() == [True, False]

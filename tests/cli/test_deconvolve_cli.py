@@ -8,7 +8,7 @@ import pytest
 import tifffile
 
 import lumigraph as lg
-from lumigraph.cli.deconvolve import depths
+from lumigraph.cli.deconvolve_options import depths
 from lumigraph.preparation import vignetting
 
 FOCUSED = """

@@ -1,17 +1,20 @@
-"""`estimate`: aberrations from the light field of beads, together with the beads."""
+"""`estimate`: aberrations from the light field, together with the object; here of beads."""
 
 import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from lumigraph.adaptive.beads import brightest
+from lumigraph.adaptive.checked import BEADS, asked_for, bent
 from lumigraph.adaptive.field import PRIOR, Nodes
 from lumigraph.adaptive.fit import OWN, PLACES, Around, Fit, Model, solved
+from lumigraph.adaptive.of_volume import of_volume
 from lumigraph.adaptive.wavefront import Wavefront
+from lumigraph.adaptive.worth import UNKNOWN, worth
 from lumigraph.core import checks, memory
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.raw import RawImage
@@ -20,18 +23,10 @@ from lumigraph.deconvolution.methods import State
 from lumigraph.deconvolution.problem import Problem, Scale, values
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
 from lumigraph.instruments import LightFieldMicroscope
-from lumigraph.instruments.capabilities import WithPupil
 from lumigraph.scene import Points
 
 TERMS = tuple(range(5, 16))
 """Noll indices up to the fourth order that the object cannot explain."""
-
-EXPLAINED = {
-    1: "a piston changes no image",
-    2: "the beads' places along x explain it",
-    3: "the beads' places along y explain it",
-    4: "the beads' depths explain it",
-}
 
 ACCURACY = 3e-2
 """Of points' images: their errors are not alike from bead to bead, and less than noise."""
@@ -58,10 +53,8 @@ FAINT = (0.15, 0.05)
 BEYOND = 6e-6
 """How far beyond the outermost depths beads may stand [m]."""
 
-UNKNOWN = "the light field holds too little information"
-
 MISFIT = 2.0
-"""Mean of (r - m)²/m above which the beads do not explain the raw image."""
+"""Mean of (r - m)²/m above which an object does not explain the raw image."""
 
 
 def estimate(
@@ -73,24 +66,30 @@ def estimate(
     regions: tuple[int, int] = (1, 1),
     exposure: Exposure | None = None,
     pixels: Calibration | None = None,
+    object: Literal["beads", "volume"] = "beads",  # noqa: A002 - what it is called everywhere
 ) -> Wavefront:
-    """Aberrations of a light-field microscope from one raw image of beads, with the beads.
+    """Aberrations of a light-field microscope from one raw image, with the object.
 
-    Richardson-Lucy finds the beads. Then their places and light and the Zernike coefficients are fitted
+    Of beads: Richardson-Lucy finds them. Then their places and light and the Zernike coefficients are fitted
     together, by Levenberg and Marquardt's steps on the Poisson likelihood, and Richardson-Lucy looks for more
     beads in what is left. A term stays if it gains more log-likelihood than ½ ln N for N pixels (Schwarz's
     criterion); the others are 0. What is known before: a coefficient is of the order of 1 wave rms.
 
+    Of any object with texture: the shifts of views give a start (see `start`), unless none is likelier. Then
+    Richardson-Lucy's steps on a volume take turns with Gauss and Newton's on the coefficients, for which the
+    volume's voxels are unknown, too, until the likelihood rises no more. Each time the volume begins even:
+    what has adapted to a wrong wavefront resists a better one.
+
     Parameters
     ----------
     raw
-        Of sparse beads, as it was read.
+        As it was read.
     microscope
         Configuration "1.0", with square lenslets. Aberrations of its description are taken as known.
     depths
-        Planes in which beads are looked for [m], such as each 6 µm.
+        Planes in which beads are looked for, or of the volume [m], such as each 6 µm.
     terms
-        Noll indices. Piston, tilt and defocus cannot be told from the beads' places: see `Wavefront.untold`.
+        Noll indices. Piston, tilt and defocus cannot be told from the object's place: see `Wavefront.untold`.
     regions
         Of the field along y and x, each with coefficients of its own at its middle; linear between.
         Neighbours are expected to differ by 0.3 waves rms.
@@ -99,11 +98,15 @@ def estimate(
         counts as one electron.
     pixels
         Calibration of a real camera.
+    object
+        "beads", sparse points anywhere; "volume", anything, as samples of which three go into a lenslet.
+        A volume has one region.
 
     Raises
     ------
     GeometryError
-        Another configuration, no terms, fewer than two depths, no beads.
+        Another configuration, no terms, no depths, fewer than two of them or no beads where those are
+        looked for, another kind of object, regions of a volume.
     CalibrationError
         A raw image of another shape, or a dark one.
     SamplingError
@@ -112,14 +115,25 @@ def estimate(
     Warns
     -----
     SamplingWarning
-        The beads do not explain the raw image.
+        The object does not explain the raw image.
 
     References
     ----------
     G. Schwarz, Ann. Stat. 6, 461 (1978).
     """
+    parted = _regions(regions)
+    if object == "volume":
+        if parted != (1, 1):
+            raise GeometryError(
+                f"regions are {parted} but a volume has one. Crop the raw image, or use beads."
+            )
+        found = of_volume((raw, exposure, pixels), microscope, depths, terms)
+        _warn_of_misfit(found.pearson, "the volume leaves")
+        return found
+    if object != "beads":
+        raise GeometryError(f"object is {object!r} but must be 'beads' or 'volume'.")
     given = _Given.of((raw, exposure, pixels), microscope, depths, terms)
-    model = given.model(_regions(regions))
+    model = given.model(parted)
     first = Fit(given.beads(), np.zeros((len(model.nodes), len(given.terms))))
     _require_memory(model, first)
     every = np.ones(len(given.terms), bool)
@@ -127,11 +141,11 @@ def estimate(
     fit, rounds = _fitted(given, model, plain, every)
     around = model.around(fit)
     covariance = _covariance(model, around)[-fit.coefficients.size :, -fit.coefficients.size :]
-    free = _worth(covariance, fit.coefficients, model.counted)
+    free = worth(covariance, fit.coefficients, model.counted)
     if not free.all():
         fit = model.improved(replace(fit, coefficients=fit.coefficients * free), free, STEPS["all"])
         around = model.around(fit)
-    _warn_of_misfit(fit, around)
+    _warn_of_misfit(around.pearson, f"{len(fit.points.intensities)} beads leave")
     shape = (len(model.nodes.y), len(model.nodes.x), len(given.terms))
     deviations = np.sqrt(np.diag(covariance)).reshape(shape)
     unknown = {j: UNKNOWN for j, d in zip(given.terms, deviations.max((0, 1)), strict=True) if d > PRIOR / 2}
@@ -139,16 +153,15 @@ def estimate(
     return Wavefront(
         given.terms, found, deviations, (model.nodes.y, model.nodes.x), given.untold | unknown, fit.points,
         (model.deviance(plain), model.deviance(fit)), around.pearson, rounds, fit.steps,
-        given.bent(found.mean((0, 1))),
+        bent(microscope, given.terms, found.mean((0, 1))),
     )  # fmt: skip
 
 
-def _warn_of_misfit(fit: Fit, around: Around) -> None:
-    if around.pearson > MISFIT:
+def _warn_of_misfit(pearson: float, what: str) -> None:
+    if pearson > MISFIT:
         warnings.warn(
-            f"{len(fit.points.intensities)} beads leave {around.pearson:.3g} times the variance of noise in "
-            "the raw image: it holds more than beads, or more terms, or the gain is wrong. The wavefront may "
-            "be off.",
+            f"{what} {pearson:.3g} times the variance of noise in the raw image: it holds more than that, or "
+            "more terms, or the gain is wrong. The wavefront may be off.",
             SamplingWarning,
             stacklevel=3,
         )
@@ -175,26 +188,16 @@ class _Given:
         terms: Sequence[int],
     ) -> "_Given":
         raw, exposure, pixels = given
-        if not isinstance(microscope, WithPupil) or microscope.configuration != "1.0":
-            raise GeometryError(
-                "aberrations are estimated for a LightFieldMicroscope of configuration '1.0'."
-            )
-        planes = np.unique([checks.finite("a depth", float(dz)) for dz in depths])
+        planes, found, untold = asked_for(microscope, depths, terms, BEADS)
         if len(planes) < 2:
             raise GeometryError(
                 f"depths are {list(planes)} but beads need at least two planes to stand between."
             )
-        asked = tuple(dict.fromkeys(int(j) for j in terms))
-        found = tuple(j for j in asked if j not in EXPLAINED)
-        if not found:
-            raise GeometryError(f"terms are {asked} but the beads explain 1 to 4 themselves. Give others.")
-        microscope.pupil_images(found)  # refuses what has no phase, and indices that are none
         if exposure is None:
             exposure = Exposure.of(raw) if isinstance(raw, RawImage) else Exposure()
         operator = microscope.operator(tuple(planes), SAMPLES, accuracy=ACCURACY, pixels=pixels)
         data = values(raw, operator, exposure)
         problem = Problem.of(raw, exposure, Scale.of(operator, exposure, data))
-        untold = {j: reason for j, reason in EXPLAINED.items() if j in asked}
         return cls(microscope, operator, problem, planes, found, untold, pixels)
 
     def model(self, regions: tuple[int, int]) -> Model:
@@ -210,14 +213,6 @@ class _Given:
         )
         nodes = Nodes.of(grid, regions, len(self.terms))
         return Model(images, self.problem, nodes, (low, high))
-
-    def bent(self, coefficients: np.ndarray) -> LightFieldMicroscope:
-        """The microscope with aberrations."""
-        known = dict(self.microscope.objective.aberrations)
-        for j, value in zip(self.terms, coefficients, strict=True):
-            if value:
-                known[j] = known.get(j, 0.0) + float(value)
-        return self.microscope.replace(objective={"aberrations": known})
 
     def beads(self, shown: np.ndarray | None = None) -> Points:
         """Beads by Richardson-Lucy; of what is brighter than `shown` where that is given."""
@@ -285,28 +280,6 @@ def _covariance(model: Model, around: Around) -> np.ndarray:
     whole, n = around.information / max(around.pearson, 1.0), len(model.nodes.information)
     whole[-n:, -n:] += model.nodes.information
     return solved(whole, np.eye(len(whole)))
-
-
-def _worth(covariance: np.ndarray, coefficients: np.ndarray, pixels: float) -> np.ndarray:
-    """Which terms (terms,) gain more log-likelihood than Schwarz's criterion asks for, without the others."""
-    nodes, count = coefficients.shape
-    free = np.ones(count, bool)
-    while free.any():
-        x, known = coefficients.copy(), np.tile(free, nodes)
-        if not free.all():  # where the others go if these are 0
-            inverse = np.linalg.inv(covariance)
-            change = np.linalg.solve(inverse[np.ix_(known, known)], inverse[np.ix_(known, ~known)])
-            x.ravel()[known] += change @ coefficients.ravel()[~known]
-            own = np.linalg.inv(inverse[np.ix_(known, known)])
-        else:
-            own = covariance
-        places = {j: np.flatnonzero(np.flatnonzero(known) % count == j) for j in np.flatnonzero(free)}
-        gains = {j: x[:, j] @ np.linalg.solve(own[np.ix_(at, at)], x[:, j]) for j, at in places.items()}
-        weakest = min(gains, key=lambda j: gains[j])
-        if gains[weakest] >= nodes * math.log(pixels):
-            break
-        free[weakest] = False
-    return free
 
 
 def _require_memory(model: Model, fit: Fit) -> None:

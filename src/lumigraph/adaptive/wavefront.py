@@ -1,12 +1,13 @@
 """`Wavefront`: what a light field tells of its microscope's aberrations."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.core.brief import brief
+from lumigraph.core.volume import Volume
 from lumigraph.elements.zernike import zernike
 from lumigraph.instruments import LightFieldMicroscope
 from lumigraph.scene import Points
@@ -14,7 +15,7 @@ from lumigraph.scene import Points
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wavefront:
-    """Aberrations that were estimated together with beads, and how well they are known.
+    """Aberrations that were estimated together with the object, and how well they are known.
 
     Parameters
     ----------
@@ -29,15 +30,20 @@ class Wavefront:
     untold
         Terms that cannot be known here, and why.
     beads
-        The object.
+        The object; none where it is a volume.
     deviance
-        Poisson deviance per pixel with the beads alone, and with the wavefront.
+        Poisson deviance per pixel with the object alone, and with the wavefront.
     pearson
         Mean of (r - m)²/m, electrons: 1 where only noise is left.
     rounds, steps
-        How often beads were looked for, and steps of the fit.
+        How often objects were looked for, and steps of the fit.
     microscope
         The description with the mean aberrations of the field.
+    volume
+        The object; None where it is beads.
+    explained
+        Part of each term's information, from 0 to 1, that is lost as the volume could explain what the term
+        does; empty of beads.
     """
 
     terms: tuple[int, ...]
@@ -51,6 +57,8 @@ class Wavefront:
     rounds: int
     steps: int
     microscope: LightFieldMicroscope
+    volume: Volume | None = None
+    explained: Mapping[int, float] = field(default_factory=dict)
 
     __repr__ = brief
 

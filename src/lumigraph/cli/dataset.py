@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.batch import Hands, kept
 from lumigraph.cli.console import line, progress
-from lumigraph.cli.deconvolve import depths
+from lumigraph.cli.deconvolve_options import depths
 from lumigraph.cli.options import COMMAND, COMMON, Common, Output
 from lumigraph.cli.standing import Standing
 from lumigraph.cli.tolerance import Tolerances, given_tolerances

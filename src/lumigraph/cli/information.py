@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from lumigraph.cli.console import progress
-from lumigraph.cli.deconvolve import depths as planes_of
+from lumigraph.cli.deconvolve_options import depths as planes_of
 from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.core.result import Figure, Quantity, Result
 

@@ -133,7 +133,7 @@ class Lit:
     image
         (count, count).
     changes
-        (directions, count, count): by each coefficient [1/waves rms], then by y, x and dz [1/m].
+        (directions, count, count): by default by each coefficient [1/waves rms], then by y, x and dz [1/m].
     cell
         Row and column of the point's own cell, in the window's middle; may lie beside the layout's.
     """
@@ -235,10 +235,19 @@ class PupilImages:
                 found += light * np.tensordot(phases[: len(found)], turned, 2)
         return found
 
-    def lit(self, points: Points, coefficients: np.ndarray) -> Iterator[Lit]:
-        """Image and all derivatives of each point of intensity 1, in order of the points."""
-        directions = np.eye(len(self.terms) + PLACES)
-        return (lit for _, lit in self._each(points, coefficients, directions))
+    def lit(
+        self, points: Points, coefficients: np.ndarray, directions: np.ndarray | None = None
+    ) -> Iterator[Lit]:
+        """Image and derivatives of each point of intensity 1, in order of the points.
+
+        Along directions (k, terms + 3), the last three of y, x and dz; all single ones if left out.
+        """
+        along = np.eye(len(self.terms) + PLACES) if directions is None else directions
+        return (lit for _, lit in self._each(points, coefficients, along))
+
+    def cells_at(self, dz: float) -> int:
+        """Along the window that holds the image of a point at a depth [m], without coefficients."""
+        return max(self._size(objective, dz)[0] for objective in self.objectives)
 
     def placed(self, samples: np.ndarray) -> np.ndarray:
         """Raw image (ny, nx) of samples of the layout."""

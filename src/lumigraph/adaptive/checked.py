@@ -1,0 +1,75 @@
+"""What is asked for: depths and terms, checked; and the microscope with what is found."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from lumigraph.core import checks
+from lumigraph.errors import GeometryError
+from lumigraph.instruments import LightFieldMicroscope
+from lumigraph.instruments.capabilities import WithPupil
+
+
+class Kind(NamedTuple):
+    """What an object explains itself, in words, and why for each term."""
+
+    all_of_it: str
+    reasons: dict[int, str]
+
+
+PISTON = "a piston changes no image"
+
+BEADS = Kind(
+    "the beads explain 1 to 4 themselves",
+    {
+        1: PISTON,
+        2: "the beads' places along x explain it",
+        3: "the beads' places along y explain it",
+        4: "the beads' depths explain it",
+    },
+)
+
+VOLUME = Kind(
+    "the volume explains 1 to 4 itself",
+    {
+        1: PISTON,
+        2: "the volume's place along x explains it",
+        3: "the volume's place along y explains it",
+        4: "the volume's depth explains it",
+    },
+)
+
+
+def asked_for(
+    microscope: LightFieldMicroscope, depths: Sequence[float], terms: Sequence[int], kind: Kind
+) -> tuple[np.ndarray, tuple[int, ...], dict[int, str]]:
+    """Planes [m], terms that can be found, and the others with reasons.
+
+    Raises
+    ------
+    GeometryError
+        Another configuration than "1.0", no depths, no terms.
+    """
+    if not isinstance(microscope, WithPupil) or microscope.configuration != "1.0":
+        raise GeometryError("aberrations are estimated for a LightFieldMicroscope of configuration '1.0'.")
+    planes = np.unique([checks.finite("a depth", float(dz)) for dz in depths])
+    if not len(planes):
+        raise GeometryError("there are no depths. Give some, such as each 6 µm.")
+    asked = tuple(dict.fromkeys(int(j) for j in terms))
+    found = tuple(j for j in asked if j not in kind.reasons)
+    if not found:
+        raise GeometryError(f"terms are {asked} but {kind.all_of_it}. Give others.")
+    microscope.pupil_images(found)  # refuses what has no phase, and indices that are none
+    return planes, found, {j: reason for j, reason in kind.reasons.items() if j in asked}
+
+
+def bent(
+    microscope: LightFieldMicroscope, terms: Sequence[int], coefficients: np.ndarray
+) -> LightFieldMicroscope:
+    """The microscope with aberrations beyond those of its description."""
+    known = dict(microscope.objective.aberrations)
+    for j, value in zip(terms, coefficients, strict=True):
+        if value:
+            known[j] = known.get(j, 0.0) + float(value)
+    return microscope.replace(objective={"aberrations": known})

@@ -1,0 +1,125 @@
+"""Aberrations from the light field of any object, together with its volume."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from lumigraph.adaptive.checked import VOLUME, asked_for, bent
+from lumigraph.adaptive.field import PRIOR
+from lumigraph.adaptive.sight import Sight
+from lumigraph.adaptive.start import start
+from lumigraph.adaptive.voxels import ITERATIONS, Around, Told, Voxels
+from lumigraph.adaptive.wavefront import Wavefront
+from lumigraph.adaptive.worth import UNKNOWN, worth
+from lumigraph.core import arrays
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.raw import RawImage
+from lumigraph.core.volume import Volume
+from lumigraph.deconvolution import Exposure
+from lumigraph.deconvolution.problem import values
+from lumigraph.elements.zernike import noll_to_nm
+from lumigraph.errors import CalibrationError, SamplingError
+from lumigraph.instruments import LightFieldMicroscope
+from lumigraph.scene import Points
+
+ACCURACY = 3e-2
+"""Of points' images."""
+
+SAMPLES = 3
+"""Of the volume along a lenslet."""
+
+Given = tuple[RawImage | np.ndarray, Exposure | None, Calibration | None]
+
+
+def of_volume(
+    given: Given, microscope: LightFieldMicroscope, depths: Sequence[float], terms: Sequence[int]
+) -> Wavefront:
+    """The wavefront of (raw image, exposure, pixels), and the volume; see `estimate`."""
+    raw, exposure, pixels = given
+    planes, found, untold = asked_for(microscope, depths, terms, VOLUME)
+    if exposure is None:
+        exposure = Exposure.of(raw) if isinstance(raw, RawImage) else Exposure()
+    farthest = float(np.abs(planes).max())
+    images = microscope.pupil_images(found, farthest=farthest, accuracy=ACCURACY, pixels=pixels)
+    sight = Sight(images, tuple(map(float, planes)), SAMPLES, -images.layout.frame)
+    sight.require_memory()
+    sight = Sight.of(images, sight.planes, SAMPLES)
+    voxels = Voxels(sight, values(raw, sight.operator(np.zeros(len(found))), exposure), exposure)
+    first = [np.zeros(len(found)), *_starts(given, microscope, found, exposure)]
+    told = min((voxels.begun(c, ITERATIONS[0]) for c in first), key=lambda one: one.state.deviance)
+    told, around = _improved(voxels, told, np.ones(len(found), bool), ITERATIONS)
+    covariance = _covariance(voxels, told, around)
+    free = worth(covariance, told.coefficients[None], voxels.counted(told))
+    if not free.all():
+        kept = voxels.begun(told.coefficients * free, ITERATIONS[-1], told.steps)
+        told, around = _improved(voxels, kept, free, ITERATIONS[-1:]) if free.any() else (kept, around)
+    plain = voxels.begun(np.zeros(len(found)), ITERATIONS[-1], told.steps)
+    if not _is_likelier(voxels, told, plain):
+        told = plain
+    grid = sight.picture
+    volume = np.asarray(arrays.to_numpy(told.state.estimate))[(slice(None), *sight.inside)]
+    return Wavefront(
+        found, told.coefficients.reshape(1, 1, -1), np.sqrt(np.diag(covariance)).reshape(1, 1, -1),
+        (np.array([grid.center[0]]), np.array([grid.center[1]])),
+        untold | _unknown(found, covariance), Points(np.zeros((0, 3)), np.zeros(0)),
+        (plain.state.deviance, told.state.deviance), voxels.pearson(told), 1, told.steps,
+        bent(microscope, found, told.coefficients), Volume(volume, grid, sight.planes),
+        _explained(found, around),
+    )  # fmt: skip
+
+
+def _starts(
+    given: Given, microscope: LightFieldMicroscope, terms: tuple[int, ...], exposure: Exposure
+) -> list[np.ndarray]:
+    """Coefficients to begin with, from the views' shifts: all of them, and those above the second order.
+
+    A scene of few things passes for astigmatism if those along y and those along x stand at other depths.
+    """
+    raw, _, pixels = given
+    data = np.asarray(raw.data if isinstance(raw, RawImage) else raw, np.float32)
+    background = np.asarray(arrays.to_numpy(exposure.background)) + exposure.black_level
+    try:
+        slopes = start(np.maximum(data - background, 0).astype(np.float32), microscope, terms, pixels=pixels)
+    except (CalibrationError, SamplingError):
+        return []  # nothing to compare: the fit begins without aberrations
+    known = dict(microscope.objective.aberrations)
+    found = np.array([slopes.coefficients[j] - known.get(j, 0.0) for j in terms])
+    high = np.array([noll_to_nm(j)[0] > 2 for j in terms])
+    return [found, found * high] if high.any() and not high.all() else [found]
+
+
+def _improved(voxels: Voxels, told: Told, free: np.ndarray, iterations: Sequence[int]) -> tuple[Told, Around]:
+    """Step by step with volumes that are followed farther and farther."""
+    found = voxels.improved(told, free)
+    for n in iterations[1:]:
+        found = voxels.improved(voxels.begun(found[0].coefficients, n, found[0].steps), free)
+    return found
+
+
+def _is_likelier(voxels: Voxels, told: Told, plain: Told) -> bool:
+    """Whether coefficients are worth it, all together, by Schwarz's criterion.
+
+    Volumes on a grid of samples do not explain raw images to their noise: what they leave, in variances of
+    noise, raises the bar.
+    """
+    count, unknowns = voxels.counted(told), np.count_nonzero(told.coefficients)
+    gained = (plain.state.deviance - told.state.deviance) * count
+    return gained > unknowns * math.log(count) * max(voxels.pearson(told), 1.0)
+
+
+def _covariance(voxels: Voxels, told: Told, around: Around) -> np.ndarray:
+    """Of the coefficients; larger where the volume does not explain the raw image."""
+    information = around.information / max(voxels.pearson(told), 1.0)
+    return np.linalg.inv(information + np.eye(len(information)) / PRIOR**2)
+
+
+def _unknown(terms: tuple[int, ...], covariance: np.ndarray) -> dict[int, str]:
+    deviations = np.sqrt(np.diag(covariance))
+    return {j: UNKNOWN for j, d in zip(terms, deviations, strict=True) if d > PRIOR / 2}
+
+
+def _explained(terms: tuple[int, ...], around: Around) -> dict[int, float]:
+    """Part of each term's information that the volume takes, as it explains what the term does."""
+    left = np.diag(around.information) / np.diag(around.fixed)
+    return {j: float(np.clip(1 - part, 0, 1)) for j, part in zip(terms, left, strict=True)}

@@ -1,0 +1,186 @@
+r"""A first wavefront from the shifts of views: a light field is a Shack-Hartmann sensor of its scene.
+
+Each view looks through a part of the pupil at q. There a wavefront W (in waves) moves the picture by
+Δ = -λ ∂W/∂q in the object, as a slope of it does on a Shack-Hartmann sensor, whatever the scene is: views are
+compared with the mean of all, moved back. Depth moves pictures in proportion to q, as defocus does.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, shift
+
+from lumigraph.core import checks
+from lumigraph.core.brief import brief
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.raw import RawImage
+from lumigraph.elements.zernike import noll_to_nm, zernike
+from lumigraph.errors import CalibrationError, GeometryError
+from lumigraph.instruments import LightFieldMicroscope
+from lumigraph.instruments.capabilities import WithPupil
+from lumigraph.rendering import decode
+
+EDGE = 0.9
+"""Of the pupil's radius, within which views count: beyond it they are dark, or half of them is."""
+
+SMOOTH = (2.0, 1.2, 0.7, 0.5)
+"""Standard deviations by which pictures are smoothed, in turn: large shifts come first [lenslets]."""
+
+TURNS = 8
+"""Of comparing and moving, for each of them."""
+
+BASE = (2, 3, 4)
+"""Tilts and defocus, which are the scene's place and depth: fitted and dropped."""
+
+STEP = 1e-4
+"""Of central differences, in pupil radii."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slopes:
+    """Shifts of views, and the wavefront that has these slopes.
+
+    Parameters
+    ----------
+    coefficients
+        Noll index to waves rms.
+    deviations
+        Their standard deviations, from what the wavefront leaves of the shifts [waves rms].
+    places
+        Where the views stand in the pupil (views, 2), y and x [pupil radii].
+    shifts
+        Of their pictures in the object (views, 2), y and x [m].
+    residual
+        Rms of what the wavefront leaves of the shifts [m].
+    """
+
+    coefficients: dict[int, float]
+    deviations: dict[int, float]
+    places: np.ndarray
+    shifts: np.ndarray
+    residual: float
+
+    __repr__ = brief
+
+    @property
+    def rms(self) -> float:
+        """Of the wavefront [waves]."""
+        return float(np.linalg.norm(list(self.coefficients.values())))
+
+
+def start(
+    raw: RawImage | np.ndarray,
+    microscope: LightFieldMicroscope,
+    terms: Sequence[int],
+    *,
+    pixels: Calibration | None = None,
+) -> Slopes:
+    """A light-field microscope's wavefront from the shifts of its views, as rays see it.
+
+    A start for `estimate`, which knows diffraction: some tenths of it are left. Any object with texture.
+
+    Parameters
+    ----------
+    raw
+        As it was read, without background.
+    microscope
+        Configuration "1.0". Aberrations of its description are not taken away.
+    terms
+        Noll indices from 5 on.
+    pixels
+        Calibration of a real camera.
+
+    Raises
+    ------
+    GeometryError
+        Another configuration, terms that are none or that the scene explains.
+    CalibrationError
+        A raw image of another shape, a dark or even one, too few lenslets.
+    """
+    if not isinstance(microscope, WithPupil) or microscope.configuration != "1.0":
+        raise GeometryError("slopes are those of a LightFieldMicroscope of configuration '1.0'.")
+    asked = tuple(dict.fromkeys(int(j) for j in terms))
+    for j in asked:
+        noll_to_nm(j)
+    if not asked or min(asked) < 5:
+        raise GeometryError(f"terms are {asked} but the scene's place and depth explain 1 to 4. Give others.")
+    calibration = microscope.calibration if pixels is None else pixels
+    places, pictures = _views(raw, microscope, calibration)
+    size = microscope.lenslet_size
+    every = (*BASE, *asked)
+    slopes = -_slopes(places, every) * (
+        microscope.wavelength / microscope.objective.numerical_aperture / size
+    )
+    found, left = np.zeros(len(every)), np.zeros_like(places)
+    for sigma in SMOOTH:
+        smooth = gaussian_filter(pictures, (0, sigma, sigma))
+        for _ in range(TURNS):
+            left = _left(smooth, slopes @ found)
+            found = found + np.linalg.lstsq(slopes.reshape(-1, len(every)), left.ravel(), rcond=1e-6)[0]
+    moved = slopes @ found + left
+    off = moved - slopes @ found
+    flat = slopes.reshape(-1, len(every))
+    variance = float(np.square(off).sum()) / max(off.size - len(every), 1)
+    known = np.sqrt(variance * np.diag(np.linalg.pinv(flat.T @ flat)))
+    n = len(BASE)
+    return Slopes(
+        {j: float(c) for j, c in zip(asked, found[n:], strict=True)},
+        {j: float(d) for j, d in zip(asked, known[n:], strict=True)},
+        places, moved * size, float(np.sqrt(np.mean(np.square(off).sum(1)))) * size,
+    )  # fmt: skip
+
+
+def _views(
+    raw: RawImage | np.ndarray, microscope: LightFieldMicroscope, calibration: Calibration
+) -> tuple[np.ndarray, np.ndarray]:
+    """Places (k, 2) of the views in the pupil, in radii, and their contrasts (k, t, s)."""
+    data = np.asarray(raw.data if isinstance(raw, RawImage) else raw, np.float32)
+    if data.shape != calibration.shape:
+        raise CalibrationError(
+            f"the raw image has shape {data.shape} but the microscope's {calibration.shape}."
+        )
+    checks.finite_array("the raw image", data, CalibrationError)
+    views = decode(data, calibration)
+    radius = views.separation * microscope.objective.numerical_aperture / microscope.magnification
+    v, u = np.meshgrid(views.aperture.y / radius, views.aperture.x / radius, indexing="ij")
+    inside = np.hypot(v, u) < EDGE
+    pictures = np.asarray(views.data)[inside]
+    if min(pictures.shape[1:]) < 5:
+        raise CalibrationError(f"views have {pictures.shape[1:]} lenslets but shifts need at least 5 x 5.")
+    means = pictures.mean((1, 2), keepdims=True)
+    if not means.min() > 0:
+        raise CalibrationError("the raw image is dark: views without light have no shifts.")
+    contrast = pictures / means - 1
+    if contrast.std() < 1e-5:  # rounding
+        raise CalibrationError("the raw image is even: without texture there are no shifts.")
+    return -np.stack([v[inside], u[inside]], 1), contrast  # raw images are turned by 180°, objects are not
+
+
+def _slopes(places: np.ndarray, terms: Sequence[int]) -> np.ndarray:
+    """Slopes (k, 2, terms) of Zernike terms along y and x, per pupil radius."""
+    found = []
+    for ahead in (np.array([STEP, 0.0]), np.array([0.0, STEP])):
+        ends = [_polynomials(places + side * ahead, terms) for side in (1, -1)]
+        found.append((ends[0] - ends[1]) / (2 * STEP))
+    return np.stack(found, 1)
+
+
+def _polynomials(places: np.ndarray, terms: Sequence[int]) -> np.ndarray:
+    rho, angle = np.hypot(*places.T), np.arctan2(places[:, 0], places[:, 1])
+    return np.stack([zernike(j, rho, angle) for j in terms], 1)
+
+
+def _left(pictures: np.ndarray, shifts: np.ndarray) -> np.ndarray:
+    """Shifts (k, 2) of pictures (k, t, s) from their mean, beyond those given; by Lucas and Kanade [px]."""
+    back = np.stack(
+        [shift(one, -d, order=1, mode="nearest") for one, d in zip(pictures, shifts, strict=True)]
+    )
+    mean = back.mean(0)
+    slope = np.stack(np.gradient(mean))[:, 1:-1, 1:-1]
+    square = np.tensordot(slope, slope, ((1, 2), (1, 2)))
+    off = (back - mean)[:, 1:-1, 1:-1]
+    right = -np.tensordot(off, slope, ((1, 2), (1, 2)))
+    ridge = 1e-3 * np.trace(square) * np.eye(2)
+    found = np.linalg.solve(square + ridge, right.T).T
+    return found / np.maximum(1.0, np.linalg.norm(found, axis=1, keepdims=True))

@@ -1,0 +1,212 @@
+r"""A volume and a wavefront together: Richardson-Lucy's steps on one, Gauss and Newton's on both.
+
+With o the volume, A(c) the operator of coefficients c, m = A o + b and F = diag(g w / m), the change of the
+image by c_j is J_j = ∂A/∂c_j o. What the volume can explain of it, by changes o u of its own, counts for
+nothing: u_j is the most likely one for J_j, with a prior of 1 for u, and what is left is
+
+.. math:: P_j = J_j - A (o u_j), \quad S = J^T F P, \quad S\, \delta = P^T F (r - m)
+
+S is Fisher's information of c with all voxels unknown (a Schur complement).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lumigraph.adaptive.field import PRIOR
+from lumigraph.adaptive.fit import solved
+from lumigraph.adaptive.sight import Sight
+from lumigraph.core import arrays
+from lumigraph.core.threads import single_products
+from lumigraph.deconvolution import RichardsonLucy
+from lumigraph.deconvolution.beyond import BARELY
+from lumigraph.deconvolution.exposure import Exposure
+from lumigraph.deconvolution.methods import State
+from lumigraph.deconvolution.problem import Problem, Scale
+
+ITERATIONS = (4, 15)
+"""Of Richardson-Lucy, accelerated: few at first, for a volume that explains a wrong wavefront resists it."""
+
+SOLVED = 20
+"""Steps of conjugate gradients by which the volume explains a change."""
+
+LONGEST = 0.5
+"""Longest step of all coefficients together [waves rms]."""
+
+TRIES = 4
+"""Steps, each shorter than the one before, of which one must be likelier."""
+
+STEPS = 25
+"""At most."""
+
+GAIN = 2.0
+"""Log-likelihood that a step must gain for another one to follow."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Told:
+    """A volume and coefficients that explain a raw image.
+
+    Parameters
+    ----------
+    coefficients
+        (terms,) [waves rms].
+    problem
+        With the operator of these coefficients.
+    state
+        The volume, its image and its deviance per pixel.
+    steps
+        Taken so far.
+    iterations
+        Of Richardson-Lucy.
+    """
+
+    coefficients: np.ndarray
+    problem: Problem
+    state: State
+    steps: int
+    iterations: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Around:
+    """What coefficients change around a volume and coefficients.
+
+    Parameters
+    ----------
+    information
+        S (terms, terms), without the prior.
+    slope
+        Of the log-likelihood (terms,).
+    fixed
+        Fisher's information (terms, terms) if the volume were known.
+    """
+
+    information: np.ndarray
+    slope: np.ndarray
+    fixed: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Voxels:
+    """What a raw image is explained by.
+
+    Parameters
+    ----------
+    sight
+        Operators by coefficients.
+    raw, exposure
+        What was seen.
+    """
+
+    sight: Sight
+    raw: np.ndarray
+    exposure: Exposure
+
+    def begun(self, coefficients: np.ndarray, iterations: int, steps: int = 0) -> Told:
+        """Coefficients with the volume that Richardson-Lucy finds from an even one."""
+        operator = self.sight.operator(coefficients)
+        problem = Problem.of(self.raw, self.exposure, Scale.of(operator, self.exposure, self.raw, BARELY))
+        method, state = RichardsonLucy(accelerated=True), State.at(problem, problem.flat())
+        for _ in range(iterations):
+            state = method.step(problem, state)
+        return Told(coefficients, problem, state, steps, iterations)
+
+    def counted(self, told: Told) -> float:
+        """Pixels that count."""
+        return float(self._weights(told.problem).sum()) / told.problem.scale.gain
+
+    def pearson(self, told: Told) -> float:
+        """Mean of (r - m)²/m over the pixels that count: 1 where only noise is left."""
+        shown, data = arrays.to_numpy(told.state.model), arrays.to_numpy(told.problem.data)
+        return float((self._weights(told.problem) * (data - shown) ** 2 / shown).sum() / self.counted(told))
+
+    def improved(self, told: Told, free: np.ndarray, steps: int = STEPS) -> tuple[Told, Around]:
+        """After at most some steps, with those coefficients free that are marked; and what is around them."""
+        damping, around = 1e-2, self.around(told)
+        for _ in range(steps):
+            found = None
+            for _ in range(TRIES):
+                tried = self._moved(told, self._step(told, around, free, damping))
+                if tried.state.deviance < told.state.deviance:
+                    found, damping = self._farther(told, tried), damping / 10
+                    break
+                damping = max(10 * damping, 0.1)
+            if found is None:
+                break
+            gained = (told.state.deviance - found.state.deviance) / 2 * self.counted(told)
+            told, around = found, self.around(found)
+            if gained < GAIN:
+                break
+        return told, around
+
+    def _farther(self, told: Told, found: Told) -> Told:
+        """Twice as far, as long as it is likelier: the volume that resisted goes along."""
+        while True:
+            step = 2 * (found.coefficients - told.coefficients)
+            if np.linalg.norm(step) > LONGEST:
+                return found
+            tried = replace(self._moved(told, step), steps=found.steps)
+            if tried.state.deviance >= found.state.deviance:
+                return found
+            found = tried
+
+    @single_products()
+    def around(self, told: Told) -> Around:
+        """How coefficients change the image, and what of that the volume explains."""
+        scale, volume = told.problem.scale, np.asarray(told.state.estimate, np.float32)
+        response = 1.0 if scale.response is None else arrays.to_numpy(scale.response)
+        shown, data = arrays.to_numpy(told.state.model), arrays.to_numpy(told.problem.data)
+        weights = (self._weights(told.problem) / shown).astype(np.float32)
+        changes = [response * one.forward(volume) for one in self.sight.changes(told.coefficients)]
+        columns = np.stack([*changes, data - shown]).astype(np.float32)
+        left = np.stack([c - self._seen(told, self._explained(told, weights, c)) for c in columns])
+        whole = np.tensordot(columns * weights, left, ((1, 2), (1, 2))).astype(np.float64)
+        fixed = np.tensordot(columns[:-1] * weights, columns[:-1], ((1, 2), (1, 2))).astype(np.float64)
+        information = (whole + whole.T)[:-1, :-1] / 2
+        return Around(information, whole[-1, :-1], fixed)
+
+    def _explained(self, told: Told, weights: np.ndarray, column: np.ndarray) -> np.ndarray:
+        """Relative changes u of the volume that explain an image best, by conjugate gradients."""
+        u, right = 0.0, self._back(told, weights * column)
+        rows = self._back(told, weights * self._seen(told, np.ones_like(right))) + 1
+        ahead = moved = right / rows
+        power = float((right * moved).sum(dtype=np.float64))
+        first = power
+        for _ in range(SOLVED):
+            if power <= 1e-4 * first:
+                break
+            turned = self._back(told, weights * self._seen(told, ahead)) + ahead
+            step = power / float((ahead * turned).sum(dtype=np.float64))
+            u, right = u + step * ahead, right - step * turned
+            moved = right / rows
+            power, before = float((right * moved).sum(dtype=np.float64)), power
+            ahead = moved + power / before * ahead
+        return u + 0 * ahead
+
+    def _seen(self, told: Told, move: np.ndarray) -> np.ndarray:
+        """A (o u), on the pixels."""
+        scale = told.problem.scale
+        light = scale.operator.forward(np.asarray(told.state.estimate, np.float32) * move)
+        return light if scale.response is None else light * arrays.to_numpy(scale.response)
+
+    def _back(self, told: Told, image: np.ndarray) -> np.ndarray:
+        """Transpose of `_seen`."""
+        scale = told.problem.scale
+        light = image if scale.response is None else image * arrays.to_numpy(scale.response)
+        return np.asarray(told.state.estimate, np.float32) * scale.operator.adjoint(light.astype(np.float32))
+
+    def _step(self, told: Told, around: Around, free: np.ndarray, damping: float) -> np.ndarray:
+        step, prior = np.zeros(len(free)), np.eye(len(free)) / PRIOR**2
+        slope = around.slope - told.coefficients / PRIOR**2
+        step[free] = solved((around.information + prior)[np.ix_(free, free)], slope[free], damping)
+        return step / max(1.0, float(np.linalg.norm(step)) / LONGEST)
+
+    def _moved(self, told: Told, step: np.ndarray) -> Told:
+        return self.begun(told.coefficients + step, told.iterations, told.steps + 1)
+
+    def _weights(self, problem: Problem) -> np.ndarray:
+        """Electrons that a unit of each pixel counts for (ny, nx)."""
+        scale = problem.scale
+        ones = np.ones(self.raw.shape) if scale.weights is None else arrays.to_numpy(scale.weights)
+        return scale.gain * ones

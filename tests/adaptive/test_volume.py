@@ -1,0 +1,120 @@
+"""Aberrations from the light field of a textured volume, whose raw image another operator makes."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+from tests.adaptive.test_estimate import SCOPE
+
+import lumigraph as lg
+from lumigraph.adaptive import estimate, start
+from lumigraph.adaptive.sight import Sight
+from lumigraph.adaptive.voxels import Voxels
+from lumigraph.deconvolution import Exposure
+
+DEPTHS = (-5e-6, -2.5e-6, 0.0, 2.5e-6, 5e-6)
+TRUE_DEPTHS = (-5.5e-6, -1.5e-6, 2.5e-6, 6.5e-6)
+EXPOSURE = Exposure(gain=1.0)
+COUNTS = 40.0
+"""Electrons in a pixel, in the mean."""
+
+
+def exposed(aberrations, planes=TRUE_DEPTHS, samples=5, seed=0):
+    """By propagation on a grid, from more planes and finer samples than are looked for."""
+    bent = SCOPE.replace(objective={"aberrations": aberrations})
+    operator = bent.operator(planes, samples, accuracy=2e-2).widened(0.05)[0]
+    rng = np.random.default_rng(4)
+    across = 0.5 * samples
+    texture = gaussian_filter(rng.normal(size=operator.shape[1]), (0.7, across, across))
+    light = operator.forward(np.maximum(texture / texture.std(), 0).astype(np.float32) ** 2)
+    return np.random.default_rng(seed).poisson(light * COUNTS / light.mean()).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def sight():
+    return Sight.of(SCOPE.pupil_images((6, 8), accuracy=3e-2), (-3e-6, 2e-6), 2)
+
+
+def volume_of(sight, seed=2):
+    rng = np.random.default_rng(seed)
+    volume = np.zeros((2, *sight.grid.shape), np.float32)
+    volume[(slice(None), *sight.inside)] = rng.uniform(size=(2, *sight.picture.shape))
+    return volume
+
+
+def test_a_volume_is_seen_as_the_microscopes_operator_sees_it(sight):
+    bent = SCOPE.replace(objective={"aberrations": {6: 0.2, 8: -0.1}})
+    operator = bent.operator((-3e-6, 2e-6), 2, accuracy=2e-2)
+    assert sight.picture == operator.object_grid
+    volume = volume_of(sight)
+    found = sight.operator(np.array([0.2, -0.1])).forward(volume)
+    wanted = operator.forward(volume[(slice(None), *sight.inside)])
+    assert np.std(found - wanted) < 0.05 * np.std(wanted)
+
+
+def test_changes_of_a_volumes_image_are_central_differences(sight):
+    at, volume = np.array([0.1, -0.05]), volume_of(sight)
+    for step, change in zip(0.02 * np.eye(2), sight.changes(at), strict=True):
+        ends = [sight.operator(at + side * step).forward(volume) for side in (1, -1)]
+        wanted = (ends[0] - ends[1]) / 0.04
+        assert np.std(change.forward(volume) - wanted) < 0.12 * np.std(wanted)
+
+
+def test_what_the_volume_explains_counts_for_nothing(sight):
+    """With all voxels free less is known of each term, and a volume that fits leaves no slope."""
+    raw = sight.operator(np.zeros(2)).forward(volume_of(sight) + 0.2).astype(np.float32) * 50
+    voxels = Voxels(sight, raw, EXPOSURE)
+    around = voxels.around(voxels.begun(np.zeros(2), 30))
+    known, fixed = np.diag(around.information), np.diag(around.fixed)
+    assert (known > 0).all()
+    assert (known < 0.95 * fixed).all()
+    assert np.abs(np.linalg.solve(around.information, around.slope)).max() < 0.02
+
+
+def test_views_shift_by_the_wavefronts_slopes():
+    """One plane with texture: what rays say of 0.4 waves of coma, astigmatism and spherical aberration."""
+    true = {6: 0.25, 7: -0.2, 11: 0.2}
+    found = start(exposed(true, planes=(0.0,), samples=3), SCOPE, (6, 7, 11))
+    assert found.coefficients == pytest.approx(true, abs=0.1)
+    assert found.places.shape == found.shifts.shape
+    assert np.hypot(*found.places.T).max() < 0.9
+    assert found.rms == pytest.approx(0.38, abs=0.1)
+    assert set(found.deviations) == set(true)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"microscope": lg.PlenopticCamera.from_catalogue("thesis-plenoptic-1")}, "configuration '1.0'"),
+        ({"terms": (4, 6)}, "place and depth explain 1 to 4"),
+        ({"terms": ()}, "Give others"),
+        ({"raw": np.ones((135, 134), np.float32)}, "the microscope's"),
+        ({"raw": np.full((135, 135), np.nan)}, "NaN"),
+        ({"raw": np.zeros((135, 135))}, "dark"),
+        ({"raw": np.ones((135, 135))}, "even"),
+    ],
+)
+def test_shifts_that_cannot_be_measured_are_refused(given, message):
+    with pytest.raises(lg.LumigraphError, match=message):
+        start(**{"raw": np.ones((135, 135)), "microscope": SCOPE, "terms": (6,), **given})
+
+
+@pytest.mark.long
+def test_aberrations_come_back_with_the_volume():
+    raw = exposed({6: 0.3, 8: -0.25})
+    found = estimate(raw, SCOPE, DEPTHS, (4, 6, 8), exposure=EXPOSURE, object="volume")
+    assert found.coefficients == pytest.approx({6: 0.3, 8: -0.25}, abs=0.02)
+    assert found.untold == {4: "the volume's depth explains it"}
+    assert found.deviance[0] > found.deviance[1]
+    assert (found.deviations < 0.02).all()
+    assert found.volume is not None
+    assert found.volume.depths == DEPTHS
+    assert set(found.explained) == {6, 8}
+    assert all(0 < part < 1 for part in found.explained.values())
+    assert len(found.beads.intensities) == 0
+
+
+@pytest.mark.long
+def test_no_aberration_of_a_volume_is_invented():
+    found = estimate(exposed({}), SCOPE, DEPTHS, (6, 8), exposure=EXPOSURE, object="volume")
+    assert found.rms < 0.02
+    assert (found.deviations > 0).all()
