@@ -35,6 +35,13 @@ def test_a_number_with_a_known_optimum_is_found(search):
     assert len(found.rows) <= 1 + 12 + 60
 
 
+def test_the_largest_is_the_other_end():
+    vary = {"lenslets.magnification": "0.3:0.6:3"}
+    found = lg.optimise(CAMERA, vary, "largest cross-talk", evaluations=20)
+    assert found.active == {"lenslets.magnification": 0.6}
+    assert 0 < found.gain(found.start) < 0.1
+
+
 class Known:
     """Cameras whose cost is known: least at given parts of two ranges, and none beyond a border."""
 

@@ -183,7 +183,7 @@ def bounds(
     >>> import lumigraph as lg
     >>> scope = lg.load_camera("lfm-fourier")
     >>> found = lg.information.bounds(scope, [-10e-6, 10e-6], lg.information.Light(5000))
-    >>> 0.1e-6 < found.depth < 1e-6
+    >>> 3e-8 < found.depth < 3e-7
     True
     """
     light = Light() if light is None else light
