@@ -92,6 +92,15 @@ def test_one_wide_lenslet_in_the_pupil_images_as_the_objective_does_aberrated():
     )
 
 
+def test_the_operator_of_a_fourier_microscope_sees_the_same_aberrations():
+    scope = fourier(objective={"aberrations": {7: 0.2, 6: 0.3}})
+    whole, own = scope.fourier_points().whole, scope.point_image(0.0, 0.0, 4 * UM)
+    image = source(scope, np.zeros(1), 1e-2).image(np.array([0.0, 0.0, 4 * UM]))
+    assert np.linalg.norm(own / whole - image) < 1e-5 * np.linalg.norm(image)
+    plain = fourier().point_image(0.0, 0.0, 4 * UM)
+    assert np.linalg.norm(own - plain) > 0.2 * np.linalg.norm(plain)
+
+
 @pytest.mark.parametrize("name", ["thesis-plenoptic-1", "thesis-plenoptic-2-m050", "lfm-fourier"])
 def test_nearly_all_light_is_caught_in_focus(name):
     camera = lg.load_camera(name)

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import line, progress
-from lumigraph.cli.deconvolve import depths as planes_of
+from lumigraph.cli.deconvolve_options import depths as planes_of
 from lumigraph.cli.options import Output
 from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.core.result import Figure, Result
