@@ -113,6 +113,25 @@ def test_files_that_are_no_lens_are_one_line(camera, tmp_path, text):
         _ = camera.replace(main_lens={"prescription": path}).glass
 
 
+def first_glass(tmp_path, text):
+    """The double Gauss with another first glass."""
+    whole, file = lens_path(), tmp_path / "lens.zmx"
+    with whole as path:
+        file.write_text(path.read_text().replace("___BLANK 1 0 1.61 53.3", text))
+    return file
+
+
+def test_another_glass_of_the_same_name_is_refused(tmp_path):
+    with pytest.raises(GeometryError, match=r"N-BK7 of index 1.61 at surface 1, .* takes 1.5168"):
+        Prescription(first_glass(tmp_path, "N-BK7 0 0 1.61 53.3"))
+    assert Prescription(first_glass(tmp_path, "N-BK7 0 0 1.5168 64.17")).notes == ()
+
+
+def test_a_glass_of_no_catalogue_is_noted(tmp_path):
+    (note,) = Prescription(first_glass(tmp_path, "N-NONE7 0 0 1.61 53.3")).notes
+    assert note == "N-NONE7 is in no catalogue: it is followed by its index and Abbe number"
+
+
 def test_points_of_a_plenoptic_camera_take_the_lens(camera):
     plenoptic = lg.PlenopticCamera(
         wavelength="550 nm", object_distance=Z1,

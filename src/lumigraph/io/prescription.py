@@ -25,6 +25,12 @@ _VIGNETTING = ("VDXN", "VDYN", "VCXN", "VCYN", "VANN")
 _VISIBLE = (0.38e-6, 0.75e-6)
 """Where a glass is known by its index and Abbe number [m]."""
 
+_D_LINE = 587.5618e-9
+"""Wavelength of the indices of a ZMX file [m]."""
+
+_SAME_INDEX = 1e-3
+"""By which a glass's index may be off the file's: melts and catalogues differ by less."""
+
 _MM, _UM = 1e-3, 1e-6
 
 
@@ -105,6 +111,8 @@ class Prescription:
             content(path)
         self._lens = _read(path)
         self._check()
+        if path.suffix.lower() == ".zmx":
+            self.notes += tuple(self._check_glasses(path))
 
     def _refuse(self, what: str, remedy: str) -> GeometryError:
         return GeometryError(f"{self.name!r} has {what}, which is not followed. {remedy}")
@@ -133,6 +141,20 @@ class Prescription:
             raise self._refuse("an apodisation or a polarisation", "Leave it out.")
         if lens.fields.telecentric:
             raise self._refuse("a telecentric object space", "Use a lens with an entrance pupil.")
+
+    def _check_glasses(self, path: Path) -> Iterator[str]:
+        """Refuse glasses that are others of the same name; notes on those that are known by two numbers."""
+        surfaces = self._lens.surfaces.surfaces
+        for number, name, index in _glasses(path):
+            material = surfaces[number].material_post
+            found = float(np.ravel(material.n(_D_LINE / _UM))[0])
+            if not abs(found - index) < _SAME_INDEX:
+                raise self._refuse(
+                    f"{name} of index {index:g} at surface {number}, for which Optiland takes {found:.5g}",
+                    "Give the glass's catalogue (GCAT), or the glass by its index and Abbe number.",
+                )
+            if type(material).__name__.startswith("Abbe") and name != "___BLANK":
+                yield f"{name} is in no catalogue: it is followed by its index and Abbe number"
 
     def wavelengths(self) -> tuple[float, float]:
         """From where to where the indices of all of its glasses are known [m]."""
@@ -307,6 +329,16 @@ def _check_zmx(path: Path) -> tuple[str, ...]:
         if word in _VIGNETTING and any(map(_is_number, rest)):
             notes.append("vignetting factors of the file are not used: apertures of surfaces are")
     return tuple(dict.fromkeys(notes))
+
+
+def _glasses(path: Path) -> Iterator[tuple[int, str, float]]:
+    """Surface, name and index of the glasses of a ZMX file that say their index."""
+    surface = -1
+    for line in _text(content(path)).splitlines():
+        word, *rest = line.split() or [""]
+        surface += word == "SURF"
+        if word == "GLAS" and len(rest) > 3 and _is_number(rest[3]) and float(rest[3]) > 1:
+            yield surface, rest[0], float(rest[3])
 
 
 def _not_followed(name: str, what: str, remedy: str) -> GeometryError:
