@@ -6,7 +6,7 @@ leave out is known for each image from its own spectrum.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -15,6 +15,7 @@ from scipy.sparse import csr_array
 
 from lumigraph.core import arrays
 from lumigraph.core.cache import remembered
+from lumigraph.core.threads import each
 from lumigraph.elements.objective import Objective
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 
@@ -125,6 +126,11 @@ class Bench:
         taper *= taper[::-1]  # light that goes out on one side comes in on the other, without an edge
         return (np.tile(own, (self.cells, self.cells)) * np.outer(taper, taper)).astype(np.complex64)
 
+    def images(self, dz: float, points: Sequence[tuple[float, float]]) -> Iterator[tuple[np.ndarray, float]]:
+        """`image` of points (ky, kx) at a depth, in order."""
+        fields = self.fields(dz)
+        return each(lambda point: self.image(fields(point)), points)
+
     def image(self, field: np.ndarray) -> tuple[np.ndarray, float]:
         """Samples ((2 reach + 1) N, the same) of a point of the middle cell, from its `fields`.
 
@@ -135,29 +141,14 @@ class Bench:
         inner = slice(edge, self.cells * self.sampling.pixels - edge)
         light = self.intensity(field)
         if self.sampling.degree:
-            image, lost = self.sampled(arrays.fft2(light), self.sampling)
+            image, lost = sampled(arrays.fft2(light), self.fine, self.sampling)
             image = image[inner, inner]
         else:
-            factors = self.responses(self.sampling)[0][: len(self.at) // 2 + 1]
+            factors = responses(len(light), self.fine, self.sampling)[0][: len(light) // 2 + 1]
             across = _averaged(light, factors, self.cells * self.sampling.pixels)[:, inner]
             image = np.maximum(_averaged(across.T, factors, self.cells * self.sampling.pixels)[:, inner].T, 0)
         area = (self.lenslet.pitch / self.lenslet.magnification / self.sampling.points) ** 2
         return image * np.float32(area), lost
-
-    def sampled(self, spectrum: np.ndarray, sampling: CellSampling) -> tuple[np.ndarray, float]:
-        """Samples, none below 0, of an intensity's spectrum, and the relative rms that they do not hold."""
-        coefficients, averaged, held = self.responses(sampling)
-        n, count, lost = len(self.at), self.cells * sampling.pixels, 0.0
-        # What is taken less finely than it was computed has its spectrum folded.
-        rows = np.rint(np.fft.fftfreq(n) * n).astype(int) % count
-        fold = csr_array((coefficients * np.float32(count / n), (rows, np.arange(n))), shape=(count, n))
-        image = arrays.ifft2((fold @ (fold @ spectrum).T).T, overwrite=True).real
-        if sampling.degree:
-            power = np.square(np.abs(spectrum))
-            whole = float(averaged**2 @ power @ averaged**2)
-            clipped = np.square(np.minimum(image, 0)).sum(dtype=np.float64) * (n * n / count) ** 2
-            lost = math.sqrt(max(whole - float(held @ power @ held) + clipped, 0.0) / whole)
-        return np.maximum(image, 0), lost
 
     def fields(self, dz: float) -> Callable[[tuple[float, float]], np.ndarray]:
         """Gives the field (modes, n, n) before the lenslets of a point (ky, kx) at a depth [samples]."""
@@ -195,9 +186,24 @@ class Bench:
             image += np.square(behind.real) + np.square(behind.imag)
         return image
 
-    def responses(self, sampling: CellSampling) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """As `responses`, on the whole fine grid."""
-        return responses(len(self.at), self.fine, sampling)
+
+def sampled(spectrum: np.ndarray, fine: int, sampling: CellSampling) -> tuple[np.ndarray, float]:
+    """Samples, none below 0, of the spectrum of an intensity over whole cells, and the relative rms that they
+    do not hold.
+    """
+    n = len(spectrum)
+    count, lost = n // fine * sampling.pixels, 0.0
+    coefficients, averaged, held = responses(n, fine, sampling)
+    # What is taken less finely than it was computed has its spectrum folded.
+    rows = np.rint(np.fft.fftfreq(n) * n).astype(int) % count
+    fold = csr_array((coefficients * np.float32(count / n), (rows, np.arange(n))), shape=(count, n))
+    image = arrays.ifft2((fold @ (fold @ spectrum).T).T, overwrite=True).real
+    if sampling.degree:
+        power = np.square(np.abs(spectrum))
+        whole = float(averaged**2 @ power @ averaged**2)
+        clipped = np.square(np.minimum(image, 0)).sum(dtype=np.float64) * (n * n / count) ** 2
+        lost = math.sqrt(max(whole - float(held @ power @ held) + clipped, 0.0) / whole)
+    return np.maximum(image, 0), lost
 
 
 def responses(count: int, fine: int, sampling: CellSampling) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -244,6 +250,6 @@ def samples_needed(objective: Objective, lenslet: Lenslet, width: float, dz: flo
     places = {((0.03, -0.46), 0.0), ((0.21, 0.37), dz)}
     spectra = [arrays.fft2(bench.intensity(bench.fields(at)(point))) for point, at in places]
     N = max(2, math.floor(cutoff))
-    while max(bench.sampled(one, CellSampling(1, N, width, DEGREE))[1] for one in spectra) > accuracy:
+    while max(sampled(one, bench.fine, CellSampling(1, N, width, DEGREE))[1] for one in spectra) > accuracy:
         N = math.ceil(1.06 * N)
     return N

@@ -30,7 +30,7 @@ from lumigraph.operators.microscope_kernels import (
 from lumigraph.operators.microscope_operator import MicroscopeOperator, suits_frequencies
 from lumigraph.operators.microscope_pixels import FRAME
 
-VERSION = 3
+VERSION = 4
 """Of the kernels' numbers: a change of theirs makes those that are kept useless."""
 
 
@@ -108,7 +108,7 @@ def microscope_operator(
     _check_order(planes)
     demand = Demand(require_accuracy(accuracy), math.ceil(1.5 * max(layout.cells)))
     for one in objectives:
-        require_window(one, lenslet, max(planes, key=abs), demand, layout.sampling.points)
+        require_window(one, lenslet, layout.sampling, max(planes, key=abs), demand, layout.sampling.points)
     sizes = [kernel_bytes(objectives[0], lenslet, layout.sampling, dz, demand) for dz in planes]
     stored = 1 if folder is None else 0
     needed = max(sizes) * 2 + stored * sum(sizes) * (0.25 if objectives[0].is_round else 1)

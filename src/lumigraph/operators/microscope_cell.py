@@ -2,6 +2,10 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from lumigraph.core.cache import remembered
+
 
 @dataclass(frozen=True, slots=True)
 class Lenslet:
@@ -53,3 +57,19 @@ class CellSampling:
     def classes(self) -> int:
         """Points of a cell, s²."""
         return self.points**2
+
+
+@remembered
+def parts(n: int) -> np.ndarray:
+    """Orthonormal matrix (n, n) from n samples to their even parts, then their odd ones.
+
+    >>> (parts(3) @ [1.0, 0.0, -1.0]).round(6).tolist()
+    [0.0, 0.0, 1.414214]
+    """
+    found, half = np.zeros((n, n)), (n + 1) // 2
+    for k in range(half):
+        found[k, k] += 1
+        found[k, n - 1 - k] += 1
+    for k in range(n // 2):
+        found[half + k, k], found[half + k, n - 1 - k] = 1, -1
+    return found / np.linalg.norm(found, axis=1, keepdims=True)

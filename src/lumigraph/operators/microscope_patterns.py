@@ -13,6 +13,7 @@ import numpy as np
 
 from lumigraph.core.cache import ByteCache, remembered
 from lumigraph.core.threads import each, single_products
+from lumigraph.operators.microscope_cell import parts
 from lumigraph.operators.microscope_kernels import SliceKernel
 
 WORTH = 0.8
@@ -68,22 +69,6 @@ def all_patterns(n: int) -> Patterns:
     odd_y, odd_x = np.divmod(np.arange(n * n), n)
     odd = np.stack([odd_y >= half, odd_x >= half]).astype(np.int8)
     return Patterns(np.kron(one, one).T, odd, along=one)
-
-
-@remembered
-def parts(n: int) -> np.ndarray:
-    """Orthonormal matrix (n, n) from n samples to their even parts, then their odd ones.
-
-    >>> (parts(3) @ [1.0, 0.0, -1.0]).round(6).tolist()
-    [0.0, 0.0, 1.414214]
-    """
-    found, half = np.zeros((n, n)), (n + 1) // 2
-    for k in range(half):
-        found[k, k] += 1
-        found[k, n - 1 - k] += 1
-    for k in range(n // 2):
-        found[half + k, k], found[half + k, n - 1 - k] = 1, -1
-    return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
 def patterns(kernels: Sequence[SliceKernel], left_out: float) -> list[Patterns]:

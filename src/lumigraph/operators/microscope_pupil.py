@@ -23,10 +23,11 @@ from lumigraph.elements.disc import disc, nodes_for
 from lumigraph.elements.objective import Objective
 from lumigraph.elements.zernike import noll_to_nm, zernike
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators.microscope_bench import fineness, guard, responses, series
+from lumigraph.operators.microscope_bench import fineness, guard, responses
 from lumigraph.operators.microscope_building import Layout
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_kernels import Demand, reach_of
+from lumigraph.operators.microscope_waves import bloch, centred, over_cells
 from lumigraph.scene import Points
 
 BLOCK = 2**22
@@ -89,25 +90,19 @@ def _waves(
     """For (cells, samples of the light along a lenslet, nodes along a diameter, precision) of a window."""
     cells, fine, count, dtype = told
     qy, qx, area = disc(count, count)
-    n, wave, d = cells * fine, objective.wavelength, lenslet.pitch
-    steepest = objective.numerical_aperture / lenslet.magnification / wave
-    finest = math.floor(fine / 2 - steepest * d)
-    orders, factors = np.arange(-finest, finest + 1), series(lenslet, wave, finest)
-    at, own = (np.arange(fine) - (fine - 1) / 2) / fine, np.arange(cells) - cells // 2  # [pitches]
-    inside = np.exp(2j * np.pi * np.outer(orders, at))
+    steepest = objective.numerical_aperture / lenslet.magnification / objective.wavelength * lenslet.pitch
+    finest = math.floor(fine / 2 - steepest)
 
-    def bloch(q: np.ndarray) -> np.ndarray:
-        turns = q[:, None] * (d / (wave * lenslet.magnification))  # per pitch
-        paths = np.exp(-1j * np.pi * wave * lenslet.distance / d**2 * (turns + orders) ** 2) * factors
-        cell = ((paths @ inside) * np.exp(2j * np.pi * turns * at)).astype(dtype)
-        moves = np.exp(2j * np.pi * turns * own).astype(dtype)
-        return (moves[:, :, None] * cell[:, None, :]).reshape(len(q), n)
+    def waves(q: np.ndarray) -> np.ndarray:
+        turns = q * (lenslet.pitch / (objective.wavelength * lenslet.magnification))
+        behind = bloch(lenslet, objective.wavelength, turns, finest, centred(fine))
+        return over_cells(behind.astype(dtype), turns, cells)
 
     a = objective.aperture
-    across = np.stack([bloch(row) for row in a * qx])
+    across = np.stack([waves(row) for row in a * qx])
     places = np.broadcast_to(a * qy, qx.shape), a * qx
     return Waves(
-        (places[0], places[1]), area * a**2, np.ascontiguousarray(bloch(a * qy[:, 0]).T), across,
+        (places[0], places[1]), area * a**2, np.ascontiguousarray(waves(a * qy[:, 0]).T), across,
         _sampling(cells, fine, sampling).astype(np.real(across).dtype),
     )  # fmt: skip
 

@@ -219,7 +219,7 @@ def point_image(
     farthest = max(max(k, n - 1 - k) for k, n in zip(own, layout.cells, strict=True))
     demand = Demand(accuracy, farthest + 1)  # what falls beside the sensor needs no window
     for one in objectives:
-        require_window(one, lenslet, position[2], demand)
+        require_window(one, lenslet, layout.sampling, position[2], demand)
     cells, error = point_cells(objectives, lenslet, layout.sampling, within, (position[2], demand))
     plane = np.zeros((layout.cells[0], N, layout.cells[1], N))
     reach = len(cells) // 2

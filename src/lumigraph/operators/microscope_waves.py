@@ -1,0 +1,224 @@
+r"""Images of a point behind square lenslets as products of matrices along y and along x.
+
+A point's field before the lenslets is a sum of plane waves, each of which square lenslets turn into a Bloch
+wave b along each axis (`bloch`). So its field on the sensor is a product of matrices, and moving the point to
+(y, x) in its cell only turns phases:
+
+.. math:: V = b_y^T \, e^{-2\pi i f y} \, P \, e^{-2\pi i f x} \, b_x
+
+P is the spectrum of the field, the same for all points of a depth. It is of low rank but for a small rest:
+over a square pupil a paraxial defocus would be of rank 1. All but P is nearly unitary, so the singular values
+that are left out tell what the field loses. Where the objective is round P is even or odd along y and along
+x, which halves its sides.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from lumigraph.core import arrays
+from lumigraph.core.threads import each
+from lumigraph.elements.objective import Objective
+from lumigraph.operators.microscope_bench import fineness, guard, sampled, series
+from lumigraph.operators.microscope_cell import CellSampling, Lenslet, parts
+
+SMEARED = 4
+"""Periods in a pitch by which the soft border of a window widens a field's spectrum, to each side."""
+
+DEAR = 300
+"""Multiply-adds of a product in the time of a decomposition of n × n numbers, over n³."""
+
+Point = tuple[float, float]
+
+
+def bloch(lenslet: Lenslet, wavelength: float, turns: np.ndarray, finest: int, at: np.ndarray) -> np.ndarray:
+    """Plane waves on the sensor (waves, places), of some periods in a pitch before the lenslets (waves,).
+
+    Parameters
+    ----------
+    lenslet, wavelength
+        Square lenslets.
+    turns
+        Periods in a pitch.
+    finest
+        Up to so many periods in a pitch a lenslet's Fourier series is followed.
+    at
+        Places from the middle of a cell [pitches].
+    """
+    orders, column = np.arange(-finest, finest + 1), turns[:, None]
+    curve = np.pi * wavelength * lenslet.distance / lenslet.pitch**2
+    paths = np.exp(-1j * curve * (column + orders) ** 2) * series(lenslet, wavelength, finest)
+    return (paths @ np.exp(2j * np.pi * np.outer(orders, at))) * np.exp(2j * np.pi * column * at)
+
+
+def over_cells(waves: np.ndarray, turns: np.ndarray, cells: int) -> np.ndarray:
+    """`bloch` of the middle cell (turns, places), for a row of cells (turns, cells × places)."""
+    moves = np.exp(2j * np.pi * np.outer(turns, np.arange(cells) - cells // 2)).astype(waves.dtype)
+    return (moves[:, :, None] * waves[:, None, :]).reshape(len(turns), -1)
+
+
+class Crossed:
+    """Square lenslets around a point's own, and the way from there to the pixels; as `Bench`.
+
+    Parameters
+    ----------
+    objective, lenslet, sampling
+        Of the microscope.
+    reach
+        Cells to each side of a point's own whose image is wanted.
+    margin
+        Samples of the light, over what its band without diffraction at lenslets asks for.
+    left_out
+        Relative rms of fields that a low rank may leave out.
+    """
+
+    def __init__(
+        self,
+        objective: Objective,
+        lenslet: Lenslet,
+        sampling: CellSampling,
+        reach: int,
+        margin: float,
+        left_out: float = 0.0,
+    ) -> None:
+        self.objective, self.lenslet, self.sampling = objective, lenslet, sampling
+        self.reach, self.left_out = reach, left_out
+        self.fine, self.guard = fineness(objective, lenslet, margin), guard(objective, lenslet)
+        self.steepest = (
+            objective.numerical_aperture / lenslet.magnification / objective.wavelength * lenslet.pitch
+        )
+
+    def images(self, dz: float, points: Sequence[Point]) -> Iterator[tuple[np.ndarray, float]]:
+        """Samples ((2 reach + 1) N, the same) of points (ky, kx) at a depth, in order; as `Bench.image`."""
+        turns, spectra = self._spectra(dz)
+        power = float(np.square(np.abs(spectra)).sum())
+        allowed = self.left_out**2 / len(spectra) * power
+        modes = [self._factors(spectrum, len(points), allowed) for spectrum in spectra]
+        waves = self._waves(turns)
+        missing = math.sqrt(sum(left for *_, left in modes) / power)
+
+        def moved(told: tuple[int, float]) -> list[np.ndarray]:
+            axis, k = told
+            turn = np.exp(-2j * np.pi * turns * self._place(k)).astype(np.complex64)
+            return [(factors[axis] * turn) @ waves for factors in modes]
+
+        wanted = sorted({(axis, point[axis]) for point in points for axis in (0, 1)})
+        found = dict(zip(wanted, each(moved, wanted), strict=True))
+
+        def image(point: Point) -> tuple[np.ndarray, float]:
+            samples, lost = self._seen(list(zip(found[0, point[0]], found[1, point[1]], strict=True)))
+            return samples * np.float32(self._area), math.hypot(lost, missing)
+
+        return each(image, points)
+
+    def held_bytes(self, points: int) -> float:
+        """Of what `images` holds at most, of points on so many lines along y and along x, in all threads."""
+        modes, cells = self.objective.modes, 2 * self.reach + 1
+        if self.sampling.degree:
+            samples, of_each = (cells + 2 * self.guard) * self.fine, 64.0
+        else:
+            samples, of_each = cells * self.sampling.pixels * self._nodes, 24.0 / self._nodes
+        waves = self._count // (2 if self.objective.is_round else 1)
+        threads = min(arrays.WORKERS, points**2)
+        held = 16.0 * (3 * modes + 6) * self._count**2 + 24.0 * self._count * samples
+        return held + 16.0 * modes * points * waves * samples + threads * of_each * samples**2
+
+    @property
+    def _window(self) -> int:
+        """Cells of a point's field, half of the first and of the last of them its soft border."""
+        return 2 * (self.reach + self.guard) + 2
+
+    @property
+    def _count(self) -> int:
+        """Samples along the window, m."""
+        return self._window * (math.ceil(2 * self.steepest) + 2 * SMEARED) // 2 * 2 + 1
+
+    @property
+    def _area(self) -> float:
+        return (self.lenslet.pitch / self.lenslet.magnification / self.sampling.points) ** 2
+
+    def _place(self, k: float) -> float:
+        """Of a point, from its cell's middle [pitches]."""
+        return (k - (self.sampling.points - 1) / 2) / self.sampling.points
+
+    def _spectra(self, dz: float) -> tuple[np.ndarray, np.ndarray]:
+        """Periods in a pitch (m,), and the plane waves (modes, m, m) of a point's field around it."""
+        cells, count = self._window, self._count
+        at = (np.arange(count) - count // 2) * (cells / count)
+        taper = np.sin(np.pi / 2 * np.clip(cells - 2 * np.abs(at), 0, 1)) ** 2
+        place = at * (self.lenslet.pitch / self.lenslet.magnification)
+        fields = self.objective.fields(place[:, None], place[None, :], dz) * np.outer(taper, taper)
+        spectra = np.fft.fft2(np.fft.ifftshift(fields, (1, 2)), norm="forward")
+        return (np.arange(count) - count // 2) / cells, np.fft.fftshift(spectra, (1, 2))
+
+    def _factors(
+        self, spectrum: np.ndarray, points: int, allowed: float
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Two matrices (rank, m) whose product is the spectrum, and the power that they leave out."""
+        count = len(spectrum)
+        down = across = np.eye(count, dtype=np.float32)
+        if self.objective.is_round:
+            down, across = (_of_parity(spectrum, axis) for axis in (0, 1))
+        core = (down @ spectrum @ across.T).astype(np.complex64)
+        samples = (2 * self.reach + 1) * self.fine
+        if not allowed or DEAR * len(core) ** 2 > points * samples**2:
+            return down, core @ across, 0.0
+        u, s, v = np.linalg.svd(core)
+        left = np.cumsum(np.square(s[::-1], dtype=np.float64))[::-1]
+        rank = max(int((left > allowed).sum()), 1)
+        return (u[:, :rank] * s[:rank]).T @ down, v[:rank] @ across, float(left[rank:][:1].sum())
+
+    def _waves(self, turns: np.ndarray) -> np.ndarray:
+        """Behind the lenslets (m, nodes × samples): of each of a pixel's nodes, or on a grid for splines."""
+        N, finest = self.sampling.pixels, math.floor(self.fine / 2 - self.steepest)
+        told = self.lenslet, self.objective.wavelength, turns, finest
+        if self.sampling.degree:
+            cells = 2 * (self.reach + self.guard) + 1
+            at = np.arange(cells * self.fine) + 0.5
+            border = np.minimum(at, at[::-1]) / self.fine  # no edge where the last cell meets the first
+            waves = over_cells(bloch(*told, centred(self.fine)), turns, cells)
+            return (waves * np.sin(np.pi / 2 * np.minimum(2 * border, 1)) ** 2).astype(np.complex64)
+        nodes, weights = np.polynomial.legendre.leggauss(self._nodes)
+        places = centred(N) + nodes[:, None] * self.sampling.width / 2
+        waves = [over_cells(bloch(*told, at), turns, 2 * self.reach + 1) for at in places]
+        weighed = [one * math.sqrt(weight / 2) for one, weight in zip(waves, weights, strict=True)]
+        return np.concatenate(weighed, axis=1).astype(np.complex64)
+
+    @property
+    def _nodes(self) -> int:
+        """Of the quadrature over a pixel, along an axis."""
+        return 1 if self.sampling.degree else math.ceil(1 + self.fine * self.sampling.width / 2)
+
+    def _seen(self, fields: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, float]:
+        """Samples of what does not interfere, each along y (rank, nodes × samples) and along x."""
+        nodes = self._nodes
+        count = fields[0][0].shape[1] // nodes
+        light = np.zeros((count, 2 * nodes * count), np.float32)
+        for down, across in fields:
+            for part in np.split(down, nodes, axis=1):
+                numbers = (part.T @ across).view(np.float32)
+                light += np.square(numbers, out=numbers)
+        light = light.reshape(count, nodes, count, 2).sum(1)
+        light = light[..., 0] + light[..., 1]
+        if not self.sampling.degree:
+            return light, 0.0
+        image, lost = sampled(arrays.fft2(light), self.fine, self.sampling)
+        edge = self.guard * self.sampling.pixels
+        return image[edge:-edge, edge:-edge], lost
+
+
+def centred(count: int) -> np.ndarray:
+    """Middles of the parts of a cell [pitches].
+
+    >>> centred(4).tolist()
+    [-0.375, -0.125, 0.125, 0.375]
+    """
+    return (np.arange(count) - (count - 1) / 2) / count
+
+
+def _of_parity(spectrum: np.ndarray, axis: int) -> np.ndarray:
+    """Orthonormal rows that hold a spectrum that is even, or odd, along an axis."""
+    whole, half = parts(len(spectrum)), (len(spectrum) + 1) // 2
+    mirrored = np.vdot(spectrum, np.flip(spectrum, axis)).real
+    return (whole[:half] if mirrored > 0 else whole[half:]).astype(np.float32)
