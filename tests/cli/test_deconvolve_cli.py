@@ -110,6 +110,14 @@ def test_ctrl_c_keeps_what_was_reached(focused, tmp_path, monkeypatch):
     assert float(lg.open(tmp_path / "picture.partial.tiff").data.max()) > 0
 
 
+def test_it_stops_where_an_iteration_changes_little(focused):
+    said = ("deconvolve", "raw.tiff", "--camera", "camera.toml", "--change", 0.2, "--json", "-o", "out.tiff")
+    found = json.loads(focused(*said).out)
+    assert 1 < found["iterations"] < 30
+    assert found["change"] < 0.2
+    assert found["stopped"] == f"change {found['change']:.3g} is below 0.2"
+
+
 def test_pages_of_a_series_share_one_sensitivity(focused, tmp_path, monkeypatch):
     """It was computed again for each page, and the object widened again."""
     module = importlib.import_module("lumigraph.deconvolution.deconvolve")  # the function has its name, too
@@ -177,6 +185,7 @@ def test_vignetting_is_what_a_white_image_shows_over_many_lenslets():
         (("--strength", "0.1"), "--strength needs a prior"),
         (("--strength", "nan", "--prior", "tv"), "--strength is nan"),
         (("--deviance", "-1"), "--deviance is -1"),
+        (("--change", "0"), "--change is 0"),
         (("--background", "-1"), "--background is -1"),
         (("--background", "1", "--dark", "raw.tiff"), "both give the dark"),
         (("--dark", "small.tiff"), "the dark image has shape (4, 4)"),

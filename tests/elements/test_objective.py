@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import j0, j1
 
-from lumigraph.elements.objective import Mismatch, Objective, focus_intensity
+from lumigraph.elements.mismatch import Mismatch
+from lumigraph.elements.objective import Objective, focus_intensity
 from lumigraph.errors import GeometryError
 
 WAVE = 525e-9

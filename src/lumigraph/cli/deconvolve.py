@@ -224,7 +224,10 @@ def _engine(asked: _Asked) -> "Deconvolver":
     if asked.shifts is not None and len(set(asked.shifts)) > 1:  # finer than lenslets sample: no low-pass
         way = replace(way, raw_lattice=True)
     return Deconvolver(
-        operator, Stop(way.iterations, way.deviance), method=way.method(asked.camera, operator), warm=way.warm
+        operator,
+        Stop(way.iterations, way.deviance, way.change),
+        method=way.method(asked.camera, operator),
+        warm=way.warm,
     )
 
 

@@ -127,6 +127,8 @@ class Way:
     deviance
         Stop where the deviance per pixel falls to this: to 1 for raw images of 'simulate --noise', whose
         electrons are known; refused where they are not.
+    change
+        Stop where an iteration changes the object by less than this part of it, such as 0.01.
     raw_lattice
         Leave out the low-pass that keeps squares as large as lenslets out of a microscope's volumes. Objects
         that were moved between raw images have none.
@@ -142,6 +144,7 @@ class Way:
     strength: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
     accelerated: Annotated[bool, Parameter(negative="")] = False
     deviance: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
+    change: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
     raw_lattice: Annotated[bool, Parameter(negative="")] = False
     checkpoint: Path | None = None
     warm: Annotated[bool, Parameter(negative="")] = False
@@ -154,6 +157,7 @@ class Way:
             raise FormatError("--strength needs a prior. Give --prior tv or --prior wavelets.")
         above_zero("--strength", self.strength)
         above_zero("--deviance", self.deviance)
+        above_zero("--change", self.change)
 
     def method(self, camera: "Instrument", operator: "Linear") -> "RichardsonLucy":
         """`RichardsonLucy` with what was asked for."""

@@ -16,16 +16,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from threading import Lock
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.special import j0, j1, jv
 
 from lumigraph.core import checks
 from lumigraph.core.cache import remembered
+from lumigraph.elements import radial
 from lumigraph.elements.disc import disc, nodes_for, plane
+from lumigraph.elements.mismatch import Mismatch
 from lumigraph.elements.zernike import noll_to_nm, zernike
 from lumigraph.errors import GeometryError
 
@@ -36,53 +36,6 @@ PER_NYQUIST = 16
 
 AZIMUTHS = 64
 """Directions in which aberrations are sampled, at least; harmonics up to half of them."""
-
-_WEAK = 1e-5
-"""Harmonics below this part of the strongest are left out."""
-
-
-@dataclass(frozen=True, slots=True)
-class Mismatch:
-    r"""Layers that an objective was not made for: Gibson and Lanni's aberration.
-
-    .. math:: \Phi = k \sum_j t_j \left(\sqrt{n_j^2 - q^2} - \frac{n_i}{n_j}\sqrt{n_i^2 - q^2}\right)
-
-    over the sample between coverslip and focus, the coverslip, and, subtracted, the coverslip of the design.
-    The second term is the immersion's share that refocusing takes away, so that no paraxial defocus is left.
-
-    Parameters
-    ----------
-    sample_index
-        n of the medium around the object.
-    focus_depth
-        Of the focused plane below the coverslip [m].
-    coverslip, design
-        (index, thickness [m]) of the coverslip in use and of the one in the design; both or neither.
-
-    References
-    ----------
-    S. F. Gibson & F. Lanni, J. Opt. Soc. Am. A 9, 154 (1992).
-    """
-
-    sample_index: float
-    focus_depth: float = 0.0
-    coverslip: tuple[float, float] | None = None
-    design: tuple[float, float] | None = None
-
-    def __post_init__(self) -> None:
-        checks.positive("sample_index", self.sample_index, "1")
-        if checks.finite("focus_depth", self.focus_depth) < 0:
-            raise GeometryError(f"focus_depth is {self.focus_depth:g} m but must be at least 0 m.")
-        if (self.coverslip is None) != (self.design is None):
-            raise GeometryError("give both coverslip= and design=, or neither: their difference counts.")
-
-    def path(self, q: np.ndarray, index: float) -> np.ndarray:
-        """Optical path Φ/k [m] at q = n sin θ, for an immersion of this index."""
-        layers = [(self.sample_index, self.focus_depth)]
-        if self.coverslip is not None and self.design is not None:
-            layers += [self.coverslip, (self.design[0], -self.design[1])]
-        immersion = np.sqrt(index**2 - q**2)
-        return sum((t * (np.sqrt(n**2 - q**2) - index / n * immersion) for n, t in layers), np.zeros_like(q))
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,8 +160,8 @@ class Objective:
         found = np.zeros((self.modes, *radius.shape), np.complex128)
         for mode, harmonics in enumerate(tables):
             for order, pieces in harmonics:
-                part = _at(places, pieces)
-                found[mode] += part if order == 0 else part * _power(turn, order)
+                part = radial.at(places, pieces)
+                found[mode] += part if order == 0 else part * radial.power(turn, order)
         return found
 
     def intensity(self, y: np.ndarray | float, x: np.ndarray | float, dz: float) -> np.ndarray:
@@ -289,24 +242,6 @@ class Objective:
                 return float(np.interp(part, inside, steps))
             reach *= 1.6
         return reach
-
-
-def _at(places: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-    """Cubic polynomials (2, 4, n), real and imaginary, highest power first, at places in steps."""
-    index = places.astype(np.intp)
-    rest, found = places - index, np.empty(places.shape, np.complex128)
-    for part, (first, *others) in zip((found.real, found.imag), pieces, strict=True):
-        value = first[index]
-        for coefficient in others:
-            value *= rest
-            value += coefficient[index]
-        part[...] = value
-    return found
-
-
-def _power(turn: np.ndarray | float, order: int) -> np.ndarray | float:
-    """exp(i order φ) from exp(i φ)."""
-    return turn**order if order > 0 else np.conj(turn) ** -order
 
 
 _FOUR = ((0.0, 1.0), (1.0, 0.0), (math.sqrt(0.5), math.sqrt(0.5)), (math.sqrt(0.5), -math.sqrt(0.5)))
@@ -421,7 +356,7 @@ def _tables(
     tables = []
     for harmonic, _, amplitude in apodised:
         spectrum = np.fft.fft(_turned(harmonic, angle)[:, None] * waves, axis=0) / count
-        tables.append(_harmonics(spectrum, amplitude * weight * wave * scale, k * q, steps))
+        tables.append(radial.harmonics_of(spectrum, amplitude * weight * wave * scale, k * q, steps))
     return float(steps[1]), tables
 
 
@@ -437,39 +372,3 @@ def _aberrated(objective: Objective, rho: np.ndarray, angle: np.ndarray) -> np.n
     for j, waves in objective.terms:
         phase += 2 * np.pi * waves * zernike(j, rho[None, :], angle[:, None])
     return np.exp(1j * phase)
-
-
-def _harmonics(
-    spectrum: np.ndarray, amplitude: np.ndarray, q: np.ndarray, steps: np.ndarray
-) -> list[tuple[int, np.ndarray]]:
-    """Order and radial integral, in cubic pieces (2, 4, radii), of each azimuthal harmonic that counts."""
-    strength = np.abs(spectrum).max(1)
-    found = []
-    for row in np.flatnonzero(strength > _WEAK * strength.max()):
-        order = int(row) if row < len(spectrum) // 2 else int(row) - len(spectrum)
-        bessel = _bessel(abs(order), q, float(steps[1]), len(steps))
-        wave = amplitude * spectrum[row]
-        parts = bessel @ np.stack([wave.real, wave.imag], axis=1)
-        values = CubicSpline(np.arange(len(steps)), 1j ** abs(order) * (parts[:, 0] + 1j * parts[:, 1]))
-        found.append((order, np.stack([values.c.real, values.c.imag])))
-    return found
-
-
-_BESSEL: dict[tuple, np.ndarray] = {}
-_LOCK = Lock()
-
-
-def _bessel(order: int, q: np.ndarray, step: float, count: int) -> np.ndarray:
-    """J of this order at (radii, nodes); the last few are kept, for depths share them."""
-    key = order, len(q), float(q[-1]), float(q[0]), step, count
-    with _LOCK:
-        if key not in _BESSEL:
-            argument = np.arange(count)[:, None] * (step * q)
-            while len(_BESSEL) > 5:
-                _BESSEL.pop(next(iter(_BESSEL)))
-            if order == 2:  # by recurrence, three times as fast as jv
-                near = np.where(argument > 0, argument, 1)
-                _BESSEL[key] = 2 * j1(argument) / near - np.where(argument > 0, j0(argument), 0)
-            else:
-                _BESSEL[key] = {0: j0, 1: j1}.get(order, lambda x: jv(order, x))(argument)
-        return _BESSEL[key]

@@ -17,7 +17,8 @@ from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress
 from lumigraph.design import microscope as closed_forms
 from lumigraph.design.layout import LensletLayout, MicroscopeLayout
-from lumigraph.elements.objective import Mismatch, Model, Objective
+from lumigraph.elements.mismatch import Mismatch
+from lumigraph.elements.objective import Model, Objective
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import describe_microscope, microscope_design, trade_offs
 from lumigraph.instruments.description import Description
