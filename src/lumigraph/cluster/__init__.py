@@ -1,6 +1,7 @@
 """Many items through one piece of work, on one machine or many: `batch` and its ledger.
 
-- `run`: `batch`, `status`, what a job needs
+- `run`: `batch`, `status`
+- `estimate`: what the rest of a job needs
 - `task`: what a worker does for one frame
 - `pool`: worker processes of this machine
 - `scheduler`: workers of a dask cluster
@@ -9,8 +10,9 @@
 """
 
 from lumigraph.cluster import slurm
+from lumigraph.cluster.estimate import Estimate
 from lumigraph.cluster.ledger import Entry
-from lumigraph.cluster.run import Cluster, Estimate, Local, Report, batch, page, rows, status
+from lumigraph.cluster.run import Cluster, Local, Report, batch, page, rows, status
 from lumigraph.cluster.scheduler import Dask
 from lumigraph.cluster.task import Several, Values
 

@@ -1,0 +1,125 @@
+"""What the rest of a job will need: `Estimate`."""
+
+import heapq
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from lumigraph.cluster.ledger import Entry
+from lumigraph.core import memory
+from lumigraph.errors import SamplingError
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What the rest of a job will need, from the frames that are done.
+
+    Parameters
+    ----------
+    frames
+        Still to do.
+    seconds
+        Of all workers together, side by side [s].
+    memory
+        Of one worker [bytes].
+    size
+        On the disk [bytes].
+    noun
+        What an item is.
+    busy
+        Processor time of all workers together [s].
+    """
+
+    frames: int
+    seconds: float
+    memory: int
+    size: int
+    noun: str = "frame"
+    busy: float = 0.0
+
+    @classmethod
+    def of(
+        cls,
+        entries: Iterable[Entry],
+        frames: int,
+        workers: int,
+        *,
+        processors: float = math.inf,
+        starting: float = 0.0,
+    ) -> "Estimate":
+        """From entries of frames like those to come, by one worker; the slower ones made what it keeps.
+
+        Parameters
+        ----------
+        entries
+            Of one worker.
+        frames
+            Still to do.
+        workers
+            Of which one is ready; the others make what they keep first.
+        processors
+            That all workers share: a frame alone may use several. Infinite where they are not known.
+        starting
+            Time until a worker begins [s].
+        """
+        known = list(entries)
+        usual, slowest = (pick(known, key=lambda one: one.seconds) for pick in (min, max))
+        others = min(workers, frames) - 1
+        late = starting + slowest.seconds - usual.seconds
+        busy = frames * usual.busy + others * max(slowest.busy - usual.busy, 0.0)
+        seconds = max(_side_by_side(frames, usual.seconds, others * [late]), busy / processors)
+        memory, size = max(one.memory for one in known), max(one.size for one in known)
+        return cls(frames, seconds, memory, frames * size, busy=busy)
+
+    def __str__(self) -> str:
+        minutes = f"{self.seconds / 60:.1f} minutes" if self.seconds > 90 else f"{self.seconds:.0f} s"
+        frames = f"{self.frames} {many(self.noun, self.frames)}"
+        return (
+            f"{frames} to do: about {minutes}, {memory.told(self.memory)} a worker, {memory.told(self.size)} "
+            "on the disk"
+        )
+
+    def require(self, workers: int, output: Path) -> None:
+        """Refuse what cannot fit.
+
+        Raises
+        ------
+        SamplingError
+            More memory or disk than there is, and how many workers would fit.
+        """
+        whole = memory.total()
+        if whole is not None and self.memory * workers > whole:
+            fitting = max(whole // max(self.memory, 1), 1)
+            raise SamplingError(
+                f"{workers} workers need {self.memory * workers / 2**30:.3g} GiB but the machine has "
+                f"{whole / 2**30:.3g} GiB. Use at most {fitting}."
+            )
+        memory.require_disk(
+            self.size, output.parent, f"{self.frames} {many(self.noun, self.frames)}", SamplingError
+        )
+
+
+def _side_by_side(frames: int, seconds: float, late: list[float]) -> float:
+    """When the last of so many frames ends, by one worker who is ready and others who begin late.
+
+    Each of them is given a frame at once, and the next one when it is done.
+
+    >>> _side_by_side(4, 2.0, [3.0]), _side_by_side(2, 1.0, [9.0])
+    (6.0, 10.0)
+    """
+    ends = [0.0, *(start + seconds for start in late)]
+    heapq.heapify(ends)
+    for _ in range(frames - len(late)):
+        heapq.heapreplace(ends, ends[0] + seconds)
+    return max(ends)
+
+
+def many(noun: str, count: int) -> str:
+    """A noun's plural.
+
+    >>> many("run of 16 frames", 2), many("frame", 1)
+    ('runs of 16 frames', 'frame')
+    """
+    first, *rest = noun.split(" ")
+    return " ".join([first + "s" * (count != 1), *rest])
