@@ -77,7 +77,10 @@ def test_regions_of_the_field_have_aberrations_of_their_own():
     sides = [SCOPE.replace(objective={"aberrations": {6: waves}}) for waves in (0.2, -0.1)]
     light = sum(one.point_image(*place, accuracy=2e-2) for one, place in zip(sides, BEADS, strict=True))
     raw = np.random.default_rng(3).poisson(light * 2e4 / UNIT + 1).astype(np.float32)
-    found = estimate(raw, SCOPE, DEPTHS, (6,), regions=(1, 2), exposure=EXPOSURE)
+    steps: list[float] = []
+    found = estimate(raw, SCOPE, DEPTHS, (6,), regions=(1, 2), exposure=EXPOSURE, progress=steps.append)
+    assert len(steps) > 2
+    assert 0 < min(steps) <= max(steps) < 1
     assert found.values.shape == (1, 2, 1)
     at_beads = np.interp(BEADS[:, 1], found.nodes[1], found.values[0, :, 0])
     np.testing.assert_allclose(at_beads, [0.2, -0.1], atol=0.02)

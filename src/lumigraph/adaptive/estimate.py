@@ -17,6 +17,7 @@ from lumigraph.adaptive.wavefront import Wavefront
 from lumigraph.adaptive.worth import UNKNOWN, worth
 from lumigraph.core import checks, memory
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
 from lumigraph.deconvolution import Exposure, RichardsonLucy
 from lumigraph.deconvolution.methods import State
@@ -67,6 +68,7 @@ def estimate(
     exposure: Exposure | None = None,
     pixels: Calibration | None = None,
     object: Literal["beads", "volume"] = "beads",  # noqa: A002 - what it is called everywhere
+    progress: Progress | None = None,
 ) -> Wavefront:
     """Aberrations of a light-field microscope from one raw image, with the object.
 
@@ -101,6 +103,8 @@ def estimate(
     object
         "beads", sparse points anywhere; "volume", anything, as samples of which three go into a lenslet.
         A volume has one region.
+    progress
+        Called as ``progress(fraction)`` after each step; how many there will be is not known.
 
     Raises
     ------
@@ -127,13 +131,13 @@ def estimate(
             raise GeometryError(
                 f"regions are {parted} but a volume has one. Crop the raw image, or use beads."
             )
-        found = of_volume((raw, exposure, pixels), microscope, depths, terms)
+        found = of_volume((raw, exposure, pixels), microscope, depths, terms, progress or silent)
         _warn_of_misfit(found.pearson, "the volume leaves")
         return found
     if object != "beads":
         raise GeometryError(f"object is {object!r} but must be 'beads' or 'volume'.")
     given = _Given.of((raw, exposure, pixels), microscope, depths, terms)
-    model = given.model(parted)
+    model = given.model(parted, progress or silent)
     first = Fit(given.beads(), np.zeros((len(model.nodes), len(given.terms))))
     _require_memory(model, first)
     every = np.ones(len(given.terms), bool)
@@ -200,7 +204,7 @@ class _Given:
         problem = Problem.of(raw, exposure, Scale.of(operator, exposure, data))
         return cls(microscope, operator, problem, planes, found, untold, pixels)
 
-    def model(self, regions: tuple[int, int]) -> Model:
+    def model(self, regions: tuple[int, int], progress: Progress) -> Model:
         """Of the pixels."""
         farthest = float(np.abs(self.depths).max())
         images = self.microscope.pupil_images(
@@ -212,7 +216,7 @@ class _Given:
             for end, side in ((np.min, -1), (np.max, 1))
         )
         nodes = Nodes.of(grid, regions, len(self.terms))
-        return Model(images, self.problem, nodes, (low, high))
+        return Model(images, self.problem, nodes, (low, high), progress)
 
     def beads(self, shown: np.ndarray | None = None) -> Points:
         """Beads by Richardson-Lucy; of what is brighter than `shown` where that is given."""

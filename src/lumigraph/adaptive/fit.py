@@ -12,6 +12,7 @@ import numpy as np
 
 from lumigraph.adaptive.field import Nodes
 from lumigraph.core import arrays
+from lumigraph.core.progress import Progress, Stage, silent
 from lumigraph.core.threads import each
 from lumigraph.deconvolution.problem import Problem
 from lumigraph.operators.microscope_pupil import PLACES, PupilImages
@@ -28,6 +29,9 @@ TRIES = 5
 
 GAIN = 0.5
 """Log-likelihood that a step must gain for another one to follow."""
+
+USUAL = 10
+"""Steps after which progress is said to be half: how many there will be is not known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,12 +89,15 @@ class Model:
         Of the field, where coefficients stand.
     limits
         Least and greatest (y, x, dz) of beads [m].
+    progress
+        Of the fit's steps.
     """
 
     images: PupilImages
     problem: Problem
     nodes: Nodes
     limits: tuple[np.ndarray, np.ndarray]
+    progress: Progress = silent
 
     @property
     def weights(self) -> np.ndarray:
@@ -175,6 +182,7 @@ class Model:
             if found is None:
                 return fit
             gained, fit = (fit.objective - found.objective) / 2, found
+            stepped(self.progress, fit.steps)
             if gained < GAIN:
                 return fit
         return fit
@@ -211,3 +219,8 @@ def solved(matrix: np.ndarray, right: np.ndarray, damping: float = 0.0) -> np.nd
 
 def _one(points: Points, p: int) -> Points:
     return Points(points.positions[p : p + 1], points.intensities[p : p + 1])
+
+
+def stepped(progress: Progress, steps: int) -> None:
+    """Say that a fit has taken so many steps."""
+    progress(Stage(steps / (steps + USUAL), f"step {steps} of the fit"))

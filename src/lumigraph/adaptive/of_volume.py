@@ -14,6 +14,7 @@ from lumigraph.adaptive.wavefront import Wavefront
 from lumigraph.adaptive.worth import UNKNOWN, worth
 from lumigraph.core import arrays
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.progress import Progress
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.deconvolution import Exposure
@@ -33,8 +34,9 @@ Given = tuple[RawImage | np.ndarray, Exposure | None, Calibration | None]
 
 
 def of_volume(
-    given: Given, microscope: LightFieldMicroscope, depths: Sequence[float], terms: Sequence[int]
-) -> Wavefront:
+    given: Given, microscope: LightFieldMicroscope, depths: Sequence[float], terms: Sequence[int],
+    progress: Progress,
+) -> Wavefront:  # fmt: skip
     """The wavefront of (raw image, exposure, pixels), and the volume; see `estimate`."""
     raw, exposure, pixels = given
     planes, found, untold = asked_for(microscope, depths, terms, VOLUME)
@@ -45,7 +47,7 @@ def of_volume(
     sight = Sight(images, tuple(map(float, planes)), SAMPLES, -images.layout.frame)
     sight.require_memory()
     sight = Sight.of(images, sight.planes, SAMPLES)
-    voxels = Voxels(sight, values(raw, sight.operator(np.zeros(len(found))), exposure), exposure)
+    voxels = Voxels(sight, values(raw, sight.operator(np.zeros(len(found))), exposure), exposure, progress)
     first = [np.zeros(len(found)), *_starts(given, microscope, found, exposure)]
     told = min((voxels.begun(c, ITERATIONS[0]) for c in first), key=lambda one: one.state.deviance)
     told, around = _improved(voxels, told, np.ones(len(found), bool), ITERATIONS)

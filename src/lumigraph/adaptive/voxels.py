@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lumigraph.adaptive.field import PRIOR
-from lumigraph.adaptive.fit import solved
+from lumigraph.adaptive.fit import solved, stepped
 from lumigraph.adaptive.sight import Sight
 from lumigraph.core import arrays
+from lumigraph.core.progress import Progress, silent
 from lumigraph.core.threads import single_products
 from lumigraph.deconvolution import RichardsonLucy
 from lumigraph.deconvolution.beyond import BARELY
@@ -97,11 +98,14 @@ class Voxels:
         Operators by coefficients.
     raw, exposure
         What was seen.
+    progress
+        Of the steps.
     """
 
     sight: Sight
     raw: np.ndarray
     exposure: Exposure
+    progress: Progress = silent
 
     def begun(self, coefficients: np.ndarray, iterations: int, steps: int = 0) -> Told:
         """Coefficients with the volume that Richardson-Lucy finds from an even one."""
@@ -136,6 +140,7 @@ class Voxels:
                 break
             gained = (told.state.deviance - found.state.deviance) / 2 * self.counted(told)
             told, around = found, self.around(found)
+            stepped(self.progress, told.steps)
             if gained < GAIN:
                 break
         return told, around

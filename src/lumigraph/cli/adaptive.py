@@ -87,6 +87,7 @@ class Adaptive:
             self.indices(),
             pixels=raw.calibration,
             object=self.object or "volume",
+            progress=shown,
         )
 
 
@@ -111,9 +112,14 @@ def with_wavefront(result: Result, found: "Wavefront") -> Result:
     )
 
     def figures() -> "Iterator[Figure]":
+        import numpy as np
+
         from lumigraph import plots
 
-        drawn = plots.show(found.phase(), label="wavefront [waves]", cmap="RdBu_r")
+        phase = found.phase()
+        most = float(np.nanmax(np.abs(phase))) or 1.0
+        drawn = plots.show(phase, label="wavefront [waves]", cmap="RdBu_r", limits=(-most, most))
+        drawn.axes[0].set_axis_off()
         yield Figure(drawn, "Over the objective's pupil, as the raw image says.", "Wavefront")
         yield from result.figures()
 

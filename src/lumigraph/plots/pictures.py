@@ -26,8 +26,9 @@ _ENDS = 1, 99
 
 
 def show(
-    image: Any, *, grid: Grid | None = None, title: str = "", label: str = "", cmap: str | None = None
-) -> Figure:
+    image: Any, *, grid: Grid | None = None, title: str = "", label: str = "", cmap: str | None = None,
+    limits: tuple[float | None, float | None] = (None, None),
+) -> Figure:  # fmt: skip
     """Figure of an image or of any noun that holds one.
 
     A `Field` shows its intensity and its phase; a `LightField` its central view, a sample of views and
@@ -45,6 +46,8 @@ def show(
         Above the figure, and beside the colour bar.
     cmap
         Colours of a grey image, a name that matplotlib knows.
+    limits
+        Values of its first and last colour; None for the image's own.
 
     Raises
     ------
@@ -65,7 +68,6 @@ def show(
         return projections(image, cmap=cmap or "magma")
     if isinstance(image, Stack):
         return _stack(image, cmap)
-    limits: tuple[float | None, float | None] = (None, None)
     if isinstance(image, DepthMap):
         label, cmap, image, limits = _mapped(image, label, cmap)
     if isinstance(image, RawImage):
