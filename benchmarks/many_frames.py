@@ -5,6 +5,7 @@
     python -m benchmarks.many_frames ledger                    its part of a frame's processor time
     python -m benchmarks.many_frames kills [--frames 500]      a data set killed five times, and one not
     python -m benchmarks.many_frames standard                  25 planes as fine as 1463 x 1273 pixels
+    python -m benchmarks.many_frames cost                      by planes, samples and lenslets
 
 Times are those of this machine as busy as it is; two workers.
 """
@@ -244,9 +245,32 @@ def standard(frames: int, folder: Path) -> None:
           f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GiB")  # fmt: skip
 
 
+SIZES = ((5, 3, 29), (11, 3, 29), (21, 3, 29), (5, 5, 29), (5, 9, 29), (5, 3, 15), (5, 3, 59))
+"""Planes, samples per lenslet, lenslets along each side."""
+
+
+def cost(frames: int, folder: Path) -> None:
+    """Processor seconds of a microscope's operator and of a frame of 4 iterations, by the object's size."""
+    print("| planes | samples per lenslet | lenslets | operator, s | a frame, s | operator, MiB |")
+    print("|---|---|---|---|---|---|")
+    for planes, samples, side in SIZES:
+        scope = lg.LightFieldMicroscope.from_catalogue("lfm-guv")
+        scope = scope.replace(lenslets={"count": (side, side)}, sensor={"shape": None})
+        depths, began = tuple(np.linspace(-10e-6, 10e-6, planes)), time.process_time()
+        operator = scope.operator(depths, samples, pixels=15, accuracy=1e-2)
+        built, engine = time.process_time() - began, Deconvolver(operator, 4)
+        raw = np.random.default_rng(0).poisson(200, operator.shape[0]).astype(np.float32)
+        times = [time.process_time()]
+        for _ in range(1 + frames):  # the first one makes what they share
+            engine(raw)
+            times.append(time.process_time())
+        each, held = np.median(np.diff(times)[1:]), operator.memory_bytes / 2**20
+        print(f"| {planes} | {samples} | {side}² | {built:.1f} | {each:.2f} | {held:.0f} |", flush=True)
+
+
 WHAT: dict[str, tuple[Callable[[int, Path], None], int]] = {
     "estimates": (estimates, 24), "growth": (growth, 2000), "ledger": (of_ledger, 12),
-    "kills": (kills, 500), "standard": (standard, 3),
+    "kills": (kills, 500), "standard": (standard, 3), "cost": (cost, 3),
 }  # fmt: skip
 
 

@@ -40,6 +40,10 @@ def test_clear_forgets_everything(xp):
 
 def test_several_caches_stay_within_one_budget():
     budget = Budget(limit=200)
+    ByteCache(budget).get(1, lambda: np.zeros(10))
+    assert budget.used == 80
+    budget.empty()
+    assert budget.used == 0
     caches = [ByteCache(budget) for _ in range(3)]
     for cache in caches:
         cache.get("same key", lambda: np.zeros(10))

@@ -129,12 +129,16 @@ class Designs:
     def _simulated(self, camera: "Instrument") -> "Iterable[Quantity]":
         """What is measured on a simulated picture."""
         from lumigraph import metric
+        from lumigraph.core.cache import SHARED
         from lumigraph.metric.charts import check_camera
 
         names = [name for name in self.names if metric.is_measure(name)]
         if not names:
             return ()
-        return metric.simulated(check_camera(camera), names).values()
+        try:
+            return metric.simulated(check_camera(camera), names).values()
+        finally:
+            SHARED.empty()  # the next camera is another one
 
 
 def axes_of(varied: Mapping[str, list[Any]]) -> "Axes":

@@ -63,6 +63,12 @@ class Budget:
             for key in [key for key in self._kept if key[0] is cache]:
                 self.used -= self._kept.pop(key)[1]
 
+    def empty(self) -> None:
+        """Drop what all caches keep."""
+        with self._lock:
+            self._kept.clear()
+            self.used = 0
+
     def held(self, cache: Hashable) -> int:
         """Bytes that one cache holds."""
         with self._lock:
