@@ -118,16 +118,14 @@ def start(
         for _ in range(TURNS):
             left = _left(smooth, slopes @ found)
             found = found + np.linalg.lstsq(slopes.reshape(-1, len(every)), left.ravel(), rcond=1e-6)[0]
-    moved = slopes @ found + left
-    off = moved - slopes @ found
     flat = slopes.reshape(-1, len(every))
-    variance = float(np.square(off).sum()) / max(off.size - len(every), 1)
+    variance = float(np.square(left).sum()) / max(left.size - len(every), 1)
     known = np.sqrt(variance * np.diag(np.linalg.pinv(flat.T @ flat)))
     n = len(BASE)
     return Slopes(
         {j: float(c) for j, c in zip(asked, found[n:], strict=True)},
         {j: float(d) for j, d in zip(asked, known[n:], strict=True)},
-        places, moved * size, float(np.sqrt(np.mean(np.square(off).sum(1)))) * size,
+        places, (slopes @ found + left) * size, float(np.sqrt(np.mean(np.square(left).sum(1)))) * size,
     )  # fmt: skip
 
 

@@ -166,8 +166,7 @@ class DescribedMicroscope(Instrument):
             pitch = mosaic.pixel_pitch / mosaic.total_magnification
             return Grid((mosaic.field, mosaic.field), (pitch, pitch))
         ny, nx = (5 * n for n in self.lenslets.count)
-        pitch = self.lenslet_size / 5
-        return Grid((ny, nx), (pitch, pitch), tuple(0.0 if n % 2 else pitch / 2 for n in (ny, nx)))  # type: ignore[arg-type]
+        return _about_axis(ny, nx, self.lenslet_size / 5)
 
     @property
     def scene_grid(self) -> Grid:
@@ -177,9 +176,8 @@ class DescribedMicroscope(Instrument):
             return grid
         finest = self.wavelength / (4 * self.objective.numerical_aperture)
         finer = min(3, math.ceil(grid.pitch[0] / finest))
-        pitch = grid.pitch[0] / finer
         ny, nx = (n * finer for n in grid.shape)
-        return Grid((ny, nx), (pitch, pitch), (0.0 if ny % 2 else pitch / 2, 0.0 if nx % 2 else pitch / 2))
+        return _about_axis(ny, nx, grid.pitch[0] / finer)
 
     def sampling_distances(self, depths: Sequence[float]) -> tuple[float, ...]:
         """Distance between the samples that the lenslets take of each depth [m]: finer is not measured.
@@ -229,3 +227,8 @@ class DescribedMicroscope(Instrument):
             self.lattice.position(part.indices()), part.pitch * part.fill_factor, part.focal_length[0],
             self.fourier_lens, self.magnification, pitch, self.sensor.shape, part.pitch,
         )  # fmt: skip
+
+
+def _about_axis(ny: int, nx: int, pitch: float) -> Grid:
+    """Samples that lie evenly about the axis, none of them on it where their number is even."""
+    return Grid((ny, nx), (pitch, pitch), (0.0 if ny % 2 else pitch / 2, 0.0 if nx % 2 else pitch / 2))

@@ -12,6 +12,9 @@ from lumigraph.instruments.instrument import Instrument
 MOST = 100_000
 """Combinations."""
 
+NUMBER = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\D*)")
+"""A value, and its unit if it has one."""
+
 
 def values(text: str) -> tuple[str, list[Any]]:
     """A key of the camera file and the values after it.
@@ -27,7 +30,7 @@ def values(text: str) -> tuple[str, list[Any]]:
         raise FormatError(f"--vary is {text!r} but must be like 'lenslets.focal_length=4 mm:6 mm:9'.")
     if len(parts) == 1:
         return name.strip(), [_number(word.strip()) for word in words.split(",")]
-    ends = [re.fullmatch(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\D*)", part) for part in parts[:2]]
+    ends = [NUMBER.fullmatch(part) for part in parts[:2]]
     if len(parts) != 3 or None in ends or not parts[2].isdecimal() or not 2 <= int(parts[2]) <= MOST:
         raise FormatError(f"--vary {text!r} must be 'first:last:count', with a count from 2 to {MOST}.")
     (first, unit), (last, other) = (end.groups() for end in ends if end)

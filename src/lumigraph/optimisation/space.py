@@ -1,17 +1,14 @@
 """What may change of a camera: ranges, whose counts make a first grid, and values of a stock."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from lumigraph.errors import FormatError
-from lumigraph.instruments.varied import combinations, values
+from lumigraph.instruments.varied import NUMBER, combinations, values
 
 ACTIVE = 1e-3
 """Part of a range within which a value is at its end."""
-
-_NUMBER = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +34,7 @@ class Range:
 
     def part(self, value: Any) -> float:
         """Where in the range a value is, 0 to 1."""
-        found = _NUMBER.fullmatch(str(value))
+        found = NUMBER.fullmatch(str(value))
         assert found is not None
         return (float(found[1]) - self.low) / (self.high - self.low)
 
@@ -109,7 +106,7 @@ class Space:
 
 
 def _range(text: str, some: list[Any]) -> Range:
-    ends = [_NUMBER.fullmatch(str(value)) for value in (some[0], some[-1])]
+    ends = [NUMBER.fullmatch(str(value)) for value in (some[0], some[-1])]
     assert ends[0] is not None
     assert ends[1] is not None
     low, high = (float(one[1]) for one in ends if one)
