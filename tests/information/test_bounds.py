@@ -69,7 +69,10 @@ def test_a_pixels_information_is_that_of_its_counted_likelihood(mean, sigma):
 
 
 def test_derivatives_before_a_fourier_microscope_are_those_of_its_images():
-    scope = fourier(objective={"aberrations": {6: 0.1, 7: 0.15}})
+    own = {4: {"focal_change": 0.03}, 5: {"focal_change": -0.02, "offset_x": "-9 um"}}
+    scope = fourier(
+        objective={"aberrations": {6: 0.1, 7: 0.15}}, lenslets={"single": own, "fill_factor": 0.9}
+    )
     points, at = source(scope, np.array([7 * UM]), 1e-2), np.array([1.3 * UM, -0.4 * UM, 7 * UM])
     lit, _ = points.lit(at, checked=False)
     for axis, h in enumerate((1e-9, 1e-9, 1e-8)):

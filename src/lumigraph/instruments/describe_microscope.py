@@ -84,14 +84,19 @@ def _reconstruction(scope: "LightFieldMicroscope") -> Iterator[Row]:
 def _fourier(scope: "LightFieldMicroscope") -> Iterator[Row]:
     assert scope.fourier_lens is not None  # asked by `microscope`
     M, pitch, relay = scope.magnification, scope.lenslets.pitch, scope.fourier_lens
-    focal_length = scope.lenslets.focal_length[0]
+    focal_length = scope.lenslet_distance
     yield Row("Fourier lens", relay, "m", "f_F, given")
     yield Row("pupil", scope.pupil_diameter, "m", "2 f_F NA/M, on the lenslets")
     yield Row("lenslets across the pupil", scope.pupil_diameter / pitch, "", "")
-    yield Row("total magnification", M * focal_length / relay, "", "M f_µ/f_F")
-    yield Row("field of view", design.fourier_field(relay, M, pitch, focal_length), "m", "d f_F / (f_µ M)")
+    yield Row("total magnification", M * focal_length / relay, "", "M b/f_F")
+    yield Row("field of view", design.fourier_field(relay, M, pitch, focal_length), "m", "d f_F / (b M)")
     resolution = design.fourier_resolution(scope.wavelength, relay, M, pitch)
     yield Row("reconstructed resolution", resolution, "m", "λ f_F / (d M)")
+    depths = scope.in_focus
+    for number in scope.lenslets.single:
+        yield Row(
+            f"lenslet {number} is in focus at", float(depths[number - 1]), "m", "n (1/b - 1/f) (f_F/M)²"
+        )
 
 
 def _sensor(scope: "LightFieldMicroscope") -> Iterator[Row]:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from lumigraph.core.calibration import Calibration
@@ -51,6 +52,11 @@ class DescribedMicroscope(Instrument):
             if given != (self.configuration == configuration):
                 verb = "needs" if self.configuration == configuration else "has no use for"
                 raise GeometryError(f"configuration {self.configuration!r} {verb} {key}. Change one of them.")
+        if self.lenslets.single and self.configuration != "fourier":
+            raise GeometryError(
+                f"single lenslets differ in configuration 'fourier', not {self.configuration!r}. "
+                "Leave lenslets.single out."
+            )
         if self.objective.model == "rays" and self.configuration != "1.0":
             raise GeometryError(
                 f"objective.model 'rays' needs configuration '1.0', not {self.configuration!r}. Use 'scalar'."
@@ -141,15 +147,23 @@ class DescribedMicroscope(Instrument):
         """Whether lenslets stand in the pupil, so that each micro-image is a view."""
         return self.configuration == "fourier"
 
+    @property
+    def in_focus(self) -> np.ndarray:
+        """Depths (k,) at which the lenslets of a Fourier microscope are in focus, to first order [m]."""
+        mosaic, medium = self._mosaic(), self.objectives[0].medium
+        return medium * mosaic.defocus * (mosaic.fourier_lens / mosaic.magnification) ** 2
+
     @cached_property
     def calibration(self) -> Calibration:
         """Where the micro-images stand on the raw image [px], by geometry; only those inside the sensor."""
         sensor, pitch = self.sensor, self.sensor.pixel_pitch
-        # Raw images are turned by 180°, which turns the lattice about the axis.
-        lattice = self.lattice.scaled(-self.relay_magnification / pitch)
+        # Raw images are turned by 180°, and the lattice about the axis; behind a pupil they are not.
+        sign = 1 if self.in_pupil else -1
+        lattice = self.lattice.scaled(sign * self.relay_magnification / pitch)
         lattice = lattice.moved(sensor.shape[0] // 2, sensor.shape[1] // 2)
-        indices = -self.lenslets.indices()[::-1]
-        centers = lattice.position(indices)
+        indices = sign * self.lenslets.indices()[::sign]
+        own = self.lenslets.each()[0] - self.lattice.position(self.lenslets.indices())
+        centers = lattice.position(indices) + own * self.relay_magnification / pitch
         inside = ((centers >= -0.5) & (centers <= [n - 0.5 for n in sensor.shape])).all(axis=1)
         return Calibration(
             lattice, sensor.shape, indices[inside], centers[inside], 0.0,
@@ -223,9 +237,10 @@ class DescribedMicroscope(Instrument):
     def _mosaic(self) -> Mosaic:
         assert self.fourier_lens is not None  # checked above
         part, pitch = self.lenslets, self.pixels.pixel_pitch / self.relay_magnification
+        centers, focal_lengths = part.each()
         return Mosaic(
-            self.lattice.position(part.indices()), part.pitch * part.fill_factor, part.focal_length[0],
-            self.fourier_lens, self.magnification, pitch, self.sensor.shape, part.pitch,
+            centers, part.pitch * part.fill_factor, focal_lengths, self.lenslet_distance,
+            self.fourier_lens, self.magnification, pitch, self.sensor.shape, part.spacing,
         )  # fmt: skip
 
 

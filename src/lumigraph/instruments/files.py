@@ -115,13 +115,15 @@ def write(table: Mapping[str, Any]) -> str:
 _LENGTHS = (
     "wavelength", "object_distance", "focal_length", "diameter", "pitch", "pixel_pitch", "offset",
     "bandwidth", "tube_lens", "focus_depth", "lenslet_offset", "sensor_distance", "fourier_lens",
-    "separation", "lenslet_distance", "decentre_scatter", "wavelengths",
+    "offset_y", "offset_x", "separation", "lenslet_distance", "decentre_scatter", "wavelengths",
 )  # fmt: skip
 
 
 def _table(name: str, values: Mapping[str, Any]) -> list[str]:
     plain = {key: value for key, value in values.items() if not isinstance(value, dict) and value is not None}
-    lines = [f"[{name}]", *(f"{key} = {_text(str(key), value)}" for key, value in plain.items())]
+    lines = [f"{key} = {_text(str(key), value)}" for key, value in plain.items()]
+    if lines or not values:
+        lines = [f"[{name}]", *lines]
     for key, inner in values.items():
         if isinstance(inner, dict) and inner:
             lines += _table(f"{name}.{key}", inner)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from lumigraph.core import checks
 from lumigraph.core.calibration import Calibration
@@ -36,6 +36,15 @@ class LensletCamera(Camera):
     model: Model = "paraxial"
     built: Built = Field(default_factory=Built)
     tolerances: Tolerances = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _lenslets_are_alike(self) -> Self:
+        if self.lenslets.single:
+            raise GeometryError(
+                "lenslets.single is of Fourier microscopes; before a main lens lenslets differ by kinds. "
+                "Give three focal lengths in layout 'hex'."
+            )
+        return self
 
     @property
     def described(self) -> Self:

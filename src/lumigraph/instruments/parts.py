@@ -4,6 +4,7 @@ Values are SI floats or text with a unit in Python; in a file, lengths carry the
 """
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -18,6 +19,7 @@ from lumigraph.instruments.quantities import (
     Angle,
     Bits,
     Counts,
+    Displacement,
     File,
     Fraction,
     Length,
@@ -35,6 +37,8 @@ MOST_PIXELS = 2**28
 """Largest sensor: 268 million pixels, 1 GiB in single precision."""
 MOST_LENSLETS = 2**20
 """Largest array: 1024 x 1024."""
+MOST_CHANGE = 0.5
+"""Of a single lenslet's focal length."""
 
 
 class MainLens(Part):
@@ -77,6 +81,43 @@ class MainLens(Part):
         return self.over_field is not None or self.prescription is not None
 
 
+class OneLenslet(Part):
+    """What a lenslet has of its own, table ``[lenslets.single.N]``.
+
+    Parameters
+    ----------
+    focal_change
+        By what part its focal length is longer than the array's: 0.03 is 3 % longer.
+    offset_y, offset_x
+        Of it, aperture and all, from its place on the lattice.
+    """
+
+    focal_change: Number = 0.0
+    offset_y: Displacement = 0.0
+    offset_x: Displacement = 0.0
+
+    @field_validator("focal_change")
+    @classmethod
+    def _is_a_part(cls, change: float) -> float:
+        if not abs(change) <= MOST_CHANGE:
+            raise GeometryError(f"{change:g} is beyond ±{MOST_CHANGE:g}. Give a part, such as 0.03 for 3 %.")
+        return change
+
+
+def _singles(value: Any) -> Any:
+    """Numbers of lenslets, which a file has as text."""
+    if not isinstance(value, Mapping):
+        raise FormatError(f"{value!r} is not a table. Write [lenslets.single.1] above what lenslet 1 has.")
+    for key in value:
+        if not str(key).isdecimal() or int(key) < 1:
+            raise FormatError(f"{key!r} is no number of a lenslet. Count them from 1, row by row.")
+    return {int(key): one for key, one in value.items()}
+
+
+Singles = Annotated[dict[int, OneLenslet], BeforeValidator(_singles)]
+"""What single lenslets have, by number."""
+
+
 class Lenslets(Part):
     """The lenslet array.
 
@@ -102,6 +143,9 @@ class Lenslets(Part):
         From +x towards +y [rad], or text such as "2 mrad".
     offset
         Of the lenslets from the axis (y, x), less than half a pitch.
+    single
+        Lenslets that differ from the others, in the pupil of a Fourier microscope: `OneLenslet` by number,
+        from 1 on row by row as `indices` has them.
     """
 
     pitch: Length
@@ -113,6 +157,7 @@ class Lenslets(Part):
     fill_factor: Fraction = 1.0
     rotation: Angle = 0.0
     offset: Offset = (0.0, 0.0)
+    single: Singles = Field(default_factory=dict)
 
     @field_validator("count")
     @classmethod
@@ -142,6 +187,21 @@ class Lenslets(Part):
                     f"offset along {name} is {shift * 1e6:.6g} µm but must stay below {slack * 1e6:.6g} µm. "
                     "Give what is left after whole lenslets, or change count."
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _singles_have_room(self) -> "Lenslets":
+        if not self.single:
+            return self
+        count = len(self.indices())
+        if (last := max(self.single)) > count:
+            raise GeometryError(f"single has lenslet {last}, but there are {count}. Count them from 1.")
+        width = self.pitch * self.fill_factor
+        if (room := self.spacing) < width * (1 - 1e-9):
+            raise GeometryError(
+                f"two lenslets stand {room * 1e6:.6g} µm from each other but are {width * 1e6:.6g} µm wide. "
+                "Change their offsets, or use a smaller fill_factor."
+            )
         return self
 
     @property
@@ -191,6 +251,25 @@ class Lenslets(Part):
         across, along = self._turned(*lattice.position(pairs).T)
         height, width = self.extent
         return pairs[(np.abs(across) <= height / 2) & (np.abs(along) <= width / 2)]
+
+    def each(self) -> tuple[np.ndarray, np.ndarray]:
+        """Centres (k, 2) as (y, x) and focal lengths (k,) [m] of the lenslets of one kind, as `indices`."""
+        centers = self.lattice().position(self.indices())
+        focal_lengths = np.full(len(centers), self.focal_length[0])
+        for number, own in self.single.items():
+            centers[number - 1] += own.offset_y, own.offset_x
+            focal_lengths[number - 1] *= 1 + own.focal_change
+        return centers, focal_lengths
+
+    @property
+    def spacing(self) -> float:
+        """How wide lenslets may be before two overlap, at most the pitch [m]."""
+        if not self.single:
+            return self.pitch
+        along = np.stack(self._turned(*self.each()[0].T), -1)
+        apart = np.abs(along[:, None] - along).max(-1)
+        np.fill_diagonal(apart, np.inf)
+        return float(min(apart.min(), self.pitch))
 
     def _turned(self, y: Any, x: Any) -> tuple[Any, Any]:
         """Coordinates (y, x) in the frame that turns with the array."""

@@ -1,7 +1,7 @@
 """What pydantic found wrong, as one line of ours: the dotted field, the value, the remedy."""
 
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -47,6 +47,9 @@ def _keys(model: type[BaseModel], where: tuple[str, ...]) -> list[str]:
     """Keys that the table at `where` may have."""
     current: Any = model
     for part in where:
+        if get_origin(current) is dict:  # of parts, by keys that are free
+            current = get_args(current)[1]
+            continue
         fields = {field.alias or name: field for name, field in current.model_fields.items()}
         current = fields[part].annotation
     return [field.alias or name for name, field in current.model_fields.items()]

@@ -63,14 +63,35 @@ def combinations(varied: Mapping[str, list[Any]]) -> list[dict[str, Any]]:
 
 
 def changed(camera: Instrument, item: Mapping[str, Any]) -> Instrument:
-    """The camera whose file has other values, by dotted keys; lengths carry a unit as in the file."""
+    """The camera whose file has other values, by dotted keys; lengths carry a unit as in the file.
+
+    A part of a key is one of a table, a number that counts a list's values from 0, or several with commas
+    between them, which all get the value: ``lenslets.single.2,8.focal_change``.
+    """
     table = tomllib.loads(camera.to_toml())
     for name, value in item.items():
-        *path, last = name.split(".")
-        place: Any = table
-        for part in path:
-            place = place.setdefault(part, {})
-            if not isinstance(place, dict):
-                raise FormatError(f"--vary {name}: {part} is a value, which has no parts. Check the key.")
-        place[last] = value
+        *path, last = ([one.strip() for one in part.split(",")] for part in name.split("."))
+        places: list[Any] = [table]
+        for keys in path:
+            places = [_inside(place, key, name) for place in places for key in keys]
+        for place, key in itertools.product(places, last):
+            place[_key(place, key, name)] = value
     return type(camera).from_table(table, "--vary")
+
+
+def _inside(place: Any, key: str, name: str) -> Any:
+    """What stands under a key of a table or a list; a table that is not there is begun."""
+    key = _key(place, key, name)
+    found = place.setdefault(key, {}) if isinstance(place, dict) else place[key]
+    if not isinstance(found, dict | list):
+        raise FormatError(f"--vary {name}: {key} is a value, which has no parts. Check the key.")
+    return found
+
+
+def _key(place: Any, key: str, name: str) -> Any:
+    """A key as its table or list has it."""
+    if isinstance(place, dict):
+        return key
+    if not (key.isdecimal() and int(key) < len(place)):
+        raise FormatError(f"--vary {name}: {key} is none of the values 0 to {len(place) - 1}. Check the key.")
+    return int(key)

@@ -5,14 +5,17 @@ point moves its image behind every lenslet by the same amount, so that each dept
 each lenslet:
 
 .. math:: h_j(x) = \left| \int_{lenslet\ j} A(q)\, e^{i k \sqrt{n^2 - q^2}\, dz}
-          e^{-2\pi i (u - P_j) x / (\lambda f_\mu)}\, du \right|^2, \qquad q = u M / f_F
+          e^{i k (1/b - 1/f_j) |u - P_j|^2 / 2}
+          e^{-2\pi i (u - P_j) x / (\lambda b)}\, du \right|^2, \qquad q = u M / f_F
+
+A lenslet that is weaker than 1/b focuses points at a depth n (1/b - 1/f_j) (f_F/M)², farther away.
 
 C. Guo et al., "Fourier light-field microscopy", Opt. Express 27, 25573 (2019).
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -37,8 +40,12 @@ class Mosaic:
     ----------
     centers
         Of the lenslets (k, 2) as (y, x) [m], the pupil's middle at (0, 0).
-    width, focal_length
-        Of a lenslet, d and f_µ [m].
+    width
+        Of a lenslet, d [m].
+    focal_lengths
+        Of the lenslets (k,), f_j [m].
+    distance
+        Lenslets to the plane that the sensor sees, b [m].
     fourier_lens
         f_F [m].
     magnification
@@ -51,7 +58,8 @@ class Mosaic:
 
     centers: np.ndarray
     width: float
-    focal_length: float
+    focal_lengths: np.ndarray
+    distance: float
     fourier_lens: float
     magnification: float
     pixel_pitch: float
@@ -60,8 +68,13 @@ class Mosaic:
 
     @property
     def total_magnification(self) -> float:
-        """From the object to the sensor, M f_µ/f_F."""
-        return self.magnification * self.focal_length / self.fourier_lens
+        """From the object to the sensor, M b/f_F."""
+        return self.magnification * self.distance / self.fourier_lens
+
+    @property
+    def defocus(self) -> np.ndarray:
+        """Of each lenslet, 1/b - 1/f_j [1/m]."""
+        return 1 / self.distance - 1 / self.focal_lengths
 
     @property
     def field(self) -> int:
@@ -195,8 +208,8 @@ def fourier_operator(
     planes = (0.0,) if depths is None else tuple(checks.finite("a depth", dz) for dz in depths)
     if not planes:
         raise GeometryError("there are no depths. Give at least one, such as 0.0 for the focused plane.")
-    half = half_window(objectives[0], mosaic, planes)
-    lit = lit_lenslets(objectives[0], mosaic)
+    mosaic = lit_lenslets(objectives[0], mosaic)
+    half, lit = half_window(objectives[0], mosaic, planes), mosaic.centers
     # Three times: as complex spectra of a window that holds the field too.
     needed = 24.0 * len(planes) * len(lit) * (2 * half + 1 + mosaic.field) ** 2
     memory.require(needed, "the images of points", "Use fewer slices or larger pixels.", SamplingError)
@@ -206,10 +219,10 @@ def fourier_operator(
     places = lit / mosaic.pixel_pitch + middle
     nearest = np.round(places).astype(int)
     for objective in objectives:
-        for j, center in enumerate(lit):
+        for j, rest in enumerate(places - nearest):
+            view = View.of(objective, mosaic, j, half)
             for k, dz in enumerate(planes):
-                image = _image(objective, mosaic, (center, places[j] - nearest[j]), dz, half)
-                images[k, j] += image / len(objectives)
+                images[k, j] += _image(objective, view, rest, dz) / len(objectives)
     n = mosaic.field
     pitch = mosaic.pixel_pitch / mosaic.total_magnification
     # Sample n // 2 of the object stands on the axis, and its image on the lenslet's pixel.
@@ -220,25 +233,26 @@ def fourier_operator(
     )  # fmt: skip
 
 
-def lit_lenslets(objective: Objective, mosaic: Mosaic) -> np.ndarray:
-    """Centres of the lenslets that the pupil lights at least in part."""
+def lit_lenslets(objective: Objective, mosaic: Mosaic) -> Mosaic:
+    """Those lenslets that the pupil lights at least in part."""
     radius = mosaic.fourier_lens * objective.aperture / mosaic.magnification
     nearest = np.maximum(np.abs(mosaic.centers) - mosaic.width / 2, 0)
-    lit = mosaic.centers[np.hypot(*nearest.T) < radius]
-    if not len(lit):
+    lit = np.hypot(*nearest.T) < radius
+    if not lit.any():
         raise GeometryError(
             f"no lenslet stands in the pupil, which is {2 * radius * 1e3:.4g} mm wide. "
             "Check fourier_lens and count."
         )
-    return lit
+    return replace(mosaic, centers=mosaic.centers[lit], focal_lengths=mosaic.focal_lengths[lit])
 
 
 def half_window(objective: Objective, mosaic: Mosaic, depths: Sequence[float]) -> int:
     """Pixels to each side that hold a point's images at all depths."""
     tangent = objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
     moved = max(abs(dz) for dz in depths) * tangent + objective.spread()
-    spread = TAIL * objective.wavelength * mosaic.focal_length / mosaic.width
-    return math.ceil((moved * mosaic.total_magnification + spread) / mosaic.pixel_pitch)
+    blur = mosaic.distance * float(np.abs(mosaic.defocus).max()) * mosaic.width / 2
+    spread = TAIL * objective.wavelength * mosaic.distance / mosaic.width
+    return math.ceil((moved * mosaic.total_magnification + blur + spread) / mosaic.pixel_pitch)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -252,11 +266,11 @@ class View:
     q
         n sin θ along y and x of the rays that go through them.
     amplitude
-        (n, n), of a point on the axis, of 1 in the pupil's middle.
+        (n, n), of a point on the axis, of 1 in the pupil's middle; with the phase of the lenslet's defocus.
     turn
         Phase over samples' place per pixel that the image is away [rad/m].
     half, over
-        Pixels to each side, samples along each of them.
+        Pixels to each side, Gauss-Legendre nodes along each of them.
     scale
         Of intensities: a lenslet that is open all over, with cos θ = 1, gives 1 in all (Parseval).
     """
@@ -270,9 +284,10 @@ class View:
     scale: float
 
     @classmethod
-    def of(cls, objective: Objective, mosaic: Mosaic, center: np.ndarray, half: int) -> "View":
-        """That of the lenslet at a place."""
-        wave, f, width = objective.wavelength, mosaic.focal_length, mosaic.width
+    def of(cls, objective: Objective, mosaic: Mosaic, lenslet: int, half: int) -> "View":
+        """That of the lenslet of a number."""
+        wave, f, width = objective.wavelength, mosaic.distance, mosaic.width
+        center, bend = mosaic.centers[lenslet], np.pi * mosaic.defocus[lenslet] / wave
         n = math.ceil(2.2 * (2 * half + 1) * mosaic.pixel_pitch * width / (wave * f)) + 8
         u = ((np.arange(n) - (n - 1) / 2) / n) * width
         # The pupil's image is upside down.
@@ -282,29 +297,27 @@ class View:
         inside = np.clip((objective.aperture - q) / (width / n * step) + 0.5, 0, 1)
         within = np.minimum(1, objective.aperture / np.maximum(q, 1e-300))
         cosine = np.sqrt(1 - (q * within / objective.medium) ** 2)
-        over = max(1, math.ceil(2.2 * mosaic.pixel_pitch * width / (wave * f)))
-        scale = (mosaic.pixel_pitch * width / (over * wave * f * n**2)) ** 2
+        over = 1 + math.ceil(2.2 * mosaic.pixel_pitch * width / (wave * f))
+        amplitude = inside / np.sqrt(cosine) * np.exp(1j * bend * (u[:, None] ** 2 + u**2))
+        scale = (mosaic.pixel_pitch * width / (2 * wave * f * n**2)) ** 2
         turn = 2 * np.pi * mosaic.pixel_pitch / (wave * f)
-        return cls(u, (qy * within, qx * within), inside / np.sqrt(cosine), turn, half, over, scale)
+        return cls(u, (qy * within, qx * within), amplitude, turn, half, over, scale)
 
     def waves(self, middle: float) -> np.ndarray:
-        """From the samples to those of the pixels (pixels · over, n) around a place near a pixel [px]."""
-        count = 2 * self.half + 1
-        fine = (np.arange(count * self.over) + 0.5) / self.over - 0.5 - self.half
-        return np.exp(-1j * self.turn * np.outer(fine - middle, self.u))
+        """From the samples to the nodes of the pixels (pixels · over, n) around a place near a pixel [px]."""
+        nodes = np.polynomial.legendre.leggauss(self.over)[0] / 2
+        fine = np.arange(-self.half, self.half + 1)[:, None] + nodes
+        return np.exp(-1j * self.turn * np.outer(fine.ravel() - middle, self.u))
 
     def pixels(self, light: np.ndarray) -> np.ndarray:
-        """Of intensities on the pixels' samples."""
-        count = 2 * self.half + 1
-        return light.reshape(count, self.over, count, self.over).sum((1, 3)) * self.scale
+        """Of intensities on the pixels' nodes."""
+        count, weights = 2 * self.half + 1, np.polynomial.legendre.leggauss(self.over)[1]
+        parts = light.reshape(count, self.over, count, self.over)
+        return np.einsum("yixj,i,j->yx", parts, weights, weights, optimize=True) * self.scale
 
 
-def _image(
-    objective: Objective, mosaic: Mosaic, place: tuple[np.ndarray, np.ndarray], dz: float, half: int
-) -> np.ndarray:
+def _image(objective: Objective, view: View, rest: np.ndarray, dz: float) -> np.ndarray:
     """Image (2 half + 1)² behind a lenslet, of a point that sends 1 through a whole one on the axis."""
-    center, rest = place
-    view = View.of(objective, mosaic, center, half)
     pupil = view.amplitude * np.exp(1j * objective.phase(*view.q, dz))
     field = view.waves(rest[0]) @ pupil @ view.waves(rest[1]).T
     return view.pixels(np.square(np.abs(field)))

@@ -45,17 +45,19 @@ class FourierPoints:
         """Raw image and its derivatives by y, x and dz [1/m], (4, ny, nx)."""
         found = np.zeros((4, *self.mosaic.shape))
         for objective in self.objectives:
-            half = half_window(objective, self.mosaic, (dz,))
-            for center in lit_lenslets(objective, self.mosaic):
-                self._add(found, (objective, center, half), (y, x, dz))
+            lit = lit_lenslets(objective, self.mosaic)
+            half = half_window(objective, lit, (dz,))
+            for j, center in enumerate(lit.centers):
+                view = View.of(objective, lit, j, half)
+                self._add(found, center, view, objective, (y, x, dz))
         return found / len(self.objectives)
 
     def _add(
-        self, found: np.ndarray, by: tuple[Objective, np.ndarray, int], position: Sequence[float]
-    ) -> None:
+        self, found: np.ndarray, center: np.ndarray, view: View, objective: Objective,
+        position: Sequence[float],
+    ) -> None:  # fmt: skip
         """Add what a lenslet shows."""
-        objective, center, half = by
-        mosaic, count = self.mosaic, 2 * half + 1
+        mosaic, half, count = self.mosaic, view.half, 2 * view.half + 1
         at = (center + mosaic.total_magnification * np.array(position[:2])) / mosaic.pixel_pitch
         nearest = np.round(at).astype(int)
         corner = nearest - half + np.array(mosaic.shape) // 2
@@ -64,7 +66,7 @@ class FourierPoints:
             start, stop = min(max(0, first), n), min(max(0, first + count), n)
             raw.append(slice(start, stop))
             own.append(slice(start - first, stop - first))
-        image = _images(View.of(objective, mosaic, center, half), objective, at - nearest, position[2])
+        image = _images(view, objective, at - nearest, position[2])
         image[1:3] *= mosaic.total_magnification / mosaic.pixel_pitch
         found[:, raw[0], raw[1]] += image[:, own[0], own[1]]
 
