@@ -5,6 +5,7 @@
     python -m benchmarks.many_frames ledger                    its part of a frame's processor time
     python -m benchmarks.many_frames kills [--frames 500]      a data set killed five times, and one not
     python -m benchmarks.many_frames standard                  25 planes as fine as 1463 x 1273 pixels
+    python -m benchmarks.many_frames scaling [--frames 60]     two workers beside one
     python -m benchmarks.many_frames cost                      by planes, samples and lenslets
 
 Times are those of this machine as busy as it is; two workers.
@@ -85,7 +86,7 @@ def estimate(name: str, frames: int, folder: Path) -> dict[str, float]:
     require = run.Estimate.require
 
     def noted(needed: run.Estimate, workers: int, output: Path) -> None:
-        said.append((needed, time.perf_counter()))
+        said.append((needed, time.time()))
         require(needed, workers, output)
 
     output = folder / f"out{list(JOBS).index(name)}.{'csv' if name == 'sweep' else 'zarr'}"
@@ -96,10 +97,11 @@ def estimate(name: str, frames: int, folder: Path) -> dict[str, float]:
             raise SystemExit(f"{name} failed")
     finally:
         run.Estimate.require = require
-    (needed, began), ended = said[0], max(p.stat().st_mtime for p in (ledger(output) / "done").iterdir())
+    needed, began = said[-1]  # the first one is of memory alone
     entries = cluster.status(output).entries
-    later = [entries[k] for k in sorted(entries)[2:]]
-    used = time.perf_counter() - began - (time.time() - ended)
+    written = {int(p.stem): p.stat().st_mtime for p in (ledger(output) / "done").glob("*.json")}
+    later = [entries[k] for k, when in written.items() if when > began]
+    used = max(written.values()) - began
     return {
         "said [s]": needed.seconds, "used [s]": used, "time": used / needed.seconds,
         "processor time": sum(one.busy for one in later) / needed.busy,
@@ -220,7 +222,7 @@ def contents(store: Path) -> dict[str, int]:
 
 
 def standard(frames: int, folder: Path) -> None:
-    """Processor seconds of the operator, of the first frame and of each further one, and peak memory."""
+    """Seconds of the operator, of the first frame and of each further one, and peak memory."""
     scope = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
         wavelength="525 nm",
         objective={
@@ -232,17 +234,36 @@ def standard(frames: int, folder: Path) -> None:
         lenslets={"pitch": "125 um", "focal_length": "2.5 mm", "count": (77, 67)},
         sensor={"shape": (1463, 1273), "pixel_pitch": "6.5789 um"},
     )
-    times = [time.process_time()]
+    times = [(time.process_time(), time.perf_counter())]
     operator = scope.operator(tuple(np.linspace(-60e-6, 60e-6, 25)), 19, pixels=19, accuracy=1e-2)
     engine, rng = Deconvolver(operator, 4), np.random.default_rng(0)
     for _ in range(frames):
-        times.append(time.process_time())
+        times.append((time.process_time(), time.perf_counter()))
         engine(rng.poisson(200, operator.shape[0]).astype(np.float32))
-    times.append(time.process_time())
-    first, *others = np.diff(times)[1:]
-    print(f"operator {times[1] - times[0]:.1f} s, first frame {first:.1f} s, others "
-          f"{', '.join(f'{one:.1f}' for one in others)} s of processors; "
-          f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GiB")  # fmt: skip
+    times.append((time.process_time(), time.perf_counter()))
+    for what, (built, first, *others) in zip(("processors", "clock"), np.diff(times, axis=0).T, strict=True):
+        print(f"{what}: operator {built:.1f} s, first frame {first:.1f} s, others "
+              f"{', '.join(f'{one:.1f}' for one in others)} s")  # fmt: skip
+    print(f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GiB")
+
+
+def scaling(frames: int, folder: Path) -> None:
+    """Frames a second of two workers over those of one, from the first frame of the last worker on."""
+    inputs(folder, frames)
+    pace = {}
+    for workers in (1, 2):
+        output = folder / f"by{workers}.zarr"
+        words = [*JOBS["deconvolve, 5 planes, 3 samples"], "-o", str(output), "--workers", str(workers)]
+        if lumigraph(words):
+            raise SystemExit("it failed")
+        ends: dict[str, list[float]] = {}
+        for number, entry in cluster.status(output).entries.items():
+            when = (ledger(output) / "done" / f"{number:06}.json").stat().st_mtime
+            ends.setdefault(entry.where, []).append(when)
+        ready = max(min(times) for times in ends.values())
+        later = [when for times in ends.values() for when in times if when > ready]
+        pace[workers] = len(later) / (max(later) - ready)
+    print(f"{pace[1]:.3g} and {pace[2]:.3g} frames a second: {pace[2] / pace[1]:.2f} times")
 
 
 SIZES = ((5, 3, 29), (11, 3, 29), (21, 3, 29), (5, 5, 29), (5, 9, 29), (5, 3, 15), (5, 3, 59))
@@ -270,7 +291,7 @@ def cost(frames: int, folder: Path) -> None:
 
 WHAT: dict[str, tuple[Callable[[int, Path], None], int]] = {
     "estimates": (estimates, 24), "growth": (growth, 2000), "ledger": (of_ledger, 12),
-    "kills": (kills, 500), "standard": (standard, 3), "cost": (cost, 3),
+    "kills": (kills, 500), "standard": (standard, 3), "scaling": (scaling, 60), "cost": (cost, 3),
 }  # fmt: skip
 
 

@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import fmean
 
 from lumigraph.cluster.ledger import Entry
 from lumigraph.core import memory
@@ -48,29 +49,34 @@ class Estimate:
         processors: float = math.inf,
         starting: float = 0.0,
     ) -> "Estimate":
-        """From entries of frames like those to come, by one worker; the slower ones made what it keeps.
+        """From entries of frames like those to come: the first one of each worker made what it keeps.
 
         Parameters
         ----------
         entries
-            Of one worker.
+            In the order in which they ended.
         frames
             Still to do.
         workers
-            Of which one is ready; the others make what they keep first.
+            Of which those with an entry are ready; the others make what they keep first.
         processors
             That all workers share: a frame alone may use several. Infinite where they are not known.
         starting
             Time until a worker begins [s].
         """
         known = list(entries)
-        usual, slowest = (pick(known, key=lambda one: one.seconds) for pick in (min, max))
+        first: dict[str, Entry] = {}
+        later = [one for one in known if first.setdefault(one.where, one) is not one]
+        usual = later or [min(known, key=lambda one: one.seconds)]
+        seconds, busy = fmean(one.seconds for one in usual), fmean(one.busy for one in usual)
+        late = starting + max(max(one.seconds for one in first.values()) - seconds, 0.0)
+        made = max(max(one.busy for one in first.values()) - busy, 0.0)
         others = min(workers, frames) - 1
-        late = starting + slowest.seconds - usual.seconds
-        busy = frames * usual.busy + others * max(slowest.busy - usual.busy, 0.0)
-        seconds = max(_side_by_side(frames, usual.seconds, others * [late]), busy / processors)
-        memory, size = max(one.memory for one in known), max(one.size for one in known)
-        return cls(frames, seconds, memory, frames * size, busy=busy)
+        ready = min(len(first) - 1, others)
+        busy = frames * busy + (others - ready) * made
+        ends = _side_by_side(frames, seconds, ready * [0.0] + (others - ready) * [late])
+        memory, size = max(one.memory for one in known), fmean(one.size for one in known)
+        return cls(frames, max(ends, busy / processors), memory, round(frames * size), busy=busy)
 
     def __str__(self) -> str:
         minutes = f"{self.seconds / 60:.1f} minutes" if self.seconds > 90 else f"{self.seconds:.0f} s"

@@ -17,8 +17,9 @@ from lumigraph.core import arrays, checks
 from lumigraph.core.progress import Progress, Stage, silent
 from lumigraph.errors import LumigraphError
 
-_FIRST = 2
-"""Frames that are done before the others are estimated: the first one makes what they share."""
+_TRIED, _TRIAL, _PART = 3, 20.0, 4
+"""Frames of each worker that are done before the others are estimated, while the first one shows that they
+take fewer seconds than this; and one of so many frames at most."""
 
 _TOLD = 16
 """Of so many frames that are checked, one is told of."""
@@ -156,7 +157,7 @@ def batch(
     progress
         Called with the fraction that is done.
     estimated
-        Called with what the rest will need, once a frame is done.
+        Called with what the rest will need, once the first frames are done.
 
     Returns
     -------
@@ -185,11 +186,8 @@ def batch(
         left = list(_left(task, first, last, progress))
         with cluster.group(task) as group:
             if left:
-                began_first = time.perf_counter()
-                for done in range(min(_FIRST, len(left))):
-                    _do(group, left[done : done + 1], done, len(left), progress)
-                _check(task, (cluster, group), (left, time.perf_counter() - began_first), estimated)
-                _do(group, left[_FIRST:], _FIRST, len(left), progress)
+                rest = _begin(task, (cluster, group), left, progress, estimated)
+                _do(group, rest, len(left) - len(rest), len(left), progress)
     found = status(output)
     mine = {number: why for number, why in found.failures.items() if first <= number < last}
     return replace(found, failures=mine, seconds=time.perf_counter() - began)
@@ -235,45 +233,87 @@ def page(output: str | os.PathLike[str]) -> Path:
     return (path if (path / "job.json").exists() else Ledger.beside(path).folder) / PAGE
 
 
-def _do(group: Group, numbers: list[int], done: int, total: int, progress: Progress) -> None:
-    """Do some frames; those that somebody else works on are asked for until they are done."""
-    before, began = done, time.perf_counter()
-    for _ in range(_ROUNDS):
-        busy = []
-        for number, outcome in group.each(numbers):
-            if outcome == BUSY:
-                busy.append(number)
-                continue
-            done += 1
-            rate = (done - before) / (time.perf_counter() - began)
-            progress(Stage(done / total, f"{done} of {total} done, {_pace(rate)}"))
-        if not busy:
-            return
-        numbers = busy
-        time.sleep(_PATIENCE)
-    raise LumigraphError(
-        f"{len(numbers)} frames are still being computed by other runs. Start again when they have ended."
-    )
-
-
-def _check(
-    task: Task, who: tuple[Cluster, Group], begun: tuple[list[int], float],
+def _begin(
+    task: Task, who: tuple[Cluster, Group], left: list[int], progress: Progress,
     estimated: Callable[[Estimate], None] | None,
+) -> list[int]:  # fmt: skip
+    """Do frames that show what the others will need, tell it, and give the others.
+
+    The first one makes what they share; after it, some from all over the job by all workers side by side.
+
+    Raises
+    ------
+    SamplingError
+        The others cannot fit.
+    """
+    began, (_, group) = time.perf_counter(), who
+    done = _do(group, left[:1], 0, len(left), progress)
+    first, rest = _entries(task, done), left[1:]
+    starting = max(time.perf_counter() - began - sum(one.seconds for one in first), 0.0)
+    if first and rest:
+        _need(task, who, len(rest), first, starting)  # refused before other workers take as much memory
+    tried = _tried(rest, group.count, first[0].seconds if first else math.inf)
+    done += _do(group, tried, 1, len(left), progress)
+    rest = [number for number in rest if number not in set(tried)]
+    known = _entries(task, done)
+    if known and rest:
+        _need(task, who, len(rest), known, starting, estimated)
+    return rest
+
+
+def _tried(numbers: list[int], workers: int, seconds: float) -> list[int]:
+    """Some of the frames, evenly spaced, by what the first one took: costs may change along a job.
+
+    >>> _tried(list(range(1, 24)), 2, 0.1), _tried(list(range(1, 24)), 2, 60.0), _tried([7, 8], 4, 60.0)
+    ([3, 7, 12, 17, 21], [6, 18], [8])
+    """
+    each = min(_TRIED, int(_TRIAL / max(seconds, 1e-3)))
+    count = min(max(workers * max(each, 1), 1), max(len(numbers) // _PART, 1), len(numbers))
+    return [numbers[(2 * k + 1) * len(numbers) // (2 * count)] for k in range(count)]
+
+
+def _entries(task: Task, numbers: list[int]) -> list[Entry]:
+    """Of those frames that did not fail."""
+    return [entry for number in numbers if (entry := task.ledger.entry(number)) is not None]
+
+
+def _need(
+    task: Task, who: tuple[Cluster, Group], frames: int, known: list[Entry], starting: float,
+    estimated: Callable[[Estimate], None] | None = None,
 ) -> None:  # fmt: skip
-    """Tell what the rest needs, by the first frames and their time, and refuse what cannot fit."""
-    left, elapsed = begun
-    first = [entry for number in left[:_FIRST] if (entry := task.ledger.entry(number)) is not None]
-    if not first or len(left) <= _FIRST:
-        return
+    """Tell what so many frames need, by those that are known, and refuse what cannot fit."""
     cluster, group = who
-    starting = max(elapsed - sum(entry.seconds for entry in first), 0.0)
     processors = arrays.WORKERS if cluster.is_here else math.inf
-    rest = len(left) - _FIRST
-    needed = Estimate.of(first, rest, group.count, processors=processors, starting=starting)
+    needed = Estimate.of(known, frames, group.count, processors=processors, starting=starting)
     needed = replace(needed, noun=task.ledger.noun)
     if estimated is not None:
         estimated(needed)
     needed.require(group.count if cluster.is_here else 1, task.output)
+
+
+def _do(group: Group, numbers: list[int], done: int, total: int, progress: Progress) -> list[int]:
+    """Do some frames; those that somebody else works on are asked for until they are done.
+
+    Their numbers are given in the order in which they ended.
+    """
+    ended, began, waiting = list[int](), time.perf_counter(), numbers
+    for _ in range(_ROUNDS):
+        busy = []
+        for number, outcome in group.each(waiting):
+            if outcome == BUSY:
+                busy.append(number)
+                continue
+            ended.append(number)
+            rate = len(ended) / (time.perf_counter() - began)
+            whole = done + len(ended)
+            progress(Stage(whole / total, f"{whole} of {total} done, {_pace(rate)}"))
+        if not busy:
+            return ended
+        waiting = busy
+        time.sleep(_PATIENCE)
+    raise LumigraphError(
+        f"{len(waiting)} frames are still being computed by other runs. Start again when they have ended."
+    )
 
 
 def _pace(rate: float) -> str:
