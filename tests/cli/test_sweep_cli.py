@@ -91,7 +91,7 @@ def test_what_no_camera_can_have_is_a_row_with_the_reason(tmp_path, capsys):
         (["--vary", "lenslets.focal_length=4,5"], "has no unit"),
         (["--vary", "lenslets.focal_length=4 mm:6 um:3"], "has two units"),
         (["--vary", "lenslets.focal_length=4 mm:6 mm"], "first:last:count"),
-        (["--vary", "lenslets.focal_length=4 mm:6 mm:1"], "a count from 2"),
+        (["--vary", "lenslets.focal_length=4 mm:6 mm:0"], "a count from 1"),
         (["--vary", "lenslets.focal_length"], "must be like"),
         (["--vary", "wavelength.a=1"], "which has no parts"),
         (["--vary", FOCAL, "--vary", FOCAL], "names a key twice"),

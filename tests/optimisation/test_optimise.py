@@ -1,5 +1,6 @@
 """Searches find optima that are known, go on after a kill to the same result, and refuse nonsense at once."""
 
+import dataclasses
 import json
 import math
 
@@ -77,6 +78,25 @@ def test_bounds_fall_and_the_best_is_a_camera_that_has_them():
     assert found.best["depth"] <= found.swept["depth"]
     again = lg.information.bounds(found.camera, DEPTHS, Light(5000), places=goal.places)
     assert again.depth == pytest.approx(found.best["depth"], rel=1e-6)
+
+
+def test_the_best_bound_carries_the_error_of_its_derivatives():
+    """A step that is far too long shows: what is said holds the bound by the right one."""
+    camera = lg.load_camera(CAMERA).replace(main_lens={"diameter": "3 mm"})
+    goal, first = Goal("lateral", depths=(2e-3,), light=Light(5000), places=1), collected(camera)
+    rough = goal.values(camera, first)["lateral"]
+    value, error = goal.checked(camera, first, rough)
+    again = lg.information.bounds(camera, (2e-3,), Light(5000), places=1)
+    assert value == pytest.approx(again.lateral, rel=1e-9)
+    assert 0 < error < 0.01
+    assert error >= abs(rough / value - 1) > 0
+    assert goal.checked(camera, first, 1.5 * value)[1] == pytest.approx(0.5)
+    exact = lg.optimise(SCOPE, {"fourier_lens": "60 mm:90 mm:1"}, depths=(2e-6,), search="grid")
+    assert exact.checked == (pytest.approx(exact.best["depth"], rel=1e-9), 0.0)
+    assert exact.best["fourier_lens"] == "75 mm"
+    assert dataclasses.replace(exact, checked=(8e-8, 0.25)).quantities()[2].interval == pytest.approx(
+        (6e-8, 1e-7)
+    )
 
 
 def test_more_aperture_collects_more_of_the_same_points_light():

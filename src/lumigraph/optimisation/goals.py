@@ -119,15 +119,34 @@ class Goal:
             return {self.name: math.nan if found is None else float(found)}
         return {row.name: float(row.value) for row in instrument.quantities() if row.name == self.name}
 
+    def checked(self, instrument: Instrument, first: float, rough: float) -> tuple[float, float]:
+        """A bound by derivatives of two steps, and its relative error; exact derivatives have none.
+
+        The error is that of the derivatives, or what the second step changes of the bound where that is more.
+
+        Parameters
+        ----------
+        instrument, first
+            As of `values`.
+        rough
+            The bound by one step, as `values` has it.
+        """
+        light = self._light(instrument, first)
+        found = bounds(instrument, self.depths, light, places=self.places)
+        value = float(getattr(found, self.name))
+        return value, max(float(np.max(found.errors)), abs(rough / value - 1))
+
+    def _light(self, instrument: Instrument, first: float) -> Light:
+        return Light(self.light.photons * collected(instrument) / first, self.light.background)
+
     def _bounds(self, instrument: Instrument, first: float) -> dict[str, float]:
-        photons = self.light.photons * collected(instrument) / first
-        light = Light(photons, self.light.background)
+        light = self._light(instrument, first)
         with warnings.catch_warnings():
             warnings.simplefilter("error", SamplingWarning)
             found = bounds(instrument, self.depths, light, places=self.places, checked=False)
         return {
             "depth": found.depth, "lateral": found.lateral, "brightness": found.brightness,
-            LIGHT: float(found.caught.mean()), "photons": photons,
+            LIGHT: float(found.caught.mean()), "photons": light.photons,
         }  # fmt: skip
 
     def cost(self, values: dict[str, Any]) -> float:

@@ -40,6 +40,9 @@ class Optimum:
         Values of the best at an end of their range, by key: another range would give a better camera.
     rows
         All cameras, in the order of the search; those that cannot be have an "error".
+    checked
+        Of a bound: the best by derivatives of two steps, as `information.bounds` checks them, and its
+        relative error. The search takes one step. None of other goals.
     """
 
     goal: Goal
@@ -49,6 +52,7 @@ class Optimum:
     best: dict[str, Any]
     active: dict[str, Any]
     rows: list[dict[str, Any]]
+    checked: tuple[float, float] | None = None
 
     __repr__ = brief
 
@@ -61,10 +65,12 @@ class Optimum:
     def quantities(self) -> tuple[Quantity, ...]:
         """The goal before, of the best of the grid, and of the best."""
         name, unit = self.goal.name, BOUNDS.get(self.goal.name, "")
+        best, error = self.checked or (self.best[name], 0.0)
+        between = (best * (1 - error), best * (1 + error)) if error else None
         return (
             Quantity(f"{name}, as given", self.start.get(name), unit),
             Quantity(f"{name}, best of the grid", self.swept[name], unit),
-            Quantity(f"{name}, best", self.best[name], unit),
+            Quantity(f"{name}, best", best, unit, between),
             Quantity("cameras", len(self.rows)),
             Quantity("impossible", sum(ERROR in row for row in self.rows)),
         )  # fmt: skip
@@ -163,7 +169,9 @@ def optimise(
             raise GeometryError(f"none of the first {len(items)} cameras can be, such as: {reason}")
         best = refined(cameras, space, swept, (search, most, seed))
         given, first, last = (dict(cameras.row(item)) for item in ({}, swept, best))
-    return Optimum(aim, changed(start, best), given, first, last, space.active(best), cameras.rows)
+    camera = changed(start, best)
+    checked = aim.checked(camera, cameras.first, last[aim.name]) if aim.name in BOUNDS else None
+    return Optimum(aim, camera, given, first, last, space.active(best), cameras.rows, checked)
 
 
 def _check(start: Instrument, item: Mapping[str, Any]) -> None:

@@ -76,7 +76,7 @@ class Space:
                 raise FormatError(f"--vary names {name} twice. Give all its values at once.")
             grid[name] = some
             if ":" in text:
-                ranges[name] = _range(text, some)
+                ranges[name] = _range(text)
         if not grid:
             raise FormatError("there is nothing to vary. Give a key and its values.")
         return cls(grid, ranges)
@@ -105,8 +105,8 @@ class Space:
         }
 
 
-def _range(text: str, some: list[Any]) -> Range:
-    ends = [NUMBER.fullmatch(str(value)) for value in (some[0], some[-1])]
+def _range(text: str) -> Range:
+    ends = [NUMBER.fullmatch(part.strip()) for part in text.partition("=")[2].split(":")[:2]]
     assert ends[0] is not None
     assert ends[1] is not None
     low, high = (float(one[1]) for one in ends if one)

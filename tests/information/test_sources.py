@@ -1,0 +1,80 @@
+"""Images of points before microscopes: axes, signs and units, by closed forms of rays and by each other."""
+
+import numpy as np
+import pytest
+
+import lumigraph as lg
+from lumigraph.information.points import MicroscopeSource, PupilSource, source
+
+UM = 1e-6
+PIXELS = 12
+"""Of a lenslet's width."""
+SOURCES = {"square": PupilSource, "round": MicroscopeSource}
+
+
+def scope(shape="square"):
+    """20x/0.5 with lenslets that match it, of 6.25 µm in the object."""
+    return lg.LightFieldMicroscope(
+        wavelength="525 nm",
+        objective={"magnification": 20, "numerical_aperture": 0.5},
+        lenslets={"pitch": "125 um", "focal_length": "2.5 mm", "count": (5, 5), "shape": shape},
+        sensor={"pixel_pitch": 125 * UM / PIXELS, "shape": (5 * PIXELS + 1, 5 * PIXELS + 3)},
+    )
+
+
+@pytest.fixture(scope="module", params=SOURCES)
+def points(request):
+    found = source(scope(request.param), np.array([40 * UM]), 1e-2)
+    assert type(found) is SOURCES[request.param]
+    return found
+
+
+def test_a_point_that_moves_by_a_lenslet_moves_its_image_by_one_along_the_same_axis(points):
+    at, cell = np.array([1.3, -0.7, 2.0]) * UM, points.cell(2 * UM)
+    image = points.image(at)
+    assert {tuple(row) for row in np.round(np.abs(cell) / UM, 9).tolist()} == {(0.0, 6.25), (6.25, 0.0)}
+    for vector in cell:
+        moved = points.image(at + np.append(vector, 0.0))
+        steps = tuple(np.round(vector / (6.25 * UM)).astype(int) * PIXELS)
+        assert np.linalg.norm(moved - np.roll(image, steps, (0, 1))) < 0.02 * np.linalg.norm(image)
+        assert np.linalg.norm(moved - np.roll(image, steps[::-1], (0, 1))) > np.linalg.norm(image)
+
+
+@pytest.mark.parametrize("dz", [40 * UM, -40 * UM])
+def test_behind_a_lenslet_beside_the_axis_a_points_spot_stands_where_its_ray_ends(points, dz):
+    """The image is M² dz before the lenslets: from there the ray to Y has a slope of Y/(M² dz)."""
+    image = points.image(np.array([0.0, 0.0, dz]))
+    slope = 125 * UM / (20**2 * dz)
+    wanted = slope * 2.5e-3 / (125 * UM) * PIXELS
+    middle = np.array(image.shape) // 2
+    for axis in (0, 1):
+        for side in (-1, 1):
+            y, x = middle + np.eye(2, dtype=int)[axis] * side * PIXELS
+            spot = image[y - 5 : y + 6, x - 5 : x + 6]
+            shift = np.arange(-5, 6) @ spot.sum(1 - axis) / spot.sum()
+            assert shift == pytest.approx(side * wanted, rel=0.15)
+            assert abs(np.arange(-5, 6) @ spot.sum(axis) / spot.sum()) < 0.02 * abs(wanted)
+
+
+def test_the_light_is_what_the_lenslets_let_through(points):
+    """Out of focus round ones leave out what stands between them, π/4 in all; in focus nothing does."""
+    open_part = 1.0 if isinstance(points, PupilSource) else np.pi / 4
+    assert points.image(np.zeros(3)).sum() == pytest.approx(0.985, abs=0.01)
+    assert points.image(np.array([1.3, -0.7, 9.0]) * UM).sum() == pytest.approx(0.99 * open_part, abs=0.02)
+
+
+def test_derivatives_are_those_of_the_images(points):
+    at = np.array([1.3, -0.7, 9.0]) * UM
+    lit, errors = points.lit(at, checked=True)
+    assert np.linalg.norm(lit[0] - points.image(at)) < 1e-6 * np.linalg.norm(lit[0])
+    assert (errors == 0).all() if isinstance(points, PupilSource) else (errors > 0).all()
+    for axis, step in enumerate((2e-8, 2e-8, 1e-7)):
+        move = np.eye(3)[axis] * step
+        slope = (points.image(at + move) - points.image(at - move)) / (2 * step)
+        assert np.linalg.norm(slope - lit[1 + axis]) < 0.01 * np.linalg.norm(slope)
+
+
+def test_square_lenslets_show_the_same_by_the_pupil_as_by_the_image():
+    one, other = source(scope(), np.array([-9 * UM]), 1e-2), MicroscopeSource(scope(), 1e-2)
+    image, wanted = (points.image(np.array([1.3, -0.7, -9.0]) * UM) for points in (one, other))
+    assert np.linalg.norm(image - wanted) < 0.02 * np.linalg.norm(wanted)  # both were asked for 1e-2
