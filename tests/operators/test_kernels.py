@@ -61,7 +61,7 @@ def test_mirrored_blocks_are_those_computed_one_by_one(layout, monkeypatch):
     monkeypatch.setattr(Optics, "reach", (2, 2))
     monkeypatch.setattr(Optics, "near", (1, 1))
     folded = whole(kernels._unpacked(kernels._build(optics), optics))
-    monkeypatch.setattr(point_images.Wave, "even", False)
+    monkeypatch.setattr(point_images.Wave, "even", (False, False))
     assert difference(folded, whole(kernels._unpacked(kernels._build(optics), optics))) < 1e-4
 
 

@@ -19,7 +19,8 @@
   `microscope_pupil`, points by the pupil's phase; `microscope_pixels`, real pixels; `fourier_microscope`;
   `fourier_points`, its points with derivatives
 - `exact`: lenslets and distances beyond the paraxial; `paraxial`, how far off that is
-- `varying`: main lenses whose aberrations change over the field; `let`, the share of each sample
+- `varying`: main lenses whose aberrations change over the field; `let`, the share of each sample; `mirrors`,
+  what is known of one field, of those that mirror it
 - `fineness`: what an accuracy asks for
 - `band`: band-limited samples along an axis, to and from points and pixels
 - `camera`: `CameraOptics`, what an operator reads of an instrument, as plain values

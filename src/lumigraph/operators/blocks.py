@@ -161,7 +161,8 @@ class Builder:
         self.apart = None
         if not optics.straight:
             self.apart = LensletLight(self.lenslets, self.light, optics.lit, accuracy)
-        self.even = self.light.even, self.light.even and symmetric(optics.array)
+        up, left = self.light.even
+        self.even = up, left and symmetric(optics.array)
         y, x = self.axes
         self.square = y == x and bool(np.allclose(self.light.data, self.light.data.T))
         self.norm = self.least = 0.0

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -350,7 +351,7 @@ def blur(camera: CameraOptics, distance: float) -> float:
     Where that changes over the field, it is the largest.
     """
     if varying.plate_of(camera) is not None:
-        return max(blur(each, distance) for each in varying.some(camera))
+        return _widest(replace(camera, array=None), distance)
     elements = camera.lens.elements
     (focal_length,) = (p.focal_length for p in elements if isinstance(p, ThinLens))
     spread = 1 - camera.separation * (1 / focal_length - 1 / distance)
@@ -366,6 +367,12 @@ def blur(camera: CameraOptics, distance: float) -> float:
         down = down + bend * (plate.phase(y + step, x) - plate.phase(y - step, x))
         across = across + bend * (plate.phase(y, x + step) - plate.phase(y, x - step))
     return math.sqrt(2 * float(np.mean(down**2 + across**2)))
+
+
+@lru_cache(maxsize=64)
+def _widest(camera: CameraOptics, distance: float) -> float:
+    """`blur` behind a lens that changes over the field: asked for thousands of times."""
+    return max(blur(each, distance) for each in varying.some(camera))
 
 
 def _pair(values: Iterable[Any]) -> tuple[Any, Any]:

@@ -29,20 +29,22 @@ import numpy as np
 from lumigraph.core import arrays, memory
 from lumigraph.core.arrays import Array
 from lumigraph.core.grid import Grid
-from lumigraph.core.linear import Linear, Shape, stack
+from lumigraph.core.linear import Chain, Linear, Shape, stack
 from lumigraph.core.progress import Progress
 from lumigraph.core.progress import part as part_of
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators import varying
+from lumigraph.operators import mirrors, varying
 from lumigraph.operators.beyond import Beyond, beyond
 from lumigraph.operators.blocks import Part
 from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.cell_response import Pair
 from lumigraph.operators.cells import Cells, blur, check_alike
 from lumigraph.operators.kernels import A_MINUTE, LONGEST, Matrix, matrix
+from lumigraph.operators.mirrors import Mirror
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.over_field import over_field
 from lumigraph.operators.paraxial import field_matters, resolved
+from lumigraph.operators.places import Turn
 from lumigraph.operators.points import seen
 from lumigraph.operators.sizes import build_operations
 from lumigraph.operators.streamed import Streamed
@@ -332,13 +334,16 @@ class _Making:
 def _varying(camera: CameraOptics, grid: Grid, dz: float, making: _Making) -> Linear:
     """Of a plane before a lens that changes over the field."""
     distance, accuracy = camera.object_distance + dz, making.accuracy
+    optics = Optics.of(camera, distance, accuracy)
+    turns = mirrors.turns(optics.bricks)
     found = varying.lenses(
-        camera, (grid.y / distance, grid.x / distance), seen(camera, distance, accuracy), accuracy
-    )
-    count, number = len(found.chosen), iter(range(len(found.chosen)))
-    _check_price(camera, distance, accuracy, count)
+        camera, (grid.y / distance, grid.x / distance), seen(camera, distance, accuracy), accuracy,
+        mirrors.of_fields(turns, optics.rotation),
+    )  # fmt: skip
+    count, number = len(found.sources), iter(range(len(found.sources)))
+    _check_price(optics.bricks, count)
 
-    def of(one: CameraOptics) -> Linear:
+    def of(one: CameraOptics) -> PeriodicOperator:
         mine = making.of(next(number), count)
         result = periodic_operator(
             one, grid, dz, accuracy=accuracy, folder=mine.folder, progress=mine.progress
@@ -347,14 +352,35 @@ def _varying(camera: CameraOptics, grid: Grid, dz: float, making: _Making) -> Li
             count * result.memory_bytes, f"the operators of {count} lenses over the field",
             "Use fewer lenslets, or a coarser accuracy.", SamplingError,
         )  # fmt: skip
+        assert isinstance(result, PeriodicOperator)  # of one lens and depth
         return result
 
-    return varying.operator(camera, grid, distance, found, of)
+    def mirrored(one: PeriodicOperator, number: int) -> PeriodicOperator:
+        return mirrored_operator(one, turns[number])
+
+    return varying.operator(camera, grid, distance, found, of, mirrored)
 
 
-def _check_price(camera: CameraOptics, distance: float, accuracy: float, count: int) -> None:
+def mirrored_operator(operator: PeriodicOperator, turn: Turn) -> PeriodicOperator:
+    """With the same matrices, of what the main lens makes of mirrored light."""
+
+    def before(spread: Linear) -> Chain:
+        return Chain((spread, Mirror(spread.shape[0], turn).T))
+
+    planes = tuple(
+        replace(
+            plane,
+            spread=before(plane.spread),
+            beyond=plane.beyond and replace(plane.beyond, spread=before(plane.beyond.spread)),
+        )
+        for plane in operator.planes
+    )
+    image = Mirror(operator.readout.shape[1], turn)
+    return replace(operator, planes=planes, readout=Chain((image, operator.readout)))
+
+
+def _check_price(optics: Optics, count: int) -> None:
     """Refuse what would take too long to build."""
-    optics = Optics.of(camera, distance, accuracy).bricks
     if (operations := count * build_operations(optics)) > LONGEST:
         raise SamplingError(
             f"the operators of {count} lenses over the field take {operations:.0e} operations to build, "

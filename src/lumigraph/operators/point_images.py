@@ -35,14 +35,15 @@ class Wave:
         return Wave(self.data / np.float32(factor), self.first)
 
     @property
-    def even(self) -> bool:
-        """Whether it is the same in a mirror, left and right and up and down."""
+    def even(self) -> tuple[bool, bool]:
+        """Whether it is the same in a mirror, up and down, and left and right."""
         middle = [-f for f in self.first]
         span = [min(m, n - 1 - m) for m, n in zip(middle, self.data.shape, strict=True)]
         core = self.data[middle[0] - span[0] : middle[0] + span[0] + 1]
         core = core[:, middle[1] - span[1] : middle[1] + span[1] + 1]
         tolerance = 1e-5 * float(np.abs(core).max())
-        return all(np.abs(core - np.flip(core, axis)).max() < tolerance for axis in (0, 1))
+        y, x = (bool(np.abs(core - np.flip(core, axis)).max() < tolerance) for axis in (0, 1))
+        return y, x
 
 
 def wave(

@@ -14,7 +14,7 @@ how many, and how far off fields between the nodes are, which is stated.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -33,6 +33,16 @@ SHARE = 0.6
 
 CHOSEN = 0.4
 """Part of the accuracy that lenses at the nodes may be off by that are not chosen."""
+
+ALONE = np.eye(2)[None]
+"""Mirrors of a camera that has none: the fields themselves."""
+
+ASIDE = 1.1
+"""Fields that reach farther to one side than this, of half of them, are not mirrored."""
+
+Pair = tuple[float, float]
+
+M = TypeVar("M", bound=Linear)
 
 Image = Callable[[CameraOptics], np.ndarray]
 """Of some points behind a camera's lens: what tells lenses apart, as one row of numbers."""
@@ -84,6 +94,23 @@ def check_one(camera: CameraOptics) -> None:
         raise GeometryError(OF_ONE_LENS)
 
 
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """A lens that stands for others.
+
+    Parameters
+    ----------
+    field
+        (y, x), tangents.
+    source, mirror
+        The field that it mirrors, or itself, and the number of the mirror.
+    """
+
+    field: Pair
+    source: Pair
+    mirror: int = 0
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Lenses:
     """Fields whose lenses stand for all others.
@@ -91,7 +118,7 @@ class Lenses:
     Parameters
     ----------
     chosen
-        Their fields (y, x), tangents.
+        Those lenses.
     shares
         Of each chosen lens in those of all nodes (R, n, n).
     middle, half
@@ -100,11 +127,16 @@ class Lenses:
         What fields between the nodes are off by, relative rms, at the worst of those tried.
     """
 
-    chosen: tuple[tuple[float, float], ...]
+    chosen: tuple[Chosen, ...]
     shares: np.ndarray
-    middle: tuple[float, float]
-    half: tuple[float, float]
+    middle: Pair
+    half: Pair
     left: float
+
+    @property
+    def sources(self) -> list[Pair]:
+        """Fields whose lenses the chosen ones mirror, each once."""
+        return list(dict.fromkeys(one.source for one in self.chosen))
 
     def weights(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Of the chosen lenses (R, ny, nx), for fields at y (ny,) and x (nx,)."""
@@ -113,13 +145,6 @@ class Lenses:
             for at, middle, half in zip((y, x), self.middle, self.half, strict=True)
         )
         return np.einsum("rij,iy,jx->ryx", self.shares, down, across, optimize=True)
-
-    def of_points(self, fields: np.ndarray) -> np.ndarray:
-        """Of the chosen lenses (R, n), for fields (n, 2)."""
-        down, across = (
-            lagrange(self.shares.shape[1], (fields[:, k] - self.middle[k]) / self.half[k]) for k in (0, 1)
-        )
-        return np.einsum("rij,in,jn->rn", self.shares, down, across, optimize=True)
 
 
 def nodes(count: int) -> np.ndarray:
@@ -137,9 +162,27 @@ def lagrange(count: int, at: np.ndarray) -> np.ndarray:
 
 
 def lenses(
-    camera: CameraOptics, fields: tuple[np.ndarray, np.ndarray], image: Image, accuracy: float
+    camera: CameraOptics,
+    fields: tuple[np.ndarray, np.ndarray],
+    image: Image,
+    accuracy: float,
+    mirrors: np.ndarray = ALONE,
 ) -> Lenses:
     """The fewest lenses that fields along y and along x have, to a part of the accuracy, relative rms.
+
+    Parameters
+    ----------
+    camera
+        Whose lens changes over the field.
+    fields
+        Along y and along x, tangents.
+    image
+        What tells lenses apart.
+    accuracy
+        Of operators.
+    mirrors
+        Matrices (n, 2, 2) of what fields (y, x) become in mirrors that change nothing else, the first of
+        them the fields themselves: where a lens is chosen, all that it mirrors may be.
 
     Raises
     ------
@@ -153,65 +196,90 @@ def lenses(
     ends = [(float(at.min()), float(at.max())) for at in fields]
     corners = np.array([(a, b) for a in ends[0] for b in ends[1]])
     plate.aberrations.check(corners[:, 0], corners[:, 1])
-    middle = tuple((low + high) / 2 for low, high in ends)
+    if any(max(map(abs, pair)) > ASIDE * max((pair[1] - pair[0]) / 2, 1e-12) for pair in ends):
+        mirrors = ALONE
+    if len(mirrors) > 1:
+        ends = [(-max(map(abs, pair)), max(map(abs, pair))) for pair in ends]
+    middle = (sum(ends[0]) / 2, sum(ends[1]) / 2)
     half = tuple(max((high - low) / 2, 1e-12) for low, high in ends)
+    known: dict[Pair, np.ndarray] = {}
 
-    def seen(y: float, x: float) -> np.ndarray:
-        field = middle[0] + y * half[0], middle[1] + x * half[1]
-        return image(at(camera, *field)).astype(np.float64)
+    def seen(field: Pair) -> np.ndarray:
+        key = round(field[0], 12), round(field[1], 12)
+        if key not in known:
+            known[key] = image(at(camera, *key)).astype(np.float64)
+        return known[key]
 
-    tried = [(place, seen(*place)) for place in TRIED]
-    found = next(
-        (f for f in (_lenses(seen, tried, n, accuracy) for n in COUNTS) if f.left <= SHARE * accuracy), None
+    search = _Search(seen, middle, (half[0], half[1]), accuracy, mirrors)
+    least = math.inf
+    for count in COUNTS:
+        found = search.with_nodes(count)
+        if found.left <= SHARE * accuracy:
+            return found
+        least = found.left
+    raise SamplingError(
+        f"aberrations change so fast over the field that lenses between {COUNTS[-1]} x {COUNTS[-1]} "
+        f"others are off by {least:.2g} rms; accuracy {accuracy:g} allows {SHARE * accuracy:.2g}. "
+        f"Ask for {least / SHARE:.2g}, or use a smaller field; single points are not interpolated."
     )
-    if found is None:
-        least = _lenses(seen, tried, COUNTS[-1], accuracy).left
-        raise SamplingError(
-            f"aberrations change so fast over the field that lenses between {COUNTS[-1]} x {COUNTS[-1]} "
-            f"others are off by {least:.2g} rms; accuracy {accuracy:g} allows {SHARE * accuracy:.2g}. "
-            f"Ask for {least / SHARE:.2g}, or use a smaller field; single points are not interpolated."
-        )
-    chosen = tuple((middle[0] + y * half[0], middle[1] + x * half[1]) for y, x in found.chosen)
-    return replace(found, chosen=chosen, middle=(middle[0], middle[1]), half=(half[0], half[1]))
 
 
 TRIED = ((0.97, 0.93), (-0.88, 0.31), (0.05, -0.6), (-0.41, -0.77))
 """Fields, of half of them, at which interpolation is measured."""
 
 
-def _lenses(
-    seen: Callable[[float, float], np.ndarray],
-    tried: Sequence[tuple[tuple[float, float], np.ndarray]],
-    count: int,
-    accuracy: float,
-) -> Lenses:
-    """With so many nodes along each axis, on fields from -1 to 1."""
-    places = [(y, x) for y in nodes(count) for x in nodes(count)]
-    known = np.array([seen(*place) for place in places])
-    picked, shares = decomposed(known, CHOSEN * accuracy)
-    found = Lenses(
-        tuple((float(places[k][0]), float(places[k][1])) for k in picked),
-        shares.reshape(-1, count, count), (0.0, 0.0), (1.0, 1.0), 0.0,
-    )  # fmt: skip
-    off = 0.0
-    for place, expected in tried:
-        image = found.of_points(np.array([place]))[:, 0] @ known[picked]
-        off = max(off, float(np.linalg.norm(image - expected) / np.linalg.norm(expected)))
-    return replace(found, left=off)
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """For the lenses of fields around a `middle`, up to `half` of them away; see `lenses`."""
 
+    seen: Callable[[Pair], np.ndarray]
+    middle: Pair
+    half: Pair
+    accuracy: float
+    mirrors: np.ndarray
 
-def decomposed(rows: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of which all (n, m) are sums, to a relative rms of `least` each, and their weights (R, n)."""
-    gram = rows @ rows.T
-    norms, left, picked = np.diag(gram).copy(), np.diag(gram).copy(), []
-    factor = np.zeros((len(rows), 0))
-    while len(picked) < len(rows) and np.max(left / norms) > least**2:
-        k = int(np.argmax(left / norms))
-        column = (gram[:, k] - factor @ factor[k]) / math.sqrt(left[k])
-        factor, left = np.column_stack((factor, column)), np.maximum(left - column**2, 0)
-        picked.append(k)
-    mine = np.array(picked or [0])
-    return mine, np.linalg.lstsq(rows[mine].T, rows.T, rcond=None)[0]
+    def with_nodes(self, count: int) -> Lenses:
+        """With so many nodes along each axis."""
+        places = [self._field(y, x) for y in nodes(count) for x in nodes(count)]
+        known = np.array([self.seen(place) for place in places])
+        chosen, rows = self._chosen(places, known)
+        shares = np.linalg.lstsq(rows.T, known.T, rcond=None)[0].reshape(-1, count, count)
+        found, off = Lenses(chosen, shares, self.middle, self.half, 0.0), 0.0
+        for y, x in TRIED:
+            field = self._field(y, x)
+            weights, expected = found.weights(*np.array(field)[:, None])[:, 0, 0], self.seen(field)
+            off = max(off, float(np.linalg.norm(weights @ rows - expected) / np.linalg.norm(expected)))
+        return replace(found, left=off)
+
+    def _field(self, y: float, x: float) -> Pair:
+        return self.middle[0] + y * self.half[0], self.middle[1] + x * self.half[1]
+
+    def _chosen(self, places: Sequence[Pair], known: np.ndarray) -> tuple[tuple[Chosen, ...], np.ndarray]:
+        """Lenses of which all at some places are sums, and their images (R, m)."""
+        least, chosen, rows = CHOSEN * self.accuracy, [], []
+        norms, rest, basis = np.linalg.norm(known, axis=1), known.copy(), np.zeros((0, known.shape[1]))
+        while not chosen or np.max(np.linalg.norm(rest, axis=1) / norms) > least:
+            worst = int(np.argmax(np.linalg.norm(rest, axis=1) / norms))
+            for one in self._mirrored(places[worst]):
+                row = self.seen(one.field)
+                new = row - (row @ basis.T) @ basis
+                new -= (new @ basis.T) @ basis  # once is not enough in finite precision
+                if np.linalg.norm(new) <= least * np.linalg.norm(row):
+                    continue
+                new /= np.linalg.norm(new)
+                basis, rest = np.vstack((basis, new)), rest - np.outer(rest @ new, new)
+                chosen.append(one)
+                rows.append(row)
+        return tuple(chosen), np.array(rows)
+
+    def _mirrored(self, field: Pair) -> list[Chosen]:
+        """A field and all that it mirrors, from the one of them that has the largest coordinates."""
+        fields = [(float(y), float(x)) for y, x in self.mirrors @ field]
+        source = max(fields, key=lambda one: (round(min(one), 12), round(max(one), 12)))
+        found: dict[Pair, Chosen] = {}
+        for number, (y, x) in enumerate(self.mirrors @ source):
+            found.setdefault((round(y, 12), round(x, 12)), Chosen((float(y), float(x)), source, number))
+        return list(found.values())
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -219,8 +287,14 @@ class FieldOperator(Sum):
     """Operator of a camera whose main lens changes over the field: of few lenses, each of its share."""
 
     left: float = 0.0
+    held: float = 0.0
 
     title: ClassVar[str] = "Operator of a lens that changes over the field"
+
+    @property
+    def memory_bytes(self) -> float:
+        """Of the operators, those that mirror others not counted, and of their shares [bytes]."""
+        return self.held + 4.0 * len(self.maps) * math.prod(self.shape[0])
 
     @property
     def error(self) -> float:
@@ -229,12 +303,23 @@ class FieldOperator(Sum):
 
 
 def operator(
-    camera: CameraOptics, grid: Grid, distance: float, found: Lenses, of: Callable[[CameraOptics], Linear]
+    camera: CameraOptics,
+    grid: Grid,
+    distance: float,
+    found: Lenses,
+    of: Callable[[CameraOptics], M],
+    mirrored: Callable[[M, int], Linear] | None = None,
 ) -> FieldOperator:
-    """Of a plane at a distance [m], by the operators `of` cameras with one lens."""
+    """Of a plane at a distance [m], by operators `of` cameras with one lens and `mirrored` ones."""
     weights = found.weights(grid.y / distance, grid.x / distance).astype(np.float32)
+    known = {source: of(at(camera, *source)) for source in found.sources}
     maps: list[Linear] = []
-    for field, weight in zip(found.chosen, weights, strict=True):
-        part = of(at(camera, *field))
+    for one, weight in zip(found.chosen, weights, strict=True):
+        part: Linear = known[one.source]
+        if one.mirror and mirrored is not None:
+            part = mirrored(known[one.source], one.mirror)
         maps.append(Chain((Let(weight), part), object_grid=grid))
-    return FieldOperator(tuple(maps), (1.0,) * len(maps), left=found.left, object_grid=grid)
+    held = sum(part.memory_bytes for part in known.values())
+    return FieldOperator(
+        tuple(maps), (1.0,) * len(maps), left=found.left, held=held + weights.nbytes, object_grid=grid
+    )
