@@ -5,9 +5,11 @@
 - `space`: what may change, and which cameras that gives
 - `evaluations`: each camera once, noted in a ledger, so that a search goes on after a kill
 - `search`: a grid, then downhill from its best, or over all of the ranges
+- `mask`: `depth_mask`, a phase in the pupil that leaves detail alike over a range of defocus
 """
 
 from lumigraph.optimisation.goals import Goal
+from lumigraph.optimisation.mask import DepthMask, depth_mask
 from lumigraph.optimisation.optimise import Optimum, optimise
 
-__all__ = ["Goal", "Optimum", "optimise"]
+__all__ = ["DepthMask", "Goal", "Optimum", "depth_mask", "optimise"]
