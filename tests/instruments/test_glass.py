@@ -127,6 +127,16 @@ def test_a_point_farther_out_is_imaged_by_an_ellipse(camera):
     assert sums[0] / sums[1] == pytest.approx(1 - SHRINK * 0.06**2, rel=3e-3)
 
 
+def test_a_prescription_without_focal_length_names_the_remedy(tmp_path):
+    with pytest.raises(
+        FormatError, match=r"focal_length is missing beside prescription. Write the lens' own"
+    ):
+        lg.SingleLensCamera(
+            object_distance=Z1, wavelength="550 nm", main_lens={"prescription": tmp_path / "lens.zmx"},
+            sensor={"pixel_pitch": "5 um", "shape": (101, 101)},
+        )  # fmt: skip
+
+
 def test_simulated_points_take_it(camera):
     small = camera.replace(sensor={"shape": (101, 101)})
     raw = lg.simulate(small, lg.targets.points([(0.0, 0.0)]))

@@ -92,6 +92,41 @@ def test_optilands_json_is_the_same(camera, tmp_path):
     assert one == pytest.approx(two, abs=1e-9)
 
 
+@pytest.mark.parametrize("what", ["pickups", "solves"])
+def test_surfaces_that_follow_others_are_refused(camera, tmp_path, what):
+    """Placing the image plane would move them without a word."""
+    from optiland.fileio import save_optiland_file
+
+    path, lens = tmp_path / "lens.json", Prescription(camera.main_lens.prescription)._lens
+    given = {"pickups": (1, "radius", 2), "solves": ("marginal_ray_height", 12, 0.0)}[what]
+    getattr(lens, what).add(*given)
+    save_optiland_file(lens, str(path))
+    with pytest.raises(GeometryError, match="pickups or solves"):
+        Prescription(path)
+
+
+def test_the_drawing_shows_rays_on_the_spheres_of_the_file(camera):
+    """With radii and distances as written; rays meet in the image, the chief ray amid the stop."""
+    drawn, lines = camera.layout().glass, camera.main_lens.prescription.read_text().splitlines()
+    curvatures, gaps = (
+        [float(line.split()[1]) for line in lines if line.split()[:1] == [key]][1:-1]
+        for key in ("CURV", "DISZ")
+    )
+    vertices = np.concatenate(([0.0], np.cumsum(gaps[:-1]))) * 1e-3
+    assert drawn.surfaces.shape[:2] == (11, 2)
+    for places in (drawn.rays[:, :, 1:-1], drawn.surfaces.transpose(2, 1, 0)):
+        z, y = places[:, 0], places[:, 1]
+        c = np.array(curvatures) * 1e3
+        np.testing.assert_allclose(z, vertices + c * y**2 / (1 + np.sqrt(1 - c**2 * y**2)), atol=1e-9)
+    assert drawn.stop == 5
+    chief = drawn.rays[len(drawn.rays) // 2 + 2, 1]
+    assert abs(chief[1 + drawn.stop]) < 1e-8
+    at_image = drawn.rays[5:, 1, -1]
+    assert np.ptp(at_image) < 2e-4 < abs(at_image).min()
+    assert chief[0] / at_image[2] == pytest.approx(-Z1 / (1 / (1 / F - 1 / Z1)), rel=0.02)
+    assert drawn.is_glass == (True, False, True, True, False, False, True, True, False, True, False)
+
+
 def test_more_light_than_the_file_opens_to_is_refused(camera):
     with pytest.raises(GeometryError, match="opens to"):
         _ = camera.replace(main_lens={"diameter": 0.03}).glass

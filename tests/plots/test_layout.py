@@ -1,10 +1,12 @@
 """Ray diagrams: the right distances in words, readable labels, and rays that meet where optics says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.patches import Ellipse
 
-from lumigraph.design.layout import Layout
+from lumigraph.design.layout import GlassLayout, Layout
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import load_camera
 from lumigraph.plots.layout import layout
@@ -128,3 +130,24 @@ def test_each_kind_of_lenslets_has_its_colour_and_the_stronger_one_is_thicker():
     focal = load_camera("multi-focus-hex").layout().lenslets
     by_kind = {lens.get_width(): focal.focal_length(k - len(lenses) // 2) for k, lens in enumerate(lenses)}
     assert [by_kind[width] for width in sorted(by_kind)] == sorted(by_kind.values(), reverse=True)
+
+
+def test_a_main_lens_of_glass_has_a_panel_to_scale():
+    """Two pieces of glass, one on each side of the stop."""
+    at = np.linspace(-5e-3, 5e-3, 11)
+    surfaces = np.array([[np.full(11, z), at] for z in (0.0, 4e-3, 6e-3, 8e-3, 9e-3)])
+    rays = np.zeros((6, 2, 7)) + np.array([-0.1, 0, 4e-3, 6e-3, 8e-3, 9e-3, 0.1])[:, None].T
+    glass = GlassLayout(surfaces, (True, False, False, True, False), rays, 2, (3e-3, 5e-3))
+    drawn = camera_of("thesis-plenoptic-1").layout()
+
+    class Real:
+        def layout(self):
+            return replace(drawn, glass=glass)
+
+    upper, middle, lower = layout(Real()).axes
+    assert len(middle.patches) == 2
+    assert middle.get_aspect() == 1.0
+    assert {"H", "H\u2032", "stop"} <= {text.get_text() for text in middle.texts}
+    assert glass.half_heights == pytest.approx([5e-3] * 5)
+    assert upper.patches
+    assert lower.patches

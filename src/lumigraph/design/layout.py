@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 
 @dataclass(frozen=True, slots=True)
 class LensletLayout:
@@ -35,6 +37,37 @@ class LensletLayout:
         return self.focal_lengths[number % len(self.focal_lengths)]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class GlassLayout:
+    """The surfaces of a main lens, and rays through them; z counts from the first surface's vertex.
+
+    Parameters
+    ----------
+    surfaces
+        Places (n, 2, points) [m]: z, and heights from edge to edge as far as the rays reach.
+    is_glass
+        Whether there is glass behind each of them (n,).
+    rays
+        Places (rays, 2, n + 2) [m], z and height: at the object, at the surfaces and at the image; from two
+        fields with as many rays each, the chief ray in their middle.
+    stop
+        Number of the surface that is the stop.
+    planes
+        Front and rear principal planes [m].
+    """
+
+    surfaces: np.ndarray
+    is_glass: tuple[bool, ...]
+    rays: np.ndarray
+    stop: int
+    planes: tuple[float, float]
+
+    @property
+    def half_heights(self) -> np.ndarray:
+        """Semi-diameters of the surfaces (n,) [m], as far as the rays reach."""
+        return self.surfaces[:, 1].max(axis=1)
+
+
 @dataclass(frozen=True, slots=True)
 class Layout:
     """A main lens, a sensor, and lenslets between them or none.
@@ -51,6 +84,8 @@ class Layout:
         [m].
     lenslets
         None without them.
+    glass
+        Of a main lens whose prescription is known.
     """
 
     object_distance: float
@@ -60,6 +95,7 @@ class Layout:
     separation: float
     sensor_width: float
     lenslets: LensletLayout | None = None
+    glass: GlassLayout | None = None
 
     @property
     def length(self) -> float:

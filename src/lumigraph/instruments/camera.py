@@ -21,6 +21,7 @@ from lumigraph.elements import FieldPlate, LensletArray, ThinLens, Train, Zernik
 from lumigraph.errors import GeometryError, ParaxialWarning
 from lumigraph.instruments import describe_glass, parameters, point_view
 from lumigraph.instruments.glass import Glass, Wanted, glass
+from lumigraph.instruments.glass_layout import glass_layout
 from lumigraph.instruments.grids import Sampling
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.parameters import Parameter
@@ -164,19 +165,24 @@ class Camera(Instrument):
             Optiland is not installed.
         """
         path = self.main_lens.prescription
-        if path is None:
-            return None
-        return glass(path, Wanted(
+        return None if path is None else glass(path, self._wanted)
+
+    @property
+    def _wanted(self) -> Wanted:
+        """What it asks of its glass."""
+        return Wanted(
             self.wavelength, self.object_distance, self.main_lens.focal_length, self.pupil_diameter,
             math.hypot(*self.sampling.object_half) / self.object_distance,
-        ))  # fmt: skip
+        )  # fmt: skip
 
     def layout(self) -> Layout:
         """Distances and sizes that a ray diagram shows."""
         width = self.sensor.shape[1] * self.sensor.pixel_pitch
+        path = self.main_lens.prescription
         return Layout(
             self.object_distance, self.main_lens.focal_length, self.pupil_diameter, self.image_distance,
             self.separation, width, self._lenslet_layout(),
+            None if path is None else glass_layout(path, self._wanted),
         )  # fmt: skip
 
     def _lenslet_layout(self) -> LensletLayout | None:

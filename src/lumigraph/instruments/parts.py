@@ -69,6 +69,16 @@ class MainLens(Part):
     over_field: Annotated[OverField | None, BeforeValidator(given)] = None
     prescription: File | None = None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _has_a_focal_length(cls, table: Any) -> Any:
+        if isinstance(table, dict) and "prescription" in table and "focal_length" not in table:
+            raise FormatError(
+                "focal_length is missing beside prescription. Write the lens' own at the camera's "
+                'wavelength, such as "50 mm": where another one is written, the error names the right one.'
+            )
+        return table
+
     @model_validator(mode="after")
     def _has_one_source(self) -> "MainLens":
         if self.over_field is not None and self.prescription is not None:

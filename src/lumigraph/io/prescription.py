@@ -33,6 +33,9 @@ _SAME_INDEX = 1e-3
 
 _MM, _UM = 1e-3, 1e-6
 
+_DRAWN = 41
+"""Places of a surface that is drawn."""
+
 
 @dataclass(frozen=True, slots=True)
 class FirstOrder:
@@ -135,6 +138,8 @@ class Prescription:
                 )
             if getattr(surface.aperture, "r_min", 0):
                 raise self._refuse(f"an annular aperture at surface {number}", "Use round apertures.")
+        if len(lens.pickups) or len(lens.solves):  # they move surfaces whenever others are placed
+            raise self._refuse("pickups or solves", "Save it without them: numbers stay as they are.")
         if not any(surface.is_stop for surface in lens.surfaces.surfaces):
             raise self._refuse("no stop", "Say which surface is the stop.")
         if lens.apodization is not None or lens.polarization != "ignore":
@@ -240,6 +245,28 @@ class Prescription:
             for each, scale in ((rays.M, 1), (rays.L, 1), (rays.y, _MM), (rays.x, _MM), (rays.opd, _MM))
         )
         return Rays(*(each.reshape(len(heights), len(pupil)) for each in found))
+
+    def drawn(self, wavelength: float, heights: np.ndarray, pupil: np.ndarray) -> dict[str, np.ndarray]:
+        """What a drawing shows: rays as those of `trace`, in the plane of the field, and surfaces [m].
+
+        `rays` (rays, 2, n + 2), z and height at object, surfaces and image; `surfaces` (n, 2, points), z and
+        height as far as the rays reach; `is_glass` (n,), behind each of them; `stop`, the number of one.
+        """
+        self.trace(wavelength, heights, np.stack([pupil, np.zeros_like(pupil)], axis=-1))
+        found = self._lens.surfaces
+        rays = np.stack([np.asarray(each, float) for each in (found.z, found.y)]).transpose(2, 0, 1) * _MM
+        inner, profiles = found.surfaces[1:-1], []
+        for surface, place, half in zip(
+            inner, np.ravel(found.positions)[1:-1], np.abs(rays[:, 1, 1:-1]).max(axis=0), strict=True
+        ):
+            at = np.linspace(-half, half, _DRAWN)
+            sag = np.ravel(surface.geometry.sag(np.zeros(_DRAWN), at / _MM))
+            profiles.append([(float(place) + sag) * _MM, at])
+        indices = [float(np.ravel(surface.material_post.n(wavelength / _UM))[0]) for surface in inner]
+        return {
+            "rays": rays, "surfaces": np.array(profiles), "is_glass": np.array(indices) > 1 + 1e-3,
+            "stop": np.flatnonzero([surface.is_stop for surface in inner]),
+        }  # fmt: skip
 
     @contextlib.contextmanager
     def _tracing(self) -> Iterator[None]:

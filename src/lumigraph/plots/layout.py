@@ -11,7 +11,7 @@ from matplotlib.patches import Ellipse, Rectangle
 
 from lumigraph.design.layout import Layout, LensletLayout, MicroscopeLayout
 from lumigraph.errors import GeometryError
-from lumigraph.plots import microscope_layout
+from lumigraph.plots import glass_layout, microscope_layout
 from lumigraph.plots.axes import Drawing
 
 MM = 1e3
@@ -34,7 +34,8 @@ def layout(camera: Camera) -> Figure:
 
     The upper panel shows the whole camera, the lower one the lenslets and the sensor. Distances along the
     axis are to scale within a panel, heights are enlarged; the upper panel of a microscope is not to scale.
-    Lenslets of several focal lengths have a colour for each, the stronger ones are thicker.
+    Lenslets of several focal lengths have a colour for each, the stronger ones are thicker. A main lens of
+    glass has a panel of its own, to scale.
 
     Parameters
     ----------
@@ -58,14 +59,16 @@ def layout(camera: Camera) -> Figure:
             f"the object at {drawn.object_distance * MM:.6g} mm is inside the focal length of "
             f"{drawn.focal_length * MM:.6g} mm: there is no image to draw. Move it farther away."
         )
-    if drawn.lenslets is None:
-        figure = Drawing(figsize=(9.0, 3.6), layout="constrained")
-        _whole(figure.subplots(), drawn)
-        return figure
-    figure = Drawing(figsize=(9.0, 7.4), layout="constrained")
-    upper, lower = figure.subplots(2, 1, height_ratios=(1.0, 1.15))
-    _whole(upper, drawn)
-    _enlarged(lower, drawn, drawn.lenslets)
+    panels = [(1.0, lambda axes: _whole(axes, drawn))]
+    if (glass := drawn.glass) is not None:
+        panels.append((1.15, lambda axes: glass_layout.whole(axes, glass)))
+    if (lenslets := drawn.lenslets) is not None:
+        panels.append((1.15, lambda axes: _enlarged(axes, drawn, lenslets)))
+    heights = [height for height, _ in panels]
+    figure = Drawing(figsize=(9.0, 3.6 if len(panels) == 1 else 3.44 * sum(heights)), layout="constrained")
+    every = figure.subplots(len(panels), 1, height_ratios=heights, squeeze=False)
+    for axes, (_, draw) in zip(every[:, 0], panels, strict=True):
+        draw(axes)
     return figure
 
 
