@@ -1,14 +1,14 @@
 """Raw images and calibrations that fit each other, and that do not: what the drift check says of them.
 
-Scenes are points, beads and stars before a dark ground, gratings of every pitch, charts, textures, dark ones
-and a white one. Their raw images are drawn by rays and boxes (each micro-image shows the scene around its own
-place, magnified, behind a stop with soft edges), or simulated by wave optics for cameras of several kinds;
-then pixels add noise. Each is judged with the right calibration, and with ones whose pitch is 1 % off or that
-are turned by 0.5 deg. A wrong pair should be found where the scene lights most of the picture and there are
-gaps. Real raw images (LUMIGRAPH_DATA), too. Results are kept in a file of JSON lines, so that a run goes on
-where it was stopped.
+Scenes are points, beads and stars before a dark ground, gratings of every pitch, charts, textures, dark ones,
+a white one, and edges behind which it is dark or nearly so, over few lenslets, too. Their raw images are
+drawn by rays and boxes (each micro-image shows the scene around its own place, magnified, behind a stop with
+soft edges), or simulated by wave optics for cameras of several kinds; then pixels add noise. Each is judged
+with the right calibration, and with ones whose pitch is 1 % off or that are turned by 0.5 deg. A wrong pair
+should be found where the scene lights most of the picture and there are gaps. Real raw images
+(LUMIGRAPH_DATA), too. Results are kept in a file of JSON lines, so that a run goes on where it was stopped.
 
-    python -m benchmarks.drift [drawn | simulated | real] [first:last] [-o results.jsonl]
+    python -m benchmarks.drift [drawn | simulated | edges | real] [first:last] [-o results.jsonl]
 """
 
 import argparse
@@ -105,6 +105,19 @@ def _texture(rng: np.random.Generator, shape: tuple[int, int]) -> Seen:
     return scene
 
 
+def _edge(rng: np.random.Generator, shape: tuple[int, int]) -> Seen:
+    """A bright part of the picture and a black one, or one that is not quite black."""
+    angle, black = rng.uniform(0, 2 * np.pi), float(rng.choice([0, rng.uniform(0, 0.3)]))
+    cy, cx = rng.uniform(0.2, 0.8, 2) * shape
+    steep = rng.random() < 0.5
+    angle = np.round(angle / (np.pi / 2)) * np.pi / 2 + rng.uniform(-0.1, 0.1) if steep else angle
+
+    def scene(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        return np.where((y - cy) * np.sin(angle) + (x - cx) * np.cos(angle) > 0, 1.0, black)
+
+    return scene
+
+
 KINDS = ("points", "beads", "stars", "grating", "chart", "texture", "dark", "white")
 SAID = ("refused", "warned", "shifted", "fits", "nothing")
 LIT = ("grating", "chart", "texture", "white")
@@ -133,6 +146,8 @@ def _seen(kind: str, rng: np.random.Generator, pitch: float, shape: tuple[int, i
             return _grating(rng, pitch)
         case "chart":
             return _chart(rng, pitch)
+        case "edge":
+            return _edge(rng, shape)
         case "white":
             return lambda y, x: np.ones(y.shape)
         case _:
@@ -145,12 +160,13 @@ def _exposed(light: np.ndarray, kind: str, rng: np.random.Generator) -> np.ndarr
     return rng.poisson(np.maximum(light, 0) * full) + rng.normal(20, 2, light.shape)
 
 
-def drawn(number: int) -> Pair:
-    """The raw image of a number, by rays and boxes."""
+def drawn(number: int, kind: str = "") -> Pair:
+    """The raw image of a number, by rays and boxes; kinds in turn unless told."""
     rng = np.random.default_rng(number)
-    kind = KINDS[number % len(KINDS)]
+    kind = kind or KINDS[number % len(KINDS)]
     pitch, layout = float(np.exp(rng.uniform(np.log(8), np.log(32)))), ("square", "hex")[number // 8 % 2]
-    shape = int(pitch * rng.uniform(24, 44)), int(pitch * rng.uniform(24, 44))
+    fewest = 9 if kind == "edge" else 24
+    shape = int(pitch * rng.uniform(fewest, 44)), int(pitch * rng.uniform(fewest, 44))
     lattice = getattr(lg.Lattice, layout)(pitch, rng.uniform(-0.03, 0.03), tuple(rng.uniform(0, pitch, 2)))
     y, x = np.arange(shape[0], dtype=float)[:, None], np.arange(shape[1], dtype=float)[None]
     dy, dx = lattice.offset(y, x)
@@ -180,6 +196,8 @@ CAMERAS: dict[str, tuple[type[PlenopticCamera] | type[FocusedPlenopticCamera], d
         "object_distance": 120e-3,
         "lenslets": {"focal_length": (6e-3, 6.3e-3, 5.7e-3), "pitch": 150e-6, "count": (20, 18),
                      "layout": "hex", "shape": "round", "magnification": 0.5}}),
+    "1.0, narrow": (PlenopticCamera, {"main_lens": {"focal_length": 120e-3}, "object_distance": 240e-3,
+        "wavelength": 633e-9, "lenslets": {"focal_length": 10e-3, "pitch": 110e-6, "count": (31, 31)}}),
 }  # fmt: skip
 
 
@@ -188,14 +206,14 @@ def _camera(name: str, pixels: int) -> Simulated:
     """With so many pixels across a lenslet."""
     kind, given = CAMERAS[name]
     sensor = {"pixel_pitch": given["lenslets"]["pitch"] / pixels}
-    return kind(**{**given, "wavelength": 550e-9, "sensor": sensor})
+    return kind(**{"wavelength": 550e-9, **given, "sensor": sensor})
 
 
-def simulated(number: int) -> Pair:
-    """The raw image of a number, by wave optics."""
-    rng = np.random.default_rng([number, 1])
-    name = list(CAMERAS)[number // len(KINDS) % len(CAMERAS)]
-    kind, camera = KINDS[number % len(KINDS)], _camera(name, (11, 14)[number // len(KINDS) % 2])
+def simulated(number: int, kind: str = "", name: str = "") -> Pair:
+    """The raw image of a number, by wave optics; kinds and the first five cameras in turn unless told."""
+    rng, turn = np.random.default_rng([number, 1]), number // len(KINDS)
+    kind, name = kind or KINDS[number % len(KINDS)], name or list(CAMERAS)[turn % 5]
+    camera = _camera(name, (11, 14)[turn % 2])
     grid, right = camera.object_grid, camera.calibration
     assert right is not None
     across = min(grid.shape) / min(right.shape) * right.lattice.pitch  # samples for each lenslet
@@ -212,6 +230,13 @@ def simulated(number: int) -> Pair:
     raw = _exposed(light / np.percentile(light, 99 if kind in LIT else 100), kind, rng)
     told = f"simulated {number} {kind}, {name}, {right.lattice.pitch:.1f} px, {1e3 * near:+.1f} mm"
     return Pair(told, raw, right, kind in LIT)
+
+
+def edge(number: int) -> Pair:
+    """The raw image of an edge, drawn and simulated in turn."""
+    if number % 2 == 0:
+        return drawn(number, "edge")
+    return simulated(number, "edge", list(CAMERAS)[number // 2 % len(CAMERAS)])
 
 
 def real(number: int) -> Pair:
@@ -238,6 +263,7 @@ def wrong(right: Calibration) -> dict[str, Calibration]:
 SOURCES: dict[str, tuple[Callable[[int], Pair], int]] = {
     "drawn": (drawn, 400),
     "simulated": (simulated, 240),
+    "edges": (edge, 160),
     "real": (real, len(REAL)),
 }
 """Pairs by number, and how many are looked at unless told."""

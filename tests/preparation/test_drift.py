@@ -195,6 +195,23 @@ def test_a_slip_is_told_with_its_error(rng):
     assert all(0 < found.slip < 4 * found.error < 0.1 for found in slips)
 
 
+def test_a_part_of_the_picture_that_is_out_of_step_makes_no_slip(rng):
+    """Behind an edge, where light only strays, spots stand half a pitch from those in the light."""
+    lattice = LATTICES["square"]
+    both = [raw_image(one, (400, 440), rng) for one in (lattice, lattice.moved(0.0, lattice.pitch / 2))]
+    half = np.where(np.arange(440) < 180, both[1], both[0])
+    found = drift(half, off(lattice))
+    assert found.slip > 0.1, "which was warned of"
+    assert found.slip < 3 * found.error
+    decode(half, off(lattice))  # warnings are errors
+
+
+@pytest.mark.parametrize("number", [77, 135, 142])  # 2.0, hexagonal out of focus, few lenslets drawn
+def test_an_edge_is_no_lattice(number):
+    """In and out of focus: of 160 edges 13 were warned of; each of these was."""
+    assert not [row for row in judged("edges", number) if row.pair == "right" and is_bad(row)]
+
+
 @pytest.mark.parametrize("number", [0, 3, 4, 13])  # points, a grating, a chart, a texture
 def test_drawn_pairs_are_right_or_wrong_as_they_were_drawn(number):
     """A few of the pairs of `python -m benchmarks.drift`."""

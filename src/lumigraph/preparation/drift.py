@@ -18,8 +18,12 @@ from lumigraph.preparation.agreement import Described
 _SIZE = 1024  # px of the middle of the picture that is looked at
 _FEWEST = 8.0  # lenslets across it
 _CERTAIN, _SLIGHT = 0.5, 0.1  # pitches between the lattices at the border; right pairs reach 0.06
-_LIKELY = 0.2  # of it where its error is not known
 _SIGMAS = 3.0  # of its standard error from which a slip counts; a specimen pulls at the lines of gaps
+_STRIPS = 8  # of the picture are left out, one after the other
+_STUDENT = 4.43 / 3  # what is as unlikely as three standard errors where seven strips tell them
+# Harmonics that are looked at in each part; both signs, since a basis may lean either way.
+_ORDERS = np.array([(1, 0), (0, 1), (1, 1), (1, -1), (2, 0), (0, 2), (2, 1), (1, 2), (2, -1), (1, -2)])
+_FAINT = 0.25  # of the strongest line: fainter ones are left out
 _BLOCKS, _EVERYWHERE = (
     8,
     0.45,
@@ -47,8 +51,9 @@ class Drift:
     evidence
         Lines of the lattice in the spectrum of the raw image's gaps over their surroundings.
     error
-        Standard error of the slip [pitches], by how far the lines scatter about those of one lattice; 0
-        where there are too few to tell.
+        Standard error of the slip [pitches], by how far the lines scatter about those of one lattice where
+        there are enough of them. From a slip of 0.1 on, by how far they move when parts of the picture are
+        left out, too.
     """
 
     pitch: float
@@ -109,12 +114,16 @@ def drift(data: Array, calibration: Calibration) -> Drift | None:
     if _share(gaps, seen) < _EVERYWHERE:  # spots of a few points repeat, too, by what depth they are at
         return None
     half = np.array([(y, x) for y in (-0.5, 0.5) for x in (-0.5, 0.5)]) * calibration.shape
+    slip, error = float(np.abs(half @ (seen - waves).T).max()), _at_border(found.errors, calibration.shape)
+    if slip >= _SLIGHT:
+        between = _STUDENT * _between_parts(gaps, seen)
+        error = math.hypot(error, _at_border(between, calibration.shape))
     return Drift(
         float(np.hypot(*seen_basis).mean()), float(np.hypot(*basis).mean()),
         math.atan2(*seen_basis[:, 1]), math.atan2(*basis[:, 1]),
-        float(np.abs(half @ (seen - waves).T).max()),
+        slip,
         _shift(picture, seen, basis, np.array(calibration.lattice.origin) - corner), found.evidence,
-        _between_lines(found.errors, calibration.shape),
+        error,
     )  # fmt: skip
 
 
@@ -131,8 +140,7 @@ def check_drift(data: Array, calibration: Calibration, camera: Described | None 
     Warns
     -----
     SamplingWarning
-        The lattices slip by 0.1 to 0.5 of a pitch (from 0.2 on where the error is not known), or the
-        micro-images are shifted by more than a quarter.
+        The lattices slip by 0.1 to 0.5 of a pitch, or the micro-images are shifted by more than a quarter.
 
     Raises
     ------
@@ -150,7 +158,7 @@ def verdict(found: Drift) -> str:
     sure = found.slip >= _SIGMAS * found.error
     if sure and found.slip >= _CERTAIN:
         return "refused"
-    if sure and found.slip >= (_SLIGHT if found.error > 0 else _LIKELY):
+    if sure and found.slip >= _SLIGHT:
         return "warned"
     if found.shift is not None and max(map(abs, found.shift)) > _SHIFTED * found.pitch:
         return "shifted"
@@ -226,7 +234,43 @@ def _share(gaps: np.ndarray, waves: np.ndarray) -> float:
     return min(shares)
 
 
-def _between_lines(errors: np.ndarray, shape: tuple[int, int]) -> float:
+def _between_parts(gaps: np.ndarray, waves: np.ndarray) -> np.ndarray:
+    """Standard errors (2, 2) of both waves along y and x [1/px], by leaving out strips of the picture.
+
+    A lattice goes on all over the picture; what an edge adds to its lines stands in a few strips. By the
+    jackknife over strips along y and along x; the larger ones count.
+    """
+    even = gaps - gaps.mean()
+    lines = _ORDERS @ waves
+    steps, heights = zip(*(_without(even, line) for line in lines), strict=True)
+    across = [_without(even.T, line[::-1])[0][:, ::-1] for line in lines]
+    weights = np.where(heights > _FAINT * np.max(heights), heights, 0)
+    fit = np.linalg.pinv(_ORDERS * weights[:, None]) * weights  # of both waves, through those of all lines
+    moved = np.einsum("wl,alsy->wasy", fit, np.array([steps, across]))
+    return np.sqrt((_STRIPS - 1) * moved.var(2)).max(1)
+
+
+def _without(gaps: np.ndarray, wave: np.ndarray) -> tuple[np.ndarray, float]:
+    """Steps (strip, 2) from a wave to the top of its line without each strip across y; the line's height.
+
+    One step of Newton's up the line's logarithm, by the moments of the windowed picture times the wave.
+    """
+    places = [np.arange(n) - (n - 1) / 2 for n in gaps.shape]
+    turned = [np.hanning(len(p) + 2)[1:-1] * np.exp(-2j * np.pi * k * p)
+              for p, k in zip(places, wave, strict=True)]  # fmt: skip
+    powers = [turn[:, None] * p[:, None] ** np.arange(3) for turn, p in zip(turned, places, strict=True)]
+    rows = gaps @ powers[1].astype(np.complex64)
+    strips = places[0] / len(gaps) * _STRIPS - np.arange(_STRIPS)[:, None] + (_STRIPS - 1) / 2
+    kept = 1 - np.cos(np.pi / 2 * np.clip(strips, -1, 1)) ** 2
+    moments = np.einsum("sn,ni,nj->sij", kept, powers[0], rows, optimize=True)
+    moments = moments / moments[:, :1, :1]
+    mean = moments[:, [1, 0], [0, 1]]
+    spread = moments[:, [[2, 1], [1, 0]], [[0, 1], [1, 2]]] - mean[:, :, None] * mean[:, None, :]
+    steps = np.linalg.pinv(spread.real) @ mean.imag[..., None] / (2 * np.pi)
+    return steps[..., 0], float(np.abs(powers[0][:, 0] @ rows[:, 0]))
+
+
+def _at_border(errors: np.ndarray, shape: tuple[int, int]) -> float:
     """Standard error of the slip at the border of a picture, of those of the waves (2, 2) [1/px]."""
     found = float(np.hypot(*(errors * shape / 2).T).max())
     return 0.0 if math.isnan(found) else found
