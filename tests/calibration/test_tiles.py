@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from calibration_drawing import white
-from lumigraph.calibration import calibrate, lattice_fit, tiles
+from lumigraph.calibration import calibrate, centres, lattice_fit, tiles
+from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.warp import Warp
 from lumigraph.errors import CalibrationError
@@ -81,3 +82,17 @@ def test_a_large_picture_without_a_measured_centre_is_refused(rng, monkeypatch):
     monkeypatch.setattr(tiles, "whole", lambda *_: unmeasured)
     with pytest.raises(CalibrationError, match="no centre could be measured"):
         calibrate(picture)
+
+
+@pytest.mark.parametrize("pitch", [5.9, 9.1, 17.2])
+def test_a_single_round_leaves_out_only_pixels_without_weight(pitch, monkeypatch, rng):
+    lattice, shape = Lattice.square(pitch, 0.03, (100.3, 99.8)), (200, 210)
+    picture = (white(lattice, shape)[0] + 0.05 * rng.standard_normal(shape)).astype(np.float32)
+    none = np.zeros((0, 2), np.int64)
+    model = Calibration(lattice, shape, none, none.astype(float), 0.0)
+    found = centres.measured(picture, model, rounds=1)
+    reach = centres._reach
+    monkeypatch.setattr(centres, "_reach", lambda size, rounds: reach(size, rounds) + 3)
+    wider = centres.measured(picture, model, rounds=1)
+    np.testing.assert_allclose(found.centers, wider.centers, atol=1e-5)
+    np.testing.assert_allclose(found.light, wider.light, rtol=1e-5, atol=1e-5)

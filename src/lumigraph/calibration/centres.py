@@ -1,15 +1,17 @@
 """Sub-pixel centre of every micro-image, where a lattice says that one should be."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy import ndimage
 
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 
-_CHUNK = 1 << 24  # pixels gathered at a time
+_CHUNK = 1 << 18  # pixels gathered at a time: as many as a processor's cache holds
 _ITERATIONS = 4
 _FOLLOWED = 0.9  # pitches: sigma of the window over which gaps are followed
 _SOFT = 0.2  # of the cell: over how much its window fades, so that pixels do not jump in and out
@@ -80,8 +82,9 @@ def measured(
     ]
     indices = model.indices_within(ranges[0], ranges[1])
     guess = model.position(indices)
-    step = max(1, int(_CHUNK / np.prod([size + 6 for size in cell])))
-    parts = [_centre(picture, guess[k : k + step], cell, rounds) for k in range(0, len(guess), step)]
+    around = windows(picture, [_reach(size, rounds) for size in cell])
+    step = max(1, _CHUNK // math.prod(around.shape[2:]))
+    parts = [_centre(around, guess[k : k + step], cell, rounds) for k in range(0, len(guess), step)]
     centers = np.concatenate([p[0] for p in parts]) if parts else guess
     light = np.concatenate([p[1] for p in parts]) if parts else np.zeros((0, 3))
     return Tried(indices, centers, light, np.all(np.abs(centers - guess) < 0.35 * np.array(cell), axis=-1))
@@ -160,33 +163,50 @@ def _cell(lattice: Lattice) -> tuple[float, float]:
     return (rows, second) if abs(lattice.rotation) < math.pi / 12 else (lattice.pitch, rows)
 
 
+def windows(picture: np.ndarray, reach: Sequence[int]) -> np.ndarray:
+    """The surroundings (y, x, 2 ry + 1, 2 rx + 1) of every pixel, a view; the border goes on outwards."""
+    wide = np.pad(picture, [(r, r) for r in reach], mode="edge")
+    return sliding_window_view(wide, [2 * r + 1 for r in reach])
+
+
+def _fade(size: float) -> float:
+    """Over how many pixels the window of a cell falls to 0."""
+    return max(_SOFT * size, 1)
+
+
+def _reach(size: float, rounds: int) -> int:
+    """Pixels around a centre that the window of a cell covers, which moves where it follows the centre."""
+    if rounds == 1:
+        return math.ceil((size + _fade(size) + 1) / 2) - 1
+    return math.ceil(size * (0.5 + _SOFT / 2)) + 2
+
+
 def _centre(
-    picture: np.ndarray, guess: np.ndarray, cell: tuple[float, float], rounds: int
+    around: np.ndarray, guess: np.ndarray, cell: tuple[float, float], rounds: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Centres (k, 2) and light (k, 3): mean of the cell, first harmonic along y and along x."""
     first = np.rint(guess).astype(np.int64)
-    reach = [math.ceil(size * (0.5 + _SOFT / 2)) + 2 for size in cell]
-    offsets = [np.arange(-r, r + 1) for r in reach]
-    rows = np.clip(first[:, :1] + offsets[0], 0, picture.shape[0] - 1)
-    columns = np.clip(first[:, 1:] + offsets[1], 0, picture.shape[1] - 1)
-    patches = picture[rows[:, :, None], columns[:, None, :]]
+    patches = around[tuple(np.clip(first, 0, np.array(around.shape[:2]) - 1).T)]
+    offsets = [np.arange(n) - n // 2 for n in around.shape[2:]]
+    angles = [2 * math.pi * o / size for o, size in zip(offsets, cell, strict=True)]
+    waves = [np.stack([np.cos(angle), np.sin(angle)], -1) for angle in angles]
     shift = guess - first
     light = np.zeros((len(guess), 3))
     limit = 0.45 * np.array(cell)
     for _ in range(rounds):
-        distance = [offsets[a] - shift[:, a, None] for a in (0, 1)]
         window = [
-            np.clip((size / 2 - np.abs(d)) / max(_SOFT * size, 1) + 0.5, 0, 1)
-            for d, size in zip(distance, cell, strict=True)
+            np.clip((size / 2 - np.abs(o - s[:, None])) / _fade(size) + 0.5, 0, 1)
+            for o, s, size in zip(offsets, shift.T, cell, strict=True)
         ]
         profile_y = np.matmul(patches, window[1].astype(np.float32)[:, :, None])[..., 0]
         profile_x = np.matmul(window[0].astype(np.float32)[:, None, :], patches)[:, 0]
         light[:, 0] = (profile_y * window[0]).sum(-1)
         move = np.empty_like(shift)
         for axis, profile in enumerate((profile_y, profile_x)):
-            angle = 2 * math.pi * distance[axis] / cell[axis]
-            weighted = profile * window[axis]
-            cosine, sine = (weighted * np.cos(angle)).sum(-1), (weighted * np.sin(angle)).sum(-1)
+            turn = 2 * math.pi * shift[:, axis] / cell[axis]  # of the harmonic, to the centre so far
+            real, imaginary = ((profile * window[axis]) @ waves[axis]).T
+            cosine = real * np.cos(turn) + imaginary * np.sin(turn)
+            sine = imaginary * np.cos(turn) - real * np.sin(turn)
             move[:, axis] = np.arctan2(sine, cosine) * cell[axis] / (2 * math.pi)
             light[:, axis + 1] = cosine
         shift = np.clip(shift + move, guess - first - limit, guess - first + limit)

@@ -5,11 +5,11 @@ import math
 import numpy as np
 from scipy import ndimage
 
-from lumigraph.calibration.centres import Spots
+from lumigraph.calibration.centres import Spots, windows
 from lumigraph.core.calibration import Calibration
 
 _SAMPLES = 8  # pixels that fall into one cell of the mean micro-image at least
-_CHUNK = 1 << 21  # pixels at a time
+_CHUNK = 1 << 18  # pixels at a time: as many as a processor's cache holds
 _RIDGE = 1e-4
 _FINE = 768  # samples of the mean micro-image that the nearest is taken of
 
@@ -35,11 +35,12 @@ def sharpened(picture: np.ndarray, spots: Spots, model: Calibration) -> Spots:
     pitch = model.lattice.pitch
     reach = math.ceil(pitch * (0.5 if model.lattice.layout == "square" else 0.56))
     step = max(1, _CHUNK // (2 * reach + 1) ** 2)
+    around, tables = windows(picture, (reach, reach)), _tables(mean, model)
     for k in range(0, len(centers), step):
         part = slice(k, k + step)
         start = model.position(spots.indices[part])
         most = max(0.5, 0.01 * pitch)
-        centers[part] = start + np.clip(_moves(picture, mean, model, start, reach), -most, most)
+        centers[part] = start + np.clip(_moves(around, tables, model, start), -most, most)
     good = np.hypot(*(centers - spots.centers).T) < max(0.75, 0.05 * pitch)
     return spots._replace(centers=np.where(good[:, None], centers, spots.centers))
 
@@ -67,30 +68,39 @@ def mean_cell(picture: np.ndarray, model: Calibration, *, symmetric: bool = Fals
     return cell
 
 
-def _moves(
-    picture: np.ndarray, mean: np.ndarray, model: Calibration, centers: np.ndarray, reach: int
-) -> np.ndarray:
-    """Shifts (k, 2) [px] of micro-images from where they are thought to be."""
+def _tables(mean: np.ndarray, model: Calibration) -> np.ndarray:
+    """The mean micro-image and its slopes along y and x, downwards, finely sampled (m * m, 4).
+
+    Beside each other, and with a fourth number that says nothing: so they are looked up together.
+    """
     size, inverse = len(mean), np.linalg.inv(model.lattice.matrix)
-    first = np.rint(centers).astype(np.int64)
-    steps = np.arange(-reach, reach + 1)
-    rows, columns = first[:, :1] + steps, first[:, 1:] + steps
-    on = ((rows >= 0) & (rows < picture.shape[0]))[:, :, None]
-    on = on & ((columns >= 0) & (columns < picture.shape[1]))[:, None, :]
-    rows, columns = np.clip(rows, 0, picture.shape[0] - 1), np.clip(columns, 0, picture.shape[1] - 1)
-    values = picture[rows[:, :, None], columns[:, None, :]]
-    dy = (rows - centers[:, :1])[:, :, None].astype(np.float32)
-    dx = (columns - centers[:, 1:])[:, None, :].astype(np.float32)
-    u, v = (np.float32(inverse[k, 0]) * dy + np.float32(inverse[k, 1]) * dx for k in (0, 1))
-    inside = on & (np.abs(u) < 0.62) & (np.abs(v) < 0.62)
     along = [(np.roll(mean, -1, a) - np.roll(mean, 1, a)) * size / 2 for a in (0, 1)]
     slopes = [inverse[0, k] * along[0] + inverse[1, k] * along[1] for k in (0, 1)]
     fine = max(1, round(_FINE / size)) * size
+    tables = [_refined(table, fine).ravel() for table in (mean, -slopes[0], -slopes[1])]
+    return np.stack([*tables, np.zeros_like(tables[0])], -1)
+
+
+def _moves(around: np.ndarray, tables: np.ndarray, model: Calibration, centers: np.ndarray) -> np.ndarray:
+    """Shifts (k, 2) [px] of micro-images from where they are thought to be."""
+    inverse, shape = np.linalg.inv(model.lattice.matrix), np.array(around.shape[:2])
+    first, reach = np.rint(centers).astype(np.int64), around.shape[2] // 2
+    steps, fine = np.arange(-reach, reach + 1), math.isqrt(len(tables))
+    rows, columns = first[:, :1] + steps, first[:, 1:] + steps
+    values = around[tuple(np.clip(first, 0, shape - 1).T)]
+    dy = (rows - centers[:, :1])[:, :, None].astype(np.float32)
+    dx = (columns - centers[:, 1:])[:, None, :].astype(np.float32)
+    u, v = (np.float32(inverse[k, 0]) * dy + np.float32(inverse[k, 1]) * dx for k in (0, 1))
+    inside = (np.abs(u) < 0.62) & (np.abs(v) < 0.62)
+    if ((first < reach) | (first >= shape - reach)).any():
+        inside &= ((rows >= 0) & (rows < shape[0]))[:, :, None]
+        inside &= ((columns >= 0) & (columns < shape[1]))[:, None, :]
     at = [np.rint(w * np.float32(fine)).astype(np.int32) % fine for w in (u, v)]
     place = at[0] * fine + at[1]
+    looked = tables.view(np.complex128).ravel().take(place.ravel()).view(np.float32).reshape(*u.shape, 4)
     terms = np.empty((len(centers), 5, *u.shape[1:]), np.float32)
-    for k, table in ((0, mean), (3, -slopes[0]), (4, -slopes[1])):
-        np.multiply(_refined(table, fine).ravel()[place], inside, out=terms[:, k])
+    for column, k in enumerate((0, 3, 4)):
+        np.multiply(looked[..., column], inside, out=terms[:, k])
     np.multiply(terms[:, 0], dy / np.float32(reach), out=terms[:, 1])
     np.multiply(terms[:, 0], dx / np.float32(reach), out=terms[:, 2])
     flat = terms.reshape(len(centers), 5, -1)
