@@ -20,9 +20,10 @@ from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.row import Row
 from lumigraph.operators.fourier_microscope import fourier_operator
 from lumigraph.operators.fourier_points import FourierPoints
-from lumigraph.operators.microscope_bench import DEGREE, samples_needed
+from lumigraph.operators.microscope_bench import DEGREE
 from lumigraph.operators.microscope_building import Layout, microscope_operator, require_accuracy
 from lumigraph.operators.microscope_cell import CellSampling
+from lumigraph.operators.microscope_kernels import samples_needed
 from lumigraph.operators.microscope_pixels import narrowed, placement
 from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.points import OUTSIDE
@@ -182,14 +183,13 @@ class LightFieldMicroscope(DescribedMicroscope):
         if self.configuration == "fourier":
             operator = fourier_operator(self.objectives, self._mosaic(), (dz,))
             return operator.point_image(y, x), operator.error
-        finer = accuracy
-        if any(
+        beside = any(
             abs(at) > n * self.lenslet_size / 2 for at, n in zip((y, x), self.lenslets.count, strict=True)
-        ):
-            finer = max(accuracy * OUTSIDE, 1e-5)
+        )
+        finer = max(accuracy * OUTSIDE, 1e-5) if beside else accuracy
         layout = self._layout(SAMPLES, None, (dz,), finer)
         image, error = point_image(self.objectives, self.lenslet, layout, (y, x, dz), finer)
-        return image, error * accuracy / finer
+        return image, error / OUTSIDE if beside else error
 
     def fourier_points(self) -> FourierPoints:
         """Images of points anywhere as a Fourier microscope sees them, with derivatives by their place.

@@ -7,7 +7,6 @@ leave out is known for each image from its own spectrum.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache
 
 import numpy as np
 import scipy.fft
@@ -21,9 +20,6 @@ from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 
 DEGREE = 3
 """Of the B-splines from which pixels are interpolated: higher degrees ring, and what is below 0 is cut."""
-
-WIDEST = 8
-"""Cells to each side of the window by which the number of samples is chosen."""
 
 MORE = 1.2
 """How many more samples along a lenslet may be taken so that the fields of all points are windows of one."""
@@ -174,6 +170,11 @@ class Bench:
 
         return window
 
+    def lights(self, dz: float, points: Sequence[tuple[float, float]]) -> Iterator[np.ndarray]:
+        """`intensity` of points (ky, kx) at a depth, in order."""
+        fields = self.fields(dz)
+        return each(lambda point: self.intensity(fields(point)), points)
+
     def intensity(self, field: np.ndarray) -> np.ndarray:
         """On the whole fine grid behind the lenslets, from the field (modes, n, n) of a point before them."""
         image = np.zeros((len(self.at),) * 2, np.float32)
@@ -235,21 +236,3 @@ def _averaged(light: np.ndarray, factors: np.ndarray, count: int) -> np.ndarray:
         part = spectrum[:, start - half + 1 : start - first + 1]
         folded[:, first:] += part[:, ::-1].conj()
     return arrays.irfft(folded, count, axis=1)
-
-
-@lru_cache(maxsize=64)
-def samples_needed(objective: Objective, lenslet: Lenslet, width: float, dz: float, accuracy: float) -> int:
-    """Samples N along a lenslet from which pixels of a width [lenslets] are interpolated to an accuracy.
-
-    By the spectra of two points, in the focused plane and at a depth.
-    """
-    cutoff = 2 * lenslet.pitch**2 / (objective.wavelength * abs(lenslet.distance))
-    lit = abs(dz) * objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
-    reach = min(2 + math.ceil(lit * lenslet.magnification / lenslet.pitch), WIDEST)
-    bench = Bench(objective, lenslet, CellSampling(1, 1, width), reach, 3.0)
-    places = {((0.03, -0.46), 0.0), ((0.21, 0.37), dz)}
-    spectra = [arrays.fft2(bench.intensity(bench.fields(at)(point))) for point, at in places]
-    N = max(2, math.floor(cutoff))
-    while max(sampled(one, bench.fine, CellSampling(1, N, width, DEGREE))[1] for one in spectra) > accuracy:
-        N = math.ceil(1.06 * N)
-    return N

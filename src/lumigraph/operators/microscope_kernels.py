@@ -15,12 +15,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from lumigraph.core import memory
+from lumigraph.core import arrays, memory
 from lumigraph.core.arrays import WORKERS
 from lumigraph.core.threads import single_products
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import SamplingError
-from lumigraph.operators.microscope_bench import Bench, fineness, guard
+from lumigraph.operators.microscope_bench import DEGREE, Bench, fineness, guard, sampled
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_far import Far
 from lumigraph.operators.microscope_rays import ray_images
@@ -32,6 +32,9 @@ SECTORS = 16
 SHARES = {"near": 0.5, "window": 0.25, "patterns": 0.3, "rank": 0.1}
 """Of the accuracy, that cells treated as far, those beyond the window, patterns left out and the low rank of
 fields may take."""
+
+WIDEST = 8
+"""Cells to each side of the window by which the number of samples is chosen."""
 
 SPREAD = 8.0
 """How much more of a far lenslet's light than one spot is spread out.
@@ -384,3 +387,23 @@ def kernel_bytes(
     """Upper bound of what the kernel of a depth takes in memory, expanded to all points [bytes]."""
     cells = 2 * reach_of(objective, lenslet, dz, demand) + 1
     return 4.0 * cells**2 * sampling.classes * sampling.pixels**2
+
+
+@lru_cache(maxsize=64)
+def samples_needed(objective: Objective, lenslet: Lenslet, width: float, dz: float, accuracy: float) -> int:
+    """Samples N along a lenslet from which pixels of a width [lenslets] are interpolated to an accuracy.
+
+    By the spectra of two points, in the focused plane and at a depth.
+    """
+    cutoff = 2 * lenslet.pitch**2 / (objective.wavelength * abs(lenslet.distance))
+    lit = abs(dz) * objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
+    reach = min(2 + math.ceil(lit * lenslet.magnification / lenslet.pitch), WIDEST)
+    bench = (Bench if lenslet.is_round else Crossed)(
+        objective, lenslet, CellSampling(1, 1, width, DEGREE), reach, 3.0
+    )
+    places = ((0.03, -0.46), 0.0), ((0.21, 0.37), dz)
+    spectra = [arrays.fft2(light) for point, at in places for light in bench.lights(at, [point])]
+    N = max(2, math.floor(cutoff))
+    while max(sampled(one, bench.fine, CellSampling(1, N, width, DEGREE))[1] for one in spectra) > accuracy:
+        N = math.ceil(1.06 * N)
+    return N

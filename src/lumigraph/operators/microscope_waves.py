@@ -13,7 +13,7 @@ x, which halves its sides.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -30,6 +30,7 @@ DEAR = 300
 """Multiply-adds of a product in the time of a decomposition of n × n numbers, over n³."""
 
 Point = tuple[float, float]
+Pair = tuple[np.ndarray, np.ndarray]
 
 
 def bloch(lenslet: Lenslet, wavelength: float, turns: np.ndarray, finest: int, at: np.ndarray) -> np.ndarray:
@@ -91,6 +92,21 @@ class Crossed:
 
     def images(self, dz: float, points: Sequence[Point]) -> Iterator[tuple[np.ndarray, float]]:
         """Samples ((2 reach + 1) N, the same) of points (ky, kx) at a depth, in order; as `Bench.image`."""
+        fields, missing = self._fields(dz, points)
+
+        def image(point: Point) -> tuple[np.ndarray, float]:
+            samples, lost = self._seen(fields(point))
+            return samples * np.float32(self._area), math.hypot(lost, missing)
+
+        return each(image, points)
+
+    def lights(self, dz: float, points: Sequence[Point]) -> Iterator[np.ndarray]:
+        """Intensities on the fine grid behind the lenslets, as `Bench.lights`; where samples are splines'."""
+        fields, _ = self._fields(dz, points)
+        return each(lambda point: self._light(fields(point)), points)
+
+    def _fields(self, dz: float, points: Sequence[Point]) -> tuple[Callable[[Point], list[Pair]], float]:
+        """Gives what of a point's light does not interfere, along y and along x; and what that leaves out."""
         turns, spectra = self._spectra(dz)
         power = float(np.square(np.abs(spectra)).sum())
         allowed = self.left_out**2 / len(spectra) * power
@@ -105,12 +121,7 @@ class Crossed:
 
         wanted = sorted({(axis, point[axis]) for point in points for axis in (0, 1)})
         found = dict(zip(wanted, each(moved, wanted), strict=True))
-
-        def image(point: Point) -> tuple[np.ndarray, float]:
-            samples, lost = self._seen(list(zip(found[0, point[0]], found[1, point[1]], strict=True)))
-            return samples * np.float32(self._area), math.hypot(lost, missing)
-
-        return each(image, points)
+        return lambda point: list(zip(found[0, point[0]], found[1, point[1]], strict=True)), missing
 
     def held_bytes(self, points: int) -> float:
         """Of what `images` holds at most, of points on so many lines along y and along x, in all threads."""
@@ -190,8 +201,17 @@ class Crossed:
         """Of the quadrature over a pixel, along an axis."""
         return 1 if self.sampling.degree else math.ceil(1 + self.fine * self.sampling.width / 2)
 
-    def _seen(self, fields: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, float]:
-        """Samples of what does not interfere, each along y (rank, nodes × samples) and along x."""
+    def _seen(self, fields: Sequence[Pair]) -> tuple[np.ndarray, float]:
+        """Samples of what does not interfere, and the relative rms that they do not hold."""
+        light = self._light(fields)
+        if not self.sampling.degree:
+            return light, 0.0
+        image, lost = sampled(arrays.fft2(light), self.fine, self.sampling)
+        edge = self.guard * self.sampling.pixels
+        return image[edge:-edge, edge:-edge], lost
+
+    def _light(self, fields: Sequence[Pair]) -> np.ndarray:
+        """Sum of intensities of fields, each along y (rank, nodes × samples) and along x."""
         nodes = self._nodes
         count = fields[0][0].shape[1] // nodes
         light = np.zeros((count, 2 * nodes * count), np.float32)
@@ -200,12 +220,7 @@ class Crossed:
                 numbers = (part.T @ across).view(np.float32)
                 light += np.square(numbers, out=numbers)
         light = light.reshape(count, nodes, count, 2).sum(1)
-        light = light[..., 0] + light[..., 1]
-        if not self.sampling.degree:
-            return light, 0.0
-        image, lost = sampled(arrays.fft2(light), self.fine, self.sampling)
-        edge = self.guard * self.sampling.pixels
-        return image[edge:-edge, edge:-edge], lost
+        return light[..., 0] + light[..., 1]
 
 
 def centred(count: int) -> np.ndarray:
