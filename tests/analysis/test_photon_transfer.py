@@ -122,3 +122,31 @@ def test_images_that_measure_no_sensor_are_refused(rng):
         CalibrationError, match="there are 2 exposure times, 1 of them different, for 1 pairs"
     ):
         photon_transfer([flat], [dark], exposure_times=[1.0, 1.0])
+
+
+def test_a_dark_pair_errs_in_noise_and_gain_alike():
+    """Dim flats: both grow with the dark variance. Errors added as independent ones would be a third less."""
+    sensor, light, found = (
+        Sensor((60, 60), 5e-6, read_noise=12.0, black_level=100),
+        np.full((60, 60), 0.05),
+        [],
+    )
+    for seed in range(80):
+        rng = np.random.default_rng(seed)
+        flats = [[sensor.expose(light, photons=4000, rng=rng) for _ in range(2)] for _ in range(9)]
+        found.append(photon_transfer(flats, [pair(sensor, 0.0, rng)]))
+    spread = np.std([one.dark_noise for one in found])
+    assert spread == pytest.approx(np.mean([one.dark_noise_error for one in found]), rel=0.24)
+
+
+def test_what_rounding_does_to_a_fine_noise_is_in_its_error():
+    """Numbers half a noise apart, black level on a number: 1/12 is not what rounding adds to the variance."""
+    off, errors = [], []
+    for seed in range(8):
+        sensor = Sensor((300, 300), 5e-6, full_well=10000, read_noise=1.35, black_level=100)
+        rng = np.random.default_rng(seed)
+        one = photon_transfer([pair(sensor, x, rng) for x in (0.2, 0.5)], [pair(sensor, 0.0, rng)])
+        off.append(one.dark_noise - sensor.dark_noise)
+        errors.append(one.dark_noise_error)
+    assert np.sqrt(np.mean(np.square(off))) < 1.6 * np.mean(errors)
+    assert np.sqrt(np.mean(np.square(off))) > 0.5 * np.mean(errors)

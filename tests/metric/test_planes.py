@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lumigraph.analysis import find_chart
+from lumigraph.analysis import Chart, find_chart
 from lumigraph.errors import SamplingError
 from lumigraph.metric import planes
 
@@ -34,9 +34,28 @@ def test_the_patch_is_that_of_the_straightest_corners(monkeypatch):
     pictures = {part: board(wrong=part / 1.04 - 1) for part in (0.96, 1.0, 1.04)}
     monkeypatch.setattr(planes, "_PATCHES", tuple(pictures))
     monkeypatch.setattr(planes, "rendered_at", lambda ready, patch, camera: pictures[patch / 10])
-    chart, lenslet = planes.straightest(None, 10.0, None)
-    assert chart.picture is pictures[1.04]
-    assert lenslet == 10
+    tried = planes.straightest(None, 10.0, None)
+    assert tried.chart.picture is pictures[1.04]
+    assert tried.lenslet == 10
+    assert [one.chart.picture for one in tried.beside] == [pictures[1.0]]
+
+
+def test_intervals_hold_what_the_next_patch_would_have_given():
+    """Corners that are straighter than their scale is sure: the scatter alone would say 0.01 %."""
+    index = np.stack(np.mgrid[:6, :6], -1).reshape(-1, 2)
+    rng, picture = np.random.default_rng(1), np.zeros((140, 140))
+    ends = []
+    for scale in (0.999, 1.0, 1.0005):
+        corners = 10 + 22 * scale * index + rng.normal(0, 0.005, index.shape)
+        ends.append(planes.Tried(Chart(picture, corners, index)))
+    alone = ends[1]
+    between = planes.Tried(alone.chart, 1.0, (ends[0], ends[2]))
+    halves = []
+    for tried in (alone, between):
+        low, high = {q.name: q for q in planes.of_chart(tried, 22e-3)}["sample_on_chart"].interval
+        halves.append((high - low) / 2 / 1e-3)
+    assert halves[0] < 1e-4
+    assert halves[1] == pytest.approx(1.96 * 1e-3 / np.sqrt(3), rel=0.1)  # the farther neighbour counts
 
 
 def test_no_chart_at_any_patch_is_refused(monkeypatch):
@@ -51,7 +70,7 @@ def test_short_edges_read_high_within_their_interval(cut):
     frequency = np.linspace(0, 1, 4001)
     true = frequency[np.argmax(np.sinc(frequency) * lens(frequency, cut) < 0.5)]
     chart = find_chart(board(cut=cut))
-    found = {q.name: q for q in planes.of_chart(chart, None)}["mtf50_middle"]
+    found = {q.name: q for q in planes.of_chart(planes.Tried(chart), None)}["mtf50_middle"]
     low, high = found.interval
     assert low < true < high
     assert low < true < 2 * found.value - high  # below what the scatter holds

@@ -156,10 +156,10 @@ def photon_transfer(
             f"{top:.6g} counts: they are {', '.join(f'{each.mean:.4g}' for each in lit)} in the mean. "
             "Change the light or the exposure."
         )
-    gain, gain_error = _gain(
-        means[fitted], variances[fitted], np.array([m.spread for m in lit])[fitted], dark.spread
-    )
-    noise, noise_error = _dark_noise(dark, gain, gain_error)
+    spreads = np.array([each.spread for each in lit])
+    gain, gain_error, with_dark = _gain(means[fitted], variances[fitted], spreads[fitted])
+    noise, noise_error = _dark_noise(dark, gain, gain_error, with_dark)
+    gain_error = math.hypot(gain_error, with_dark * dark.spread)
     current, level, read_noise = _dark_current(unlit, exposure_times, gain, noise)
     saturates = any(each.saturated > 1e-2 for each in lit)
     return PhotonTransfer(
@@ -211,10 +211,11 @@ def _check_dark(pair: Pair, dark: _Moments) -> None:
         )
 
 
-def _gain(
-    means: np.ndarray, variances: np.ndarray, spreads: np.ndarray, dark_spread: float
-) -> tuple[float, float]:
-    """Electrons per count and their error, from a line through the dark pair; its error is in all of them."""
+def _gain(means: np.ndarray, variances: np.ndarray, spreads: np.ndarray) -> tuple[float, float, float]:
+    """Electrons per count, its error by the flats alone, and its derivative by the dark pair's variance.
+
+    Of a line through the dark pair, whose variance was taken from all of the flats'.
+    """
     weights = 1 / np.maximum(spreads, 1e-9 * means) ** 2
     total = float(weights @ means**2)
     slope = float(weights @ (means * variances)) / total
@@ -223,15 +224,27 @@ def _gain(
             f"the variance does not grow with the mean: {slope:.3g} counts² per count. "
             "Give raw images as read out, not averaged, denoised or compressed."
         )
-    error = math.hypot(math.sqrt(1 / total), float(weights @ means) / total * dark_spread)
-    return 1 / slope, error / slope**2
+    return 1 / slope, math.sqrt(1 / total) / slope**2, float(weights @ means) / total / slope**2
 
 
-def _dark_noise(dark: _Moments, gain: float, gain_error: float) -> tuple[float, float]:
+def _dark_noise(dark: _Moments, gain: float, gain_error: float, with_dark: float) -> tuple[float, float]:
+    """Noise [electrons] and its error; the gain grows `with_dark`, the dark pair's variance, so both add."""
     variance = max(dark.variance - 1 / 12, 0.0)
     noise = gain * math.sqrt(variance)
-    own = gain * dark.spread / (2 * math.sqrt(variance)) if variance else gain * math.sqrt(dark.spread)
-    return noise, math.hypot(own, noise * gain_error / gain)
+    if not variance:
+        return noise, gain * math.sqrt(dark.spread)
+    own = (gain / (2 * math.sqrt(variance)) + math.sqrt(variance) * with_dark) * dark.spread
+    rounded = gain * _rounding(variance) / (2 * math.sqrt(variance))
+    return noise, math.hypot(own, rounded, noise * gain_error / gain)
+
+
+def _rounding(variance: float) -> float:
+    """Standard deviation of what rounding to counts adds to a variance [counts²] beside 1/12.
+
+    By Poisson's sum over whole counts, of a normal distribution whose mean stands anywhere between two: its
+    first term is (4 σ² + 1/π²) exp(-2 π² σ²) times the cosine of that place.
+    """
+    return (4 * variance + 1 / math.pi**2) * math.exp(-2 * math.pi**2 * variance) / math.sqrt(2)
 
 
 def _dark_current(

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -76,8 +76,32 @@ def _pictured(views: LightField, value: float) -> np.ndarray:
     return grey(refocus(views, float(to_numpy(alpha.values)[0, 0])))
 
 
-def straightest(ready: PreparedImage, patch: float, camera: LensletCamera | None) -> tuple[Chart, float]:
-    """The chart on the picture whose patches fit together best, and its samples from lenslet to lenslet.
+@dataclass(frozen=True, slots=True, eq=False)
+class Tried:
+    """A chart on a picture, its samples from lenslet to lenslet, and those of the patches next to its own."""
+
+    chart: Chart
+    lenslet: float = 1.0
+    beside: tuple["Tried", ...] = ()
+
+    def within(self) -> Chart:
+        """The corners that neighbours of their lenslet show, too."""
+        return self.chart.within(self.lenslet)
+
+    def swayed(self, value: Callable[["Tried"], float]) -> float:
+        """Standard deviation of a value, as which patch is right is not known better than to the next one.
+
+        The value is anywhere between what the patches on either side give, none of it likelier.
+        """
+        own, others = value(self), []
+        for one in self.beside:
+            with suppress(SamplingError):  # too few corners, of a board at the limit
+                others.append(abs(value(one) - own))
+        return max(others, default=0.0) / math.sqrt(3)
+
+
+def straightest(ready: PreparedImage, patch: float, camera: LensletCamera | None) -> Tried:
+    """The chart on the picture whose patches fit together best, and those of the patches next to that.
 
     Diffraction biases the patch that depth measures by some per cent. Patches that are too wide or too narrow
     move the corners to and fro within each lenslet's piece of the picture: the patch near the measured one
@@ -100,14 +124,18 @@ def straightest(ready: PreparedImage, patch: float, camera: LensletCamera | None
     charts = []
     for part in _PATCHES:
         with suppress(SamplingError):
-            charts.append((find_chart(rendered_at(ready, part * patch, camera)), part))
+            found = find_chart(rendered_at(ready, part * patch, camera))
+            charts.append((Tried(found, max(1.0, abs(round(part * patch)))), part))
     if not charts:
         raise SamplingError("no corners of a chessboard are seen. Bring the chart into the picture.")
-    most = max(len(chart) for chart, _ in charts)
-    whole = [one for one in charts if len(one[0]) > _WHOLE * most]
+    most = max(len(one.chart) for one, _ in charts)
+    whole = [one for one in charts if len(one[0].chart) > _WHOLE * most]
     told = most >= LEAST_BENT  # fewer corners are straight by chance
-    chart, part = min(whole, key=lambda one: one[0].unevenness if told else abs(one[1] - 1))
-    return chart, max(1.0, abs(round(part * patch)))
+    best = min(
+        range(len(whole)), key=lambda k: whole[k][0].chart.unevenness if told else abs(whole[k][1] - 1)
+    )
+    beside = tuple(whole[k][0] for k in (best - 1, best + 1) if 0 <= k < len(whole))
+    return replace(whole[best][0], beside=beside)
 
 
 def rendered_at(ready: PreparedImage, value: float, camera: LensletCamera | None) -> np.ndarray:
@@ -183,26 +211,23 @@ def plane(
     entries = _depths(found, seen.depth, camera)
     try:
         if views is None:
-            chart, lenslet = straightest(board, value, camera)
+            tried = straightest(board, value, camera)
         else:
-            chart, lenslet = find_chart(_pictured(views, value)), 1.0
+            tried = Tried(find_chart(_pictured(views, value)))
     except SamplingError as error:
         picture = rendered_at(board, value, camera) if views is None else _pictured(views, value)
         return Plane(seen.depth, (*entries, _not("mtf50_middle", error)), picture)
-    found_on = (*_sharpness(chart, spacing), *_shape(chart, spacing, lenslet))
-    return Plane(seen.depth, (*found_on, *entries), chart.picture)
+    found_on = (*_sharpness(tried.chart, spacing), *_shape(tried, spacing))
+    return Plane(seen.depth, (*found_on, *entries), tried.chart.picture)
 
 
 def _not(name: str, error: Exception | str) -> Entry:
     return Entry("", Quantity(name, None), f"not measured: {error}")
 
 
-def of_chart(chart: Chart, spacing: float | None, lenslet: float = 1.0) -> list[Quantity]:
-    """Sharpness, size and distortion of a picture of the chart, whose squares are `spacing` wide [m].
-
-    `lenslet` is how far lenslets are apart on the picture [samples].
-    """
-    return [entry.quantity for entry in (*_sharpness(chart, spacing), *_shape(chart, spacing, lenslet))]
+def of_chart(tried: Tried, spacing: float | None) -> list[Quantity]:
+    """Sharpness, size and distortion of a picture of the chart, whose squares are `spacing` wide [m]."""
+    return [entry.quantity for entry in (*_sharpness(tried.chart, spacing), *_shape(tried, spacing))]
 
 
 def is_middle(at: np.ndarray, chart: Chart) -> bool:
@@ -238,11 +263,13 @@ def _sharpness(chart: Chart, spacing: float | None) -> list[Entry]:
     return entries
 
 
-def _shape(chart: Chart, spacing: float | None, lenslet: float) -> list[Entry]:
+def _shape(tried: Tried, spacing: float | None) -> list[Entry]:
     """Size and distortion, by the corners that neighbours of their lenslet show, too."""
-    entries, inside = [], chart.within(lenslet)
+    entries, chart, inside = [], tried.chart, tried.within()
     if spacing is not None and len(inside) >= LEAST_BENT:
-        value, part = spacing / inside.spacing, 1.96 * inside.spacing_error / inside.spacing
+        value, error = spacing / inside.spacing, inside.spacing_error / inside.spacing
+        sway = tried.swayed(lambda one: math.log(one.within().spacing / one.lenslet))
+        part = _half(error, 2 * len(inside) - 6, sway)
         how = f"width of the chart's squares over that of their picture, {len(inside)} corners"
         ends = (value * (1 - part), value * (1 + part))
         entries.append(Entry("", Quantity("sample_on_chart", value, "m", ends), how))
@@ -253,9 +280,15 @@ def _shape(chart: Chart, spacing: float | None, lenslet: float) -> list[Entry]:
         bent, error = inside.distortion()
     except SamplingError as problem:
         return [*entries, _not("distortion", problem)]
-    interval = (100 * (bent - 1.96 * error), 100 * (bent + 1.96 * error))
+    half = _half(error, 2 * len(inside) - 9, tried.swayed(lambda one: one.within().distortion()[0]))
+    interval = (100 * (bent - half), 100 * (bent + half))
     how = f"radial, at the picture's corner, over the distance from its middle; {len(inside)} corners"
     return [*entries, Entry("", Quantity("distortion", 100 * bent, "%", interval), how)]
+
+
+def _half(error: float, freedom: int, sway: float) -> float:
+    """Half a 95 % interval, of a standard deviation by few corners (Student's t) and what else sways."""
+    return math.hypot(float(student.ppf(0.975, max(freedom, 1))) * error, 1.96 * sway)
 
 
 def _depths(got: Found, true: float | None, camera: LensletCamera | None) -> list[Entry]:

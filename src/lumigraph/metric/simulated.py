@@ -65,11 +65,13 @@ def simulated(
     lattice = calibrate(white)
     ready = prepare(charts.boards[0].raw, lattice, white=white, dark=dark, camera=camera)
     if isinstance(camera, Rendered) and planes.is_rendered(camera, ready):
-        chart, lenslet = planes.straightest(ready, camera.patch_at(0.0), camera)
+        tried = planes.straightest(ready, camera.patch_at(0.0), camera)
     else:
-        chart, lenslet = find_chart(planes.grey(refocus(decode(ready, lattice), 1.0))), 1.0
-    found = {entry.name: entry for entry in planes.of_chart(chart, charts.spacing, lenslet)}
-    return {name: found[name] if name in found else _contrast(chart, charts.spacing, name) for name in names}
+        tried = planes.Tried(find_chart(planes.grey(refocus(decode(ready, lattice), 1.0))))
+    found = {entry.name: entry for entry in planes.of_chart(tried, charts.spacing)}
+    return {
+        name: found[name] if name in found else _contrast(tried.chart, charts.spacing, name) for name in names
+    }
 
 
 def _contrast(chart: Chart, spacing: float, name: str) -> Quantity:
