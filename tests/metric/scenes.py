@@ -35,3 +35,38 @@ def corners(rng: np.random.Generator, *, frames: int = 6, noise: float = 0.3, sh
     table = np.concatenate(rows)
     whole = table.astype(int)
     return Corners(whole[:, 0], whole[:, 1], table[:, 2:4], table[:, 4:6], whole[:, 6])
+
+
+VIEWS_CAMERA = MetricCamera(
+    50e-3, 57e-3, 1.2e-3, 52e-3, 5.5e-6, (1540.0, 2060.0), tilt=(6e-4, -4e-4), radial=(0.05, 0.0, 0.0)
+)  # fmt: skip
+
+
+def in_views(camera: MetricCamera, point: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """Centres (n, 2) of the micro-images that show a point (3,) at ways (n, 2) from them [px]."""
+    center, kind = np.zeros_like(way), np.zeros(len(way), int)
+    for _ in range(3):  # the array's tilt is taken at the centre
+        center = geometry.centers(
+            camera.numbers, point[None], (center + way, center), kind, camera.pixel_pitch
+        )
+    return center
+
+
+def corners_in_views(
+    rng: np.random.Generator, *, frames: int = 8, views: int = 5, noise: float = 0.4, shared: float = 0.3
+) -> Corners:
+    """Of boards at 0.3 to 0.6 m that lean, in views of a camera 1.0; some are in its lenslets' image."""
+    way = np.stack(np.meshgrid(*2 * [np.linspace(-6.5, 6.5, views)]), -1).reshape(-1, 2)
+    rows = []
+    for frame in range(frames):
+        turn = np.array([rng.uniform(-0.1, 0.1), *rng.uniform(-0.7, 0.7, 2)])
+        shift = np.array([rng.uniform(0.3, 0.6), -0.02, -0.03]) + rng.uniform(-0.01, 0.01, 3)
+        points = geometry.moved(BOARD.points(), np.concatenate([turn, shift]))
+        for corner, point in enumerate(points):
+            center = in_views(VIEWS_CAMERA, point, way)
+            center = center + rng.normal(0, noise, way.shape) + rng.normal(0, shared, 2)
+            what = np.full((len(way), 2), (frame, corner))
+            rows.append(np.column_stack([what, center + way, center]))
+    table = np.concatenate(rows)
+    whole = table[:, :2].astype(int)
+    return Corners(*whole.T, table[:, 2:4], table[:, 4:6], 0 * whole[:, 0], in_views=True)

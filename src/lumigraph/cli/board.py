@@ -1,7 +1,7 @@
 """`lumigraph board`."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,7 +17,6 @@ from lumigraph.core.result import Figure, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
-    from lumigraph.core.prepared import PreparedImage
     from lumigraph.metric import Board, Corners, Measured, Nominal
 
 
@@ -69,18 +68,21 @@ def board(
     board: Annotated[str | None, Parameter(name="--board")] = None,
     origin: Origin = NO_ORIGIN,
     known: Known = Known(),
+    views: Annotated[bool, Parameter(negative="")] = False,
     table: Path | None = None,
     pictures: Annotated[int, Parameter(allow_leading_hyphen=True)] = 8,
     output: Output | None = None,
     common: Reported = REPORTED,
 ) -> Result:
-    """Measure a plenoptic camera 2.0 by a chessboard of known size: its lengths, with their uncertainty.
+    """Measure a plenoptic camera by a chessboard of known size: its lengths, with their uncertainty.
 
-    SOURCES are raw images of the board, three or more, in which the corners are found (this needs OpenCV:
-    pip install 'lumigraph[board]'); or one table (.csv) of where lenslets show them, with the columns frame,
-    corner, y, x, center_y, center_x, kind; or one folder of COMPOTE's (bap.csv, centers.csv, camera.json,
-    scene.json), which also says what the board and the camera are. Or the word plan: which pictures of the
-    board to take with --camera, and how well they will tell its lengths.
+    SOURCES are raw images of the board, three or more, in which the corners are found: behind the lenslets
+    of a camera 2.0 (this needs OpenCV: pip install 'lumigraph[board]'), in the views of a camera 1.0
+    (--views, or --camera of such a camera); or one table (.csv) of where lenslets show them, with the
+    columns frame, corner, y, x, center_y, center_x, kind, and in_views of a camera 1.0; or one folder of
+    COMPOTE's (bap.csv, centers.csv, camera.json, scene.json), which also says what the board and the camera
+    are. Or the word plan: which pictures of the board to take with --camera, a camera 2.0, and how well
+    they will tell its lengths.
 
     Example: `lumigraph board plan --camera camera.toml --board "9 x 5 corners, 10 mm"`
 
@@ -96,6 +98,8 @@ def board(
         Raw images, or one table or folder, or plan.
     board
         Inner corners across and down and their spacing, such as '9 x 5 corners, 10 mm'.
+    views
+        The raw images are of a camera 1.0, whose views show the corners.
     table
         Where to write the corners that were found on raw images (.csv).
     pictures
@@ -112,7 +116,7 @@ def board(
     target = None if board is None else metric.Board.from_text(board)
     if sources == (Path("plan"),):
         return _planned(origin, target, known, pictures)
-    seen, target, given, told = _read(sources, target, origin)
+    seen, target, given, told = _read(sources, target, origin, views)
     found = metric.board(seen, target, known.nominal(given))
     written = [path for path in (output, table) if path is not None]
     if output is not None:
@@ -132,7 +136,7 @@ def board(
 
 
 def _read(
-    sources: tuple[Path, ...], board: "Board | None", origin: Origin
+    sources: tuple[Path, ...], board: "Board | None", origin: Origin, views: bool
 ) -> "tuple[Corners, Board, dict[str, Any], tuple[str, ...]]":
     """Corners, their board, what the files say of the camera, and what was done to raw images."""
     from lumigraph import metric
@@ -146,31 +150,26 @@ def _read(
         raise FormatError("give --board, such as '9 x 5 corners, 10 mm'.")
     if alone and first.suffix.lower() == ".csv":
         return metric.load_corners(first), board, {}, ()
-    return _found(sources, board, origin)
+    return _found(sources, board, origin, views)
 
 
 def _found(
-    sources: tuple[Path, ...], board: "Board", origin: Origin
+    sources: tuple[Path, ...], board: "Board", origin: Origin, views: bool
 ) -> "tuple[Corners, Board, dict[str, Any], tuple[str, ...]]":
     """Of raw images."""
     from lumigraph import metric
-    from lumigraph.instruments.capabilities import WithMainLens
+    from lumigraph.instruments.capabilities import Rendered, WithMainLens
 
-    ready = list(_prepared(sources, origin))
-    camera = origin.described("render")
+    camera = origin.described("decode" if views else None)
+    in_views = views or (camera is not None and not isinstance(camera, Rendered))
+    ready = [origin.prepared(origin.read(path)) for path in sources]
     with progress("board") as tell:
-        seen = metric.find_corners(ready, board, progress=tell)
+        seen = metric.find_corners(ready, board, in_views=in_views, progress=tell)
     told = {"shape": ready[0].shape, "pixel_pitch": ready[0].pixel_pitch}
     if isinstance(camera, WithMainLens):
         told |= {"focal_length": camera.main_lens.focal_length, "pixel_pitch": camera.sensor.pixel_pitch}
     known = {name: value for name, value in told.items() if value is not None}
     return seen, board, known, ready[0].notes
-
-
-def _prepared(sources: tuple[Path, ...], origin: Origin) -> "Iterator[PreparedImage]":
-    """Raw images ready to use."""
-    for path in sources:
-        yield origin.prepared(origin.read(path), use="render")
 
 
 def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int) -> Result:

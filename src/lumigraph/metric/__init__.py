@@ -1,7 +1,7 @@
 """Cameras with lengths: calibrated from boards of known size, and distances of what they see.
 
 - `Board`: the known object; `Corners`: where its corners show on raw images.
-- `find_corners`: the same from raw images of a chessboard (`chessboard`).
+- `find_corners`: the same from raw images of a chessboard (`chessboard`), or from their `views`.
 - `MetricCamera`: main lens, lenslets, sensor, as a geometry of rays (`geometry`).
 - `board`: the camera from corners, by bundle adjustment (`adjustment`) from a coarse search (`start`),
   with the noise of corners that are seen many times (`noise`). `Measured` holds it, its errors, the poses.

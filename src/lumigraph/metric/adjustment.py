@@ -93,12 +93,16 @@ class Problem:
         return numbers, unknowns[free.shape[1] :].reshape(self.frames, 6)
 
     def misfit(self, unknowns: np.ndarray) -> np.ndarray:
-        """(n, 2) Computed minus measured [px]."""
+        """(n, 2) Computed minus measured [px]: places, or centres of corners in views."""
         numbers, poses = self.split(unknowns)
         points = geometry.moved(self.board.points()[self.corners.corner], poses[self.frame])
         pitch = self.camera.pixel_pitch
-        seen = geometry.project(numbers, points, self.corners.center, self.corners.kind, pitch)
-        return seen - self.corners.place
+        seen = self.corners
+        if seen.in_views:
+            return (
+                geometry.centers(numbers, points, (seen.place, seen.center), seen.kind, pitch) - seen.center
+            )
+        return geometry.project(numbers, points, seen.center, seen.kind, pitch) - seen.place
 
     def slopes(self, unknowns: np.ndarray) -> np.ndarray:
         """(n, 2, unknowns) Derivatives of `misfit`."""
@@ -127,7 +131,7 @@ class Problem:
         return np.concatenate([slopes, known])
 
     def _white(self, values: np.ndarray) -> np.ndarray:
-        return self.noise.whitened(values, self.sight, self.corners.kind)
+        return self.noise.whitened(values, self.sight, self.corners.kind, self.corners.way)
 
 
 def freedom(camera: MetricCamera) -> np.ndarray:
@@ -198,7 +202,7 @@ def _again(first: Problem, misfit: np.ndarray) -> tuple[Problem, np.ndarray]:
             "the corners of a picture fit no position of the board. Leave it out, or number them again."
         )
     sight = corners.sights()
-    noise = Noise.of(misfit[kept], sight, corners.kind)
+    noise = Noise.of(misfit[kept], sight, corners.kind, corners.way)
     return replace(first, corners=corners, frame=first.frame[kept], noise=noise, sight=sight), kept
 
 

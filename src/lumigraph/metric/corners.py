@@ -1,7 +1,7 @@
 """The board and its corners on raw images."""
 
 import re
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +17,8 @@ LEAST = 3
 
 FARTHEST = 1e6
 """What no picture reaches to [px]."""
+
+_COLUMNS = ("frame", "corner", "place", "center", "kind")
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +92,9 @@ class Corners:
         (n, 2) The micro-image's centre (y, x) [px].
     kind
         (n,) Of the lenslet: 0, or 0 to 2 in arrays of three focal lengths.
+    in_views
+        Whether they were found in views of a camera 1.0: then place less centre is the view, which is exact,
+        and the centre is what was measured, that of a micro-image between those of two lenslets.
 
     Raises
     ------
@@ -104,6 +109,7 @@ class Corners:
     place: np.ndarray
     center: np.ndarray
     kind: np.ndarray
+    in_views: bool = False
 
     __repr__ = brief
 
@@ -124,7 +130,7 @@ class Corners:
                 raise CalibrationError(f"{name} reaches to {most:.3g} px but at most {FARTHEST:g} px.")
             object.__setattr__(self, name, values)
         if not len(self) or {len(self.corner), len(self.kind)} != {len(self)}:
-            sizes = ", ".join(f"{f.name} {len(getattr(self, f.name))}" for f in fields(self))
+            sizes = ", ".join(f"{name} {len(getattr(self, name))}" for name in _COLUMNS)
             raise CalibrationError(f"the columns have {sizes} rows but must have as many, at least one.")
         if self.corner.min() < 0 or not 0 <= self.kind.min() <= self.kind.max() <= 2:
             raise CalibrationError(
@@ -137,7 +143,12 @@ class Corners:
 
     def __getitem__(self, chosen: np.ndarray) -> "Corners":
         """Some of the rows, by a mask or indices."""
-        return Corners(*(getattr(self, f.name)[chosen] for f in fields(self)))
+        return Corners(*(getattr(self, name)[chosen] for name in _COLUMNS), in_views=self.in_views)
+
+    @property
+    def way(self) -> np.ndarray | None:
+        """(n, 2) From centres to places of corners in views [px]; None of others."""
+        return self.place - self.center if self.in_views else None
 
     @property
     def frames(self) -> np.ndarray:

@@ -22,6 +22,9 @@ from lumigraph.store import write_bytes
 COLUMNS = ("frame", "corner", "y", "x", "center_y", "center_x", "kind")
 """Of a table of corners: lengths in pixels."""
 
+IN_VIEWS = "in_views"
+"""A column of ones in a table of corners that were found in views."""
+
 KIND = "lumigraph metric camera"
 
 _COMPOTE = ("bap.csv", "centers.csv", "camera.json", "scene.json")
@@ -32,27 +35,32 @@ _MM = 1e-3
 
 
 def load_corners(path: str | os.PathLike[str]) -> Corners:
-    """Corners from a table (.csv) with a header of `COLUMNS`; `kind` may be left out.
+    """Corners from a table (.csv) with a header of `COLUMNS`, and `IN_VIEWS`; `kind` may be left out.
 
     Raises
     ------
     FormatError
-        Another file, a column that is missing, text that is no number.
+        Another file, a column that is missing, text that is no number, some corners in views but not all.
     """
     file = source.regular_file(path)
     found = _table(file, COLUMNS[:-1])
+    in_views = set(found.get(IN_VIEWS, np.zeros(1)).tolist())
+    if in_views not in ({0.0}, {1.0}):
+        raise FormatError(f"column {IN_VIEWS} of {file} must hold 0 in all rows, or 1 in all.")
     with _checked(file):
         place, center = (_pair(found, y, x) for y, x in (("y", "x"), ("center_y", "center_x")))
         found.setdefault("kind", np.zeros(len(place)))
         frame, corner, kind = (_whole(name, found) for name in ("frame", "corner", "kind"))
-        return Corners(frame, corner, place, center, kind)
+        return Corners(frame, corner, place, center, kind, in_views == {1.0})
 
 
 def save_corners(corners: Corners, path: str | os.PathLike[str]) -> None:
     """Write a table of corners (.csv), which `load_corners` reads."""
-    columns = (corners.frame, corners.corner, *corners.place.T, *corners.center.T, corners.kind)
+    names = (*COLUMNS, IN_VIEWS) if corners.in_views else COLUMNS
+    columns = [corners.frame, corners.corner, *corners.place.T, *corners.center.T, corners.kind]
+    columns += [np.ones_like(corners.frame)] * corners.in_views
     rows = (",".join(map(str, row)) for row in zip(*map(np.ndarray.tolist, columns), strict=True))
-    write_bytes(path, ("\n".join((",".join(COLUMNS), *rows)) + "\n").encode())
+    write_bytes(path, ("\n".join((",".join(names), *rows)) + "\n").encode())
 
 
 def load_compote(folder: str | os.PathLike[str]) -> tuple[Corners, Board, Nominal]:
@@ -117,7 +125,11 @@ def save(measured: Measured, path: str | os.PathLike[str]) -> None:
         "kind": KIND,
         "camera": asdict(measured.camera),
         "covariance": measured.covariance.tolist(),
-        "noise": {"own": measured.noise.own.tolist(), "shared": measured.noise.shared},
+        "noise": {
+            "own": measured.noise.own.tolist(),
+            "shared": measured.noise.shared,
+            "sway": measured.noise.sway,
+        },
         "board": asdict(measured.board),
         "residual_px": measured.residual_px,
         "left_out": measured.left_out,
@@ -152,9 +164,10 @@ def load(path: str | os.PathLike[str]) -> Measured:
         board = Board(tuple(found["board"]["shape"]), found["board"]["spacing"])
         camera = MetricCamera(**lists)
         own, shared = _numbers(found["noise"], "own", len(camera.gains)), _number(found["noise"], "shared")
+        sway = _number(found["noise"], "sway") if "sway" in found["noise"] else 0.0
         numbers = len(camera.numbers)
         return Measured(
-            camera, _numbers(found, "covariance", numbers, numbers), Noise(own, shared), board,
+            camera, _numbers(found, "covariance", numbers, numbers), Noise(own, shared, sway), board,
             tuple(_pose(one) for one in found["poses"]), _number(found, "residual_px"),
             int(found["left_out"]), tuple(map(str, found["notes"])),
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Corners of a chessboard in the micro-images of raw images of a plenoptic 2.0 camera."""
+"""Corners of a chessboard on raw images: in micro-images of a camera 2.0, in `views` of a camera 1.0."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -13,7 +13,7 @@ from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
 from lumigraph.depth import correlation
 from lumigraph.errors import CalibrationError
-from lumigraph.metric import chessboard
+from lumigraph.metric import chessboard, views
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.preparation import of_raw
 from lumigraph.rendering import render
@@ -44,14 +44,18 @@ def find_corners(
     board: Board,
     calibration: Calibration | None = None,
     *,
+    in_views: bool = False,
     progress: Progress = silent,
 ) -> Corners:
-    """Where lenslets show the corners of a chessboard, on raw images of a plenoptic 2.0 camera.
+    """Where lenslets or views show the corners of a chessboard, on raw images of a plenoptic camera.
 
-    A picture is rendered of each raw image, sharp all over (`lumigraph.depth.correlation`), and the board
-    found on it by OpenCV. That says where each lenslet should show each corner; there it is looked for in
-    the micro-image itself, as the saddle of the brightness, which no even blur moves. All places of one
-    corner must lie on its line, place = centre - k (X - centre): others are left out.
+    Of a camera 2.0, a picture is rendered of each raw image, sharp all over (`lumigraph.depth.correlation`),
+    and the board found on it by OpenCV. That says where each lenslet should show each corner; there it is
+    looked for in the micro-image itself, as the saddle of the brightness, which no even blur moves. All
+    places of one corner must lie on its line, place = centre - k (X - centre): others are left out.
+
+    Lenslets of a camera 1.0 show no corners. Its raw images are decoded to 7 x 7 views or fewer, and each
+    view that lies wholly within the main lens' stop is searched for the same saddles.
 
     Parameters
     ----------
@@ -62,15 +66,17 @@ def find_corners(
         Inner corners of a chessboard with a white margin.
     calibration
         Of raw images that were not prepared.
+    in_views
+        Whether the raw images are of a camera 1.0.
     progress
         Called as ``progress(fraction)``.
 
     Raises
     ------
     CalibrationError
-        No pictures, one without the whole board, or squares too small to be told apart behind a lenslet.
+        No pictures, one without the whole board, or squares too small to be told apart.
     LumigraphError
-        OpenCV is not installed.
+        OpenCV, which finds boards of cameras 2.0, is not installed.
 
     References
     ----------
@@ -79,11 +85,11 @@ def find_corners(
     """
     found = []
     for frame, raw in enumerate(raws):
-        found.append(_on_picture(raw, calibration, board, frame))
+        found.append((views.on_picture if in_views else _on_picture)(raw, calibration, board, frame))
         progress((frame + 1) / len(raws))
     if not found:
         raise CalibrationError("there are no raw images. Give three or more of the board.")
-    return Corners(*(np.concatenate(column) for column in zip(*found, strict=True)))
+    return Corners(*(np.concatenate(column) for column in zip(*found, strict=True)), in_views=in_views)
 
 
 @of_raw

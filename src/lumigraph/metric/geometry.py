@@ -6,8 +6,12 @@ axis with distortion. The ray through lenslet c, at L, meets the sensor b behind
 
 .. math:: s = c + b (c - V n')/(L - V)
 
-and the lenslet whose micro-image stands at s0 is at c = s0 E/(E + b). Every function here takes complex
-numbers too, for `slope`.
+and the lenslet whose micro-image stands at s0 is at c = s0 E/(E + b). In a view of a camera 1.0, s - s0 is
+given and s0 is where the point shows:
+
+.. math:: s_0 = \frac{(s - s_0) (L - V) + b V n'}{c / s_0 \, (L - V + b) - (L - V)}
+
+which holds for images in the lenslets' plane too. Every function here takes complex numbers too, for `slope`.
 """
 
 from collections.abc import Callable
@@ -47,6 +51,26 @@ def project(
     lenslet, sag = lenslets(seen, L, b, L / ratio, tilt)
     place = lenslet + (lenslet - lateral) * (b - sag) / (L + sag - image)
     return (seen + gains[kind][:, None] * (place - seen)) / pixel_pitch + axis
+
+
+def centers(
+    numbers: np.ndarray, points: np.ndarray, seen_at: tuple[np.ndarray, np.ndarray], kind: np.ndarray,
+    pixel_pitch: float,
+) -> np.ndarray:  # fmt: skip
+    """Centres (n, 2) [px] of the micro-images that show points (n, 3), (z, y, x), at given ways from them.
+
+    ``seen_at`` are places and centres (n, 2) [px] as measured; the tilt of the array is taken there.
+    """
+    place, center = seen_at
+    f, L, b, ratio = numbers[:4]
+    axis, tilt, gains = numbers[4:6], numbers[6:8], numbers[len(NAMES) :]
+    distance = points[:, :1]
+    image = f * distance / (distance - f)
+    lateral = image * distorted(points[:, 1:] / distance, numbers[8:11], numbers[11:13])
+    _, sag = lenslets((center - axis) * pixel_pitch, L, b, L / ratio, tilt)
+    way = (place - center) * pixel_pitch / gains[kind][:, None]
+    away, behind, part = L + sag - image, b - sag, (L / ratio + sag) / (L / ratio + b)
+    return (way * away + lateral * behind) / (part * (away + behind) - away) / pixel_pitch + axis
 
 
 def lenslets(

@@ -25,25 +25,44 @@ class Noise:
         (kinds,) Of one place, for each kind of lenslet.
     shared
         Of all places of a corner on a picture together.
+    sway
+        Of how far a corner in views moves with the view [px/px]: samples of views pull corners towards them,
+        and a corner passes slowly from one sample to the next.
     """
 
     own: np.ndarray
     shared: float
+    sway: float = 0.0
 
     @classmethod
-    def of(cls, residual: np.ndarray, sight: np.ndarray, kind: np.ndarray) -> "Noise":
-        """Estimated from residuals (n, 2) [px], by the moments of corners with two places or more."""
-        count, kinds = np.bincount(sight), int(kind.max()) + 1
-        mean = _means(residual, sight)
-        inner = np.mean((residual - mean[sight]) ** 2, axis=1)
-        own = np.sqrt(np.maximum(_own(inner, sight, kind, kinds), LEAST_NOISE**2))
-        expected = np.bincount(sight, own[kind] ** 2) / count**2
-        many = count > 1
-        shared = np.mean(mean[many] ** 2) - np.mean(expected[many]) if many.any() else 0.0
-        return cls(own, float(np.sqrt(max(shared, 0.0))))
+    def of(
+        cls, residual: np.ndarray, sight: np.ndarray, kind: np.ndarray, way: np.ndarray | None = None
+    ) -> "Noise":
+        """Estimated from residuals (n, 2) [px], by the moments of corners with two places or more.
 
-    def whitened(self, values: np.ndarray, sight: np.ndarray, kind: np.ndarray) -> np.ndarray:
-        """Residuals or their derivatives (n, 2, ...), as independent ones of variance 1."""
+        `way` (n, 2) [px], from centres to places, are given for corners in views.
+        """
+        count, kinds = np.bincount(sight), int(kind.max()) + 1
+        mean, many, rest = _means(residual, sight), count > 1, 0.0
+        if way is None:
+            inner = np.mean((residual - mean[sight]) ** 2, axis=1)
+            own = _own(inner, sight, kind, kinds)
+        else:
+            ways, spread = _centred(way, sight)
+            sway = np.bincount(sight, np.sum(ways * residual, axis=1)) / spread
+            inner = np.mean((residual - mean[sight] - sway[sight, None] * ways) ** 2, axis=1)
+            # Slopes and means are taken out of the 2 n numbers of a corner.
+            own = np.full(kinds, 2 * inner[many[sight]].sum() / max(np.sum(2 * count[many] - 3), 1))
+            rest = np.mean(sway[many] ** 2 - own[0] / spread[many]) if many.any() else 0.0
+        own = np.sqrt(np.maximum(own, LEAST_NOISE**2))
+        expected = np.bincount(sight, own[kind] ** 2) / count**2
+        shared = np.mean(mean[many] ** 2) - np.mean(expected[many]) if many.any() else 0.0
+        return cls(own, float(np.sqrt(max(shared, 0.0))), float(np.sqrt(max(rest, 0.0))))
+
+    def whitened(
+        self, values: np.ndarray, sight: np.ndarray, kind: np.ndarray, way: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Residuals or their derivatives (n, 2, ...), as independent ones of variance 1; `way` as of `of`."""
         inverse = 1 / self.own[kind]
         scaled = values.reshape(len(values), -1) * inverse[:, None]
         together = csr_array((inverse, (sight, np.arange(len(sight)))))
@@ -51,7 +70,15 @@ class Noise:
         # Along the vector 1/σ of a corner's places the variance is 1 + τ² Σ 1/σ², across it 1.
         less = (1 - 1 / np.sqrt(1 + self.shared**2 * weight)) / weight
         shared = together.T @ (less[:, None] * (together @ scaled))
-        return (scaled - shared).reshape(values.shape)
+        white = (scaled - shared).reshape(values.shape)
+        if way is None or not self.sway:
+            return white
+        # Along a corner's ways from their middle, which what it shares does not touch.
+        inner, spread = _centred(way, sight)
+        less = (1 - 1 / np.sqrt(1 + (self.sway / self.own[0]) ** 2 * spread)) / spread
+        along = _sums(np.einsum("na,na...->n...", inner, white), sight)
+        taken = (less.reshape(-1, *[1] * (along.ndim - 1)) * along)[sight]
+        return white - np.einsum("na,n...->na...", inner, taken)
 
 
 def _own(inner: np.ndarray, sight: np.ndarray, kind: np.ndarray, kinds: int) -> np.ndarray:
@@ -70,6 +97,19 @@ def _own(inner: np.ndarray, sight: np.ndarray, kind: np.ndarray, kinds: int) -> 
         table[k, k] += np.sum(1 - 2 / count[mine])
         found[k] = inner[mine].sum()
     return np.linalg.lstsq(table, found, rcond=None)[0]
+
+
+def _sums(values: np.ndarray, sight: np.ndarray) -> np.ndarray:
+    """Sums (sights, ...) of (n, ...)."""
+    total = np.zeros((int(sight.max()) + 1, *values.shape[1:]))
+    np.add.at(total, sight, values)
+    return total
+
+
+def _centred(way: np.ndarray, sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ways (n, 2) from the middle of their corner's, and the sums of their squares (sights,)."""
+    inner = way - _means(way, sight)[sight]
+    return inner, np.maximum(np.bincount(sight, np.sum(inner**2, axis=1)), 1e-9)
 
 
 def _means(values: np.ndarray, sight: np.ndarray) -> np.ndarray:

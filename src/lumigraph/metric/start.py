@@ -18,6 +18,8 @@ from lumigraph.metric.corners import Board, Corners
 LEAST_PLACES, LEAST_CORNERS = 3, 6
 """Lenslets that show a corner, and corners of a picture, for the search."""
 
+_STILL = 1e-6  # of the way between views, by which a point in the lenslets' image moves
+
 _LENGTHS = 40
 """Steps of either length."""
 
@@ -63,15 +65,13 @@ def virtual(corners: Corners, middle: tuple[float, float]) -> Virtual:
     """
     sight = corners.sights()
     count = np.bincount(sight)
-    center, place = corners.center - middle, corners.place - middle
-    means = [np.stack([np.bincount(sight, v) / count for v in a.T], 1) for a in (center, place)]
-    inner, outer = center - means[0][sight], place - means[1][sight]
-    spread = np.bincount(sight, np.sum(inner**2, axis=1))
-    slope = np.bincount(sight, np.sum(inner * outer, axis=1)) / np.maximum(spread, 1e-9)
+    slope, shift, spread = lines(corners.place - middle, corners.center - middle, sight, corners.in_views)
     first = np.unique(sight, return_index=True)[1]
     good = (count >= LEAST_PLACES) & (spread > 0)
+    if corners.in_views:
+        slope, shift = _flat(slope, shift, corners.frame[first], good)
     frame, corner = corners.frame[first], corners.corner[first]
-    found = Virtual(*(v[good] for v in (frame, corner, slope, means[1] - slope[:, None] * means[0])))
+    found = Virtual(*(v[good] for v in (frame, corner, slope, shift)))
     pictures, many = np.unique(found.frame, return_counts=True)
     kept = np.isin(found.frame, pictures[many >= LEAST_CORNERS])
     if not kept.any():
@@ -80,6 +80,43 @@ def virtual(corners: Corners, middle: tuple[float, float]) -> Virtual:
             f"{max(many, default=0)}. Take the board closer, or focus so that neighbouring lenslets overlap."
         )
     return Virtual(found.frame[kept], found.corner[kept], found.slope[kept], found.shift[kept])
+
+
+def lines(
+    place: np.ndarray, center: np.ndarray, sight: np.ndarray, in_views: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A (k,) and t (k, 2) of s = A c + t for each sight, and how far apart its lenslets or views are (k,).
+
+    In views, the centres move by 1/(A - 1) of the ways from them to the places, which are exact there.
+    """
+    known, moved = (place - center, center) if in_views else (center, place)
+    count = np.bincount(sight)
+    means = [np.stack([np.bincount(sight, v) / count for v in a.T], 1) for a in (known, moved)]
+    inner, outer = known - means[0][sight], moved - means[1][sight]
+    spread = np.bincount(sight, np.sum(inner**2, axis=1))
+    slope = np.bincount(sight, np.sum(inner * outer, axis=1)) / np.maximum(spread, 1e-9)
+    if not in_views:
+        return slope, means[1] - slope[:, None] * means[0], spread
+    slope = np.where(np.abs(slope) < _STILL, _STILL, slope)
+    shift = slope[:, None] * means[0] - means[1]
+    return 1 + 1 / slope, shift / slope[:, None], spread
+
+
+def _flat(
+    slope: np.ndarray, shift: np.ndarray, frame: np.ndarray, good: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A and t of corners in views, which move little between them, by all corners of a flat board together.
+
+    By how much a plane's points move, 1/(A - 1), is linear in where they stand, but for what a lens bends.
+    """
+    moved = 1 / (slope - 1)
+    at = -shift * moved[:, None]
+    for one in np.unique(frame):
+        mine = good & (frame == one)
+        design = np.column_stack([np.ones(int(mine.sum())), at[mine]])
+        moved[mine] = design @ np.linalg.lstsq(design, moved[mine], rcond=None)[0]
+    moved = np.where(np.abs(moved) < _STILL, _STILL, moved)
+    return 1 + 1 / moved, -at / moved[:, None]
 
 
 def search(corners: Corners, board: Board, nominal: Nominal) -> tuple[MetricCamera, dict[int, np.ndarray]]:
@@ -113,6 +150,9 @@ def search(corners: Corners, board: Board, nominal: Nominal) -> tuple[MetricCame
 
 def _distances(corners: Corners, pixel_pitch: float) -> np.ndarray:
     """Lenslets to sensor [m]: from a half to forty times what micro-images are apart."""
+    if corners.in_views:
+        lit = 2 * float(np.abs(corners.place - corners.center).max())
+        return np.geomspace(0.5, 40, _LENGTHS) * lit * pixel_pitch
     center = corners.center[np.argsort(corners.sights(), kind="stable")]
     steps = np.hypot(*np.diff(center, axis=0).T)
     pitch = float(np.median(steps[steps > 0.5])) * pixel_pitch

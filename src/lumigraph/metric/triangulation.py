@@ -11,7 +11,7 @@ from lumigraph.core.brief import brief
 from lumigraph.errors import CalibrationError
 from lumigraph.metric import geometry
 from lumigraph.metric.calibration import Measured
-from lumigraph.metric.start import Virtual
+from lumigraph.metric.start import Virtual, lines
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,8 +41,9 @@ class Triangulated:
 
 
 def triangulate(
-    measured: Measured, place: np.ndarray, center: np.ndarray, kind: np.ndarray | int = 0
-) -> Triangulated:
+    measured: Measured, place: np.ndarray, center: np.ndarray, kind: np.ndarray | int = 0,
+    *, in_views: bool = False,
+) -> Triangulated:  # fmt: skip
     """Position of a point that several lenslets show.
 
     Parameters
@@ -55,6 +56,8 @@ def triangulate(
         (n, 2) The micro-images' centres (y, x) [px].
     kind
         Of the lenslets, (n,) or one for all.
+    in_views
+        Whether the point was found in views of a camera 1.0: see `Corners`.
 
     Raises
     ------
@@ -70,9 +73,12 @@ def triangulate(
     checks.finite_array("center", center, CalibrationError)
     kinds = np.broadcast_to(np.asarray(kind), len(place))
     camera, noise = measured.camera, measured.noise
-    own, start = noise.own[kinds][:, None], _first(measured, place, center)
+    own, start = noise.own[kinds][:, None], _first(measured, place, center, in_views)
 
     def misfit(numbers: np.ndarray, point: np.ndarray) -> np.ndarray:
+        if in_views:
+            seen_at = place, center
+            return geometry.centers(numbers, point[None], seen_at, kinds, camera.pixel_pitch) - center
         return geometry.project(numbers, point[None], center, kinds, camera.pixel_pitch) - place
 
     def white(numbers: np.ndarray, point: np.ndarray) -> np.ndarray:
@@ -96,18 +102,17 @@ def triangulate(
     return Triangulated(found.x, covariance, float(np.sqrt(np.mean(misfit(camera.numbers, found.x) ** 2))))
 
 
-def _first(measured: Measured, place: np.ndarray, center: np.ndarray) -> np.ndarray:
+def _first(measured: Measured, place: np.ndarray, center: np.ndarray, in_views: bool) -> np.ndarray:
     """Where the rays meet, without distortion."""
     camera = measured.camera
-    inner = center - center.mean(0)
-    slope = float(np.sum(inner * (place - place.mean(0))) / np.sum(inner**2))
-    shift = (place - camera.axis).mean(0) - slope * (center - camera.axis).mean(0)
-    one = Virtual(np.zeros(1, int), np.zeros(1, int), np.array([slope]), shift[None])
+    sight = np.zeros(len(place), int)
+    slope, shift, _ = lines(place - camera.axis, center - camera.axis, sight, in_views)
+    one = Virtual(sight[:1], sight[:1], slope, shift)
     f, L, b = camera.focal_length, camera.separation, camera.lenslet_distance
     (point,) = one.points(f, L, b, camera.pixel_pitch)
     if not np.isfinite(point).all():
         raise CalibrationError(
-            f"the places move by {slope:.4g} of what the lenslets do: no point before the camera does so. "
+            f"the places move by {slope[0]:.4g} of what the lenslets do: no point before the camera does so. "
             "Check that they show the same point."
         )
     return point

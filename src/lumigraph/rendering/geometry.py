@@ -7,7 +7,9 @@ import numpy as np
 
 from lumigraph.core.arrays import Array, namespace, to_numpy
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
+from lumigraph.core.lightfield import LightField
 from lumigraph.errors import CalibrationError
 
 DISTANCE_RATIO = 20.0
@@ -142,3 +144,38 @@ def _none_whole(calibration: Calibration) -> CalibrationError:
         f"no micro-image of pitch {calibration.lattice.pitch:.1f} px lies wholly inside {ny} x {nx} pixels. "
         "Use the whole sensor's picture and its own white image."
     )
+
+
+def raw_places(
+    views: LightField, calibration: Calibration, samples: np.ndarray, which: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where samples of views come from on the raw image (y, x) [px].
+
+    Parameters
+    ----------
+    views
+        Decoded with the calibration.
+    calibration
+        Of the raw image.
+    samples
+        (n, 2) as (t, s), not rounded.
+    which
+        (n, 2) views (v, u).
+
+    Returns
+    -------
+    tuple
+        Centres (n, 2) of the micro-images, those between two lenslets too, and the ways (n, 2) from there.
+    """
+    flipped = transposed(calibration)
+    frame = Frame.of(calibration if flipped is None else flipped)
+    turn = slice(None) if flipped is None else slice(None, None, -1)
+    axes = np.stack([frame.column, frame.row])
+
+    def on_raw(grid: Grid, index: np.ndarray) -> np.ndarray:
+        at = [grid.center[k] + (index[:, k] - grid.shape[k] // 2) * grid.pitch[k] for k in (0, 1)]
+        return np.stack(at[turn], 1) @ axes
+
+    flat = (frame.axis + on_raw(views.lenslets, samples) / frame.lenslet_per_px)[:, turn]
+    center = flat if calibration.warp is None else calibration.warp.applied(flat)
+    return center, -on_raw(views.aperture, which)[:, turn] / frame.aperture_per_px

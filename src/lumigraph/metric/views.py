@@ -1,0 +1,140 @@
+"""Corners of a chessboard in the views of raw images of a plenoptic 1.0 camera."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, spline_filter
+
+from lumigraph.analysis import find_chart
+from lumigraph.analysis.saddles import settle
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.raw import RawImage
+from lumigraph.errors import CalibrationError, SamplingError
+from lumigraph.metric.corners import Board
+from lumigraph.preparation import decode, of_raw
+from lumigraph.rendering.geometry import raw_places
+
+LEAST_VIEWS = 5
+"""In which a corner must be seen."""
+
+_DIRECTIONS = 7  # views along an axis: the fewer, the less noise and the less of it is shared
+_WINDOW = 0.35  # half the window about a corner, over the width of a square
+_RADII = (2, 6)  # samples: of windows
+
+LEAST_SQUARE = _RADII[0] / _WINDOW
+"""Of a board in a view [samples]."""
+
+_SOFT = 1.0  # samples: of a blur that moves no corner, but keeps samples from pulling at them
+_STRAY = 1.5  # samples: from where a corner is expected
+_RIM = 1.0  # px: of a micro-image, whose blur moves what views there see
+_OFF = 3.0  # times the median distance from the corner's own line
+
+
+@of_raw
+def on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: int) -> tuple[np.ndarray, ...]:
+    """Columns of `Corners` of one raw image.
+
+    The board is found on the middle view. From there on, views farther out are searched for the saddles of
+    the brightness, where the views before lead to expect them: a corner moves evenly from view to view.
+    """
+    pitch = calibration.lattice.pitch
+    count = min(_DIRECTIONS, int(pitch) - (int(pitch) + 1) % 2)
+    views = decode(raw, calibration, directions=count)
+    data = np.asarray(to_numpy(views.data), np.float64)
+    data = data.mean(4) if data.ndim == 5 else data
+    which = np.argwhere(np.ones(data.shape[:2], bool))
+    _, way = raw_places(views, calibration, np.zeros((len(which), 2)), which)
+    reach = (calibration.fill or 1.0) * pitch / 2 - _RIM - pitch / count / np.sqrt(2)
+    near = np.hypot(*way.T) <= reach
+    which, way = which[near], way[near]
+    first = _board(data[count // 2, count // 2], board, frame)
+    track = _Track.of(first, _radius(first, board, frame), len(way))
+    for k in np.argsort(np.hypot(*way.T), kind="stable"):
+        track.follow(data[tuple(which[k])], way, int(k))
+    corner, view = np.nonzero(track.straight(way))
+    if not len(corner):
+        raise CalibrationError(
+            f"picture {frame} shows the board, but no corner in {LEAST_VIEWS} views or more. Take it in "
+            "better light, or nearer to the plane in focus."
+        )
+    center, ways = raw_places(views, calibration, track.places[corner, view], which[view])
+    return np.full(len(corner), frame), corner, center + ways, center, np.zeros(len(corner), int)
+
+
+def _board(middle: np.ndarray, board: Board, frame: int) -> np.ndarray:
+    """Corners (n, 2) on the middle view [samples], from either end of a board that looks the same turned."""
+    (down, across), seen = board.shape, 0
+    with suppress(SamplingError):
+        chart = find_chart(middle)
+        index, seen = chart.indices - chart.indices.min(0), len(chart)
+        if seen == down * across and sorted(index.max(0) + 1) == sorted(board.shape):
+            grid = np.zeros((*(index.max(0) + 1), 2))
+            grid[tuple(index.T)] = chart.corners
+            grid = grid if grid.shape[:2] == board.shape else grid.swapaxes(0, 1)
+            (ay, ax), (by, bx) = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
+            # A mirrored order would be a board seen from behind.
+            return (grid if ax * by - ay * bx > 0 else grid[:, ::-1]).reshape(-1, 2)
+    raise CalibrationError(
+        f"the middle view of picture {frame} does not show a whole chessboard of {across} x {down} inner "
+        f"corners with a white margin; {seen} corners of a board are seen. Leave the picture out, or give "
+        "the board's own numbers."
+    )
+
+
+def _radius(places: np.ndarray, board: Board, frame: int) -> int:
+    """Of the window about a corner [samples]."""
+    grid = places.reshape(*board.shape, 2)
+    width = min(float(np.hypot(*np.moveaxis(np.diff(grid, axis=k), -1, 0)).min()) for k in (0, 1))
+    if width < LEAST_SQUARE:
+        raise CalibrationError(
+            f"on picture {frame} the squares are {width:.3g} samples of a view wide, but {LEAST_SQUARE:.2g} "
+            "are needed. Use a board with larger squares, or bring it nearer."
+        )
+    return max(_RADII[0], min(_RADII[1], int(width * _WINDOW)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Track:
+    """Where n corners are in m views: `places` (n, m, 2) [samples], NaN where they were not found."""
+
+    first: np.ndarray
+    radius: int
+    places: np.ndarray
+
+    @classmethod
+    def of(cls, first: np.ndarray, radius: int, views: int) -> "_Track":
+        return cls(first, radius, np.full((len(first), views, 2), np.nan))
+
+    def follow(self, view: np.ndarray, way: np.ndarray, k: int) -> None:
+        """Look for the corners in one view more."""
+        middle, slope = self._lines(way)
+        start = middle + slope[:, None] * way[k]
+        at, kept = settle(spline_filter(gaussian_filter(view, _SOFT), 3), start, self.radius, stray=_STRAY)
+        inside = ((at >= self.radius) & (at <= np.array(view.shape) - 1 - self.radius)).all(1)
+        self.places[kept & inside, k] = at[kept & inside]
+
+    def straight(self, way: np.ndarray) -> np.ndarray:
+        """Which places (n, m) are on their corner's line; none of corners that too few views show."""
+        for _ in range(3):
+            middle, slope = self._lines(way)
+            off = np.hypot(*np.moveaxis(self.places - middle[:, None] - slope[:, None, None] * way, -1, 0))
+            typical = np.nanmedian(np.where(np.isfinite(off).any(1, keepdims=True), off, 0), axis=1)
+            self.places[off > np.maximum(0.02, _OFF * typical)[:, None]] = np.nan
+        good = np.isfinite(self.places[..., 0])
+        return good & (good.sum(1) >= LEAST_VIEWS)[:, None]
+
+    def _lines(self, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Place (n, 2) in the view of way 0, and how far a corner moves with the way [samples/px] (n,)."""
+        good = np.isfinite(self.places[..., 0])
+        count = np.maximum(good.sum(1), 1)[:, None]
+        ways = good[..., None] * way
+        mean = ways.sum(1) / count
+        places = np.where(good[..., None], self.places, 0)
+        place = np.where(good.any(1, keepdims=True), places.sum(1) / count, self.first)
+        across = good[..., None] * (way - mean[:, None])
+        spread = (across**2).sum((1, 2))
+        moved = (across * (places - place[:, None])).sum((1, 2))
+        slope = np.divide(moved, spread, out=np.zeros(len(spread)), where=spread > 0)
+        return place - slope[:, None] * mean, slope

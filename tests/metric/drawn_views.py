@@ -1,0 +1,68 @@
+"""Raw images of a chessboard in a camera 1.0, drawn by rays through its lenslets."""
+
+import numpy as np
+
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.lattice import Lattice
+from lumigraph.metric import Board, MetricCamera, geometry
+
+BOARD = Board((3, 4), 3.3e-3)
+COUNT, PITCH, PIXEL = 47, 11.3, 5.5e-6
+SHAPE = (round(COUNT * PITCH), round(COUNT * PITCH))
+CAMERA = MetricCamera(
+    50e-3, 57e-3, 0.9e-3, 54e-3, PIXEL, (SHAPE[0] / 2 + 3, SHAPE[1] / 2 - 4), (4e-4, -6e-4), (0.05, 0.0, 0.0)
+)
+"""In focus at 0.41 m."""
+
+
+def calibration() -> Calibration:
+    """Of its square array, turned a little."""
+    none = np.zeros((0, 2))
+    lattice = Lattice.square(PITCH, 0.004, (SHAPE[0] / 2 + 0.3, SHAPE[1] / 2 + 1.1))
+    return Calibration(lattice, SHAPE, none.astype(int), none, 0.0, pixel_pitch=PIXEL, fill=0.96)
+
+
+def raw(where: np.ndarray, rng: np.random.Generator, noise: float = 0.01) -> np.ndarray:
+    """Raw image (y, x) of an evenly lit board at a pose."""
+    known, place = calibration(), np.stack([each.ravel() for each in np.indices(SHAPE)], 1).astype(float)
+    center = known.position(np.stack(known.index(*place.T), -1))
+    lit = _lit(place - center)
+    seen, bright = np.zeros(len(place)), lit > 0
+    seen[bright] = _squares(*_on_board(where, place[bright] - center[bright], center[bright]))
+    return (lit * seen + rng.normal(0, noise, len(seen))).reshape(SHAPE).astype(np.float32)
+
+
+def white() -> np.ndarray:
+    """White image (y, x)."""
+    known, place = calibration(), np.stack([each.ravel() for each in np.indices(SHAPE)], 1).astype(float)
+    way = place - known.position(np.stack(known.index(*place.T), -1))
+    return _lit(way).reshape(SHAPE).astype(np.float32)
+
+
+def _lit(way: np.ndarray) -> np.ndarray:
+    """Light of each pixel, softer at the micro-image's edge than a pixel."""
+    return np.clip(0.96 * PITCH / 2 - np.hypot(*way.T) + 0.5, 0, 1)
+
+
+def _on_board(where: np.ndarray, way: np.ndarray, center: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points of the board (n, 2) [m] that ways from centres see, by Newton's method; a lenslet there (n,)."""
+    at, kind = np.zeros((len(way), 2)) + 4e-3, np.zeros(len(way), int)
+
+    def shown(at: np.ndarray) -> np.ndarray:
+        points = geometry.moved(np.concatenate([np.zeros((len(at), 1)), at], 1), where)
+        return geometry.centers(CAMERA.numbers, points, (center + way, center), kind, PIXEL)
+
+    for _ in range(4):
+        here, down, across = (shown(at + step) for step in ((0, 0), (1e-6, 0), (0, 1e-6)))
+        slope = np.stack([down - here, across - here], -1) / 1e-6
+        at = at - np.clip(np.linalg.solve(slope, (here - center)[..., None])[..., 0], -0.05, 0.05)
+    return at, PITCH / np.sqrt(np.abs(np.linalg.det(slope)))
+
+
+def _squares(at: np.ndarray, soft: np.ndarray) -> np.ndarray:
+    """Brightness (n,) of the board, its edges as soft as a lenslet is wide."""
+    cells = at / BOARD.spacing
+    edges = np.abs(np.mod(cells + 0.5, 2) - 1) - 0.5
+    sharp = np.clip(2 * edges * (BOARD.spacing / soft)[:, None], -1, 1).prod(1)
+    outside = (cells < -1).any(1) | (cells > np.array(BOARD.shape)).any(1)
+    return np.where(outside, 0.9, 0.5 + 0.4 * sharp)
