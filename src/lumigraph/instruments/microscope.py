@@ -23,9 +23,9 @@ from lumigraph.operators.fourier_points import FourierPoints
 from lumigraph.operators.microscope_bench import DEGREE
 from lumigraph.operators.microscope_building import Layout, microscope_operator, require_accuracy
 from lumigraph.operators.microscope_cell import CellSampling
-from lumigraph.operators.microscope_kernels import samples_needed
 from lumigraph.operators.microscope_pixels import narrowed, placement
 from lumigraph.operators.microscope_pupil import PupilImages
+from lumigraph.operators.microscope_samples import samples_needed
 from lumigraph.operators.points import OUTSIDE
 from lumigraph.simulation.microscope_scene import SAMPLES, point_image
 

@@ -16,7 +16,8 @@
   `microscope_cell`, a lenslet and its cell; `microscope_tiles`, lenslets in tiles;
   `microscope_kernels`, images of its points; `microscope_rays`, the same by rays; `microscope_spectrum`, the
   lenslets' frequencies; `microscope_patterns`, what they follow of a cell's points;
-  `microscope_pupil`, points by the pupil's phase; `microscope_pixels`, real pixels; `fourier_microscope`;
+  `microscope_pupil`, points by the pupil's phase; `microscope_pixels`, real pixels; `microscope_samples`, how
+  many samples they need; `fourier_microscope`;
   `fourier_points`, its points with derivatives
 - `exact`: lenslets and distances beyond the paraxial; `paraxial`, how far off that is
 - `varying`: main lenses whose aberrations change over the field; `let`, the share of each sample; `mirrors`,

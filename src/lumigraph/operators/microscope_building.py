@@ -30,7 +30,7 @@ from lumigraph.operators.microscope_kernels import (
 from lumigraph.operators.microscope_operator import MicroscopeOperator, suits_frequencies
 from lumigraph.operators.microscope_pixels import FRAME
 
-VERSION = 4
+VERSION = 5
 """Of the kernels' numbers: a change of theirs makes those that are kept useless."""
 
 
