@@ -4,8 +4,10 @@ An error at a place is taken to be of the mean Σ factor · term; the factors ar
 likelihood of all errors, found by Richardson and Lucy's steps, which keep them above zero. Scenes
 that are not there (LUMIGRAPH_DATA) are left out.
 
-    python -m benchmarks.expected
+    python -m benchmarks.expected [scene ...]
 """
+
+import sys
 
 import numpy as np
 
@@ -50,10 +52,21 @@ def show(found: dict[str, Parts]) -> None:
     for scene, (parts, errors) in found.items():
         ratios = [float((factors @ parts).mean() / errors.mean()) for factors in (new, old)]
         print(f"{scene}: expected over true error {ratios[0]:.2f}, by those in use {ratios[1]:.2f}")
+        print("  true over expected, from the surest eighth on:", by_eighths(old @ parts, errors))
+
+
+def by_eighths(expected: np.ndarray, errors: np.ndarray) -> str:
+    """Mean and median error (place,) of each eighth of the places by expected error, over its mean."""
+    eighths = np.array_split(np.argsort(expected, kind="stable"), 8)
+    means = [expected[some].mean() for some in eighths]
+    return ", ".join(
+        f"{errors[some].mean() / mean:.2f} ({np.median(errors[some]) / mean:.2f})"
+        for some, mean in zip(eighths, means, strict=True)
+    )
 
 
 if __name__ == "__main__":
-    measured = {name: parts_of(name) for name in there()}
+    measured = {name: parts_of(name) for name in there() if name.startswith(tuple(sys.argv[1:]) or "")}
     if set(CHOSEN) & set(measured):
         show(measured)
     else:

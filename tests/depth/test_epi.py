@@ -313,6 +313,17 @@ def test_a_place_hidden_from_one_side_still_agrees_at_its_own_depth(bar):
         assert np.median(at_bar) > 0.05
 
 
+def test_views_near_the_middle_one_count_less_as_they_move_less():
+    """On a ramp along x, a wrong place that moves by m px differs in a view at w by m w of its slope."""
+    data = np.zeros((9, 9, 16, 40)) + 1 + 0.004 * np.arange(40)
+    pictures = Pictures.of(LightField(data, Grid((9, 9), 1.0), Grid((16, 40), 1.0), 20.0))
+    cost = costs(pictures, np.array([0.0, 1.0], np.float32), 0.1, silent)[:, 8, 20]
+    slope = np.gradient(pictures.center[0, 8])[20]
+    assert cost[0] == pytest.approx(0, abs=1e-6)
+    # One view alone, at the end, says 1; all four of a side, counted alike, (1 + 2 + 3 + 4) / 16 = 0.625.
+    assert cost[1] / slope == pytest.approx(0.693, abs=0.01)
+
+
 def test_views_that_cannot_see_a_place_are_told(bar):
     views, truth = bar
     pictures = Pictures.of(views)

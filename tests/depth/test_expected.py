@@ -26,6 +26,17 @@ def test_a_map_is_least_sure_on_the_near_side_of_an_edge_that_no_picture_shows(e
     assert expected(values, shown)[15, 19] < 0.5 * near
 
 
+def test_a_slant_is_no_edge():
+    """Only its end is: a slope of 0.2 px a sample counted as an edge of 0.2 to 1.4 px everywhere."""
+    values = 0.2 * np.arange(40) + np.zeros((30, 1))
+    even = np.zeros_like(values)
+    parts = terms(values, Evidence(even, even, even))
+    inside = [parts[name][:, 5:-5] for name in ("nearer", "farther", "faint", "wide")]
+    assert np.abs(inside).max() == pytest.approx(0, abs=1e-9)
+    thin = terms(values + 3.0 * (np.arange(40) == 20), Evidence(even, even, even))
+    assert thin["farther"][15, 20] == pytest.approx(3.2)
+
+
 def test_the_factors_that_made_errors_are_found_again(rng):
     values = np.cumsum(np.cumsum(rng.normal(0, 0.3, (80, 90)), 0), 1) * (rng.random((80, 90)) > 0.3)
     evidence = Evidence(*rng.random((3, 80, 90)) * np.array([1.0, 0.5, 0.01])[:, None, None])

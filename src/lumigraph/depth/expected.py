@@ -6,12 +6,12 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 FACTORS = {
-    "noise": 0.18,
-    "nearer": 0.041,
-    "farther": 0.28,
-    "faint": 0.59,
-    "wide": 0.19,
-    "disputed": 0.097,
+    "noise": 0.26,
+    "nearer": 0.07,
+    "farther": 0.29,
+    "faint": 0.54,
+    "wide": 0.21,
+    "disputed": 0.105,
 }
 """Of the `terms`, chosen on *antinous* and *cotton*; benchmarks/expected.py compares them with a new fit."""
 
@@ -57,15 +57,20 @@ def terms(values: np.ndarray, evidence: Evidence) -> dict[str, np.ndarray]:
     """What an expected error is made of (y, x), each in the unit of the values.
 
     A map is most often wrong beside something farther, which it takes for a part of what stands before it;
-    the more so if no edge of the picture says where that ends.
+    the more so if no edge of the picture says where that ends. What is as much nearer on the other side is no
+    edge but a slant.
     """
-    farther = {width: values - minimum_filter(values, width) for width in (3, *_FADED.values(), _AROUND)}
-    nearer = {width: maximum_filter(values, width) - values for width in (3, _AROUND)}
+    farther = {width: np.maximum(_beyond_slant(values, width), 0) for width in (3, *_FADED.values())}
     faint = np.exp(-evidence.contrast / _FAINT)
     return {
         "noise": evidence.deviation,
-        "nearer": nearer[3],
+        "nearer": np.maximum(-_beyond_slant(values, 3), 0),
         "farther": farther[3],
         **{name: faint * farther[width] for name, width in _FADED.items()},
-        "disputed": evidence.disputed * (farther[_AROUND] + nearer[_AROUND]),
+        "disputed": evidence.disputed * (maximum_filter(values, _AROUND) - minimum_filter(values, _AROUND)),
     }
+
+
+def _beyond_slant(values: np.ndarray, width: int) -> np.ndarray:
+    """How much farther what is farthest in a window is, than what is nearest in it is nearer (y, x)."""
+    return (values - minimum_filter(values, width)) - (maximum_filter(values, width) - values)
