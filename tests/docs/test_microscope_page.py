@@ -4,6 +4,7 @@ import re
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import lumigraph as lg
@@ -23,9 +24,18 @@ def test_the_page_finds_its_beads():
 
 
 def test_the_microscope_file_of_the_page_is_read(tmp_path):
-    (code,) = re.findall(r"```toml\n(.*?)```", PAGE, re.S)
-    (tmp_path / "scope.toml").write_text(code)
+    whole, part = re.findall(r"```toml\n(.*?)```", PAGE, re.S)
+    (tmp_path / "scope.toml").write_text(whole)
     assert lg.load_camera(tmp_path / "scope.toml").magnification == pytest.approx(60.0)
+    regular = lg.LightFieldMicroscope.from_catalogue("lfm-fourier")
+    (tmp_path / "fourier.toml").write_text(regular.to_toml() + part)
+    found = lg.load_camera(tmp_path / "fourier.toml")
+    assert isinstance(found, lg.LightFieldMicroscope)
+    (places, focal_lengths), (moved, changed) = regular.lenslets.each(), found.lenslets.each()
+    places[1, 0] -= 20e-6
+    focal_lengths[1] *= 1.03
+    np.testing.assert_allclose(moved, places, rtol=1e-12)
+    np.testing.assert_allclose(changed, focal_lengths, rtol=1e-12)
 
 
 def test_the_example_finds_its_vesicle(tmp_path, monkeypatch, capsys):
