@@ -23,6 +23,11 @@ def test_a_file_gives_the_same_lenslets_back(scope):
     assert "[lenslets.single]\n" not in scope.to_toml()
 
 
+def test_equal_arrays_have_one_hash_as_frozen_parts_do(scope):
+    again = lg.load_camera("lfm-fourier").replace(lenslets={"single": SINGLE})
+    assert (scope.lenslets, hash(scope.lenslets)) == (again.lenslets, hash(again.lenslets))
+
+
 def test_each_stands_where_its_number_and_offset_say(scope):
     centers, focal_lengths = scope.lenslets.each()
     assert centers[1] == pytest.approx([-1.27e-3, 0.0], abs=1e-12)

@@ -46,10 +46,15 @@ def progress(task: str) -> Iterator[Progress]:
 
 @contextmanager
 def interrupts() -> Iterator[None]:
-    """Context in which no Ctrl-C is lost: what Python drops in a finaliser is raised again by progress."""
+    """Context in which no Ctrl-C is lost: what Python drops in a finaliser is raised again by progress.
+
+    After one, finalisers of what libraries had begun to make do not complain into the one line that is said.
+    """
+    complain = sys.unraisablehook
 
     def stop(*_: object) -> None:
         _interrupted.set()
+        sys.unraisablehook = lambda _: None
         raise KeyboardInterrupt
 
     _interrupted.clear()
@@ -58,6 +63,7 @@ def interrupts() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.unraisablehook = complain
         _interrupted.clear()
 
 

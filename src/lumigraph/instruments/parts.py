@@ -262,6 +262,10 @@ class Lenslets(Part):
         height, width = self.extent
         return pairs[(np.abs(across) <= height / 2) & (np.abs(along) <= width / 2)]
 
+    def __hash__(self) -> int:
+        """Of what all lenslets have: numbers by which some differ stand in a dict, which has no hash."""
+        return hash((self.pitch, self.focal_length, self.count, self.layout, self.rotation, self.offset))
+
     def each(self) -> tuple[np.ndarray, np.ndarray]:
         """Centres (k, 2) as (y, x) and focal lengths (k,) [m] of the lenslets of one kind, as `indices`."""
         centers = self.lattice().position(self.indices())

@@ -26,7 +26,7 @@ from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators.microscope_bench import fineness, guard, responses
 from lumigraph.operators.microscope_building import Layout
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_kernels import Demand, reach_of
+from lumigraph.operators.microscope_kernels import Demand, margin_of, reach_of
 from lumigraph.operators.microscope_waves import bloch, centred, over_cells
 from lumigraph.scene import Points
 
@@ -293,7 +293,7 @@ class PupilImages:
             for j, waves in zip(self.terms, c, strict=True):
                 known[j] = known.get(j, 0.0) + float(waves)
             bent = replace(objective, aberrations=known)
-            alike: dict[tuple[int, int], list[int]] = {}
+            alike: dict[tuple[int, int, int], list[int]] = {}
             for p, (_, _, dz) in enumerate(points.positions):
                 alike.setdefault(self._size(bent, float(dz)), []).append(p)
             for size, numbers in alike.items():
@@ -301,17 +301,17 @@ class PupilImages:
                 pupil = bent.pupil(*waves.q, 0.0) * waves.area
                 yield waves, pupil.astype(waves.across.dtype), self._phases(objective, waves), numbers
 
-    def _size(self, objective: Objective, dz: float) -> tuple[int, int]:
-        """Cells along a window and nodes along the pupil's diameter."""
+    def _size(self, objective: Objective, dz: float) -> tuple[int, int, int]:
+        """Cells along a window, samples of the light along a lenslet, nodes along the pupil's diameter."""
         limit = math.ceil(1.5 * max(self.layout.cells))
         cells = 2 * reach_of(objective, self.lenslet, dz, Demand(self.accuracy, limit)) + 1
         away = (cells / 2 + guard(objective, self.lenslet)) * self.lenslet.pitch / self.lenslet.magnification
         nodes = nodes_for(objective.steepest(away * math.sqrt(2), dz))
-        return cells, 24 * math.ceil(nodes / 24)
+        margin = margin_of(objective, self.lenslet, dz, Demand(self.accuracy, 1))
+        return cells, fineness(objective, self.lenslet, margin), 24 * math.ceil(nodes / 24)
 
-    def _waves(self, objective: Objective, cells: int, nodes: int) -> Waves:
+    def _waves(self, objective: Objective, cells: int, fine: int, nodes: int) -> Waves:
         dtype = "complex128" if self.double else "complex64"
-        fine = fineness(objective, self.lenslet, Demand(self.accuracy, 1).margin)
         needed = (
             np.dtype(dtype).itemsize
             * 3.0

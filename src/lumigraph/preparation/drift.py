@@ -20,7 +20,7 @@ _FEWEST = 8.0  # lenslets across it
 _CERTAIN, _SLIGHT = 0.5, 0.1  # pitches between the lattices at the border; right pairs reach 0.06
 _SIGMAS = 3.0  # of its standard error from which a slip counts; a specimen pulls at the lines of gaps
 _STRIPS = 8  # of the picture are left out, one after the other
-_STUDENT = 4.43 / 3  # what is as unlikely as three standard errors where seven strips tell them
+_STUDENT = 4.53 / 3  # what is as unlikely as three standard errors where seven strips tell them
 # Harmonics that are looked at in each part; both signs, since a basis may lean either way.
 _ORDERS = np.array([(1, 0), (0, 1), (1, 1), (1, -1), (2, 0), (0, 2), (2, 1), (1, 2), (2, -1), (1, -2)])
 _FAINT = 0.25  # of the strongest line: fainter ones are left out
