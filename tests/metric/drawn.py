@@ -43,7 +43,9 @@ def raw(seen_by: MetricCamera, where: np.ndarray, kinds: int = 1, blur: float = 
     at, scale = _on_board(seen_by, where, place, center, kind)
     lit = _lit(place, center)
     noise = np.random.default_rng(0).normal(0, 0.01, SHAPE)
-    return (gaussian_filter((lit * _squares(at, scale)).reshape(SHAPE), blur) + noise).astype(np.float32)
+    return (gaussian_filter((lit * squares(at, scale, BOARD)).reshape(SHAPE), blur) + noise).astype(
+        np.float32
+    )
 
 
 def white(kinds: int = 1, blur: float = 0.7) -> np.ndarray:
@@ -85,10 +87,10 @@ def _seen(
     return seen_by.project(geometry.moved(points, where), center, kind)
 
 
-def _squares(at: np.ndarray, soft: np.ndarray) -> np.ndarray:
-    """Brightness (n,) of the board, its edges as soft as a pixel."""
-    cells = at / BOARD.spacing
+def squares(at: np.ndarray, soft: np.ndarray, board: Board) -> np.ndarray:
+    """Brightness (n,) of a board at places (n, 2) [m], its edges as soft as so much of it (n,) [m]."""
+    cells = at / board.spacing
     edges = np.abs(np.mod(cells + 0.5, 2) - 1) - 0.5
-    sharp = np.clip(2 * edges * (BOARD.spacing / soft)[:, None], -1, 1).prod(1)
-    outside = (cells < -1).any(1) | (cells > np.array(BOARD.shape)).any(1)
+    sharp = np.clip(2 * edges * (board.spacing / soft)[:, None], -1, 1).prod(1)
+    outside = (cells < -1).any(1) | (cells > np.array(board.shape)).any(1)
     return np.where(outside, 0.9, 0.5 + 0.4 * sharp)

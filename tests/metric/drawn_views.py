@@ -5,6 +5,7 @@ import numpy as np
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.metric import Board, MetricCamera, geometry
+from metric import drawn
 
 BOARD = Board((3, 4), 3.3e-3)
 COUNT, PITCH, PIXEL = 47, 11.3, 5.5e-6
@@ -28,7 +29,7 @@ def raw(where: np.ndarray, rng: np.random.Generator, noise: float = 0.01) -> np.
     center = known.position(np.stack(known.index(*place.T), -1))
     lit = _lit(place - center)
     seen, bright = np.zeros(len(place)), lit > 0
-    seen[bright] = _squares(*_on_board(where, place[bright] - center[bright], center[bright]))
+    seen[bright] = drawn.squares(*_on_board(where, place[bright] - center[bright], center[bright]), BOARD)
     return (lit * seen + rng.normal(0, noise, len(seen))).reshape(SHAPE).astype(np.float32)
 
 
@@ -57,12 +58,3 @@ def _on_board(where: np.ndarray, way: np.ndarray, center: np.ndarray) -> tuple[n
         slope = np.stack([down - here, across - here], -1) / 1e-6
         at = at - np.clip(np.linalg.solve(slope, (here - center)[..., None])[..., 0], -0.05, 0.05)
     return at, PITCH / np.sqrt(np.abs(np.linalg.det(slope)))
-
-
-def _squares(at: np.ndarray, soft: np.ndarray) -> np.ndarray:
-    """Brightness (n,) of the board, its edges as soft as a lenslet is wide."""
-    cells = at / BOARD.spacing
-    edges = np.abs(np.mod(cells + 0.5, 2) - 1) - 0.5
-    sharp = np.clip(2 * edges * (BOARD.spacing / soft)[:, None], -1, 1).prod(1)
-    outside = (cells < -1).any(1) | (cells > np.array(BOARD.shape)).any(1)
-    return np.where(outside, 0.9, 0.5 + 0.4 * sharp)

@@ -126,8 +126,9 @@ def optimise(
 
 
 def _estimate(seconds: float, count: int) -> str:
-    time = f"{seconds / 60:.1f} minutes" if seconds > 90 else f"{seconds:.0f} s"
-    return f"{count} cameras to do at most: about {time}, if all take as long as the first"
+    from lumigraph.cluster.estimate import duration
+
+    return f"{count} cameras to do at most: about {duration(seconds)}, if all take as long as the first"
 
 
 def _lines(found: "Optimum") -> Iterator[str]:

@@ -79,11 +79,10 @@ class Estimate:
         return cls(frames, max(ends, busy / processors), memory, round(frames * size), busy=busy)
 
     def __str__(self) -> str:
-        minutes = f"{self.seconds / 60:.1f} minutes" if self.seconds > 90 else f"{self.seconds:.0f} s"
         frames = f"{self.frames} {many(self.noun, self.frames)}"
         return (
-            f"{frames} to do: about {minutes}, {memory.told(self.memory)} a worker, {memory.told(self.size)} "
-            "on the disk"
+            f"{frames} to do: about {duration(self.seconds)}, {memory.told(self.memory)} a worker, "
+            f"{memory.told(self.size)} on the disk"
         )
 
     def require(self, workers: int, output: Path) -> None:
@@ -119,6 +118,15 @@ def _side_by_side(frames: int, seconds: float, late: list[float]) -> float:
     for _ in range(frames - len(late)):
         heapq.heapreplace(ends, ends[0] + seconds)
     return max(ends)
+
+
+def duration(seconds: float) -> str:
+    """A time in words.
+
+    >>> duration(42.0), duration(150.0)
+    ('42 s', '2.5 minutes')
+    """
+    return f"{seconds / 60:.1f} minutes" if seconds > 90 else f"{seconds:.0f} s"
 
 
 def many(noun: str, count: int) -> str:

@@ -267,8 +267,8 @@ def _tried(numbers: list[int], workers: int, seconds: float) -> list[int]:
     >>> _tried(list(range(1, 24)), 2, 0.1), _tried(list(range(1, 24)), 2, 60.0), _tried([7, 8], 4, 60.0)
     ([3, 7, 12, 17, 21], [6, 18], [8])
     """
-    each = min(_TRIED, int(_TRIAL / max(seconds, 1e-3)))
-    count = min(max(workers * max(each, 1), 1), max(len(numbers) // _PART, 1), len(numbers))
+    each = max(min(_TRIED, int(_TRIAL / max(seconds, 1e-3))), 1)
+    count = min(workers * each, max(len(numbers) // _PART, 1), len(numbers))
     return [numbers[(2 * k + 1) * len(numbers) // (2 * count)] for k in range(count)]
 
 

@@ -60,11 +60,12 @@ def terms(values: np.ndarray, evidence: Evidence) -> dict[str, np.ndarray]:
     the more so if no edge of the picture says where that ends. What is as much nearer on the other side is no
     edge but a slant.
     """
-    farther = {width: np.maximum(_beyond_slant(values, width), 0) for width in (3, *_FADED.values())}
+    beyond = {width: _beyond_slant(values, width) for width in (3, *_FADED.values())}
+    farther = {width: np.maximum(one, 0) for width, one in beyond.items()}
     faint = np.exp(-evidence.contrast / _FAINT)
     return {
         "noise": evidence.deviation,
-        "nearer": np.maximum(-_beyond_slant(values, 3), 0),
+        "nearer": np.maximum(-beyond[3], 0),
         "farther": farther[3],
         **{name: faint * farther[width] for name, width in _FADED.items()},
         "disputed": evidence.disputed * (maximum_filter(values, _AROUND) - minimum_filter(values, _AROUND)),
