@@ -4,6 +4,7 @@ import numpy as np
 
 from lumigraph.errors import LumigraphError
 from lumigraph.metric.corners import Board
+from lumigraph.metric.order import ordered
 
 
 def find(picture: np.ndarray, board: Board) -> np.ndarray | None:
@@ -11,6 +12,11 @@ def find(picture: np.ndarray, board: Board) -> np.ndarray | None:
 
     The first is at either end of a board that looks the same turned by 180°. None where the picture does
     not show them all.
+
+    Raises
+    ------
+    CalibrationError
+        Corners that OpenCV gives in an order that no flat board has, and that cannot be put in order.
     """
     try:
         import cv2
@@ -23,10 +29,8 @@ def find(picture: np.ndarray, board: Board) -> np.ndarray | None:
     found, corners = cv2.findChessboardCornersSB(_eight_bits(picture), (across, down), flags=flags)
     if not found:
         return None
-    places = corners.reshape(down, across, 2)[..., ::-1].astype(np.float64)
-    (ay, ax), (by, bx) = places[0, -1] - places[0, 0], places[-1, 0] - places[0, 0]
-    # A mirrored order would be a board seen from behind.
-    return (places if ax * by - ay * bx > 0 else places[:, ::-1]).reshape(-1, 2)
+    places = corners.reshape(-1, 2)[:, ::-1].astype(np.float64)
+    return ordered(places, board.points()[:, 1:])
 
 
 def _eight_bits(picture: np.ndarray) -> np.ndarray:

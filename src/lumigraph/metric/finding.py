@@ -15,6 +15,7 @@ from lumigraph.depth import correlation
 from lumigraph.errors import CalibrationError
 from lumigraph.metric import chessboard, views
 from lumigraph.metric.corners import Board, Corners
+from lumigraph.metric.order import told_of
 from lumigraph.preparation import of_raw
 from lumigraph.rendering import render
 from lumigraph.rendering.interpolate import as_float
@@ -74,7 +75,8 @@ def find_corners(
     Raises
     ------
     CalibrationError
-        No pictures, one without the whole board, or squares too small to be told apart.
+        No pictures, one without the whole board, corners in no order that a flat board has, or squares too
+        small to be told apart.
     LumigraphError
         OpenCV, which finds boards of cameras 2.0, is not installed.
 
@@ -146,7 +148,8 @@ class _Lines:
         sizes = correlation(raw, calibration).values
         patches = Patches.of(sizes, calibration)
         layout = Layout.of(calibration, patches, None)
-        seen = chessboard.find(render(raw, calibration, sizes, blend=True), board)
+        with told_of(f"picture {frame}"):
+            seen = chessboard.find(render(raw, calibration, sizes, blend=True), board)
         if seen is None:
             down, across = board.shape
             raise CalibrationError(

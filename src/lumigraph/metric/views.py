@@ -13,6 +13,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError, SamplingError
 from lumigraph.metric.corners import Board
+from lumigraph.metric.order import ordered, told_of
 from lumigraph.preparation import decode, of_raw
 from lumigraph.rendering.geometry import raw_places
 
@@ -73,9 +74,8 @@ def _board(middle: np.ndarray, board: Board, frame: int) -> np.ndarray:
             grid = np.zeros((*(index.max(0) + 1), 2))
             grid[tuple(index.T)] = chart.corners
             grid = grid if grid.shape[:2] == board.shape else grid.swapaxes(0, 1)
-            (ay, ax), (by, bx) = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
-            # A mirrored order would be a board seen from behind.
-            return (grid if ax * by - ay * bx > 0 else grid[:, ::-1]).reshape(-1, 2)
+            with told_of(f"the middle view of picture {frame}"):
+                return ordered(grid.reshape(-1, 2), board.points()[:, 1:])
     raise CalibrationError(
         f"the middle view of picture {frame} does not show a whole chessboard of {across} x {down} inner "
         f"corners with a white margin; {seen} corners of a board are seen. Leave the picture out, or give "
