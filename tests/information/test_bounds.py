@@ -120,7 +120,7 @@ def test_points_of_a_cell_repeat_from_lenslet_to_lenslet():
     shift = camera.micro_image_pitch / camera.sensor.pixel_pitch
     assert abs(one.sum() - other.sum()) < 5e-3
     assert abs(abs(_middle(one) - _middle(other)) - shift) < 0.05 * shift
-    assert spread(cell, 5).shape == (5, 2)
+    assert spread(cell, range(5)).shape == (5, 2)
 
 
 def _middle(image):

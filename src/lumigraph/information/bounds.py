@@ -112,6 +112,30 @@ class Bounds:
         """Of the brightness, over its value, rms."""
         return float(np.sqrt(np.mean(self.deviations[..., 3] ** 2)))
 
+    def uneven(self, name: str) -> float:
+        """How far "lateral", "depth" or "brightness" may be off as places are few, relative.
+
+        Half of what variances differ by from place to place, over the number of places: they fill the cell
+        evenly, so that errors fall faster than those of places drawn by chance. NaN of one place, and of what
+        is not told.
+        """
+        which = {"lateral": slice(0, 2), "depth": slice(2, 3), "brightness": slice(3, 4)}[name]
+        variances = np.mean(self.deviations[..., which] ** 2, axis=(0, 2))
+        count = len(variances)
+        if count < 2 or not np.isfinite(variances).all():
+            return math.nan
+        return float(variances.std(ddof=1) / variances.mean()) / 2 / count
+
+    def beside(self, other: "Bounds") -> "Bounds":
+        """Of its places and others at the same depths, before the same light."""
+        own, more = self.places.shape[1], other.places.shape[1]
+        return Bounds(
+            self.depths, np.concatenate([self.places, other.places], 1),
+            np.concatenate([self.deviations, other.deviations], 1),
+            (own * self.caught + more * other.caught) / (own + more), self.light,
+            np.maximum(self.errors, other.errors),
+        )  # fmt: skip
+
     def quantities(self) -> tuple[Quantity, ...]:
         """Over the volume."""
         return (
@@ -136,7 +160,7 @@ def bounds(
     depths: Sequence[float],
     light: Light | None = None,
     *,
-    places: int = 4,
+    places: int | range = 4,
     accuracy: float = 1e-2,
     checked: bool = True,
     progress: Progress | None = None,
@@ -157,7 +181,8 @@ def bounds(
         10,000 photons without background if left out.
     places
         At each depth; they fill the cell over which images repeat: a lenslet's, or a pixel's where
-        there is none or it stands in the pupil.
+        there is none or it stands in the pupil. A range takes others of the same sequence: `range(4, 8)`
+        are four that 4 leaves out.
     accuracy
         Of the points' images, relative, rms.
     checked
@@ -190,20 +215,35 @@ def bounds(
     checks.instance("light", light, Light)
     checks.instance("instrument", instrument, Instrument)
     planes = checked_depths(depths)
-    if checks.whole("places", places) > MOST_PLACES:
-        raise GeometryError(f"places are {places} but must be at most {MOST_PLACES}.")
+    numbers = checked_places(places)
     points = source(instrument, planes, accuracy)
     memory.require(8.0 * 12 * points.pixels, "images of a point", "Use fewer pixels.", SamplingError)
-    where = np.stack([spread(points.cell(float(dz)), places) for dz in planes])
+    where = np.stack([spread(points.cell(float(dz)), numbers) for dz in planes])
     each = _each(where, planes, progress)
     spots = [_Spot.of(points, instrument.sensor, light, place, checked) for place in each]
     _warn(spots, instrument.sensor)
-    shape = (len(planes), places, -1)
+    shape = (len(planes), len(numbers), -1)
     return Bounds(
         planes, where, np.stack([one.deviations for one in spots]).reshape(shape),
-        np.array([one.caught for one in spots]).reshape(len(planes), places).mean(1), light,
+        np.array([one.caught for one in spots]).reshape(shape[:2]).mean(1), light,
         np.max([one.errors for one in spots], axis=0),
     )  # fmt: skip
+
+
+def checked_places(places: int | range) -> range:
+    """Numbers of places in their sequence.
+
+    Raises
+    ------
+    GeometryError
+        None, too many, or a range that does not go up from 0 or more.
+    """
+    numbers = places if isinstance(places, range) else range(checks.whole("places", places))
+    if not (numbers and 0 <= numbers[0] <= numbers[-1]):
+        raise GeometryError(f"places are {places} but a range of them must go up from 0 or more.")
+    if len(numbers) > MOST_PLACES:
+        raise GeometryError(f"places are {len(numbers)} but must be at most {MOST_PLACES}.")
+    return numbers
 
 
 def checked_depths(depths: Sequence[float]) -> np.ndarray:

@@ -82,9 +82,9 @@ def source(instrument: Instrument, depths: np.ndarray, accuracy: float) -> Sourc
     raise GeometryError(f"{type(instrument).__name__} has no images of points.")
 
 
-def spread(cell: np.ndarray, count: int) -> np.ndarray:
-    """So many places (count, 2) that fill a cell evenly, around its middle."""
-    steps = (0.5 + np.outer(np.arange(count), GOLDEN)) % 1 - 0.5
+def spread(cell: np.ndarray, numbers: range) -> np.ndarray:
+    """Places (count, 2) of these numbers in a sequence that fills a cell evenly, around its middle."""
+    steps = (0.5 + np.outer(numbers, GOLDEN)) % 1 - 0.5
     return steps @ cell
 
 

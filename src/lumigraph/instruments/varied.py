@@ -82,6 +82,21 @@ def changed(camera: Instrument, item: Mapping[str, Any]) -> Instrument:
     return type(camera).from_table(table, "--vary")
 
 
+def value(camera: Instrument, name: str) -> Any:
+    """What the camera's file has under a key of `changed`; None where it has nothing, or several values."""
+    *path, last = ([one.strip() for one in part.split(",")] for part in name.split("."))
+    places: list[Any] = [tomllib.loads(camera.to_toml())]
+    for keys in (*path, last):
+        places = [_under(place, key) for place in places for key in keys]
+    return places[0] if all(one == places[0] for one in places) else None
+
+
+def _under(place: Any, key: str) -> Any:
+    if isinstance(place, list):
+        return place[int(key)] if key.isdecimal() and int(key) < len(place) else None
+    return place.get(key) if isinstance(place, dict) else None
+
+
 def _inside(place: Any, key: str, name: str) -> Any:
     """What stands under a key of a table or a list; a table that is not there is begun."""
     key = _key(place, key, name)

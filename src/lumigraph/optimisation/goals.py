@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from lumigraph import metric
 from lumigraph.errors import FormatError, GeometryError, SamplingWarning
-from lumigraph.information import Light, bounds
-from lumigraph.information.bounds import checked_depths
+from lumigraph.information import Bounds, Light, bounds
+from lumigraph.information.bounds import checked_depths, checked_places
 from lumigraph.information.points import collected
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.metric.charts import check_camera
@@ -19,7 +19,16 @@ from lumigraph.metric.charts import check_camera
 BOUNDS = {"depth": "m", "lateral": "m", "brightness": "1"}
 """Bounds of a point over the volume, and their units."""
 
-LIGHT = "light caught"
+LIGHT, PLACES = "light caught", "places"
+
+EVEN = 0.01
+"""Part of a bound that places may leave unknown where their number is not given."""
+
+ROUNDS = (range(2), range(2, 4), range(4, 8), range(8, 16))
+"""Places that are taken one after the other, until a bound is even."""
+
+OTHERS = 4
+"""Places at which bounds are judged, at least."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,18 +48,23 @@ class Goal:
     light
         Of a point, as the first camera collects it; others get theirs by their aperture.
     places
-        At each depth.
+        At each depth; None for as many as leave a bound unknown by 1 %, two to 16: more where pixels are as
+        coarse as spots.
     """
 
     name: str = "depth"
     largest: bool = False
     depths: tuple[float, ...] = ()
     light: Light = field(default_factory=Light)
-    places: int = 2
+    places: int | None = None
 
     @classmethod
     def parse(
-        cls, text: str, depths: Sequence[float] = (), light: Light | None = None, places: int = 2
+        cls,
+        text: str,
+        depths: Sequence[float] = (),
+        light: Light | None = None,
+        places: int | None = None,
     ) -> "Goal":
         """From words such as "depth", "largest views per axis" or "least cross-talk".
 
@@ -92,6 +106,7 @@ class Goal:
             if not self.depths:
                 raise GeometryError(f"goal {self.name!r} needs depths, such as depths=(-5e-3, 0.0, 5e-3).")
             checked_depths(self.depths)
+            self._rounds()
         elif metric.is_measure(self.name):
             check_camera(instrument)
         else:
@@ -119,35 +134,49 @@ class Goal:
             return {self.name: math.nan if found is None else float(found)}
         return {row.name: float(row.value) for row in instrument.quantities() if row.name == self.name}
 
-    def checked(self, instrument: Instrument, first: float, rough: float) -> tuple[float, float]:
-        """A bound by derivatives of two steps, and its relative error; exact derivatives have none.
+    def checked(self, instrument: Instrument, first: float, rough: Mapping[str, Any]) -> tuple[float, float]:
+        """A bound at other places, by derivatives of two steps, and its relative error.
 
-        The error is that of the derivatives, or what the second step changes of the bound where that is more.
+        The error is that of the derivatives, or what places and steps change of the bound where that is more.
 
         Parameters
         ----------
         instrument, first
             As of `values`.
         rough
-            The bound by one step, as `values` has it.
+            What `values` has found, at its places and by one step.
         """
-        light = self._light(instrument, first)
-        found = bounds(instrument, self.depths, light, places=self.places)
+        light, used = self._light(instrument, first), int(rough[PLACES])
+        others = range(used, used + max(used, OTHERS))
+        found = bounds(instrument, self.depths, light, places=others)
         value = float(getattr(found, self.name))
-        return value, max(float(np.max(found.errors)), abs(rough / value - 1))
+        return value, max(float(np.max(found.errors)), abs(rough[self.name] / value - 1))
 
     def _light(self, instrument: Instrument, first: float) -> Light:
         return Light(self.light.photons * collected(instrument) / first, self.light.background)
+
+    def _rounds(self) -> tuple[range, ...]:
+        return ROUNDS if self.places is None else (checked_places(self.places),)
 
     def _bounds(self, instrument: Instrument, first: float) -> dict[str, float]:
         light = self._light(instrument, first)
         with warnings.catch_warnings():
             warnings.simplefilter("error", SamplingWarning)
-            found = bounds(instrument, self.depths, light, places=self.places, checked=False)
+            found = self._even(instrument, light)
         return {
             "depth": found.depth, "lateral": found.lateral, "brightness": found.brightness,
-            LIGHT: float(found.caught.mean()), "photons": light.photons,
+            LIGHT: float(found.caught.mean()), "photons": light.photons, PLACES: found.places.shape[1],
         }  # fmt: skip
+
+    def _even(self, instrument: Instrument, light: Light) -> Bounds:
+        """Of some places, and of more until the bound is even."""
+        first, *more = self._rounds()
+        found = bounds(instrument, self.depths, light, places=first, checked=False)
+        for numbers in more:
+            if self.name == LIGHT or not found.uneven(self.name) > EVEN:
+                break
+            found = found.beside(bounds(instrument, self.depths, light, places=numbers, checked=False))
+        return found
 
     def cost(self, values: dict[str, Any]) -> float:
         """What a search makes small; infinite where there is no such camera."""

@@ -1,7 +1,9 @@
 """`optimise`: the best camera within what can be made."""
 
+import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any, get_args
@@ -10,18 +12,21 @@ from lumigraph.core import checks
 from lumigraph.core.brief import brief
 from lumigraph.core.progress import Progress, Stage
 from lumigraph.core.result import Quantity
-from lumigraph.errors import GeometryError
+from lumigraph.errors import GeometryError, SamplingWarning
 from lumigraph.information.points import collected
 from lumigraph.instruments import load_camera
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.varied import changed
 from lumigraph.optimisation.evaluations import ERROR, Evaluations, noted
-from lumigraph.optimisation.goals import BOUNDS, Goal
+from lumigraph.optimisation.goals import BOUNDS, PLACES, Goal
 from lumigraph.optimisation.search import Search, grid, refined
 from lumigraph.optimisation.space import Space
 
 MOST = 100_000
 """Evaluations."""
+
+LUCK = 0.03
+"""Part of a bound, better where it was searched than at other places, that is warned of."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,8 +46,9 @@ class Optimum:
     rows
         All cameras, in the order of the search; those that cannot be have an "error".
     checked
-        Of a bound: the best by derivatives of two steps, as `information.bounds` checks them, and its
-        relative error. The search takes one step. None of other goals.
+        Of bounds: by "start", "swept" and "best", the bound at other places than those of the search, by
+        derivatives of two steps where they are not exact, and its relative error; at least what it differs
+        by from the searched one. Empty of other goals.
     """
 
     goal: Goal
@@ -52,7 +58,7 @@ class Optimum:
     best: dict[str, Any]
     active: dict[str, Any]
     rows: list[dict[str, Any]]
-    checked: tuple[float, float] | None = None
+    checked: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     __repr__ = brief
 
@@ -65,7 +71,7 @@ class Optimum:
     def quantities(self) -> tuple[Quantity, ...]:
         """The goal before, of the best of the grid, and of the best."""
         name, unit = self.goal.name, BOUNDS.get(self.goal.name, "")
-        best, error = self.checked or (self.best[name], 0.0)
+        best, error = self.checked.get("best", (self.best[name], 0.0))
         between = (best * (1 - error), best * (1 + error)) if error else None
         return (
             Quantity(f"{name}, as given", self.start.get(name), unit),
@@ -92,8 +98,10 @@ def optimise(
     """The camera that reaches a goal best, of those that ranges and a stock allow.
 
     All combinations of the first values are computed. From the best of them a simplex goes downhill
-    ("local"), or a population by differential evolution looks over all of the ranges ("global"); values of
-    a stock stay as the best combination has them. What no camera can be is left out, with its reason.
+    ("local"), and from the camera as given where it lies within the ranges; or a population by differential
+    evolution looks over all of the ranges ("global"). Values of a stock stay as the combination has them.
+    What no camera can be is left out, with its reason. Bounds are judged at other places than those of the
+    search, for where pixels are coarse a search finds the places' luck.
 
     Parameters
     ----------
@@ -127,6 +135,11 @@ def optimise(
         An unknown key or number, a range that does not go up, an output of another search.
     GeometryError
         A goal that the instrument has not, or none of the first values gives a camera.
+
+    Warns
+    -----
+    SamplingWarning
+        At other places the best bound is larger by more than 3 %, or others are better than it.
 
     Examples
     --------
@@ -167,11 +180,72 @@ def optimise(
         if swept is None:
             reason = cameras.rows[1].get(ERROR, f"{aim.name} is not known of it")
             raise GeometryError(f"none of the first {len(items)} cameras can be, such as: {reason}")
-        best = refined(cameras, space, swept, (search, most, seed))
+        best = _refined(cameras, space, swept, (search, most, seed))
         given, first, last = (dict(cameras.row(item)) for item in ({}, swept, best))
-    camera = changed(start, best)
-    checked = aim.checked(camera, cameras.first, last[aim.name]) if aim.name in BOUNDS else None
-    return Optimum(aim, camera, given, first, last, space.active(best), cameras.rows, checked)
+    found = Optimum(
+        aim, changed(start, best), given, first, last, space.active(best), cameras.rows,
+        _elsewhere(cameras, {"start": {}, "swept": swept, "best": best}),
+    )  # fmt: skip
+    _warn_of_luck(found)
+    return found
+
+
+def _refined(
+    cameras: Evaluations, space: Space, swept: dict[str, Any], how: tuple[Search, int, int]
+) -> dict[str, Any]:
+    """The best that is found from the best of the grid, and from the camera as given where it lies within."""
+    search, most, seed = how
+    begun, own = len(cameras.rows), space.own(cameras.start)
+    starts = [swept]
+    if own is not None and own != swept and search != "grid" and space.ranges and most > 0:
+        starts = sorted([swept, own], key=cameras.cost)
+    if search == "global":  # goes everywhere from one
+        starts = starts[:1]
+    found = []
+    for k, item in enumerate(starts):
+        left = most - (len(cameras.rows) - begun)
+        found.append(refined(cameras, space, item, (search, left // (len(starts) - k), seed)))
+    return min(found, key=cameras.cost)
+
+
+def _elsewhere(
+    cameras: Evaluations, items: Mapping[str, Mapping[str, Any]]
+) -> dict[str, tuple[float, float]]:
+    """Bounds of some items at places where they were not searched."""
+    if cameras.goal.name not in BOUNDS:
+        return {}
+    known: dict[str, tuple[float, float]] = {}
+    for which, item in items.items():
+        row = cameras.row(item)
+        same = next((one for one in known if items[one] == item), None)
+        if same is not None:
+            known[which] = known[same]
+        elif math.isfinite(cameras.goal.cost(row)):
+            known[which] = cameras.goal.checked(changed(cameras.start, item), cameras.first, row)
+    return known
+
+
+def _warn_of_luck(found: Optimum) -> None:
+    """Say where a bound is of the places at which it was searched, not of the camera."""
+    if "best" not in found.checked:
+        return
+    name, unit = found.goal.name, BOUNDS[found.goal.name]
+    here, (there, _) = found.best[name], found.checked["best"]
+    said = []
+    if there > here * (1 + LUCK):
+        said.append(
+            f"the {name} bound of the best is {here:.4g} {unit} at the {found.best[PLACES]} places a depth "
+            f"where it was searched, but {there:.4g} {unit} at others: {there / here - 1:.1%} are chance"
+        )
+    for which, words in (("start", "the camera as given"), ("swept", "the best of the first values")):
+        other = found.checked.get(which, (math.inf,))[0]
+        if other < there and found.gain(getattr(found, which)) > 0:
+            said.append(
+                f"{words} has a {name} bound of {other:.4g} {unit} at other places, the best {there:.4g} "
+                f"{unit}: it is better only where it was searched"
+            )
+    for words in said:
+        warnings.warn(f"{words}. Search again with more places.", SamplingWarning, stacklevel=3)
 
 
 def _check(start: Instrument, item: Mapping[str, Any]) -> None:

@@ -1,14 +1,20 @@
 """What may change of a camera: ranges, whose counts make a first grid, and values of a stock."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from lumigraph.errors import FormatError
-from lumigraph.instruments.varied import NUMBER, combinations, values
+from lumigraph import units
+from lumigraph.errors import FormatError, LumigraphError
+from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.varied import NUMBER, combinations, value, values
 
 ACTIVE = 1e-3
 """Part of a range within which a value is at its end."""
+
+ROUNDED = 1e-9
+"""Part of a range, or of a value, by which what is written may be off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +37,12 @@ class Range:
         """The value at a part of the range, as a camera file has it."""
         number = self.low + (self.high - self.low) * min(max(part, 0.0), 1.0)
         return f"{number:.10g} {self.unit}" if self.unit else float(f"{number:.10g}")
+
+    def near(self, value: Any) -> Any:
+        """A value in the unit of the range; None beyond its ends."""
+        number = _number(value) / _number(f"1 {self.unit}" if self.unit else 1)
+        part = (number - self.low) / (self.high - self.low)
+        return self.at(part) if -ROUNDED <= part <= 1 + ROUNDED else None
 
     def part(self, value: Any) -> float:
         """Where in the range a value is, 0 to 1."""
@@ -85,6 +97,19 @@ class Space:
         """Of the first values."""
         return combinations(self.grid)
 
+    def own(self, camera: Instrument) -> dict[str, Any] | None:
+        """The item of a camera's own values; None where it lies beyond, or its file has not all of them."""
+        found: dict[str, Any] = {}
+        for name, some in self.grid.items():
+            here = value(camera, name)
+            if here is None:
+                return None
+            known = self.ranges[name].near(here) if name in self.ranges else _same(here, some)
+            if known is None:
+                return None
+            found[name] = known
+        return found
+
     def moved(self, item: Mapping[str, Any], parts: Sequence[float]) -> dict[str, Any]:
         """An item whose ranges stand at other parts, in their order."""
         found = {
@@ -103,6 +128,25 @@ class Space:
             for name, part in zip(self.ranges, self.parts(item), strict=True)
             if min(part, 1 - part) < ACTIVE
         }
+
+
+def _same(here: Any, stock: Sequence[Any]) -> Any:
+    """The value of a stock that a camera has; None where it has another."""
+    for one in stock:
+        if one == here or math.isclose(_number(one), _number(here), rel_tol=ROUNDED):
+            return one
+    return None
+
+
+def _number(value: Any) -> float:
+    """Of a value [m], or in its own unit where that is no length; NaN of a word."""
+    found = NUMBER.fullmatch(str(value))
+    if found is None:
+        return math.nan
+    try:
+        return units.parse(str(value))
+    except LumigraphError:
+        return float(found[1])
 
 
 def _range(text: str) -> Range:
