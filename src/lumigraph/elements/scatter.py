@@ -10,6 +10,9 @@ from lumigraph.errors import GeometryError
 
 _MULTIPLIERS = (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)  # splitmix64's
 
+MOST_MISSING = 0.99
+"""Part of the lenslets."""
+
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
@@ -40,7 +43,7 @@ class Scatter:
 
     def __post_init__(self) -> None:
         checks.whole("seed", self.seed, 0)
-        for name, most in (("focal_length", 0.2), ("decentre", 1.0), ("missing", 0.99)):
+        for name, most in (("focal_length", 0.2), ("decentre", 1.0), ("missing", MOST_MISSING)):
             if not 0 <= checks.finite(name, getattr(self, name)) <= most:
                 raise GeometryError(
                     f"the scatter's {name} is {getattr(self, name):g} but must be from 0 to {most:g}."

@@ -258,9 +258,13 @@ class Lenslets(Part):
         """Index pairs (k, 2) as (i, j) of the lenslets that exist, row by row."""
         lattice, (reach_y, reach_x) = self.lattice(), self.reach
         pairs = lattice.indices((-reach_y, reach_y), (-reach_x, reach_x))
-        across, along = self._turned(*lattice.position(pairs).T)
+        return pairs[self.holds(lattice.position(pairs))]
+
+    def holds(self, centers: np.ndarray) -> np.ndarray:
+        """Whether the array has lenslets at centres (k, 2) of the lattice: (k,)."""
+        across, along = self._turned(*centers.T)
         height, width = self.extent
-        return pairs[(np.abs(across) <= height / 2) & (np.abs(along) <= width / 2)]
+        return (np.abs(across) <= height / 2) & (np.abs(along) <= width / 2)
 
     def __hash__(self) -> int:
         """Of what all lenslets have: numbers by which some differ stand in a dict, which has no hash."""

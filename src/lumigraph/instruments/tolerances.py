@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator
 
 from lumigraph import units
+from lumigraph.elements.scatter import MOST_MISSING
 from lumigraph.errors import FormatError, GeometryError
 
 Shape = Literal["normal", "uniform"]
@@ -19,15 +20,24 @@ NAMES = {
     "wavelength": "length", "main_lens.focal_length": "length", "main_lens.diameter": "length",
     "lenslets.pitch": "length", "lenslets.focal_length": "length", "lenslets.fill_factor": "number",
     "lenslets.rotation": "angle", "lenslets.offset_y": "length", "lenslets.offset_x": "length",
-    "sensor.pixel_pitch": "length",
+    "sensor.pixel_pitch": "length", "lenslets.each.focal_length": "length",
+    "lenslets.each.decentre": "length", "lenslets.each.missing": "part",
 }  # fmt: skip
 """What may be off, as keys of a camera file, and ``main_lens.aberrations.N`` [waves rms] of Noll index N.
 
-Distances without a table are main lens to lenslets, lenslets to sensor and object to main lens.
+Distances without a table are main lens to lenslets, lenslets to sensor and object to main lens. Below
+``lenslets.each`` stands what each lenslet has of its own: focal length, decentre of its vertex along either
+axis, and the part of the lenslets that is missing.
 """
 
-_UNITS = {"length": "m", "angle": "rad", "number": ""}
+EACH = "lenslets.each."
+"""Begins the names of what lenslets have of their own."""
+
+MISSING = f"{EACH}missing"
+
+_UNITS = {"length": "m", "angle": "rad", "number": "", "part": ""}
 _NOLL = re.compile(r"main_lens\.aberrations\.[1-9]\d{0,3}")
+_PART = re.compile(r"\s*(\d{1,9}\.?\d{0,12})\s*(%)?\s*")
 _TEXT = re.compile(r"\s*(?:±|\+-|\+/-)\s*(.*?)\s*(normal|uniform)?\s*")
 
 
@@ -45,12 +55,12 @@ class Tolerance:
         Whether it is a part of the value.
     shape
         "normal": ± is two standard deviations, which 95 % of all cameras keep; "uniform": all keep it, and
-        none is likelier than another.
+        none is likelier than another. What lenslets have of their own is normal.
 
     Raises
     ------
     FormatError
-        An unknown name.
+        An unknown name, or a shape that it cannot have.
     GeometryError
         A range that is not above zero.
 
@@ -75,10 +85,16 @@ class Tolerance:
             raise FormatError(
                 f"the tolerance of {self.name} is {self.shape!r} but must be normal or uniform."
             )
+        if self.name == MISSING and self.half > MOST_MISSING:
+            raise GeometryError(f"{MISSING} is {self.half:g} but must be at most {MOST_MISSING:g}.")
+        if self.is_of_each and self.shape != "normal":
+            raise FormatError(f"{self.name} is uniform but lenslets differ normally. Leave 'uniform' out.")
 
     @classmethod
     def parse(cls, name: str, text: str) -> "Tolerance":
         """From text such as "±0.05 mm", "±1 %" or "±0.1 um uniform"; "+-" will do for the sign.
+
+        A part that is missing has no sign: "0.2 %".
 
         Raises
         ------
@@ -88,6 +104,8 @@ class Tolerance:
             A range that is not above zero.
         """
         check_name(name)
+        if name == MISSING:
+            return cls(name, _part(text))
         found = _TEXT.fullmatch(text) if isinstance(text, str) and len(text) < 100 else None
         dimension = NAMES.get(name, "number")
         if found is None:
@@ -108,8 +126,13 @@ class Tolerance:
         """SI unit of the value."""
         return _UNITS[NAMES.get(self.name, "number")]
 
+    @property
+    def is_of_each(self) -> bool:
+        """Whether each lenslet has its own."""
+        return self.name.startswith(EACH)
+
     def deviation_of(self, value: float) -> float:
-        """Standard deviation of the value, in SI.
+        """Standard deviation of the value, in SI; √(q (1 - q)) of whether a lenslet is there, q missing.
 
         Raises
         ------
@@ -122,9 +145,13 @@ class Tolerance:
                 "Give the tolerance with a unit."
             )
         half = self.half * abs(value) if self.relative else self.half
+        if self.name == MISSING:
+            return math.sqrt(half * (1 - half))
         return half / (math.sqrt(3) if self.shape == "uniform" else 2)
 
     def __str__(self) -> str:
+        if self.name == MISSING:
+            return f"{100 * self.half:.6g} %"
         scale, unit = {"m": (1e6, "µm"), "rad": (1e3, "mrad")}.get(self.unit, (1.0, ""))
         size = f"{100 * self.half:.6g} %" if self.relative else f"{scale * self.half:.6g} {unit}".rstrip()
         return f"±{size}" + (" uniform" if self.shape == "uniform" else "")
@@ -151,6 +178,13 @@ def _number(name: str, text: str) -> float:
         raise FormatError(
             f"the tolerance of {name} has {text!r} where a number without a unit, or a part in %, must stand."
         ) from None
+
+
+def _part(text: Any) -> float:
+    """Of lenslets that are missing."""
+    if not isinstance(text, str) or not (found := _PART.fullmatch(text)):
+        raise FormatError(f"the tolerance of {MISSING} is {str(text)[:60]!r} but must be like '0.2 %'.")
+    return float(found[1]) / (100 if found[2] else 1)
 
 
 def flat(table: Any, above: str = "") -> dict[str, str]:

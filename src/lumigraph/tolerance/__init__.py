@@ -3,7 +3,8 @@
 - `lumigraph.instruments.Tolerance`: how far a value may be off; camera files have them in ``[tolerances]``.
 - `built`: the camera with errors, all else where its description puts it; `drawn`, `cameras`: errors, and
   cameras, by chance (`making`).
-- `measures`: what follows from a camera as built beside what was meant.
+- `measures`: what follows from a camera as built beside what was meant; `single`: what single lenslets do to
+  it that differ.
 - `study`: many cameras drawn by chance (`trials`) beside first-order sensitivities, a `Study` with an
   `Outcome` for each measure.
 """

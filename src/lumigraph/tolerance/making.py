@@ -11,7 +11,13 @@ from lumigraph.core import checks
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments import Instrument, LensletCamera, Tolerance
 from lumigraph.instruments.loading import AnyCamera
-from lumigraph.instruments.tolerances import check_name
+from lumigraph.instruments.tolerances import EACH, MISSING, check_name
+
+SEED = "built.seed"
+"""Error that says which lenslet is how."""
+
+_SCATTERS = {"focal_length": "focal_length_scatter", "decentre": "decentre_scatter", "missing": "missing"}
+"""Keys of ``[built]`` by what each lenslet has of its own."""
 
 
 def check_camera(camera: AnyCamera | LensletCamera | Instrument) -> LensletCamera:
@@ -58,13 +64,16 @@ def _holder(table: Any, path: Sequence[str | int]) -> Any:
 
 
 def value_of(camera: LensletCamera, name: str) -> float:
-    """A value that may be off, in SI; of several lenslet focal lengths the first.
+    """A value that may be off, in SI; of several lenslet focal lengths the first; no lenslet is decentred.
 
     Raises
     ------
     FormatError
         A name without tolerance.
     """
+    if name.startswith(EACH):
+        check_name(name)
+        return camera.lenslets.focal_length[0] if name.endswith("focal_length") else 0.0
     path = _path(name)
     value = _holder(_meant(camera), path)[path[-1]]
     return value[0] if isinstance(value, tuple) else value
@@ -82,7 +91,8 @@ def built(camera: LensletCamera, errors: Mapping[str, float]) -> LensletCamera:
         What is meant.
     errors
         What is added to its values, in SI, by the names of `Tolerance`; of several lenslet focal lengths to
-        each.
+        each. Names below "lenslets.each" have a standard deviation, or the part that is missing, of lenslets
+        that differ by the error "built.seed".
 
     Raises
     ------
@@ -101,7 +111,15 @@ def built(camera: LensletCamera, errors: Mapping[str, float]) -> LensletCamera:
     """
     table = _meant(check_camera(camera))
     for name, error in errors.items():
-        path, added = _path(name), checks.finite(name, error)
+        added = checks.finite(name, error)
+        if name.startswith(EACH):
+            part = added / value_of(camera, name) if name.endswith("focal_length") else added
+            table["built"][_SCATTERS[name.removeprefix(EACH)]] += part
+            continue
+        if name == SEED:
+            table["built"]["seed"] = int(added)
+            continue
+        path = _path(name)
         holder = _holder(table, path)
         old = holder[path[-1]]
         holder[path[-1]] = tuple(f + added for f in old) if isinstance(old, tuple) else old + added
@@ -131,6 +149,11 @@ def tolerances_of(
         )
     for one in found:
         one.deviation_of(value_of(camera, one.name))
+    if camera.built.scatter is not None and (each := [one.name for one in found if one.is_of_each]):
+        raise FormatError(
+            f"{each[0]} would be drawn but the lenslets of [built] differ already. Leave out the tolerance, "
+            "or focal_length_scatter, decentre_scatter and missing."
+        )
     return found
 
 
@@ -139,7 +162,8 @@ def drawn(
 ) -> dict[str, float]:
     """Errors [SI] by name of one camera of many, by chance.
 
-    Each tolerance has random numbers of its own: one more or less leaves those of the others.
+    Each tolerance has random numbers of its own: one more or less leaves those of the others. Where
+    lenslets have errors of their own, these are standard deviations, and "built.seed" draws them.
 
     Parameters
     ----------
@@ -153,8 +177,16 @@ def drawn(
         Of all draws.
     """
     errors = {}
+
+    def numbers(name: str) -> np.random.Generator:
+        return np.random.default_rng([checks.whole("seed", seed, 0), number, crc32(name.encode())])
+
     for one, size in zip(tolerances, deviations, strict=True):
-        rng = np.random.default_rng([checks.whole("seed", seed, 0), number, crc32(one.name.encode())])
+        if one.is_of_each:
+            errors[SEED] = float(numbers(EACH).integers(2**32))
+            errors[one.name] = one.half if one.name == MISSING else size
+            continue
+        rng = numbers(one.name)
         unit = math.sqrt(3) * rng.uniform(-1, 1) if one.shape == "uniform" else rng.normal()
         errors[one.name] = float(size * unit)
     return errors

@@ -2,21 +2,22 @@ r"""What follows from a camera as built, beside what was meant: focus, depth, bl
 
 A point at z1 has its image at z2 behind the main lens, a = L - z2 before the lenslets. Its place in the
 micro-images moves from lenslet to lenslet, beside the micro-images' own middles, by p b z2/(a L). With the
-distances of the camera that was meant (index 0) this reads as an image at
+distances of the camera that was meant (index 0), and without errors of single lenslets (see `single`), this
+reads as an image at
 
 .. math:: z_2' = \frac{L_0}{1 + r}, \quad r = \frac{a L}{p b z_2} \cdot \frac{p_0 b_0}{L_0}
 """
 
 import math
-from collections.abc import Iterator
-from functools import lru_cache
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from lumigraph.design import thin_lens
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import LensletCamera, Lenslets, Row
+from lumigraph.instruments import LensletCamera, Row
 from lumigraph.instruments.capabilities import Rendered
+from lumigraph.tolerance.single import Differ, Sight, Single, last
 
 
 def measures(camera: LensletCamera, made: LensletCamera) -> tuple[Row, ...]:
@@ -39,28 +40,50 @@ def measures(camera: LensletCamera, made: LensletCamera) -> tuple[Row, ...]:
 
 def of_making(camera: LensletCamera, made: LensletCamera) -> Iterator[Row]:
     """Those that only a camera as built has."""
-    yield from _focus(camera, made)
-    fill = made.micro_image_width / made.micro_image_pitch
-    yield Row("micro-image fill", fill, "", "D b / L over p (1 + b/L): above 1 micro-images overlap")
-    for axis, shift in zip("yx", _corner_shift(camera, made), strict=True):
-        yield Row(f"corner shift {axis}", shift, "px", "of the last micro-image from where it was meant")
-
-
-def _focus(camera: LensletCamera, made: LensletCamera) -> Iterator[Row]:
+    scatter = made.built.scatter
+    single = Single() if scatter is None else Single.of(made, scatter)
     near = focused_distance(made)
     yield Row("focused distance", near, "m", "object that lenslets, or the sensor behind them, see sharp")
     yield Row("focus shift", near - camera.object_distance, "m", "farther than the plane that was meant")
-    yield Row("depth error", read_distance(camera, made) - made.object_distance, "m",
-              "of a point in that plane, read with the distances that were meant")  # fmt: skip
-    yield Row("blur at the object", _blur(made), "m", "diameter of a point there; below 0 beyond focus")
-    yield Row("blur behind a lenslet", _behind(made), "m", "of a point, by geometry")
+    yield from _of_lenslets(camera, made, single)
     if isinstance(made, Rendered):
         cone = made.pupil_diameter * abs(made.separation - made.image_distance) / made.image_distance
         yield Row("lenslets that see a point", cone / made.lenslets.pitch, "", "D |a| / (z2 p)")
+    fill = made.micro_image_width / made.micro_image_pitch
+    yield Row("micro-image fill", fill, "", "D b / L over p (1 + b/L): above 1 micro-images overlap")
 
 
-def focused_distance(made: LensletCamera) -> float:
+def of_differing(camera: LensletCamera) -> Callable[[Differ], dict[str, float]]:
+    """Measures of a camera as described, but for how single lenslets differ: those that follow from it."""
+    sight = Sight.of(camera)
+
+    def values(differ: Differ) -> dict[str, float]:
+        single = Single.of(camera, differ, sight)
+        return {row.name: float(row.value) for row in _of_lenslets(camera, camera, single)}
+
+    return values
+
+
+def _of_lenslets(camera: LensletCamera, made: LensletCamera, single: Single) -> Iterator[Row]:
+    """Those that lenslets change which differ from each other."""
+    read = read_distance(camera, made, single.slope)
+    yield Row("depth error", read - made.object_distance, "m",
+              "of a point in that plane, read with the distances that were meant")  # fmt: skip
+    yield Row("blur at the object", _blur(made, single.factor), "m",
+              "diameter of a point there; below 0 beyond focus")  # fmt: skip
+    yield Row("blur behind a lenslet", _behind(made, single.factor), "m", "of a point, by geometry")
+    if isinstance(made, Rendered):
+        shift = focused_distance(made, single.factor) - focused_distance(made)
+        yield Row("lenslet focus shift", shift, "m", "of a lenslet near the axis, beyond the others' focus")
+    yield Row("light of a point", single.light, "", "on the axis, that lenslets do not lose by missing")
+    for axis, shift in zip("yx", _corner_shift(camera, made, single), strict=True):
+        yield Row(f"corner shift {axis}", shift, "px", "of the last micro-image from where it was meant")
+
+
+def focused_distance(made: LensletCamera, factor: float = 1.0) -> float:
     """Object distance that a camera as built sees sharp [m]: through its lenslets, or on them.
+
+    `factor` is that of a lenslet's focal length.
 
     Raises
     ------
@@ -69,7 +92,7 @@ def focused_distance(made: LensletCamera) -> float:
     """
     relay = 0.0
     if isinstance(made, Rendered):
-        relay = 1 / (1 / made.lenslets.focal_length[0] - 1 / made.lenslet_distance)
+        relay = 1 / (1 / (made.lenslets.focal_length[0] * factor) - 1 / made.lenslet_distance)
     return _real(made.main_lens.focal_length, made.separation - relay)
 
 
@@ -83,55 +106,51 @@ def _real(focal_length: float, image: float) -> float:
     return thin_lens.object_distance(focal_length, image)
 
 
-def read_distance(camera: LensletCamera, made: LensletCamera) -> float:
+def read_distance(camera: LensletCamera, made: LensletCamera, slope: float = 0.0) -> float:
     """Distance that a point has whose micro-images are read with the camera that was meant [m].
 
-    Its lattice of micro-images is measured, its distances, focal length and pixels are those meant.
+    Its lattice of micro-images is measured, its distances, focal length and pixels are those meant. Decentred
+    lenslets add a `slope` to its images.
 
     Raises
     ------
     GeometryError
         The reading is no real object.
     """
-    image, length = made.image_distance, made.separation
+    image, length, pitch = made.image_distance, made.separation, made.lenslets.pitch
     lenslets_per_pixel = made.pixels.pixel_pitch * (length - image) * length
-    lenslets_per_pixel /= made.lenslets.pitch * made.lenslet_distance * image
+    lenslets_per_pixel /= pitch * (made.lenslet_distance * image + slope * (length - image) * length)
     meant = camera.lenslets.pitch * camera.lenslet_distance / (camera.pixels.pixel_pitch * camera.separation)
     return _real(camera.main_lens.focal_length, camera.separation / (1 + lenslets_per_pixel * meant))
 
 
-def _behind(made: LensletCamera) -> float:
+def _behind(made: LensletCamera, factor: float) -> float:
     """Diameter of a point's image behind a lenslet [m]; of a 1.0 camera of one direction's."""
-    f, b = made.lenslets.focal_length[0], made.lenslet_distance
+    f, b = made.lenslets.focal_length[0] * factor, made.lenslet_distance
     width = made.lenslets.pitch * made.lenslets.fill_factor
     nearness = 1 / (made.separation - made.image_distance) if isinstance(made, Rendered) else 0.0
     return width * (1 - b * (1 / f - nearness))
 
 
-def _blur(made: LensletCamera) -> float:
+def _blur(made: LensletCamera, factor: float) -> float:
     """The same in the plane of the object; of a 1.0 camera what the main lens blurs on the lenslets."""
     to_object = made.object_distance / made.image_distance
     if isinstance(made, Rendered):
         relay = made.separation - made.image_distance
-        return _behind(made) * abs(relay) / made.lenslet_distance * to_object
+        return _behind(made, factor) * abs(relay) / made.lenslet_distance * to_object
     length = made.separation
     return made.pupil_diameter * (1 - length / made.image_distance) * made.object_distance / length
 
 
-def _corner_shift(camera: LensletCamera, made: LensletCamera) -> tuple[float, float]:
+def _corner_shift(camera: LensletCamera, made: LensletCamera, single: Single) -> tuple[float, float]:
     """Of the micro-image behind the last lenslet of the array, on the raw image [px]."""
-    index = _last(camera.lenslets)  # pyright: ignore[reportArgumentType] - frozen models can be hashed
+    index = last(camera.lenslets)  # pyright: ignore[reportArgumentType] - frozen models can be hashed
     places = []
     for one in (made, camera):
         scale = -(1 + one.lenslet_distance / one.separation) / one.pixels.pixel_pitch
         places.append(one.lattice.position(index)[0] * scale)
-    return float(places[0][0] - places[1][0]), float(places[0][1] - places[1][1])
-
-
-@lru_cache(maxsize=16)
-def _last(lenslets: Lenslets) -> np.ndarray:
-    """Index of the last lenslet (1, 2)."""
-    return lenslets.indices()[-1:]
+    shift = places[0] - places[1] - np.array(single.corner) / made.pixels.pixel_pitch
+    return float(shift[0]), float(shift[1])
 
 
 def is_finite(value: object) -> bool:

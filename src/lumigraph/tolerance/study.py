@@ -12,6 +12,7 @@ from lumigraph.core.brief import brief
 from lumigraph.core.result import Quantity
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import LensletCamera, Tolerance
+from lumigraph.tolerance.making import SEED
 from lumigraph.tolerance.outcome import PERCENTS, Outcome
 from lumigraph.tolerance.trials import CAMERA, ERROR, Trials, column, unit_of
 
@@ -60,7 +61,7 @@ class Study:
         bad = tuple(str(row[ERROR]) for row in taken if ERROR in row)
         if len(good) < 2:
             raise GeometryError(f"{len(bad)} of {len(taken)} cameras drawn cannot be, such as: {bad[0]}")
-        given = {CAMERA, *(column(one.name, one.unit) for one in trials.tolerances)}
+        given = {CAMERA, SEED, *(column(one.name, one.unit) for one in trials.tolerances)}
         headings = [heading for heading in rows[0] if heading not in given]
         found = (_outcome(heading, rows[: trials.steps], good) for heading in headings)
         outcomes = tuple(one for one in found if one is not None)
@@ -158,8 +159,9 @@ def study(
 
     Notes
     -----
-    Errors are independent of each other. Each is of the whole camera: lenslets differ from each other in
-    nothing, and neither lens nor array nor sensor leans.
+    Errors are independent of each other, and of the whole camera, but for those below ``lenslets.each``:
+    these are independent from lenslet to lenslet. To first order their effect is the root of the sum of
+    squares of what each lenslet alone does to a measure.
 
     Examples
     --------

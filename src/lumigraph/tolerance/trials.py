@@ -12,12 +12,13 @@ import numpy as np
 from lumigraph import metric
 from lumigraph.cluster import Values
 from lumigraph.core import checks
-from lumigraph.errors import FormatError, LumigraphError
+from lumigraph.errors import FormatError, GeometryError, LumigraphError
 from lumigraph.instruments import LensletCamera, Tolerance
 from lumigraph.instruments.loading import camera_of
 from lumigraph.metric.charts import check_camera as check_charts
-from lumigraph.tolerance.making import built, check_camera, drawn, tolerances_of, value_of
-from lumigraph.tolerance.measures import is_finite, measures, of_making
+from lumigraph.tolerance.making import SEED, built, check_camera, drawn, tolerances_of, value_of
+from lumigraph.tolerance.measures import is_finite, measures, of_differing, of_making
+from lumigraph.tolerance.single import changes
 
 MOST = 1_000_000
 """Cameras that are drawn at most."""
@@ -30,6 +31,9 @@ USUAL = (
     VIEWS, "micro-image fill", "cross-talk", "corner shift y", "corner shift x",
 )  # fmt: skip
 """Measures that are taken where none are named."""
+
+OF_LENSLETS = ("lenslet focus shift", "light of a point")
+"""Those that are taken besides where lenslets differ from each other."""
 
 CAMERA, ERROR = "camera", "error"
 """Columns: which camera it is, and why there is none."""
@@ -83,12 +87,12 @@ class Trials:
         FormatError
             No tolerances, one that cannot be read, or a measure that is no number of this camera.
         GeometryError
-            Another kind of instrument.
+            Another kind of instrument, or simulated measures of lenslets that differ from each other.
         """
         check_camera(camera)
         found = tolerances_of(camera, tolerances)
         known = [row.name for row in measures(camera, built(camera, {})) if is_finite(row.value)]
-        names = _names(camera, measure, known)
+        names = _names(camera, measure, known, found)
         return cls(camera.to_toml(), found, names, checks.whole("seed", seed, 0, FormatError))
 
     @cached_property
@@ -136,13 +140,25 @@ class Trials:
         """What is off, and the measures, or why no camera is so."""
         errors = self.errors_of(item)
         about = f"draw {item['draw']}" if "draw" in item else _about(item)
-        row = {CAMERA: about}
+        row: dict[str, Any] = {CAMERA: about}
         row |= {column(one.name, one.unit): errors.get(one.name, 0.0) for one in self.tolerances}
+        if any(one.is_of_each for one in self.tolerances):
+            row[SEED] = errors.get(SEED)
+        each = next((one for one in self.tolerances if one.is_of_each and one.name == item.get("off")), None)
         try:
-            found = self._found(built(self.meant, errors))
+            found = self._found(built(self.meant, {} if each else errors))
+            if each is not None:
+                self._add_effects(found, each.name, item["side"])
         except LumigraphError as error:
             return Values({**row, ERROR: " ".join(str(error).split())})
         return Values(row | found)
+
+    def _add_effects(self, found: dict[str, Any], name: str, side: int) -> None:
+        """What lenslets do that differ, each by one deviation, as independent errors add up."""
+        size = next(s for one, s in zip(self.tolerances, self.deviations, strict=True) if one.name == name)
+        for measure, (effect, bend) in changes(self.meant, name, size, of_differing(self.meant)).items():
+            for heading in found.keys() & {measure, *(column(measure, unit) for unit in ("m", "px"))}:
+                found[heading] += side * effect + bend
 
     def _found(self, made: LensletCamera) -> dict[str, Any]:
         known: dict[str, Any] = {row.name: row for row in of_making(self.meant, made)}
@@ -180,16 +196,28 @@ def _about(item: Mapping[str, Any]) -> str:
     return f"{item['off']} {'+' if item['side'] > 0 else '-'} one deviation"
 
 
-def _names(camera: LensletCamera, asked: Sequence[str] | None, known: Sequence[str]) -> tuple[str, ...]:
+def _names(
+    camera: LensletCamera,
+    asked: Sequence[str] | None,
+    known: Sequence[str],
+    tolerances: Sequence[Tolerance],
+) -> tuple[str, ...]:
     """The measures that are asked for."""
+    each = [one.name for one in tolerances if one.is_of_each]
     if asked is None:
         left = {"views per axis"} if VIEWS in known else set()
-        return tuple(name for name in USUAL if name in known and name not in left)
+        usual = (*USUAL, *(OF_LENSLETS if each else ()))
+        return tuple(name for name in usual if name in known and name not in left)
     for name in asked:
         if name not in known and not metric.is_measure(name):
             near = get_close_matches(name, known, 3, 0.4)
             hint = f" Did you mean {', '.join(map(repr, near))}?" if near else ""
             raise FormatError(f"{name!r} is no number of a {camera.noun} camera.{hint}")
-    if any(metric.is_measure(name) for name in asked):
+    if simulated := [name for name in asked if metric.is_measure(name)]:
         check_charts(camera)
+        if each:
+            raise GeometryError(
+                f"{simulated[0]} is simulated by an operator, which repeats from lenslet to lenslet; "
+                f"{each[0]} makes them differ. Leave one of them out."
+            )
     return tuple(dict.fromkeys(asked))

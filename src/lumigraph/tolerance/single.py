@@ -1,0 +1,228 @@
+r"""What lenslets that differ from each other do to measures, by rays.
+
+A lenslet whose vertex is off by d moves all that is behind it by d b/f. Places of a point behind the lenslets
+that see it, each with its share w of the point's light, then have a slope over the lenslets' places r of
+
+.. math:: \frac{\sum w (r - \bar r) \cdot d b/f}{\sum w |r - \bar r|^2}
+
+beside the one that tells its depth. Independent errors of the lenslets add up by their squares, to first
+order: `changes` tries one lenslet after the other.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+
+from lumigraph.core import coverage
+from lumigraph.errors import GeometryError
+from lumigraph.instruments import LensletCamera, Lenslets
+from lumigraph.instruments.capabilities import Rendered
+from lumigraph.instruments.tolerances import EACH, MISSING
+
+_ACROSS = 128
+"""Rays across the stop."""
+
+Errors = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Of lenslets: factors of focal lengths, decentres along columns and rows [m], and presence."""
+
+
+class Differ(Protocol):
+    """How lenslets differ, as `lumigraph.elements.Scatter` says."""
+
+    def of(self, i: np.ndarray, j: np.ndarray) -> Errors:
+        """Errors of lenslets (i, j)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class One:
+    """A single lenslet that differs from all others, which are as described.
+
+    Parameters
+    ----------
+    index
+        Of the lenslet (i, j).
+    factor
+        Of its focal length.
+    down, across
+        Decentre of its vertex along columns and rows [m].
+    there
+        Whether it is.
+    """
+
+    index: tuple[int, int]
+    factor: float = 1.0
+    down: float = 0.0
+    across: float = 0.0
+    there: bool = True
+
+    def of(self, i: np.ndarray, j: np.ndarray) -> Errors:
+        """As `Differ.of`."""
+        mine = (i == self.index[0]) & (j == self.index[1])
+        return (
+            np.where(mine, self.factor, 1.0), np.where(mine, self.down, 0.0),
+            np.where(mine, self.across, 0.0), np.where(mine, self.there, True),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """Lenslets that see the point on the axis, in the object's plane.
+
+    Parameters
+    ----------
+    indices
+        (k, 2), as (i, j).
+    shares
+        Of the point's light (k,), by rays; they sum to 1.
+    """
+
+    indices: np.ndarray
+    shares: np.ndarray
+
+    @classmethod
+    def of(cls, camera: LensletCamera) -> "Sight":
+        """Of a camera as built.
+
+        Raises
+        ------
+        GeometryError
+            No lenslet sees the point.
+        """
+        image = camera.image_distance
+        side = (2 * np.arange(_ACROSS) + 1) / _ACROSS - 1
+        y, x = (part.ravel() for part in np.meshgrid(side, side, indexing="ij"))
+        inside = y**2 + x**2 <= 1
+        cone = camera.pupil_diameter / 2 * abs(camera.separation - image) / image
+        i, j = camera.lattice.index(cone * y[inside], cone * x[inside])
+        wide = int(np.ptp(j)) + 1
+        counts = np.bincount((i - i.min()) * wide + j - j.min())
+        (seen,) = np.nonzero(counts)
+        indices, counts = np.stack([seen // wide + i.min(), seen % wide + j.min()], -1), counts[seen]
+        there = camera.lenslets.holds(camera.lattice.position(indices))
+        if not there.any():
+            raise GeometryError("no lenslet sees the point on the axis. Use more lenslets, or less offset.")
+        return cls(indices[there], counts[there] / counts[there].sum())
+
+
+@dataclass(frozen=True, slots=True)
+class Single:
+    """What lenslets that differ do to measures.
+
+    Parameters
+    ----------
+    factor
+        Of the focal length of the lenslet that gets most of the light of a point on the axis.
+    slope
+        Of that point's images behind its lenslets, over the lenslets' places.
+    light
+        Part of its light that is not lost on missing lenslets.
+    corner
+        Of the last micro-image (y, x) [m], in physical coordinates.
+    """
+
+    factor: float = 1.0
+    slope: float = 0.0
+    light: float = 1.0
+    corner: tuple[float, float] = (0.0, 0.0)
+
+    @classmethod
+    def of(cls, camera: LensletCamera, differ: Differ, sight: Sight | None = None) -> "Single":
+        """Of a camera as built.
+
+        Raises
+        ------
+        GeometryError
+            All lenslets but one are missing that see a point.
+        """
+        sight = Sight.of(camera) if sight is None else sight
+        i, j = sight.indices.T
+        factor, *_, there = differ.of(i, j)
+        corner = _shifts(camera, differ, last(camera.lenslets))[0]
+        return cls(
+            float(factor[sight.shares.argmax()]), _slope(camera, differ, sight),
+            float(sight.shares @ there), (float(corner[0]), float(corner[1])),
+        )  # fmt: skip
+
+
+def _shifts(camera: LensletCamera, differ: Differ, indices: np.ndarray) -> np.ndarray:
+    """Of all that is behind lenslets (k, 2): (y, x) [m]."""
+    i, j = indices.T
+    factor, down, across, _ = differ.of(i, j)
+    sin, cos = coverage.sides(camera.lattice.rotation)
+    shifts = np.stack([down * cos + across * sin, across * cos - down * sin], -1)
+    focal = np.asarray(camera.lenslets.focal_length)
+    focal = focal[camera.lattice.kind(i, j) % len(focal)] * factor
+    return shifts * (camera.lenslet_distance / focal)[:, None]
+
+
+def _slope(camera: LensletCamera, differ: Differ, sight: Sight) -> float:
+    if not isinstance(camera, Rendered) or len(sight.indices) < 2:
+        return 0.0
+    there = differ.of(*sight.indices.T)[3]
+    if there.sum() < 2:
+        raise GeometryError(
+            f"{int(there.sum())} of the {len(there)} lenslets that see a point are there, and one alone "
+            "tells no depth. Let fewer be missing."
+        )
+    places, shares = camera.lattice.position(sight.indices[there]), sight.shares[there][:, None]
+    places = places - (shares * places).sum(0) / shares.sum()
+    moved = shares * places * _shifts(camera, differ, sight.indices[there])
+    return float(moved.sum() / (shares * places**2).sum())
+
+
+Values = Callable[[Differ], Mapping[str, float]]
+"""Measures of a camera whose lenslets differ so."""
+
+
+def changes(camera: LensletCamera, name: str, size: float, values: Values) -> dict[str, tuple[float, float]]:
+    """Effect and bend of independent errors of all lenslets, by the names of measures.
+
+    Each is the root of the sum of squares over the lenslets. Whether a lenslet is there is no small error,
+    but what a point loses with one of them adds up all the same.
+
+    Parameters
+    ----------
+    camera
+        As described.
+    name, size
+        Of a tolerance below "lenslets.each", and one standard deviation [SI].
+    values
+        What is measured where one lenslet differs.
+    """
+    usual = values(One((0, 0)))
+    squares = {key: np.zeros(2) for key in usual}
+    for more, less in _pairs(camera, name, size):
+        above, below = values(more), usual if less is None else values(less)
+        for key, value in usual.items():
+            if less is None:  # there or not: the whole difference, by the deviation of a chance
+                squares[key] += (size * (above[key] - value)) ** 2, 0.0
+            else:
+                squares[key] += (
+                    ((above[key] - below[key]) / 2) ** 2, ((above[key] + below[key]) / 2 - value) ** 2
+                )  # fmt: skip
+    return {key: (math.sqrt(effect), math.sqrt(bend)) for key, (effect, bend) in squares.items()}
+
+
+def _pairs(camera: LensletCamera, name: str, size: float) -> Iterator[tuple[One, One | None]]:
+    """Lenslets that matter with one deviation either way, one after the other; with each missing."""
+    seen = {(int(i), int(j)) for i, j in (*Sight.of(camera).indices, *last(camera.lenslets))}
+    for index in sorted(seen):
+        if name == MISSING:
+            yield One(index, there=False), None
+        elif name == f"{EACH}focal_length":
+            part = size / camera.lenslets.focal_length[0]
+            yield One(index, factor=1 + part), One(index, factor=1 - part)
+        else:
+            yield One(index, down=size), One(index, down=-size)
+            yield One(index, across=size), One(index, across=-size)
+
+
+@lru_cache(maxsize=16)
+def last(lenslets: Lenslets) -> np.ndarray:
+    """Index of the last lenslet (1, 2)."""
+    return lenslets.indices()[-1:]
