@@ -70,7 +70,22 @@ def test_a_slanted_plane_is_smooth_and_right(name):
     assert np.median(error) < 0.015
     assert np.quantile(error, 0.98) < 0.15
     assert found.error is not None
-    assert np.mean(error) < np.mean(found.error) < 6 * np.mean(error)
+    assert 0.6 < np.mean(found.error) / np.mean(error) < 1.8
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_a_bent_surface_is_not_flattened_and_its_error_is_told(name):
+    """With fine texture taken for noise the surface is so stiff that it is off by 0.1 px; told is a fifth."""
+    sign = -1 if name == "Galilean" else 1
+
+    def bent(y, x):
+        return sign * (6.0 + 0.8 * np.sin(x / 18) * np.cos(y / 25))
+
+    paint = texture(np.random.default_rng(1), waves=12, longest=0.6)
+    found, truth = measured(name, ((paint, bent, None),), bent)
+    error = np.abs(found.values - truth)
+    assert np.mean(error) < 0.035
+    assert 0.6 < np.mean(found.error) / np.mean(error) < 1.7
 
 
 def test_libraries_progress_and_grid(xp):

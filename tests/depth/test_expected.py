@@ -47,3 +47,14 @@ def test_the_factors_that_made_errors_are_found_again(rng):
     found = fitted(parts, errors)
     assert (found @ parts).mean() == pytest.approx(errors.mean(), rel=1e-3)
     assert np.mean(np.abs(found @ parts / (true @ parts) - 1)) < 0.1
+
+
+def test_a_slant_that_noise_disputes_is_not_at_stake_between_micro_images():
+    values = 0.2 * np.arange(40) + np.zeros((30, 1))
+    even = np.zeros_like(values)
+    inside = [
+        terms(values, Evidence(even, even + 0.5, even), slants=slants)["disputed"][10:-10, 10:-10]
+        for slants in (True, False)
+    ]
+    assert inside[0] == pytest.approx(0.5 * 14 * 0.2)
+    assert inside[1] == pytest.approx(0, abs=1e-9)

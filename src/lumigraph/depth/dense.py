@@ -17,7 +17,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.depth.correlation import WIDEST, correlation
 from lumigraph.depth.expected import Evidence, contrast, expected
 from lumigraph.depth.flat import Flat
-from lumigraph.depth.pictures import noise_of
+from lumigraph.depth.pictures import LEAST_NOISE, noise_of
 from lumigraph.depth.sightings import Sightings
 from lumigraph.depth.smooth import Stiffness, tears, update
 from lumigraph.depth.volume import box, cheapest, guided, semi_global
@@ -36,7 +36,8 @@ _ROUNDS = (2.0, 1.2)  # px: second difference that counts as an edge, round by r
 _TEAR = 1.0  # px between neighbours that are not of one surface
 _KINK, _STIFFNESS = 1e-3, 3e4  # px; per variance of the noise
 _FARTHEST = 1.2  # px that a round may move a place
-_SHARED = 0.3  # of the deviation of one sample alone: neighbours see the same pixels
+_WINDOW = 3  # samples to each side that tell what noise does
+_UNMET = 2.0  # deviations that what a window still asks for, and the stiff surface denies, is as much as
 _DOUBT = 0.8  # px: expected error with a confidence of 1/e
 
 
@@ -117,7 +118,8 @@ def dense(
     guide = _joined(sights, lambda part, rows: part.picture(sizes.between(*part.fractional)))
     first = _swept(sights, moves, (sign, guide), within(progress, 0.3, 0.8))
     found, evidence = _refined(sights, first, (sign, guide), within(progress, 0.8, 1))
-    error = np.minimum(np.maximum(expected(found, evidence), expected(-found, evidence)), reach)
+    error = np.maximum(*(expected(side * found, evidence, slants=False) for side in (1, -1)))
+    error = np.minimum(error, reach)
     _check_ends(found, error, moves, sign * np.exp(moves[[0, -1]] / reach))
     values = sign * np.exp(found / reach)
     trust, error = np.exp(-error / _DOUBT), error * np.abs(values) / reach
@@ -176,19 +178,28 @@ def _refined(
 ) -> tuple[np.ndarray, Evidence]:
     """Labels (y, x) refined on all micro-images by least squares, and what they rest on."""
     (sign, guide), noise = how, noise_of(sights.flat.image)
-    information = variance = disputed = np.zeros_like(moves)
+    pull = information = variance = disputed = np.zeros_like(moves)
     for k, jump in enumerate(_ROUNDS):
         sizes = sign * np.exp(moves / sights.flat.even)
         asked = _joined(sights, partial(_asked, sizes=sizes, noise=noise))
         pull, information, variance, disputed = np.moveaxis(asked, 1, 0)
-        noise = max(noise, float(np.sqrt(np.median(variance))))
+        # By how lenslets differ: a micro-image has no even part, and its texture would pass for noise.
+        noise = max(LEAST_NOISE, float(np.sqrt(np.median(variance))))
         held = Stiffness(_STIFFNESS * noise**2, _KINK, jump)
         change = update(moves, information, pull, held, None, tears(moves, _TEAR)) - moves
-        moves = moves + np.clip(change, -_FARTHEST, _FARTHEST)
+        change = np.clip(change, -_FARTHEST, _FARTHEST)
+        moves, pull = moves + change, pull - information * change
         progress((k + 1) / len(_ROUNDS))
-    residual = np.sqrt(np.maximum(box(variance, 2), noise_of(sights.flat.image) ** 2))
-    deviation = _SHARED * residual / np.sqrt(box(information, 3) + 1e-12)
+    residual = np.sqrt(np.maximum(box(variance, 2), noise**2))
+    deviation = _deviation(residual, information, pull)
     return moves, Evidence(deviation, box(disputed, 1), contrast(guide))
+
+
+def _deviation(residual: np.ndarray, information: np.ndarray, pull: np.ndarray) -> np.ndarray:
+    """Of the mean of a window (y, x): by noise, and by what lenslets ask and the stiff surface denies."""
+    information = box(information, _WINDOW) + 1e-12
+    unmet = np.abs(box(pull, _WINDOW)) / information
+    return np.hypot(residual / np.sqrt(information) / (2 * _WINDOW + 1), _UNMET * unmet)
 
 
 def _asked(part: Sightings, rows: slice, sizes: np.ndarray, noise: float) -> np.ndarray:

@@ -44,32 +44,38 @@ def contrast(picture: np.ndarray) -> np.ndarray:
     return np.hypot(*np.gradient(picture))
 
 
-def expected(values: np.ndarray, evidence: Evidence) -> np.ndarray:
+def expected(values: np.ndarray, evidence: Evidence, *, slants: bool = True) -> np.ndarray:
     """Mean distance from the truth (y, x) to expect, in the unit of the values and their deviation.
 
-    `values` (y, x) are greater where nearer.
+    `values` (y, x) are greater where nearer. `slants`: see `terms`.
     """
-    parts = terms(values, evidence)
+    parts = terms(values, evidence, slants=slants)
     return sum((FACTORS[name] * part for name, part in parts.items()), np.zeros_like(values))
 
 
-def terms(values: np.ndarray, evidence: Evidence) -> dict[str, np.ndarray]:
+def terms(values: np.ndarray, evidence: Evidence, *, slants: bool = True) -> dict[str, np.ndarray]:
     """What an expected error is made of (y, x), each in the unit of the values.
 
     A map is most often wrong beside something farther, which it takes for a part of what stands before it;
     the more so if no edge of the picture says where that ends. What is as much nearer on the other side is no
-    edge but a slant.
+    edge but a slant. With `slants` it is still at stake where views dispute a place.
     """
     beyond = {width: _beyond_slant(values, width) for width in (3, *_FADED.values())}
     farther = {width: np.maximum(one, 0) for width, one in beyond.items()}
+    around = _range(values, _AROUND) if slants else np.abs(_beyond_slant(values, _AROUND))
     faint = np.exp(-evidence.contrast / _FAINT)
     return {
         "noise": evidence.deviation,
         "nearer": np.maximum(-beyond[3], 0),
         "farther": farther[3],
         **{name: faint * farther[width] for name, width in _FADED.items()},
-        "disputed": evidence.disputed * (maximum_filter(values, _AROUND) - minimum_filter(values, _AROUND)),
+        "disputed": evidence.disputed * around,
     }
+
+
+def _range(values: np.ndarray, width: int) -> np.ndarray:
+    """Between the nearest and the farthest in a window (y, x)."""
+    return maximum_filter(values, width) - minimum_filter(values, width)
 
 
 def _beyond_slant(values: np.ndarray, width: int) -> np.ndarray:

@@ -2,13 +2,18 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
+from scipy.ndimage import convolve1d, spline_filter1d
 
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.raw import RawImage
 from lumigraph.rendering.interpolate import as_float
+
+_spline: Any = spline_filter1d
 
 _POWERS = 5  # of the square of the distance from a centre: light falls steeply at the edge
 _EVEN = 0.95  # of the middle's light: less comes from lenslets that are lit in part
@@ -18,7 +23,7 @@ _CHANCE = 2.0  # standard errors below which shading is chance
 _BRIGHT = 0.98  # part of the pixels of a ring that are darker than what lights it
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Flat:
     """Square roots (y, x) of a raw image over its white, as bright at the edge of micro-images as inside.
 
@@ -56,6 +61,14 @@ class Flat:
         dim = np.flatnonzero(flat.light(steps / half) < _EVEN * flat.light(np.zeros(1, np.float32)))
         return replace(flat, even=max(float(steps[dim[0]]), radius / 2) if len(dim) else radius)
 
+    @cached_property
+    def finer(self) -> np.ndarray:
+        """The image by cubic splines at whole and half pixels (2 y - 1, 2 x - 1).
+
+        Read linearly between these it errs a quarter as much: finest textures are not taken for noise.
+        """
+        return _halved(_halved(self.image, 0), 1)
+
     def light(self, distance: np.ndarray) -> np.ndarray:
         """Part of the light that reaches places at a distance from a centre, in half pitches."""
         return np.clip(np.polyval(np.float32(self.fall_off[::-1]), distance**2), *_FALL_OFF)
@@ -66,6 +79,14 @@ def grey(raw: RawImage) -> np.ndarray:
     image = to_numpy(as_float(raw.data)).astype(np.float32)
     image = np.maximum(image.mean(2) if image.ndim == 3 else image, 0)
     return image / np.float32(float(np.quantile(image, 0.999)) or 1.0)
+
+
+def _halved(image: np.ndarray, axis: int) -> np.ndarray:
+    """An image and, between its samples along an axis, its cubic spline."""
+    spline: np.ndarray = _spline(image, 3, axis, np.float32)
+    between = convolve1d(spline, [1 / 48, 23 / 48, 23 / 48, 1 / 48, 0], axis, mode="mirror")
+    out = np.insert(between, range(image.shape[axis]), image, axis)
+    return np.ascontiguousarray(np.delete(out, -1, axis))
 
 
 def _shapes(dy: np.ndarray, dx: np.ndarray) -> list[np.ndarray]:

@@ -18,7 +18,9 @@ from lumigraph.errors import GeometryError
 MOST_VIEWS = 9
 """Along one axis: views between these look much the same, and cost as much."""
 
-_LEAST_NOISE = 2e-3  # of a picture from 0 to 1: what rounding to eight bits leaves
+LEAST_NOISE = 2e-3
+"""Of a picture from 0 to 1: what rounding to eight bits leaves."""
+
 FEWEST_VIEWS, LEAST_SIDE = 2, 8
 """Along one axis, and lenslets across a view: fewer show no lines."""
 
@@ -160,4 +162,4 @@ def noise_of(picture: np.ndarray) -> float:
     rough = box(np.abs(convolve(picture, kernel)), _WINDOW)
     lit = rough[box(picture, _WINDOW) > _LIT]
     smooth = float(np.quantile(lit if lit.size else rough, _SMOOTH)) / _OF_NOISE
-    return max(smooth * math.sqrt(np.pi / 2) / 6, _LEAST_NOISE)
+    return max(smooth * math.sqrt(np.pi / 2) / 6, LEAST_NOISE)

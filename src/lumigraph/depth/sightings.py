@@ -29,14 +29,14 @@ class Sight:
 
     `away` is from the lenslet to the place, along y and x [px of the lattice]. `weight` is 0 where it is not
     seen, and less for a kind of lenslet that blurs it. `here` numbers the places (n,) within its reach, row
-    by row; `at` is where on the sensor they are seen, along y and x (n,).
+    by row; `at` is where in the image they are seen, along y and x (n,).
     """
 
     weight: np.ndarray
     value: np.ndarray
     away: Pair
     here: np.ndarray
-    at: Pair
+    at: Sequence[np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -126,10 +126,12 @@ class Sightings:
         more = np.sqrt(np.maximum(blur[trust >= _COUNTS].max() ** 2 - blur**2, 0))
         return [gaussian_filter(self.flat.image, sigma) for sigma in more]
 
-    def around(self, size: np.ndarray | float, images: Sequence[np.ndarray] = ()) -> Iterator[Sight]:
+    def around(
+        self, size: np.ndarray | float, images: Sequence[np.ndarray] = (), fineness: int = 1
+    ) -> Iterator[Sight]:
         """What each lenslet near a place shows of it if its patch has a size, one or (y, x) [px].
 
-        `images` are the raw image for each kind of lenslets, or one for all.
+        `images` are the raw image for each kind of lenslets, or one for all, of so many samples per pixel.
         """
         images = images or [self.flat.image]
         lattice, (ny, nx) = self.calibration.lattice, self.calibration.shape
@@ -153,7 +155,7 @@ class Sightings:
                 weight *= np.choose(kind, [self._some(part, here) for part in trust])
             if weight.any():
                 slant = self._some(ratio, here)
-                at = cy - slant * away[0].ravel()[here], cx - slant * away[1].ravel()[here]
+                at = [fineness * (c - slant * a.ravel()[here]) for c, a in zip((cy, cx), away, strict=True)]
                 value = _read(images, at, kind)
                 yield Sight(self._spread(weight, here), self._spread(value, here), away, here, at)
 
@@ -217,7 +219,7 @@ class Sightings:
         micro-image's edge. Values that are off by more than their noise count less: as the last says.
         """
         step = np.asarray(size / self.calibration.lattice.pitch / self.flat.even, np.float32)
-        sights = list(self.around(size))
+        sights = list(self.around(size, [self.flat.finer], 2))
         values = np.stack([sight.value for sight in sights])
         slopes = np.stack([step * self._slope(sight) for sight in sights])
         weights = seen = np.stack([sight.weight for sight in sights])
@@ -233,17 +235,17 @@ class Sightings:
 
     def _slope(self, sight: Sight) -> np.ndarray:
         """How much a lenslet's value changes with the logarithm of the patch, over patch/pitch (y, x)."""
-        image, slope = self.flat.image, np.zeros(len(sight.here), np.float32)
+        image, slope = self.flat.finer, np.zeros(len(sight.here), np.float32)
         for axis, away in enumerate(sight.away):
             ends = []
-            for half in (-0.5, 0.5):
+            for half in (-1, 1):
                 at = [place + np.float32(half * (k == axis)) for k, place in enumerate(sight.at)]
                 ends.append(_linear(image, at))
             slope -= away.ravel()[sight.here] * (ends[1] - ends[0])
         return self._spread(slope, sight.here)
 
 
-def _read(images: Sequence[np.ndarray], at: Pair, kind: np.ndarray) -> np.ndarray:
+def _read(images: Sequence[np.ndarray], at: Sequence[np.ndarray], kind: np.ndarray) -> np.ndarray:
     """Values (n,) at places of the image of each one's kind of lenslets."""
     if len(images) == 1:
         return _linear(images[0], at)
