@@ -6,6 +6,7 @@
 - `lens`: `ThinLens`
 - `lenslets`: `LensletArray`, square or hexagonal, of one or three focal lengths
 - `scatter`: `Scatter`, how lenslets of an array differ from each other
+- `lean`: `Lean`, by how much arrays and sensors lean
 - `zernike`: Zernike polynomials in Noll's order and `ZernikePlate`
 - `field_plate`: Zernike terms that change over the field, and their plate
 - `objective`: `Objective`, a microscope's, as points before it see it; `disc`, nodes of its pupil
@@ -14,6 +15,7 @@
 
 from lumigraph.elements.apertures import CircularAperture, RectangularAperture
 from lumigraph.elements.field_plate import OF_ONE_LENS, FieldPlate, Openings, ZernikeMap
+from lumigraph.elements.lean import Lean
 from lumigraph.elements.lens import ThinLens
 from lumigraph.elements.lenslets import LensletArray
 from lumigraph.elements.masks import random_phase_mask, white_phase
@@ -26,6 +28,7 @@ __all__ = [
     "CircularAperture",
     "Element",
     "FieldPlate",
+    "Lean",
     "LensletArray",
     "Openings",
     "RectangularAperture",

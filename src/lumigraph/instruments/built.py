@@ -1,14 +1,16 @@
 """Where the parts of a camera stand as built, table ``[built]``, if not where its description puts them."""
 
+import math
+
 from pydantic import model_validator
 
-from lumigraph.elements import Scatter
+from lumigraph.elements import Lean, Scatter
 from lumigraph.instruments.part import Part
-from lumigraph.instruments.quantities import Displacement, Length, NotNegative, Seed
+from lumigraph.instruments.quantities import Displacement, Length, NotNegative, Seed, Tilt
 
 
 class Built(Part):
-    """A camera as it was built: distances, where they are not the description's, and lenslets that differ.
+    """A camera as it was built: other distances than described, lenslets that differ, planes that lean.
 
     The object stays at `object_distance`, in focus or not.
 
@@ -18,6 +20,12 @@ class Built(Part):
         Main lens to lenslets, L.
     lenslet_distance
         Lenslets to sensor, b.
+    array_tilt, sensor_tilt
+        By how much lenslets, and pixels, stand farther from the main lens along y and along x: two angles,
+        about the axis, in physical coordinates; a raw image shows them turned by 180°.
+    array_bow
+        How much farther the lenslets at the array's corners stand than the middle; it grows with the square
+        of the distance from the axis.
     focal_length_scatter
         Standard deviation of single lenslets' focal lengths, as a part of them.
     decentre_scatter
@@ -35,6 +43,9 @@ class Built(Part):
 
     separation: Length | None = None
     lenslet_distance: Length | None = None
+    array_tilt: Tilt = (0.0, 0.0)
+    array_bow: Displacement = 0.0
+    sensor_tilt: Tilt = (0.0, 0.0)
     focal_length_scatter: NotNegative = 0.0
     decentre_scatter: Displacement = 0.0
     missing: NotNegative = 0.0
@@ -52,9 +63,23 @@ class Built(Part):
         found = Scatter(self.focal_length_scatter, self.decentre_scatter, self.missing, self.seed)
         return None if found == Scatter(seed=self.seed) else found
 
+    def lean(self, corner: float) -> Lean | None:
+        """Of array and sensor, whose corners are so far from the axis [m]; None where none leans.
+
+        Raises
+        ------
+        GeometryError
+            A tilt beyond 0.1 rad.
+        """
+        array, sensor = (
+            (math.tan(y), math.tan(x)) for y, x in (self.array_tilt, self.sensor_tilt)
+        )  # fmt: skip
+        found = Lean(array, self.array_bow / corner**2, sensor)
+        return None if found == Lean() else found
+
     @model_validator(mode="after")
     def _is_possible(self) -> "Built":
-        _ = self.scatter  # it refuses what cannot be
+        _ = self.scatter, self.lean(1.0)  # they refuse what cannot be
         return self
 
     def __bool__(self) -> bool:

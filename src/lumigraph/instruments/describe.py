@@ -118,10 +118,28 @@ def _distances(camera: "LensletCamera") -> Iterator[Row]:
         source = "a = L - z2" if built else "a = b/m"
         yield Row("relay distance", length - z2, "m", f"{source}, main-lens image to lenslets")
         sources = ("L = z2 + a, main lens to lenslets", "b = f_µ (1 + m)")
+    if camera.lean is not None:
+        yield from _leaning(camera)
     given = "as built, main lens to lenslets"
     yield Row("separation", length, "m", given if built.separation else sources[0])
     source = "as built" if built.lenslet_distance else sources[1]
     yield Row("lenslet distance", camera.lenslet_distance, "m", f"{source}, lenslets to sensor")
+
+
+def _leaning(camera: "LensletCamera") -> Iterator[Row]:
+    lean, (y, x) = camera.lean, camera.lenslets.reach
+    assert lean is not None  # asked by `_distances`
+    axes = ("down", "across")
+    for name, tilts in (("array", camera.built.array_tilt), ("sensor", camera.built.sensor_tilt)):
+        for axis, tilt in zip(axes, tilts, strict=True):
+            if tilt:
+                yield Row(f"{name} tilt {axis}", tilt, "rad", "as built, farther from the main lens")
+    if camera.built.array_bow:
+        yield Row("array bow", camera.built.array_bow, "m", "as built, corners farther from the main lens")
+    places = [(a * y, b * x) for a in (-1, 1) for b in (-1, 1)]
+    apart = [lean.of_sensor(*at) - lean.of_array(*at) for at in places]
+    yield Row("lenslet distance, most", camera.lenslet_distance + max(0.0, *apart), "m", "at a corner")
+    yield Row("lenslet distance, least", camera.lenslet_distance + min(0.0, *apart), "m", "at a corner")
 
 
 def _main_lens(camera: "Camera") -> Iterator[Row]:

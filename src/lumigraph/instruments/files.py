@@ -115,7 +115,7 @@ def write(table: Mapping[str, Any]) -> str:
 _LENGTHS = (
     "wavelength", "object_distance", "focal_length", "diameter", "pitch", "pixel_pitch", "offset",
     "bandwidth", "tube_lens", "focus_depth", "lenslet_offset", "sensor_distance", "fourier_lens",
-    "offset_y", "offset_x", "separation", "lenslet_distance", "decentre_scatter", "wavelengths",
+    "offset_y", "offset_x", "separation", "lenslet_distance", "decentre_scatter", "wavelengths", "array_bow",
 )  # fmt: skip
 
 
@@ -137,7 +137,7 @@ def _text(key: str, value: Any) -> str:
         return "[" + ", ".join(_text(key, each) for each in value) + "]"
     if isinstance(value, float) and key in _LENGTHS:
         return f'"{_metres(value)}"'
-    if isinstance(value, float) and key in ("rotation", "field", "y", "x"):
+    if isinstance(value, float) and key in ("rotation", "field", "y", "x", "array_tilt", "sensor_tilt"):
         return f'"{value!r} rad"'
     if isinstance(value, float) and key == "exposure_time":
         return f'"{value!r} s"'

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from lumigraph.core import checks
@@ -15,7 +16,7 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.core.linear import Linear
 from lumigraph.design import plenoptic1, plenoptic2, resolution
 from lumigraph.design.layout import LensletLayout
-from lumigraph.elements import LensletArray, Train
+from lumigraph.elements import Lean, LensletArray, Train
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import grids, point_view
 from lumigraph.instruments.built import Built
@@ -69,6 +70,11 @@ class LensletCamera(Camera):
     def _described_lenslet_distance(self) -> float:
         raise NotImplementedError
 
+    @cached_property
+    def lean(self) -> Lean | None:
+        """Of array and sensor as built; None where they are square to the axis."""
+        return self.built.lean(math.hypot(*self.lenslets.reach))
+
     @property
     def matched_diameter(self) -> float:
         """Main-lens diameter that `matching` asks for, before anything was built [m]."""
@@ -114,11 +120,23 @@ class LensletCamera(Camera):
         lattice = self.lattice.scaled(scale).moved(sensor.shape[0] // 2, sensor.shape[1] // 2)
         indices = -self.lenslets.indices()[::-1]
         centers = lattice.position(indices)
+        if self.lean is not None:
+            centers = self._leaning_centers(centers, indices)
+        off = float(np.sqrt(np.mean(np.sum((centers - lattice.position(indices)) ** 2, axis=1))))
         inside = ((centers >= -0.5) & (centers <= [n - 0.5 for n in sensor.shape])).all(axis=1)
         return Calibration(
-            lattice, sensor.shape, indices[inside], centers[inside], 0.0,
+            lattice, sensor.shape, indices[inside], centers[inside], off,
             pixel_pitch=pitch, separation=self.separation, lenslet_distance=self.lenslet_distance,
         )  # fmt: skip
+
+    def _leaning_centers(self, centers: np.ndarray, indices: np.ndarray) -> np.ndarray:
+        """Of micro-images (k, 2) [px], of lenslets that stand nearer to the sensor, or farther."""
+        assert self.lean is not None  # asked by `calibration`
+        y, x = self.lattice.position(-indices).T
+        array, scale = self.lean.of_array(y, x), 1 + self.lenslet_distance / self.separation
+        distance = self.lenslet_distance - array + self.lean.of_sensor(y * scale, x * scale)
+        middle = np.array([n // 2 for n in self.sensor.shape])
+        return middle + (centers - middle) * ((1 + distance / (self.separation + array)) / scale)[:, None]
 
     def _count(self) -> tuple[int, int]:
         return self.lenslets.count
@@ -151,7 +169,12 @@ class LensletCamera(Camera):
 
     def optics(self) -> CameraOptics:
         """What operators read of the camera, as plain values."""
-        plain = replace(super().optics(), model=self.model)
+        plain = replace(super().optics(), model=self.model, lean=self.lean)
+        if self.lean is not None and self.model != "paraxial":
+            raise GeometryError(
+                f'model is "{self.model}" but array or sensor lean, which the paraxial model follows alone. '
+                'Use model = "paraxial", or leave array_tilt, array_bow and sensor_tilt out of [built].'
+            )
         if self.model == "exact" and self.main_lens.varies:
             raise GeometryError(
                 'model is "exact" but the main lens changes over the field, which the paraxial model follows '
@@ -238,7 +261,19 @@ class LensletCamera(Camera):
         return Train((self.lens_train(), to_lenslets, self.relay_train()))
 
     def relay_train(self) -> Train:
-        """Elements from the field just before the lenslets to the sensor."""
+        """Elements from the field just before the lenslets to the sensor.
+
+        Raises
+        ------
+        GeometryError
+            Array or sensor lean: elements stand in planes square to the axis.
+        """
+        if self.lean is not None:
+            raise GeometryError(
+                "the array or the sensor leans, where fields go from plane to plane. Simulate in "
+                "Incoherent(), Coherent() or PartiallyCoherent() light, or leave array_tilt, array_bow and "
+                "sensor_tilt out of [built]."
+            )
         # "auto" pads by no more than light spreads over the short way b: a fraction of the window.
         return Train((self.lenslet_array(), Propagate(self.lenslet_distance, "auto", grid=self.image_grid)))
 

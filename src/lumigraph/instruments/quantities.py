@@ -156,6 +156,12 @@ def _pair(value: Any, info: ValidationInfo) -> tuple[float, float]:
     return _displacement(value[0], info), _displacement(value[1], info)
 
 
+def _tilt(value: Any, info: ValidationInfo) -> tuple[float, float]:
+    if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != 2:
+        raise FormatError(f"{value!r} is not two angles. Write [y, x], such as ['1 mrad', '0 mrad'].")
+    return _angle(value[0], info), _angle(value[1], info)
+
+
 def _one_or_three(value: Any, info: ValidationInfo) -> tuple[float, ...]:
     values = [value] if isinstance(value, str | Real) else list(value) if isinstance(value, Sequence) else []
     if len(values) not in (1, 3):
@@ -241,6 +247,8 @@ Angle = Annotated[float, BeforeValidator(_angle)]
 """At most half a turn either way [rad]."""
 Offset = Annotated[tuple[float, float], BeforeValidator(_pair)]
 """Two displacements (y, x) of either sign [m]."""
+Tilt = Annotated[tuple[float, float], BeforeValidator(_tilt)]
+"""Two angles: how distances grow along y and along x [rad]."""
 OneOrThree = Annotated[tuple[float, ...], BeforeValidator(_one_or_three)]
 """One length, or one for each kind of a multi-focus array [m]."""
 Time = Annotated[float, BeforeValidator(_time)]

@@ -20,12 +20,15 @@ NAMES = {
     "wavelength": "length", "main_lens.focal_length": "length", "main_lens.diameter": "length",
     "lenslets.pitch": "length", "lenslets.focal_length": "length", "lenslets.fill_factor": "number",
     "lenslets.rotation": "angle", "lenslets.offset_y": "length", "lenslets.offset_x": "length",
-    "sensor.pixel_pitch": "length", "lenslets.each.focal_length": "length",
-    "lenslets.each.decentre": "length", "lenslets.each.missing": "part",
+    "sensor.pixel_pitch": "length", "array_tilt_y": "angle", "array_tilt_x": "angle",
+    "array_bow": "length", "sensor_tilt_y": "angle", "sensor_tilt_x": "angle",
+    "lenslets.each.focal_length": "length", "lenslets.each.decentre": "length",
+    "lenslets.each.missing": "part",
 }  # fmt: skip
 """What may be off, as keys of a camera file, and ``main_lens.aberrations.N`` [waves rms] of Noll index N.
 
-Distances without a table are main lens to lenslets, lenslets to sensor and object to main lens. Below
+Distances without a table are main lens to lenslets, lenslets to sensor and object to main lens; tilts and bow
+are those of ``[built]``. Below
 ``lenslets.each`` stands what each lenslet has of its own: focal length, decentre of its vertex along either
 axis, and the part of the lenslets that is missing.
 """

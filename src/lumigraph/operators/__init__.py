@@ -22,6 +22,7 @@
 - `exact`: lenslets and distances beyond the paraxial; `paraxial`, how far off that is
 - `varying`: main lenses whose aberrations change over the field; `let`, the share of each sample; `mirrors`,
   what is known of one field, of those that mirror it
+- `leaning`: arrays and sensors that lean, by cameras that do not
 - `fineness`: what an accuracy asks for
 - `band`: band-limited samples along an axis, to and from points and pixels
 - `camera`: `CameraOptics`, what an operator reads of an instrument, as plain values

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from lumigraph.core.lattice import Lattice
-from lumigraph.elements import LensletArray, Train
+from lumigraph.elements import Lean, LensletArray, Train
 from lumigraph.sensor import Sensor
 
 Model = Literal["paraxial", "exact", "auto"]
@@ -36,6 +36,8 @@ class CameraOptics:
     model
         "paraxial", parabolic phases and Fresnel's distances; "exact", lenses free of spherical aberration and
         Rayleigh and Sommerfeld's; "auto", exact where the paraxial one misses the accuracy that is asked for.
+    lean
+        Of array and sensor; None where they are square to the axis.
     """
 
     wavelength: float
@@ -48,6 +50,7 @@ class CameraOptics:
     array: LensletArray | None = None
     lenslet_distance: float | None = None
     model: Model = "paraxial"
+    lean: Lean | None = None
 
     def optics(self) -> "CameraOptics":
         """Itself: an operator takes an instrument, or the values that it reads of one."""

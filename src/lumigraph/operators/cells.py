@@ -141,6 +141,11 @@ def lenslet_array(camera: CameraOptics) -> LensletArray:
     """The array of a camera that has lenslets, turned about the axis so that its rows lie along x."""
     if camera.array is None:
         raise GeometryError("the camera has no lenslets: the periodic operator is for lenslet arrays.")
+    if camera.lean is not None:
+        raise GeometryError(
+            "the array or the sensor leans, which simulations and operators of planes follow alone. Use "
+            "those, or leave array_tilt, array_bow and sensor_tilt out of [built]."
+        )
     return replace(camera.array, lattice=straight(camera.array.lattice))
 
 

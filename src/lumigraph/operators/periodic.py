@@ -40,6 +40,7 @@ from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.cell_response import Pair
 from lumigraph.operators.cells import Cells, blur, check_alike
 from lumigraph.operators.kernels import A_MINUTE, LONGEST, Matrix, matrix
+from lumigraph.operators.leaning import leaning_operator
 from lumigraph.operators.mirrors import Mirror
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.over_field import over_field
@@ -286,6 +287,12 @@ def periodic_operator(
     if not depths:
         raise GeometryError("dz is empty. Give at least one depth.")
     check_alike(camera.optics())
+    if camera.optics().lean is not None:
+        return leaning_operator(
+            camera.optics(), accuracy, lambda one, number, count: periodic_operator(
+                one, grid, dz, accuracy=accuracy, folder=folder, progress=part_of(progress, number, count)
+            ),
+        )  # fmt: skip
     plain, several = resolved(camera.optics(), accuracy), depths if np.ndim(dz) else None
     if varying.plate_of(plain) is not None:
         making = _Making(accuracy, folder, progress)

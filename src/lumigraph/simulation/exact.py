@@ -7,8 +7,10 @@ import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.progress import Progress
+from lumigraph.core.progress import part as share
 from lumigraph.operators import CameraOptics, points, single_lens, white
 from lumigraph.operators.coherent import coherent_image
+from lumigraph.operators.leaning import flat
 from lumigraph.operators.paraxial import left_by_field, resolved
 from lumigraph.operators.periodic import periodic_operator
 from lumigraph.operators.screens import Screen
@@ -36,11 +38,48 @@ def image_of(
     In incoherent light screens hide what stands behind them.
     """
     plain = camera.optics()
+    if plain.lean is not None:
+        return _leaning(plain, part, accuracy, progress, light, screens)
+    return _image_of(camera, part, accuracy, progress, light, screens)
+
+
+def _leaning(
+    camera: CameraOptics,
+    part: Part,
+    accuracy: float,
+    progress: Progress,
+    light: Coherent | PartiallyCoherent | None,
+    screens: Sequence[Screen],
+) -> tuple[np.ndarray, error.Reached]:
+    """By cameras that do not lean."""
+    found, reached = flat(camera, accuracy), []
+
+    def image(one: CameraOptics) -> np.ndarray:
+        told = share(progress, len(reached), len(found.cameras))
+        image, off = _image_of(one, part, accuracy, told, light, screens)
+        reached.append(off)
+        return image
+
+    total = found.image(image)
+    worst = max(reached, key=lambda one: one.rms)
+    return total, worst.and_also(found.left, f", {len(found.cameras)} cameras that do not lean")
+
+
+def _image_of(
+    camera: Camera | CameraOptics,
+    part: Part,
+    accuracy: float,
+    progress: Progress,
+    light: Coherent | PartiallyCoherent | None,
+    screens: Sequence[Screen],
+) -> tuple[np.ndarray, error.Reached]:
+    """By a camera that does not lean."""
+    plain = camera.optics()
     if screens and not isinstance(part, Diffuser):
         return hidden_image(plain, part, accuracy, progress, screens)
     if light is not None and isinstance(part, Slice):
         return _lit(replace(plain, model="paraxial"), part, accuracy, light)
-    if camera.lattice is None:
+    if plain.lattice is None and not isinstance(camera, CameraOptics):
         image, left = _without_lenslets(camera, part, accuracy)
         return image, error.SINGLE_LENS.and_also(left, ", lenses over the field" if left else "")
     if isinstance(part, Diffuser):

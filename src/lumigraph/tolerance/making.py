@@ -16,6 +16,9 @@ from lumigraph.instruments.tolerances import EACH, MISSING, check_name
 SEED = "built.seed"
 """Error that says which lenslet is how."""
 
+LEANS = ("array_tilt_y", "array_tilt_x", "sensor_tilt_y", "sensor_tilt_x")
+"""Tilts, one along each axis."""
+
 _SCATTERS = {"focal_length": "focal_length_scatter", "decentre": "decentre_scatter", "missing": "missing"}
 """Keys of ``[built]`` by what each lenslet has of its own."""
 
@@ -37,8 +40,10 @@ def check_camera(camera: AnyCamera | LensletCamera | Instrument) -> LensletCamer
 def _path(name: str) -> tuple[str | int, ...]:
     """Where a value stands in the table of a camera as built."""
     check_name(name)
-    if name in ("separation", "lenslet_distance"):
+    if name in ("separation", "lenslet_distance", "array_bow"):
         return "built", name
+    if name in LEANS:
+        return "built", name[:-2], "yx".index(name[-1])
     if name.startswith("lenslets.offset_"):
         return "lenslets", "offset", "yx".index(name[-1])
     return tuple(int(part) if part.isdecimal() else part for part in name.split("."))
@@ -50,6 +55,8 @@ def _meant(camera: LensletCamera) -> dict[str, Any]:
     table["built"] |= {"separation": camera.separation, "lenslet_distance": camera.lenslet_distance}
     table["main_lens"]["diameter"] = camera.pupil_diameter
     table["sensor"]["shape"] = camera.sensor.shape
+    for name in ("array_tilt", "sensor_tilt"):
+        table["built"][name] = list(table["built"][name])
     table["lenslets"]["offset"] = list(camera.lenslets.offset)
     return table
 

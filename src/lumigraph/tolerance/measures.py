@@ -45,6 +45,11 @@ def of_making(camera: LensletCamera, made: LensletCamera) -> Iterator[Row]:
     near = focused_distance(made)
     yield Row("focused distance", near, "m", "object that lenslets, or the sensor behind them, see sharp")
     yield Row("focus shift", near - camera.object_distance, "m", "farther than the plane that was meant")
+    corner = at_corner(made)
+    shift = focused_distance(corner) - near
+    yield Row("corner focus shift", shift, "m", "of the last lenslet, beyond the focus amid the array")
+    read = read_distance(camera, corner) - made.object_distance
+    yield Row("corner depth error", read, "m", "the same as depth error, before the last lenslet")
     yield from _of_lenslets(camera, made, single)
     if isinstance(made, Rendered):
         cone = made.pupil_diameter * abs(made.separation - made.image_distance) / made.image_distance
@@ -94,6 +99,20 @@ def focused_distance(made: LensletCamera, factor: float = 1.0) -> float:
     if isinstance(made, Rendered):
         relay = 1 / (1 / (made.lenslets.focal_length[0] * factor) - 1 / made.lenslet_distance)
     return _real(made.main_lens.focal_length, made.separation - relay)
+
+
+def at_corner(made: LensletCamera) -> LensletCamera:
+    """A camera as built whose lenslets and pixels stand everywhere as they do at the last lenslet."""
+    if made.lean is None:
+        return made
+    y, x = made.lattice.position(last(made.lenslets))[0]  # pyright: ignore[reportArgumentType]
+    array, scale = made.lean.of_array(y, x), 1 + made.lenslet_distance / made.separation
+    distance = made.lenslet_distance - array + made.lean.of_sensor(y * scale, x * scale)
+    flat = {"array_tilt": (0.0, 0.0), "sensor_tilt": (0.0, 0.0), "array_bow": 0.0}
+    built = made.built.model_copy(
+        update={**flat, "separation": made.separation + array, "lenslet_distance": distance}
+    )
+    return made.replace(built=built)
 
 
 def _real(focal_length: float, image: float) -> float:
@@ -146,7 +165,7 @@ def _corner_shift(camera: LensletCamera, made: LensletCamera, single: Single) ->
     """Of the micro-image behind the last lenslet of the array, on the raw image [px]."""
     index = last(camera.lenslets)  # pyright: ignore[reportArgumentType] - frozen models can be hashed
     places = []
-    for one in (made, camera):
+    for one in (at_corner(made), at_corner(camera)):
         scale = -(1 + one.lenslet_distance / one.separation) / one.pixels.pixel_pitch
         places.append(one.lattice.position(index)[0] * scale)
     shift = places[0] - places[1] - np.array(single.corner) / made.pixels.pixel_pitch

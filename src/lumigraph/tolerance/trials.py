@@ -16,7 +16,7 @@ from lumigraph.errors import FormatError, GeometryError, LumigraphError
 from lumigraph.instruments import LensletCamera, Tolerance
 from lumigraph.instruments.loading import camera_of
 from lumigraph.metric.charts import check_camera as check_charts
-from lumigraph.tolerance.making import SEED, built, check_camera, drawn, tolerances_of, value_of
+from lumigraph.tolerance.making import LEANS, SEED, built, check_camera, drawn, tolerances_of, value_of
 from lumigraph.tolerance.measures import is_finite, measures, of_differing, of_making
 from lumigraph.tolerance.single import changes
 
@@ -34,6 +34,9 @@ USUAL = (
 
 OF_LENSLETS = ("lenslet focus shift", "light of a point")
 """Those that are taken besides where lenslets differ from each other."""
+
+OF_LEANING = ("corner focus shift", "corner depth error")
+"""Those that are taken besides where array or sensor lean."""
 
 CAMERA, ERROR = "camera", "error"
 """Columns: which camera it is, and why there is none."""
@@ -204,9 +207,10 @@ def _names(
 ) -> tuple[str, ...]:
     """The measures that are asked for."""
     each = [one.name for one in tolerances if one.is_of_each]
+    leans = any(one.name in (*LEANS, "array_bow") for one in tolerances)
     if asked is None:
         left = {"views per axis"} if VIEWS in known else set()
-        usual = (*USUAL, *(OF_LENSLETS if each else ()))
+        usual = (*USUAL, *(OF_LENSLETS if each else ()), *(OF_LEANING if leans else ()))
         return tuple(name for name in usual if name in known and name not in left)
     for name in asked:
         if name not in known and not metric.is_measure(name):
