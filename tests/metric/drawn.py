@@ -1,7 +1,8 @@
-"""Raw images of a chessboard, drawn by rays through a known camera."""
+"""Raw images of boards, drawn by rays through a known camera."""
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.spatial import KDTree
 
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
@@ -37,13 +38,15 @@ def pose(turn: tuple[float, float, float], distance: float = 0.45, board: Board 
     return np.concatenate([turn, np.array([distance, 0.0, 0.0]) - turned])
 
 
-def raw(seen_by: MetricCamera, where: np.ndarray, kinds: int = 1, blur: float = 0.7) -> np.ndarray:
+def raw(
+    seen_by: MetricCamera, where: np.ndarray, kinds: int = 1, blur: float = 0.7, board: Board = BOARD
+) -> np.ndarray:
     """Raw image (y, x) of an evenly lit board, with 1 % of noise."""
     place, center, kind = _pixels(kinds)
     at, scale = _on_board(seen_by, where, place, center, kind)
     lit = _lit(place, center)
     noise = np.random.default_rng(0).normal(0, 0.01, SHAPE)
-    return (gaussian_filter((lit * squares(at, scale, BOARD)).reshape(SHAPE), blur) + noise).astype(
+    return (gaussian_filter((lit * painted(at, scale, board)).reshape(SHAPE), blur) + noise).astype(
         np.float32
     )
 
@@ -85,6 +88,32 @@ def _seen(
 ) -> np.ndarray:
     points = np.concatenate([np.zeros((len(at), 1)), at], 1)
     return seen_by.project(geometry.moved(points, where), center, kind)
+
+
+def painted(at: np.ndarray, soft: np.ndarray, board: Board) -> np.ndarray:
+    """Brightness (n,) of a board at places (n, 2) [m], its edges as soft as so much of it (n,) [m]."""
+    return {"corners": squares, "charuco": charuco}.get(board.pattern, dots)(at, soft, board)
+
+
+def dots(at: np.ndarray, soft: np.ndarray, board: Board) -> np.ndarray:
+    """Dark dots on white."""
+    away = np.asarray(KDTree(board.points()[:, 1:]).query(at)[0])
+    return 0.9 - 0.8 * np.clip(0.5 + (board.radius - away) / soft, 0, 1)
+
+
+def charuco(at: np.ndarray, soft: np.ndarray, board: Board) -> np.ndarray:
+    """The board as OpenCV prints it, its edges as soft as in the middle of the picture."""
+    import cv2
+
+    fine, (down, across) = 60, (n + 1 for n in board.shape)
+    words = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
+    print_ = cv2.aruco.CharucoBoard((across, down), board.spacing, board.size, words)
+    image = 0.1 + 0.8 * print_.generateImage((fine * across, fine * down)).astype(float) / 255
+    cells = 1 + at / board.spacing
+    image = gaussian_filter(
+        np.pad(image, fine, constant_values=0.9), 0.3 * fine * np.median(soft) / board.spacing
+    )
+    return map_coordinates(image, (fine * (cells + 1) - 0.5).T, order=1, mode="nearest")
 
 
 def squares(at: np.ndarray, soft: np.ndarray, board: Board) -> np.ndarray:

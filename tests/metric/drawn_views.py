@@ -1,4 +1,4 @@
-"""Raw images of a chessboard in a camera 1.0, drawn by rays through its lenslets."""
+"""Raw images of boards in a camera 1.0, drawn by rays through its lenslets."""
 
 import numpy as np
 
@@ -23,13 +23,13 @@ def calibration() -> Calibration:
     return Calibration(lattice, SHAPE, none.astype(int), none, 0.0, pixel_pitch=PIXEL, fill=0.96)
 
 
-def raw(where: np.ndarray, rng: np.random.Generator, noise: float = 0.01) -> np.ndarray:
+def raw(where: np.ndarray, rng: np.random.Generator, noise: float = 0.01, board: Board = BOARD) -> np.ndarray:
     """Raw image (y, x) of an evenly lit board at a pose."""
     known, place = calibration(), np.stack([each.ravel() for each in np.indices(SHAPE)], 1).astype(float)
     center = known.position(np.stack(known.index(*place.T), -1))
     lit = _lit(place - center)
     seen, bright = np.zeros(len(place)), lit > 0
-    seen[bright] = drawn.squares(*_on_board(where, place[bright] - center[bright], center[bright]), BOARD)
+    seen[bright] = drawn.painted(*_on_board(where, place[bright] - center[bright], center[bright]), board)
     return (lit * seen + rng.normal(0, noise, len(seen))).reshape(SHAPE).astype(np.float32)
 
 

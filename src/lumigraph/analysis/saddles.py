@@ -1,4 +1,4 @@
-"""Saddles of the brightness, such as corners of a chessboard: no even blur moves them."""
+"""Saddles of the brightness, such as corners of a chessboard, and dark dots: no even blur moves them."""
 
 import numpy as np
 from scipy.ndimage import map_coordinates
@@ -12,9 +12,9 @@ _ODD = 0.15
 
 
 def settle(
-    splines: np.ndarray, start: np.ndarray, radius: int, *, stray: float
+    splines: np.ndarray, start: np.ndarray, radius: int, *, stray: float, dots: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The saddle near each of n places, and which of them are saddles.
+    """The saddle near each of n places, or the dark dot, and which of them are some.
 
     Parameters
     ----------
@@ -26,23 +26,25 @@ def settle(
         Of the round window in which a quadratic is fitted [px].
     stray
         Farthest from its start [px].
+    dots
+        Whether to look for the middles of dark dots that the window holds.
 
     Returns
     -------
     tuple
-        Places (n, 2), and true or false (n,): a saddle that holds still, near its start, and alike on
+        Places (n, 2), and true or false (n,): one that holds still, near its start, and alike on
         opposite sides.
     """
     y, x = _disc(radius)
     solve, at = _quadratic(y, x, radius / 2), start
 
     def step(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return _towards_saddle(_windows(splines, at, y, x) @ solve)
+        return _towards_rest(_windows(splines, at, y, x) @ solve, dots)
 
     for _ in range(_STEPS):
         at = at + step(at)[0]
-    move, saddle = step(at)
-    kept = saddle & (np.hypot(*(at - start).T) < stray) & (np.hypot(*move.T) < STILL)
+    move, right = step(at)
+    kept = right & (np.hypot(*(at - start).T) < stray) & (np.hypot(*move.T) < STILL)
     kept[kept] = _odd(_windows(splines, at[kept], y, x)) < _ODD
     return at, kept
 
@@ -71,11 +73,11 @@ def _quadratic(y: np.ndarray, x: np.ndarray, width: float) -> np.ndarray:
     return (np.linalg.pinv(terms * weight[:, None]) * weight).T
 
 
-def _towards_saddle(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Step (n, 2) [px], at most 1, to where the gradient is 0, and which quadratics are saddles."""
+def _towards_rest(terms: np.ndarray, dots: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Step (n, 2) [px], at most 1, to where the gradient is 0, and which quadratics are saddles (hollows)."""
     _, gy, gx, yy, yx, xx = terms.T
     determinant = yy * xx - yx**2
-    saddle = determinant < 0
-    safe = np.where(saddle, determinant, -np.inf)
+    right = (determinant > 0) & (yy > 0) if dots else determinant < 0
+    safe = np.where(right, determinant, np.inf)
     step = np.stack([(yx * gx - xx * gy) / safe, (yx * gy - yy * gx) / safe], 1)
-    return np.clip(step, -1.0, 1.0), saddle
+    return np.clip(step, -1.0, 1.0), right

@@ -74,20 +74,24 @@ def board(
     output: Output | None = None,
     common: Reported = REPORTED,
 ) -> Result:
-    """Measure a plenoptic camera by a chessboard of known size: its lengths, with their uncertainty.
+    """Measure a plenoptic camera by a board of known size: its lengths, with their uncertainty.
 
     SOURCES are raw images of the board, three or more, in which the corners are found: behind the lenslets
-    of a camera 2.0 (this needs OpenCV: pip install 'lumigraph[board]'), in the views of a camera 1.0
-    (--views, or --camera of such a camera); or one table (.csv) of where lenslets show them, with the
-    columns frame, corner, y, x, center_y, center_x, kind, and in_views of a camera 1.0; or one folder of
-    COMPOTE's (bap.csv, centers.csv, camera.json, scene.json), which also says what the board and the camera
-    are. Or the word plan: which pictures of the board to take with --camera, a camera 2.0, and how well
-    they will tell its lengths.
+    of a camera 2.0, or in the views of a camera 1.0 (--views, or --camera of such a camera). All of the board
+    must be on each picture, but of ChArUco boards any six corners do. Finding boards needs OpenCV
+    (pip install 'lumigraph[board]'), but for chessboards in views. Or SOURCES are one table (.csv) of where
+    lenslets show them, with the columns frame, corner, y, x, center_y, center_x, kind, and in_views of a
+    camera 1.0; or one folder of COMPOTE's (bap.csv, centers.csv, camera.json, scene.json), which also says
+    what the board and the camera are. Or the word plan: which pictures of the board to take with --camera,
+    a camera 2.0, and how well they will tell its lengths.
 
     Example: `lumigraph board plan --camera camera.toml --board "9 x 5 corners, 10 mm"`
 
     Example: `lumigraph board raw1.png raw2.png raw3.png --white white.png --board "9 x 5 corners, 10 mm"
     --focal-length "50 mm" --pixel-pitch "5.5 um" -o camera.json`
+
+    Example: `lumigraph board raw*.png --white white.png --board "9 x 6 charuco, 10 mm, markers 7 mm,
+    DICT_4X4_50" --focal-length "50 mm" --pixel-pitch "5.5 um" -o camera.json`
 
     Example: `lumigraph board corners.csv --board "9 x 5 corners, 10 mm" --focal-length "50 mm" --pixel-pitch
     "5.5 um" --shape 3068 4080 -o camera.json`
@@ -97,7 +101,10 @@ def board(
     sources
         Raw images, or one table or folder, or plan.
     board
-        Inner corners across and down and their spacing, such as '9 x 5 corners, 10 mm'.
+        Inner corners of a chessboard across and down and their spacing, such as '9 x 5 corners, 10 mm'. Or
+        dots, with their diameter unless it is half of the spacing: '11 x 4 dots, 10 mm, dots 4 mm'; or, with
+        the way from row to row, '4 x 11 asymmetric dots, 10 mm'. Or a ChArUco board, by its inner corners
+        (one less than squares): '9 x 6 charuco, 10 mm, markers 7 mm, DICT_4X4_50'.
     views
         The raw images are of a camera 1.0, whose views show the corners.
     table

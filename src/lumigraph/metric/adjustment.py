@@ -95,9 +95,11 @@ class Problem:
     def misfit(self, unknowns: np.ndarray) -> np.ndarray:
         """(n, 2) Computed minus measured [px]: places, or centres of corners in views."""
         numbers, poses = self.split(unknowns)
-        points = geometry.moved(self.board.points()[self.corners.corner], poses[self.frame])
-        pitch = self.camera.pixel_pitch
-        seen = self.corners
+        flat, pitch, seen = self.board.points()[self.corners.corner], self.camera.pixel_pitch, self.corners
+        if radius := self.board.radius:
+            points = geometry.dots(numbers, flat, poses[self.frame], radius, in_views=seen.in_views)
+        else:
+            points = geometry.moved(flat, poses[self.frame])
         if seen.in_views:
             return (
                 geometry.centers(numbers, points, (seen.place, seen.center), seen.kind, pitch) - seen.center

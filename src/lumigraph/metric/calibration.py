@@ -263,6 +263,11 @@ def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
     for one, other, how in result.tied():
         if one in _LENGTHS or other in _LENGTHS:
             yield f"{one} and {other} change the pictures alike (correlation {how:.3f})"
+    if result.board.radius and result.board.size is None:
+        yield (
+            f"dots are taken as {2e3 * result.board.radius:.4g} mm wide, half of their spacing, to find "
+            "their middles from their outlines' on boards that lean. Give their width if it is another"
+        )
     if result.left_out:
         yield f"{result.left_out} places fit no corner and were left out"
 

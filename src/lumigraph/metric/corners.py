@@ -1,5 +1,6 @@
 """The board and its corners on raw images."""
 
+import math
 import re
 from dataclasses import dataclass
 
@@ -10,7 +11,23 @@ from lumigraph.core.brief import brief
 from lumigraph.errors import CalibrationError, FormatError
 from lumigraph.units import parse
 
-_BOARD = re.compile(r"\s*(\d{1,4})\s*[x×]\s*(\d{1,4})\s*(?:corners)?\s*,\s*(.+)")
+_BOARD = re.compile(r"(\d{1,4})\s*[x×]\s*(\d{1,4})\s*(corners|dots|asymmetric dots|charuco|)")
+_PART = re.compile(r"(dots|markers)\s+(.+)|(DICT_\w+)")
+
+_WRITTEN = (
+    "'9 x 5 corners, 10 mm', '11 x 4 dots, 10 mm, dots 4 mm', '4 x 11 asymmetric dots, 10 mm' or "
+    "'9 x 6 charuco, 10 mm, markers 7 mm, DICT_4X4_50'"
+)
+
+PATTERNS = ("corners", "dots", "asymmetric dots", "charuco")
+"""What boards show.
+
+- corners: the inner ones of a chessboard
+- dots: dark ones on a white ground, on a square lattice
+- asymmetric dots: in rows that are `spacing` apart; dots in a row are twice that apart, and every second row
+  begins `spacing` farther to the right
+- charuco: the inner corners of a chessboard with a marker in each white square
+"""
 
 LEAST = 3
 """Corners along either side of a board."""
@@ -23,30 +40,43 @@ _COLUMNS = ("frame", "corner", "place", "center", "kind")
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A plane with corners on a square lattice, such as the inner ones of a chessboard.
+    """A plane with corners or dots on a lattice, such as the inner corners of a chessboard.
 
     Parameters
     ----------
     shape
-        Corners down and across.
+        Corners or dots down and across.
     spacing
-        Between neighbours [m].
+        Between neighbours, or between rows of asymmetric dots [m].
+    pattern
+        One of `PATTERNS`.
+    size
+        Diameter of the dots, or width of the markers [m]; None for dots half as wide as their spacing.
+    dictionary
+        Of the markers, by OpenCV's name, such as DICT_4X4_50.
 
     Raises
     ------
     GeometryError
-        A spacing that is not above 0.
+        A spacing or size that is not above 0.
     CalibrationError
-        Fewer than three corners along a side.
+        Fewer than three corners along a side, another pattern, markers without size or dictionary, dots or
+        markers that do not fit.
 
     Examples
     --------
-    >>> Board.from_text("9 x 5 corners, 10 mm")
-    Board(shape=(5, 9), spacing=0.01)
+    >>> board = Board.from_text("9 x 5 corners, 10 mm")
+    >>> board.shape, board.spacing
+    ((5, 9), 0.01)
+    >>> Board.from_text("9 x 6 charuco, 10 mm, markers 7 mm, DICT_4X4_50").dictionary
+    'DICT_4X4_50'
     """
 
     shape: tuple[int, int]
     spacing: float
+    pattern: str = "corners"
+    size: float | None = None
+    dictionary: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", checks.shape("shape", self.shape))
@@ -55,25 +85,83 @@ class Board:
                 f"the board has {self.shape[0]} x {self.shape[1]} corners but needs {LEAST} along each side."
             )
         checks.positive("spacing", self.spacing)
+        if self.pattern not in PATTERNS:
+            raise CalibrationError(
+                f"the pattern is {self.pattern!r} but must be one of {', '.join(PATTERNS)}."
+            )
+        self._check_size()
+
+    def _check_size(self) -> None:
+        charuco = self.pattern == "charuco"
+        if charuco != (self.dictionary is not None) or (charuco and self.size is None):
+            raise CalibrationError(
+                "a ChArUco board, and no other, has markers of a dictionary; give both the width of its "
+                "markers and the dictionary, such as 'markers 7 mm, DICT_4X4_50'."
+            )
+        if self.size is None:
+            return
+        checks.positive("size", self.size)
+        if self.pattern == "corners":
+            raise CalibrationError("a chessboard has neither dots nor markers, whose size was given.")
+        most = self.spacing * (math.sqrt(2) if self.pattern == "asymmetric dots" else 1)
+        if self.size >= most:
+            raise CalibrationError(
+                f"dots or markers {self.size * 1e3:.4g} mm wide do not fit side by side, "
+                f"{most * 1e3:.4g} mm apart."
+            )
 
     @classmethod
     def from_text(cls, text: str) -> "Board":
-        """Of text such as "9 x 5 corners, 10 mm": across, down, spacing.
+        """Of text such as "9 x 5 corners, 10 mm": across, down, spacing, and what else `PATTERNS` have.
 
         Raises
         ------
         FormatError
             Other text, or a length without a unit.
         """
-        found = _BOARD.fullmatch(text)
-        if found is None:
-            raise FormatError(f"the board is {text!r} but must be written as '9 x 5 corners, 10 mm'.")
-        return cls((int(found[2]), int(found[1])), parse(found[3]))
+        first, *rest = (one.strip() for one in text.split(","))
+        found, parts = _BOARD.fullmatch(first), [_PART.fullmatch(one) for one in rest[1:]]
+        if found is None or not rest or None in parts:
+            raise FormatError(f"the board is {text!r} but must be written as {_WRITTEN}.")
+        sizes = {one[1]: parse(one[2]) for one in parts if one and one[1]}
+        names = [one[3] for one in parts if one and one[3]]
+        pattern = found[3] or "corners"
+        if sizes.keys() - {"markers" if pattern == "charuco" else "dots"} or len(parts) > 2 or len(names) > 1:
+            raise FormatError(f"the board is {text!r} but must be written as {_WRITTEN}.")
+        return cls(
+            (int(found[2]), int(found[1])), parse(rest[0]), pattern,
+            next(iter(sizes.values()), None), next(iter(names), None),
+        )  # fmt: skip
+
+    @property
+    def radius(self) -> float:
+        """Of the dots [m]; 0 of corners, which have none."""
+        if self.pattern not in ("dots", "asymmetric dots"):
+            return 0.0
+        return (self.spacing / 2 if self.size is None else self.size) / 2
+
+    @property
+    def what(self) -> str:
+        """In words, such as "chessboard of 9 x 5 inner corners"."""
+        down, across = self.shape
+        inner = f"{across} x {down} inner corners"
+        return {
+            "corners": f"chessboard of {inner} with a white margin",
+            "charuco": f"ChArUco board of {inner} ({across + 1} x {down + 1} squares), {self.dictionary}",
+        }.get(self.pattern, f"board of {across} x {down} {self.pattern}")
 
     def points(self) -> np.ndarray:
-        """Corners (n, 3) as (z, y, x) [m], row by row, in the board's own frame: z = 0."""
-        y, x = np.mgrid[: self.shape[0], : self.shape[1]].reshape(2, -1) * self.spacing
-        return np.stack([np.zeros(y.size), y, x], axis=1)
+        """Corners or dots (n, 3) as (z, y, x) [m], row by row, in the board's own frame: z = 0."""
+        y, x = np.mgrid[: self.shape[0], : self.shape[1]].reshape(2, -1)
+        if self.pattern == "asymmetric dots":
+            x = 2 * x + y % 2
+        return np.stack([np.zeros(y.size), y * self.spacing, x * self.spacing], axis=1)
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Of the points (3,), (z, y, x) [m]."""
+        points = self.points()
+        return (points.min(0) + points.max(0)) / 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -161,7 +161,8 @@ def load(path: str | os.PathLike[str]) -> Measured:
         lists: dict[str, Any] = {
             name: tuple(v) if isinstance(v, list) else v for name, v in found["camera"].items()
         }
-        board = Board(tuple(found["board"]["shape"]), found["board"]["spacing"])
+        plain: dict[str, Any] = found["board"] | {"shape": tuple(found["board"]["shape"])}
+        board = Board(**plain)
         camera = MetricCamera(**lists)
         own, shared = _numbers(found["noise"], "own", len(camera.gains)), _number(found["noise"], "shared")
         sway = _number(found["noise"], "sway") if "sway" in found["noise"] else 0.0

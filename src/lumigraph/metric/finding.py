@@ -1,4 +1,4 @@
-"""Corners of a chessboard on raw images: in micro-images of a camera 2.0, in `views` of a camera 1.0."""
+"""Corners or dots of a board on raw images: in micro-images of a camera 2.0, in `views` of a camera 1.0."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -13,9 +13,8 @@ from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
 from lumigraph.depth import correlation
 from lumigraph.errors import CalibrationError
-from lumigraph.metric import chessboard, views
+from lumigraph.metric import chessboard, views, windows
 from lumigraph.metric.corners import Board, Corners
-from lumigraph.metric.order import told_of
 from lumigraph.preparation import of_raw
 from lumigraph.rendering import render
 from lumigraph.rendering.interpolate import as_float
@@ -24,16 +23,8 @@ from lumigraph.rendering.patches import Layout, Patches
 LEAST_SEEN = 3
 """Lenslets that must show a corner."""
 
-_WINDOW = 0.35
-"""Half the window about a corner, over the way to the nearest other one: no window holds two."""
-
 _NARROW = 0.1
-"""The same over the pitch: wide windows fit into few micro-images."""
-
-_RADII = (2, 6)  # px: of windows
-
-LEAST_SQUARE = _RADII[0] / _WINDOW
-"""Of a board behind a lenslet [px]."""
+"""Half the window about a corner, over the pitch: wide windows fit into few micro-images."""
 
 _ROUNDS = 3  # corners found, places of the next round told by those found
 _STRAY = 2.5  # px: from where a corner is expected
@@ -48,23 +39,25 @@ def find_corners(
     in_views: bool = False,
     progress: Progress = silent,
 ) -> Corners:
-    """Where lenslets or views show the corners of a chessboard, on raw images of a plenoptic camera.
+    """Where lenslets or views show the corners or dots of a board, on raw images of a plenoptic camera.
 
     Of a camera 2.0, a picture is rendered of each raw image, sharp all over (`lumigraph.depth.correlation`),
     and the board found on it by OpenCV. That says where each lenslet should show each corner; there it is
-    looked for in the micro-image itself, as the saddle of the brightness, which no even blur moves. All
+    looked for in the micro-image itself, as the saddle of the brightness, which no even blur moves, or as the
+    middle of a dot, which is where the dot's outline has its middle, not the dot (`board` allows for it). All
     places of one corner must lie on its line, place = centre - k (X - centre): others are left out.
 
     Lenslets of a camera 1.0 show no corners. Its raw images are decoded to 7 x 7 views or fewer, and each
-    view that lies wholly within the main lens' stop is searched for the same saddles.
+    view that lies wholly within the main lens' stop is searched for the same saddles or dots.
 
     Parameters
     ----------
     raws
-        Pictures (y, x[, c]) of the whole board, best by `lumigraph.prepare` with a white image: without one
-        the edges of micro-images pull corners outwards. They are numbered from 0.
+        Pictures (y, x[, c]) of the whole board, or part of a ChArUco board, best by `lumigraph.prepare`
+        with a white image: without one the edges of micro-images pull corners outwards. They are
+        numbered from 0.
     board
-        Inner corners of a chessboard with a white margin.
+        Inner corners of a chessboard with a white margin, dots, or a ChArUco board.
     calibration
         Of raw images that were not prepared.
     in_views
@@ -78,7 +71,7 @@ def find_corners(
         No pictures, one without the whole board, corners in no order that a flat board has, or squares too
         small to be told apart.
     LumigraphError
-        OpenCV, which finds boards of cameras 2.0, is not installed.
+        OpenCV, which finds boards but for chessboards in views, is not installed.
 
     References
     ----------
@@ -100,7 +93,8 @@ def _on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: in
     image = to_numpy(as_float(raw.data))
     raw = replace(raw, data=image.mean(2) if image.ndim == 3 else image)
     lines = _Lines.of(raw, calibration, board, frame)
-    search = _Search.of(raw.data, lines.window(calibration.lattice.pitch, board, frame))
+    radius = lines.window(calibration.lattice.pitch, board, frame)
+    search = _Search.of(raw.data, radius, dots=board.radius > 0)
     lines, sights = search.found(lines, calibration)
     for _ in range(_ROUNDS - 1):
         lines, sights = search.found(lines, calibration)
@@ -110,10 +104,16 @@ def _on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: in
             "board to where the micro-images are sharp."
         )
     kinds = calibration.lattice.kind(*sights.index.T)
-    return np.full(len(sights), frame), sights.corner, sights.center + sights.way, sights.center, kinds
+    return (
+        np.full(len(sights), frame),
+        lines.corner[sights.corner],
+        sights.center + sights.way,
+        sights.center,
+        kinds,
+    )
 
 
-def lit_radius(calibration: Calibration, margin: float = _RADII[0]) -> float:
+def lit_radius(calibration: Calibration, margin: float = windows.LEAST) -> float:
     """How far from a micro-image's centre a corner may be, with `margin` of light around it [px]."""
     return (calibration.fill or 1.0) * calibration.lattice.pitch / 2 - margin - 2
 
@@ -137,8 +137,12 @@ class _Sights:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Lines:
-    """Each corner's place in the lattice (k, 2) [px], and how far its image moves against a lenslet (k,)."""
+    """Each corner's place in the lattice (k, 2) [px], and how far its image moves against a lenslet (k,).
 
+    Corners of a board that are not in the picture are not among them: `corner` (k,) has their numbers.
+    """
+
+    corner: np.ndarray
     places: np.ndarray
     ratio: np.ndarray
 
@@ -148,31 +152,21 @@ class _Lines:
         sizes = correlation(raw, calibration).values
         patches = Patches.of(sizes, calibration)
         layout = Layout.of(calibration, patches, None)
-        with told_of(f"picture {frame}"):
-            seen = chessboard.find(render(raw, calibration, sizes, blend=True), board)
-        if seen is None:
-            down, across = board.shape
-            raise CalibrationError(
-                f"picture {frame} does not show a whole chessboard of {across} x {down} inner corners with a "
-                "white margin. Leave the picture out, or give the board's own numbers."
-            )
-        places = np.stack([layout.y[0], layout.x[0]]) + layout.step * seen
+        seen = chessboard.find(render(raw, calibration, sizes, blend=True), board, f"picture {frame}")
+        corner = np.flatnonzero(np.isfinite(seen[:, 0]))
+        places = np.stack([layout.y[0], layout.x[0]]) + layout.step * seen[corner]
         indices = np.linalg.solve(
             calibration.lattice.matrix, (places - np.asarray(calibration.lattice.origin)).T
         )
-        return cls(places, patches.between(*indices) / calibration.lattice.pitch * np.ones(len(places)))
+        return cls(
+            corner, places, patches.between(*indices) / calibration.lattice.pitch * np.ones(len(places))
+        )
 
     def window(self, pitch: float, board: Board, frame: int) -> int:
         """Radius of the window about a corner behind a lenslet [px]."""
-        lattice = (self.places * np.abs(self.ratio)[:, None]).reshape(*board.shape, 2)
-        nearest = min(float(np.hypot(*np.moveaxis(np.diff(lattice, axis=k), -1, 0)).min()) for k in (0, 1))
-        least, most = _RADII
-        if nearest < LEAST_SQUARE:
-            raise CalibrationError(
-                f"on picture {frame} the squares are {nearest:.3g} px wide behind a lenslet, but "
-                f"{LEAST_SQUARE:.2g} px are needed. Use a board with larger squares, or bring it nearer."
-            )
-        return max(least, min(most, int(nearest * _WINDOW), round(pitch * _NARROW)))
+        shown = self.places * np.abs(self.ratio)[:, None]
+        found = windows.radius(shown, board, frame, "px wide behind a lenslet")
+        return found if board.radius else max(windows.LEAST, min(found, round(pitch * _NARROW)))
 
     def sights(self, calibration: Calibration, margin: int) -> _Sights:
         """Lenslets that should show each corner with `margin` [px] around it."""
@@ -213,20 +207,22 @@ def _line(flat: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, float, np.ndar
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Search:
-    """A raw image in which saddles of the brightness are looked for, in windows of a radius [px]."""
+    """A raw image in which saddles of the brightness, or dots, are looked for in windows of a radius [px]."""
 
     splines: np.ndarray
     radius: int
+    dots: bool
 
     @classmethod
-    def of(cls, image: np.ndarray, radius: int) -> "_Search":
-        return cls(spline_filter(image.astype(np.float64), 3), radius)
+    def of(cls, image: np.ndarray, radius: int, *, dots: bool) -> "_Search":
+        return cls(spline_filter(image.astype(np.float64), 3), radius, dots)
 
     def found(self, lines: _Lines, calibration: Calibration) -> tuple[_Lines, _Sights]:
         """Corners where lines expect them, and the lines that they are on."""
         return lines.fitted(self.settled(lines.sights(calibration, self.radius)))
 
     def settled(self, sights: _Sights) -> _Sights:
-        """The sights of saddles near the expected places, moved there."""
-        at, kept = settle(self.splines, sights.center + sights.way, self.radius, stray=_STRAY)
+        """The sights of saddles or dots near the expected places, moved there."""
+        start = sights.center + sights.way
+        at, kept = settle(self.splines, start, self.radius, stray=_STRAY, dots=self.dots)
         return replace(sights, way=at - sights.center)[kept]

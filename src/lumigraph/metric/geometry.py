@@ -73,6 +73,44 @@ def centers(
     return (way * away + lateral * behind) / (part * (away + behind) - away) / pixel_pitch + axis
 
 
+def dots(
+    numbers: np.ndarray, points: np.ndarray, poses: np.ndarray, radius: float, *, in_views: bool
+) -> np.ndarray:
+    r"""Positions (n, 3) that stand where the outlines of n dots, seen from the side, have their middles.
+
+    An outline is an ellipse, whose middle does not show the dot's: it shows the pole, with respect to the
+    dot, of the line of the board that is seen at infinity. With d the distance from the plane that
+    the lenslets see at infinity (their own image through the main lens; in views, nearly the lens itself),
+
+    .. math:: p = u - \rho^2 \nabla d / d
+
+    on the board, where d changes evenly: R. Hartley and A. Zisserman, "Multiple View Geometry", 2004, 2.2.3
+    and 3.5.2. A lens images planes onto planes, so this is exact but for distortion and the array's tilt.
+
+    Parameters
+    ----------
+    numbers
+        Of the camera.
+    points, poses
+        Middles of the dots (n, 3) in the board's frame, and poses as `moved` takes them.
+    radius
+        ρ of the dots [m].
+    in_views
+        Whether they are seen in views of a camera 1.0.
+    """
+    f, L, b, ratio = numbers[:4]
+    part = L / ratio / (L / ratio + b)
+    # Both denominators, of `project` and `centers`, times (distance - f), are `rise` z + `base`.
+    rise, base = (L - f), -L * f
+    if in_views:
+        rise, base = (part - 1) * rise + part * b, (part - 1) * base - part * b * f
+    still = np.concatenate([poses[..., :3], 0 * poses[..., 3:]], axis=-1)
+    at = moved(points, poses)
+    down, across = (moved(np.broadcast_to(axis, points.shape), still) for axis in np.eye(3)[1:])
+    leaning = down * down[:, :1] + across * across[:, :1]  # the board's own vector of steepest distance
+    return at - radius**2 * rise * leaning / (rise * at[:, :1] + base)
+
+
 def lenslets(
     seen: np.ndarray, L: complex, b: complex, pupil: complex, tilt: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -17,8 +17,9 @@ from lumigraph.metric.adjustment import Problem, freedom
 from lumigraph.metric.calibration import LEAST_FRAMES
 from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
-from lumigraph.metric.finding import LEAST_SEEN, LEAST_SQUARE, lit_radius
+from lumigraph.metric.finding import LEAST_SEEN, lit_radius
 from lumigraph.metric.noise import Noise
+from lumigraph.metric.windows import LEAST_SQUARE, nearest
 
 Turn = tuple[float, float, float]
 
@@ -137,7 +138,7 @@ def plan(
     useful = [shot for shot in shots if shot is not None]
     if not useful:
         raise CalibrationError(
-            f"there is no place where the whole board of {board.shape[1]} x {board.shape[0]} corners, "
+            f"there is no place where the whole {board.what}, "
             f"{board.spacing * 1e3:.3g} mm, is in the picture and {LEAST_SEEN} lenslets show each corner, in "
             f"squares {LEAST_SQUARE:.2g} px wide or wider. Try squares of another size."
         )
@@ -174,9 +175,8 @@ def _shot(
     camera: MetricCamera, calibration: Calibration, board: Board, noise: Noise, distance: float, turn: Turn
 ) -> _Shot | None:
     """A board at a distance; None where not all of its corners can be used."""
-    middle = np.array([0.0, *((n - 1) / 2 * board.spacing for n in board.shape)])
     still = np.array([*turn, 0.0, 0.0, 0.0])
-    pose = np.concatenate([turn, np.array([distance, 0.0, 0.0]) - geometry.moved(middle, still)])
+    pose = np.concatenate([turn, np.array([distance, 0.0, 0.0]) - geometry.moved(board.middle, still)])
     seen = _seen(camera, calibration, board, pose)
     if seen is None:
         return None
@@ -202,17 +202,15 @@ def _seen(camera: MetricCamera, calibration: Calibration, board: Board, pose: np
     shown = np.hypot(*(place - center[lenslet]).T) <= lit_radius(calibration)
     if np.bincount(corner[shown], minlength=len(points)).min() < LEAST_SEEN:
         return None
-    if _square(camera, board, points) < LEAST_SQUARE:
+    if _square(camera, points) < LEAST_SQUARE:
         return None
     corner, lenslet, place = corner[shown], lenslet[shown], place[shown]
     return Corners(np.zeros(len(corner), int), corner, place, center[lenslet], kinds[lenslet])
 
 
-def _square(camera: MetricCamera, board: Board, points: np.ndarray) -> float:
-    """Least way between neighbouring corners behind a lenslet [px]."""
-    axis, shape = np.array([camera.axis]), (*board.shape, 2)
-    shown = camera.project(points, np.repeat(axis, len(points), 0)).reshape(shape)
-    return min(float(np.hypot(*np.moveaxis(np.diff(shown, axis=k), -1, 0)).min()) for k in (0, 1))
+def _square(camera: MetricCamera, points: np.ndarray) -> float:
+    """Least way between corners behind a lenslet [px]."""
+    return nearest(camera.project(points, np.repeat(np.array([camera.axis]), len(points), 0)))
 
 
 def _chosen(shots: list[_Shot], camera: MetricCamera, nominal: Nominal, pictures: int) -> Iterator[Step]:

@@ -1,4 +1,4 @@
-"""Corners of a chessboard in the views of raw images of a plenoptic 1.0 camera."""
+"""Corners or dots of a board in the views of raw images of a plenoptic 1.0 camera."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError, SamplingError
+from lumigraph.metric import chessboard, windows
 from lumigraph.metric.corners import Board
 from lumigraph.metric.order import ordered, told_of
 from lumigraph.preparation import decode, of_raw
@@ -21,12 +22,6 @@ LEAST_VIEWS = 5
 """In which a corner must be seen."""
 
 _DIRECTIONS = 7  # views along an axis: the fewer, the less noise and the less of it is shared
-_WINDOW = 0.35  # half the window about a corner, over the width of a square
-_RADII = (2, 6)  # samples: of windows
-
-LEAST_SQUARE = _RADII[0] / _WINDOW
-"""Of a board in a view [samples]."""
-
 _SOFT = 1.0  # samples: of a blur that moves no corner, but keeps samples from pulling at them
 _STRAY = 1.5  # samples: from where a corner is expected
 _RIM = 1.0  # px: of a micro-image, whose blur moves what views there see
@@ -38,7 +33,8 @@ def on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: int
     """Columns of `Corners` of one raw image.
 
     The board is found on the middle view. From there on, views farther out are searched for the saddles of
-    the brightness, where the views before lead to expect them: a corner moves evenly from view to view.
+    the brightness, or for dots, where the views before lead to expect them: a corner moves evenly
+    from view to view.
     """
     pitch = calibration.lattice.pitch
     count = min(_DIRECTIONS, int(pitch) - (int(pitch) + 1) % 2)
@@ -50,8 +46,10 @@ def on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: int
     reach = (calibration.fill or 1.0) * pitch / 2 - _RIM - pitch / count / np.sqrt(2)
     near = np.hypot(*way.T) <= reach
     which, way = which[near], way[near]
-    first = _board(data[count // 2, count // 2], board, frame)
-    track = _Track.of(first, _radius(first, board, frame), len(way))
+    first = _board(data[count // 2, count // 2], board, f"the middle view of picture {frame}")
+    known = np.flatnonzero(np.isfinite(first[:, 0]))
+    radius = windows.radius(first[known], board, frame, "samples of a view wide")
+    track = _Track.of(first[known], radius, len(way), dots=board.radius > 0)
     for k in np.argsort(np.hypot(*way.T), kind="stable"):
         track.follow(data[tuple(which[k])], way, int(k))
     corner, view = np.nonzero(track.straight(way))
@@ -61,11 +59,13 @@ def on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: int
             "better light, or nearer to the plane in focus."
         )
     center, ways = raw_places(views, calibration, track.places[corner, view], which[view])
-    return np.full(len(corner), frame), corner, center + ways, center, np.zeros(len(corner), int)
+    return np.full(len(corner), frame), known[corner], center + ways, center, np.zeros(len(corner), int)
 
 
-def _board(middle: np.ndarray, board: Board, frame: int) -> np.ndarray:
+def _board(middle: np.ndarray, board: Board, what: str) -> np.ndarray:
     """Corners (n, 2) on the middle view [samples], from either end of a board that looks the same turned."""
+    if board.pattern != "corners":
+        return chessboard.find(middle, board, what)
     (down, across), seen = board.shape, 0
     with suppress(SamplingError):
         chart = find_chart(middle)
@@ -74,25 +74,12 @@ def _board(middle: np.ndarray, board: Board, frame: int) -> np.ndarray:
             grid = np.zeros((*(index.max(0) + 1), 2))
             grid[tuple(index.T)] = chart.corners
             grid = grid if grid.shape[:2] == board.shape else grid.swapaxes(0, 1)
-            with told_of(f"the middle view of picture {frame}"):
+            with told_of(what):
                 return ordered(grid.reshape(-1, 2), board.points()[:, 1:])
     raise CalibrationError(
-        f"the middle view of picture {frame} does not show a whole chessboard of {across} x {down} inner "
-        f"corners with a white margin; {seen} corners of a board are seen. Leave the picture out, or give "
-        "the board's own numbers."
+        f"{what} does not show a whole {board.what}; {seen} corners of a board are seen. Leave the picture "
+        "out, or give the board's own numbers."
     )
-
-
-def _radius(places: np.ndarray, board: Board, frame: int) -> int:
-    """Of the window about a corner [samples]."""
-    grid = places.reshape(*board.shape, 2)
-    width = min(float(np.hypot(*np.moveaxis(np.diff(grid, axis=k), -1, 0)).min()) for k in (0, 1))
-    if width < LEAST_SQUARE:
-        raise CalibrationError(
-            f"on picture {frame} the squares are {width:.3g} samples of a view wide, but {LEAST_SQUARE:.2g} "
-            "are needed. Use a board with larger squares, or bring it nearer."
-        )
-    return max(_RADII[0], min(_RADII[1], int(width * _WINDOW)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,16 +89,18 @@ class _Track:
     first: np.ndarray
     radius: int
     places: np.ndarray
+    dots: bool
 
     @classmethod
-    def of(cls, first: np.ndarray, radius: int, views: int) -> "_Track":
-        return cls(first, radius, np.full((len(first), views, 2), np.nan))
+    def of(cls, first: np.ndarray, radius: int, views: int, *, dots: bool) -> "_Track":
+        return cls(first, radius, np.full((len(first), views, 2), np.nan), dots)
 
     def follow(self, view: np.ndarray, way: np.ndarray, k: int) -> None:
         """Look for the corners in one view more."""
         middle, slope = self._lines(way)
         start = middle + slope[:, None] * way[k]
-        at, kept = settle(spline_filter(gaussian_filter(view, _SOFT), 3), start, self.radius, stray=_STRAY)
+        splines = spline_filter(gaussian_filter(view, _SOFT), 3)
+        at, kept = settle(splines, start, self.radius, stray=_STRAY, dots=self.dots)
         inside = ((at >= self.radius) & (at <= np.array(view.shape) - 1 - self.radius)).all(1)
         self.places[kept & inside, k] = at[kept & inside]
 

@@ -1,0 +1,44 @@
+"""Windows about corners and dots, in which they are looked for."""
+
+import math
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from lumigraph.errors import CalibrationError
+from lumigraph.metric.corners import Board
+
+_PART = 0.35
+"""Half the window about a corner, over the way to the nearest other one: no window holds two."""
+
+_RIM = 0.5
+"""By how much a window is wider than a dot [px]: it holds the edge, and fits into most micro-images."""
+
+LEAST, _MOST = 2, 6  # px, of those about corners
+
+LEAST_SQUARE = LEAST / _PART
+"""Of a board behind a lenslet [px], or in a view [samples]: squares, or the way between dots."""
+
+
+def nearest(places: np.ndarray) -> float:
+    """Least way between any two of n places (n, 2), n at least 2."""
+    return float(np.asarray(KDTree(places).query(places, 2)[0])[:, 1].min())
+
+
+def radius(places: np.ndarray, board: Board, frame: int, where: str) -> int:
+    """Of the windows about places (n, 2) of a board [px].
+
+    Raises
+    ------
+    CalibrationError
+        Places so close to each other that a window would hold two.
+    """
+    apart = nearest(places)
+    if apart < LEAST_SQUARE:
+        raise CalibrationError(
+            f"on picture {frame} the squares, or ways between dots, are {apart:.3g} {where}, but "
+            f"{LEAST_SQUARE:.2g} are needed. Use a board with larger ones, or bring it nearer."
+        )
+    if board.radius:
+        return max(LEAST, math.ceil(apart * board.radius / nearest(board.points()[:, 1:]) + _RIM))
+    return max(LEAST, min(_MOST, int(apart * _PART)))
