@@ -67,7 +67,7 @@ def test_a_scrambled_answer_of_opencv_is_put_in_order_or_refused(monkeypatch):
     answer = np.random.default_rng(3).permutation(true)[:, None, ::-1].astype(np.float32)
     monkeypatch.setattr(cv2, "findChessboardCornersSB", lambda *_, **__: (True, answer))
     dull = np.arange(100.0).reshape(10, 10)
-    assert from_either_end(chessboard.find(dull, BOARD), true.astype(np.float32).astype(float))
+    assert from_either_end(chessboard.find(dull, BOARD, "it"), true.astype(np.float32).astype(float))
     answer[3] = answer[3] + 10
     with pytest.raises(CalibrationError, match="no flat board in any order"):
-        chessboard.find(dull, BOARD)
+        chessboard.find(dull, BOARD, "it")
