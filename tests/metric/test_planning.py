@@ -60,7 +60,9 @@ def test_the_ideal_camera_of_a_file_has_its_patches() -> None:
 
 
 def test_a_board_that_cannot_be_used_is_refused() -> None:
-    with pytest.raises(CalibrationError, match="no place where the whole chessboard of 5 x 4 inner corners .*, 80 mm"):
+    with pytest.raises(
+        CalibrationError, match=r"no place where the whole chessboard of 5 x 4 inner corners .*, 80 mm"
+    ):
         metric.plan(drawn.camera(1.0), drawn.calibration(), metric.Board((4, 5), 80e-3), NOMINAL)
     with pytest.raises(CalibrationError, match="pictures is 2"):
         metric.plan(drawn.camera(1.0), drawn.calibration(), drawn.BOARD, NOMINAL, pictures=2)
