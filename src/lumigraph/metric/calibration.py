@@ -258,7 +258,8 @@ def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
     if error > 0.7 * given:
         yield (
             f"the pictures hardly tell the focal length: {f * 1e3:.2f} mm rests on the {given * 1e3:.2g} mm "
-            "to which it was known. Boards that fill the picture and lean by 30 degrees or more tell it"
+            "to which it was known, and distances with it. While the exit pupil is free, other poses of the "
+            "board hardly change that; a focal length that was measured does"
         )
     for one, other, how in result.tied():
         if one in _LENGTHS or other in _LENGTHS:
