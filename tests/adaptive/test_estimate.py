@@ -6,7 +6,7 @@ import pytest
 import lumigraph as lg
 from lumigraph.adaptive import estimate
 from lumigraph.adaptive.beads import brightest
-from lumigraph.adaptive.estimate import _warn_of_misfit
+from lumigraph.adaptive.estimate import warn_of_misfit
 from lumigraph.adaptive.field import ALIKE, PRIOR, Nodes
 from lumigraph.adaptive.worth import worth
 from lumigraph.deconvolution import Exposure
@@ -53,7 +53,7 @@ def test_what_explains_the_picture_is_stated(bent):
     assert bent.pearson == pytest.approx(1, abs=0.1)
     assert (bent.deviations < 0.01).all()
     assert bent.untold == {4: "the beads' depths explain it"}
-    assert dict(bent.microscope.objective.aberrations) == pytest.approx({6: 0.2, 8: -0.15}, abs=0.01)
+    assert dict(bent.instrument.objective.aberrations) == pytest.approx({6: 0.2, 8: -0.15}, abs=0.01)
     assert bent.rms == pytest.approx(0.25, abs=0.01)
 
 
@@ -69,7 +69,7 @@ def test_the_phase_has_the_wavefronts_rms(bent):
 def test_no_aberration_is_invented():
     found = estimate(exposed({}, 5e3), SCOPE, DEPTHS, (6, 7, 8, 11), exposure=EXPOSURE)
     assert found.rms == 0
-    assert not found.microscope.objective.aberrations
+    assert not found.instrument.objective.aberrations
     assert (found.deviations > 0).all()
 
 
@@ -89,7 +89,7 @@ def test_regions_of_the_field_have_aberrations_of_their_own():
 
 def test_beads_that_do_not_explain_the_picture_are_warned_of():
     with pytest.warns(lg.SamplingWarning, match="2 beads leave 3 times the variance of noise"):
-        _warn_of_misfit(3.0, "2 beads leave")
+        warn_of_misfit(3.0, "2 beads leave")
 
 
 RAW = np.ones((135, 135), np.float32)

@@ -84,10 +84,11 @@ def test_views_shift_by_the_wavefronts_slopes():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"microscope": lg.PlenopticCamera.from_catalogue("thesis-plenoptic-1")}, "configuration '1.0'"),
-        ({"terms": (4, 6)}, "place and depth explain 1 to 4"),
+        ({"instrument": SCOPE.replace(configuration="2.0", lenslet_offset="1 mm")}, "configuration '1.0'"),
+        ({"instrument": lg.load_camera("thesis-plenoptic-2-m050")}, "are those of a PlenopticCamera or"),
+        ({"terms": (3, 6)}, "the scene's place explains 1 to 3"),
         ({"terms": ()}, "Give others"),
-        ({"raw": np.ones((135, 134), np.float32)}, "the microscope's"),
+        ({"raw": np.ones((135, 134), np.float32)}, "the instrument's"),
         ({"raw": np.full((135, 135), np.nan)}, "NaN"),
         ({"raw": np.zeros((135, 135))}, "dark"),
         ({"raw": np.ones((135, 135))}, "even"),
@@ -95,7 +96,7 @@ def test_views_shift_by_the_wavefronts_slopes():
 )
 def test_shifts_that_cannot_be_measured_are_refused(given, message):
     with pytest.raises(lg.LumigraphError, match=message):
-        start(**{"raw": np.ones((135, 135)), "microscope": SCOPE, "terms": (6,), **given})
+        start(**{"raw": np.ones((135, 135)), "instrument": SCOPE, "terms": (6,), **given})
 
 
 @pytest.mark.long

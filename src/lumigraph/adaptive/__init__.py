@@ -1,7 +1,8 @@
-"""Digital adaptive optics: a microscope's aberrations from the light field itself, together with the object.
+"""Digital adaptive optics: an instrument's aberrations from the light field itself, together with the object.
 
 - `estimate`: `estimate`, from a raw image of beads or of any object
 - `start`: `start`, a first wavefront from the shifts of views; `Slopes`, its result
+- `sense`: `sense`, of a plenoptic camera before a point of light; `star`: its images by coefficients
 - `wavefront`: `Wavefront`, the result; `wavefront_map`, Zernike terms over the pupil
 - `of_volume`: of any object; `sight`: operators by coefficients; `voxels`: steps on volume and coefficients
 - `field`: nodes of the field at which coefficients stand
@@ -10,7 +11,8 @@
 """
 
 from lumigraph.adaptive.estimate import TERMS, estimate
+from lumigraph.adaptive.sense import MODES, sense
 from lumigraph.adaptive.start import Slopes, start
 from lumigraph.adaptive.wavefront import Wavefront, wavefront_map
 
-__all__ = ["TERMS", "Slopes", "Wavefront", "estimate", "start", "wavefront_map"]
+__all__ = ["MODES", "TERMS", "Slopes", "Wavefront", "estimate", "sense", "start", "wavefront_map"]

@@ -1,13 +1,13 @@
-"""What is asked for: depths and terms, checked; and the microscope with what is found."""
+"""What is asked for: depths and terms, checked; and the instrument with what is found."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import LightFieldMicroscope
+from lumigraph.instruments import LensletCamera, LightFieldMicroscope
 from lumigraph.instruments.capabilities import WithPupil
 
 
@@ -64,12 +64,18 @@ def asked_for(
     return planes, found, {j: reason for j, reason in kind.reasons.items() if j in asked}
 
 
-def bent(
-    microscope: LightFieldMicroscope, terms: Sequence[int], coefficients: np.ndarray
-) -> LightFieldMicroscope:
-    """The microscope with aberrations beyond those of its description."""
-    known = dict(microscope.objective.aberrations)
+Bent = TypeVar("Bent", LightFieldMicroscope, LensletCamera)
+
+
+def bent(instrument: Bent, terms: Sequence[int], coefficients: np.ndarray) -> Bent:
+    """The instrument with aberrations beyond those of its description."""
+    named, part = (
+        ("main_lens", instrument.main_lens)
+        if isinstance(instrument, LensletCamera)
+        else ("objective", instrument.objective)
+    )
+    known = dict(part.aberrations)
     for j, value in zip(terms, coefficients, strict=True):
         if value:
             known[j] = known.get(j, 0.0) + float(value)
-    return microscope.replace(objective={"aberrations": known})
+    return instrument.replace(**{named: {"aberrations": known}})

@@ -132,7 +132,7 @@ def estimate(
                 f"regions are {parted} but a volume has one. Crop the raw image, or use beads."
             )
         found = of_volume((raw, exposure, pixels), microscope, depths, terms, progress or silent)
-        _warn_of_misfit(found.pearson, "the volume leaves")
+        warn_of_misfit(found.pearson, "the volume leaves")
         return found
     if object != "beads":
         raise GeometryError(f"object is {object!r} but must be 'beads' or 'volume'.")
@@ -144,12 +144,12 @@ def estimate(
     plain = model.improved(first, ~every, STEPS["places"])
     fit, rounds = _fitted(given, model, plain, every)
     around = model.around(fit)
-    covariance = _covariance(model, around)[-fit.coefficients.size :, -fit.coefficients.size :]
+    covariance = covariance_of(model, around)[-fit.coefficients.size :, -fit.coefficients.size :]
     free = worth(covariance, fit.coefficients, model.counted)
     if not free.all():
         fit = model.improved(replace(fit, coefficients=fit.coefficients * free), free, STEPS["all"])
         around = model.around(fit)
-    _warn_of_misfit(around.pearson, f"{len(fit.points.intensities)} beads leave")
+    warn_of_misfit(around.pearson, f"{len(fit.points.intensities)} beads leave")
     shape = (len(model.nodes.y), len(model.nodes.x), len(given.terms))
     deviations = np.sqrt(np.diag(covariance)).reshape(shape)
     unknown = {j: UNKNOWN for j, d in zip(given.terms, deviations.max((0, 1)), strict=True) if d > PRIOR / 2}
@@ -157,11 +157,12 @@ def estimate(
     return Wavefront(
         given.terms, found, deviations, (model.nodes.y, model.nodes.x), given.untold | unknown, fit.points,
         (model.deviance(plain), model.deviance(fit)), around.pearson, rounds, fit.steps,
-        bent(microscope, given.terms, found.mean((0, 1))),
+        bent(microscope, given.terms, found.mean((0, 1))), covariance,
     )  # fmt: skip
 
 
-def _warn_of_misfit(pearson: float, what: str) -> None:
+def warn_of_misfit(pearson: float, what: str) -> None:
+    """Warn of what an object leaves of the raw image, in variances of noise."""
     if pearson > MISFIT:
         warnings.warn(
             f"{what} {pearson:.3g} times the variance of noise in the raw image: it holds more than that, or "
@@ -268,7 +269,7 @@ def _parts(points: Points) -> tuple[np.ndarray, np.ndarray]:
 
 def _without_faint(model: Model, fit: Fit, free: np.ndarray) -> Fit:
     """The fit without beads whose light is not known well enough to be there."""
-    covariance = _covariance(model, model.around(fit))
+    covariance = covariance_of(model, model.around(fit))
     light = np.diag(covariance)[PLACES : OWN * len(fit.points.intensities) : OWN]
     kept = light < 1 / (OWN * math.log(model.counted))
     if kept.all():
@@ -279,7 +280,7 @@ def _without_faint(model: Model, fit: Fit, free: np.ndarray) -> Fit:
     return model.improved(replace(fit, points=points), free, STEPS["all"])
 
 
-def _covariance(model: Model, around: Around) -> np.ndarray:
+def covariance_of(model: Model, around: Around) -> np.ndarray:
     """Of all unknowns; larger where the beads do not explain the raw image."""
     whole, n = around.information / max(around.pearson, 1.0), len(model.nodes.information)
     whole[-n:, -n:] += model.nodes.information

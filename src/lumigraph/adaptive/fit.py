@@ -6,7 +6,9 @@ information of Poisson noise is F = Jᵀ diag(g w / m) J. A step solves
 and the logarithm of its light, then the coefficients at each node of the field.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -15,14 +17,14 @@ from lumigraph.core import arrays
 from lumigraph.core.progress import Progress, Stage, silent
 from lumigraph.core.threads import each
 from lumigraph.deconvolution.problem import Problem
-from lumigraph.operators.microscope_pupil import PLACES, PupilImages
+from lumigraph.operators.microscope_pupil import PLACES, Lit
 from lumigraph.scene import Points
 
 OWN = PLACES + 1
 """Unknowns of a bead: y, x, dz and the logarithm of its light."""
 
 LONGEST = (1.5e-6, 1.5e-6, 3e-6, 1.0, 0.25)
-"""Longest steps: of y, x, dz [m], of the logarithm of light, of a coefficient [waves rms]."""
+"""Longest steps before a microscope: y, x, dz [m], the logarithm of light, a coefficient [waves rms]."""
 
 TRIES = 5
 """Steps, each shorter than the one before, of which one must be likelier."""
@@ -32,6 +34,31 @@ GAIN = 0.5
 
 USUAL = 10
 """Steps after which progress is said to be half: how many there will be is not known."""
+
+
+class Images(Protocol):
+    """Images of points by Zernike coefficients: `PupilImages` of microscopes, `Star` of cameras."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of a raw image."""
+        ...
+
+    def forward(self, points: Points, coefficients: np.ndarray) -> np.ndarray:
+        """Raw image (ny, nx) of points, for coefficients (terms,) [waves rms]."""
+        ...
+
+    def lit(self, points: Points, coefficients: np.ndarray) -> Iterator[Lit]:
+        """Image and derivatives of each point of intensity 1, in a window around its cell."""
+        ...
+
+    def whole(self, image: np.ndarray, cell: tuple[int, int]) -> np.ndarray:
+        """A window around a cell among all samples."""
+        ...
+
+    def placed(self, samples: np.ndarray) -> np.ndarray:
+        """Raw image (ny, nx) of samples."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,13 +118,16 @@ class Model:
         Least and greatest (y, x, dz) of beads [m].
     progress
         Of the fit's steps.
+    longest
+        Steps: see `LONGEST`.
     """
 
-    images: PupilImages
+    images: Images
     problem: Problem
     nodes: Nodes
     limits: tuple[np.ndarray, np.ndarray]
     progress: Progress = silent
+    longest: tuple[float, ...] = LONGEST
 
     @property
     def weights(self) -> np.ndarray:
@@ -196,7 +226,7 @@ class Model:
         used = np.append(np.ones(first, bool), np.tile(free, len(c)))
         step = np.zeros(n)
         step[used] = solved((around.information + prior)[np.ix_(used, used)], slope[used], damping)
-        longest = np.append(np.tile(LONGEST[:OWN], first // OWN), np.full(c.size, LONGEST[OWN]))
+        longest = np.append(np.tile(self.longest[:OWN], first // OWN), np.full(c.size, self.longest[OWN]))
         return step / max(1.0, float(np.max(np.abs(step) / longest)))
 
     def _moved(self, fit: Fit, step: np.ndarray) -> Fit:

@@ -66,8 +66,8 @@ def of_volume(
         (np.array([grid.center[0]]), np.array([grid.center[1]])),
         untold | _unknown(found, covariance), Points(np.zeros((0, 3)), np.zeros(0)),
         (plain.state.deviance, told.state.deviance), voxels.pearson(told), 1, told.steps,
-        bent(microscope, found, told.coefficients), Volume(volume, grid, sight.planes),
-        _explained(found, around),
+        bent(microscope, found, told.coefficients), covariance,
+        Volume(volume, grid, sight.planes), _explained(found, around),
     )  # fmt: skip
 
 

@@ -17,8 +17,8 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.raw import RawImage
 from lumigraph.elements.zernike import noll_to_nm, zernike
 from lumigraph.errors import CalibrationError, GeometryError
-from lumigraph.instruments import LightFieldMicroscope
-from lumigraph.instruments.capabilities import WithPupil
+from lumigraph.instruments import LensletCamera, LightFieldMicroscope, PlenopticCamera
+from lumigraph.instruments.capabilities import Decoded, WithPupil
 from lumigraph.rendering import decode
 
 EDGE = 0.9
@@ -71,23 +71,25 @@ class Slopes:
 
 def start(
     raw: RawImage | np.ndarray,
-    microscope: LightFieldMicroscope,
+    instrument: LightFieldMicroscope | PlenopticCamera,
     terms: Sequence[int],
     *,
     pixels: Calibration | None = None,
 ) -> Slopes:
-    """A light-field microscope's wavefront from the shifts of its views, as rays see it.
+    """The wavefront of a light-field microscope or camera from the shifts of its views, as rays see it.
 
     A start for `estimate`, which knows diffraction: some tenths of it are left. Any object with texture.
+    Before a camera of kind "plenoptic" it is a wavefront sensor for scenes; see `sense` for a point of light.
 
     Parameters
     ----------
     raw
         As it was read, without background.
-    microscope
-        Configuration "1.0". Aberrations of its description are not taken away.
+    instrument
+        A microscope of configuration "1.0", or a `PlenopticCamera`. Aberrations of its description are not
+        taken away.
     terms
-        Noll indices from 5 on.
+        Noll indices from 4 on; 4, defocus, where all of the scene is known to stand in the focused plane.
     pixels
         Calibration of a real camera.
 
@@ -98,20 +100,17 @@ def start(
     CalibrationError
         A raw image of another shape, a dark or even one, too few lenslets.
     """
-    if not isinstance(microscope, WithPupil) or microscope.configuration != "1.0":
-        raise GeometryError("slopes are those of a LightFieldMicroscope of configuration '1.0'.")
+    size, aperture = _seen(instrument)
     asked = tuple(dict.fromkeys(int(j) for j in terms))
     for j in asked:
         noll_to_nm(j)
-    if not asked or min(asked) < 5:
-        raise GeometryError(f"terms are {asked} but the scene's place and depth explain 1 to 4. Give others.")
-    calibration = microscope.calibration if pixels is None else pixels
-    places, pictures = _views(raw, microscope, calibration)
-    size = microscope.lenslet_size
-    every = (*BASE, *asked)
-    slopes = -_slopes(places, every) * (
-        microscope.wavelength / microscope.objective.numerical_aperture / size
-    )
+    if not asked or min(asked) < 4:
+        raise GeometryError(f"terms are {asked} but the scene's place explains 1 to 3. Give others.")
+    calibration = instrument.calibration if pixels is None else pixels
+    places, pictures = _views(raw, aperture / instrument.magnification, calibration)
+    base = tuple(j for j in BASE if j not in asked)
+    every = (*base, *asked)
+    slopes = -_slopes(places, every) * (instrument.wavelength / aperture / size)
     found, left = np.zeros(len(every)), np.zeros_like(places)
     for sigma in SMOOTH:
         smooth = gaussian_filter(pictures, (0, sigma, sigma))
@@ -121,7 +120,7 @@ def start(
     flat = slopes.reshape(-1, len(every))
     variance = float(np.square(left).sum()) / max(left.size - len(every), 1)
     known = np.sqrt(variance * np.diag(np.linalg.pinv(flat.T @ flat)))
-    n = len(BASE)
+    n = len(base)
     return Slopes(
         {j: float(c) for j, c in zip(asked, found[n:], strict=True)},
         {j: float(d) for j, d in zip(asked, known[n:], strict=True)},
@@ -129,18 +128,33 @@ def start(
     )  # fmt: skip
 
 
+def _seen(instrument: LightFieldMicroscope | PlenopticCamera) -> tuple[float, float]:
+    """Size of a lenslet in the object [m], and numerical aperture towards it."""
+    if isinstance(instrument, LensletCamera) and isinstance(instrument, Decoded):
+        distance = instrument.object_distance
+        return instrument.lenslets.pitch / instrument.magnification, instrument.pupil_diameter / 2 / distance
+    if not isinstance(instrument, WithPupil) or instrument.configuration != "1.0":
+        raise GeometryError(
+            "slopes are those of a PlenopticCamera or a LightFieldMicroscope of configuration '1.0'."
+        )
+    return instrument.lenslet_size, instrument.objective.numerical_aperture
+
+
 def _views(
-    raw: RawImage | np.ndarray, microscope: LightFieldMicroscope, calibration: Calibration
+    raw: RawImage | np.ndarray, aperture: float, calibration: Calibration
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Places (k, 2) of the views in the pupil, in radii, and their contrasts (k, t, s)."""
+    """Places (k, 2) of the views in the pupil, in radii, and their contrasts (k, t, s).
+
+    By the numerical aperture of the light on the lenslets.
+    """
     data = np.asarray(raw.data if isinstance(raw, RawImage) else raw, np.float32)
     if data.shape != calibration.shape:
         raise CalibrationError(
-            f"the raw image has shape {data.shape} but the microscope's {calibration.shape}."
+            f"the raw image has shape {data.shape} but the instrument's {calibration.shape}."
         )
     checks.finite_array("the raw image", data, CalibrationError)
     views = decode(data, calibration)
-    radius = views.separation * microscope.objective.numerical_aperture / microscope.magnification
+    radius = views.separation * aperture
     v, u = np.meshgrid(views.aperture.y / radius, views.aperture.x / radius, indexing="ij")
     inside = np.hypot(v, u) < EDGE
     pictures = np.asarray(views.data)[inside]

@@ -1,4 +1,4 @@
-"""`Wavefront`: what a light field tells of its microscope's aberrations."""
+"""`Wavefront`: what a light field tells of its instrument's aberrations."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ from lumigraph.core import checks
 from lumigraph.core.brief import brief
 from lumigraph.core.volume import Volume
 from lumigraph.elements.zernike import zernike
-from lumigraph.instruments import LightFieldMicroscope
+from lumigraph.instruments import LensletCamera, LightFieldMicroscope
 from lumigraph.scene import Points
 
 
@@ -23,7 +23,7 @@ class Wavefront:
         Noll indices.
     values, deviations
         Of each term at the nodes of the field (rows, columns, terms) [waves rms], beyond what the
-        microscope's description holds; standard deviations from Fisher's information. A term that explains
+        instrument's description holds; standard deviations from Fisher's information. A term that explains
         no more than noise has the value 0 and the deviation that it had.
     nodes
         Places (y, x) of the rows and of the columns of nodes [m].
@@ -37,8 +37,10 @@ class Wavefront:
         Mean of (r - m)²/m, electrons: 1 where only noise is left.
     rounds, steps
         How often objects were looked for, and steps of the fit.
-    microscope
+    instrument
         The description with the mean aberrations of the field.
+    covariance
+        Of all values, in order (nodes terms, nodes terms) [waves² rms].
     volume
         The object; None where it is beads.
     explained
@@ -56,7 +58,8 @@ class Wavefront:
     pearson: float
     rounds: int
     steps: int
-    microscope: LightFieldMicroscope
+    instrument: LightFieldMicroscope | LensletCamera
+    covariance: np.ndarray
     volume: Volume | None = None
     explained: Mapping[int, float] = field(default_factory=dict)
 

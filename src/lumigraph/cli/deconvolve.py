@@ -94,7 +94,7 @@ def deconvolve(
         made(0.0)
         shifts = several.moved(described, 1 + len(more)) if more else None
         wavefront = bent.found(ready, described, wanted.depths(), within(shown, 0.0, 1.0, "wavefront"))
-        described = described if wavefront is None else wavefront.microscope
+        described = described if wavefront is None else wavefront.instrument
         engine = _engine(_Asked.of(described, wanted, way, ready.calibration, made, shifts))
         _begin(engine)
         task = _Task(engine, way, output, None if several.light is None else several.lights())

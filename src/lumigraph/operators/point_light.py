@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -87,12 +87,12 @@ class Sampled:
 
     def at(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
         """As `PointLight.at`."""
-        grid, pupil = self._behind()
+        grid, pupil = self.behind()
         turn = -2j * np.pi / (self.camera.wavelength * self.camera.separation)
         return np.exp(turn * np.outer(y, grid.y)) @ (pupil @ np.exp(turn * np.outer(grid.x, x)))
 
-    def _behind(self) -> tuple[Grid, np.ndarray]:
-        """The pupil's samples, for light of 1 behind a round stop."""
+    def behind(self) -> tuple[Grid, np.ndarray]:
+        """The pupil's grid and its samples, for light of 1 behind a round stop."""
         if not self._pupil:
             # Light comes again after as many λL/D as there are samples.
             count = max(self.samples, math.ceil(3 * self.widest / _cells.airy(self.camera)))
@@ -107,3 +107,8 @@ class Sampled:
             light = (np.abs(pupil) ** 2).sum() * squared**2 / np.prod(grid.pitch)
             self._pupil.extend((grid, pupil * np.sqrt(_cells.stop_area(self.lens) / light)))
         return self._pupil[0], self._pupil[1]
+
+    def turned(self, phase: np.ndarray) -> "Sampled":
+        """How the light changes with a factor of this phase (y, x) [rad] on the pupil's grid."""
+        grid, pupil = self.behind()
+        return replace(self, _pupil=[grid, 1j * phase * pupil])

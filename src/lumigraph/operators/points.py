@@ -98,7 +98,7 @@ def _plane_image(lenslets: Relay, positions: np.ndarray, intensities: np.ndarray
     optics = lenslets.optics
     image = np.zeros([n * k for n, k in zip(optics.cells.image, optics.cells.samples, strict=True)])
     places = on_lenslets(optics, positions, optics.distance)
-    lights = _lights(optics, positions, places, _farthest(optics, places))
+    lights = _lights(optics, positions, places, farthest(optics, places))
     for light, place, intensity in zip(lights, places, intensities, strict=True):
         _add(image, lenslets, light, place, float(intensity))
     return readout(optics).forward(image.astype(np.float32))
@@ -125,7 +125,7 @@ def on_lenslets(optics: Optics, positions: np.ndarray, distance: float | np.ndar
     return np.stack([y * cos - x * sin, y * sin + x * cos], axis=1)
 
 
-def _farthest(optics: Optics, places: np.ndarray) -> float:
+def farthest(optics: Optics, places: np.ndarray) -> float:
     """From any of the places to any light that the image's cells see [m]."""
     cells, reach = optics.cells, 0.0
     for edge, n, ring, size, axis, at in zip(
@@ -140,18 +140,22 @@ def _farthest(optics: Optics, places: np.ndarray) -> float:
 def _add(image: np.ndarray, lenslets: Relay, light: PointLight, place: np.ndarray, intensity: float) -> None:
     """A point's image, added to the samples of all cells."""
     optics = lenslets.optics
-    rows, columns = _lit(optics, light, place)
+    rows, columns = lit_cells(optics, light, place)
     y, x = lenslets.places(rows, columns)
     field = lenslets.field(light.at(y - place[0], x - place[1]).astype(np.complex64), rows, columns)
-    share = optics.camera.object_pitch**2 * (optics.camera.separation / optics.distance) ** 2
-    share *= intensity / optics.image_scale**2
     (ky, kx) = optics.cells.samples
-    image[rows.start * ky : rows.stop * ky, columns.start * kx : columns.stop * kx] += share * (
-        np.abs(field) ** 2
+    image[rows.start * ky : rows.stop * ky, columns.start * kx : columns.stop * kx] += (
+        intensity * share(optics) * np.abs(field) ** 2
     )
 
 
-def _lit(optics: Optics, light: PointLight, place: np.ndarray) -> tuple[range, range]:
+def share(optics: Optics) -> float:
+    """Intensity of the image over that of light of 1, of a point of intensity 1."""
+    size = optics.camera.object_pitch * optics.camera.separation / optics.distance
+    return (size / optics.image_scale) ** 2
+
+
+def lit_cells(optics: Optics, light: PointLight, place: np.ndarray) -> tuple[range, range]:
     """Rows and columns of the image's cells that all but `LEFT_OUT` of the accuracy lies in."""
     cells, far = optics.cells, []
     axes = [
@@ -188,12 +192,12 @@ def seen(camera: CameraOptics, distance: float, accuracy: float) -> varying.Imag
     lenslets, pitch = relay(optics), optics.array.lattice.pitch
     middle = np.array(optics.cells.middle(optics.cells.kind))
     places = [middle + pitch * np.array(part) for part in TOLD]
-    farthest = _farthest(optics, np.array(places))
+    reach = farthest(optics, np.array(places))
 
     def light(one: CameraOptics) -> PointLight:
-        return Sampled(one, _cells.lens(one), distance, farthest, COARSE_PUPIL)  # all in one way
+        return Sampled(one, _cells.lens(one), distance, reach, COARSE_PUPIL)  # all in one way
 
-    lit = [_lit(optics, light(one), places[0]) for one in varying.some(camera)]
+    lit = [lit_cells(optics, light(one), places[0]) for one in varying.some(camera)]
     rows, columns = (range(min(r[k].start for r in lit), max(r[k].stop for r in lit)) for k in (0, 1))
     y, x = lenslets.places(rows, columns)
 
