@@ -93,3 +93,18 @@ def test_what_is_hardly_shared_is_not_compared():
     assert reading is not None
     assert reading.weight.sum() == pytest.approx(1)
     assert len(reading.places) < inside.sum()
+
+
+def test_a_reading_is_linear_between_pixels(rng):
+    inside = np.hypot(*np.mgrid[-8:9, -8:9]) < 7.2
+    image, move = rng.random((17, 17)).astype(np.float32), np.array([2.3, -3.8])
+    reading = Reading.of(inside.astype(np.float32), move)
+    assert reading is not None
+    at = np.stack(np.divmod(reading.places, 17)) + move[:, None]
+    assert reading.matrix @ image.ravel() == pytest.approx(
+        map_coordinates(image, at, order=1, mode="constant"), abs=1e-5
+    )
+    shared = inside.ravel() * map_coordinates(
+        inside.astype(float), np.mgrid[:17, :17].reshape(2, -1) + move[:, None], order=1, mode="grid-constant"
+    )
+    assert reading.weight == pytest.approx(shared[shared > 0] / shared.sum(), rel=1e-4)

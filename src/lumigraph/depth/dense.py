@@ -163,11 +163,11 @@ def _swept(
         "Ask for {factor:.1f}x fewer samples, or crop the raw image.",
     )
     cost = np.empty((len(moves), *guide.shape), np.float32)
-    for k, size in enumerate(sign * np.exp(moves / reach)):
-        images = sights.alike(float(size))
-        for rows, part in sights.bands:
-            cost[k, rows] = part.disagreement(float(size), _MOST, images)
-        progress((k + 1) / len(moves))
+    sizes = sign * np.exp(moves / reach)
+    blurred = sights.blurred(sizes)
+    for k, (rows, columns, part) in enumerate(sights.blocks):
+        cost[:, rows, columns] = part.disagreements(sizes, _MOST, blurred)
+        progress((k + 1) / len(sights.blocks))
     cost = semi_global(guided(cost, guide, 3), guide, 0.2 * _MOST, _MOST)
     first = moves[0] + cheapest(cost)[0] * (moves[1] - moves[0])
     return np.clip(median_filter(first, 5), moves[0], moves[-1]).astype(np.float32)

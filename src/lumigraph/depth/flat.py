@@ -15,6 +15,8 @@ from lumigraph.rendering.interpolate import as_float
 
 _spline: Any = spline_filter1d
 
+Pair = tuple[np.ndarray, np.ndarray]
+
 _POWERS = 5  # of the square of the distance from a centre: light falls steeply at the edge
 _EVEN = 0.95  # of the middle's light: less comes from lenslets that are lit in part
 _SPARE = 1.5  # px from the edge of the lit part of a micro-image
@@ -45,11 +47,8 @@ class Flat:
         to 0. Without a white image it is what all micro-images have in common.
         """
         image = grey(raw)
-        y, x = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in image.shape), indexing="ij", sparse=True)
-        i, j = calibration.index(y, x)
-        center = calibration.position(np.stack([i, j], -1)).astype(np.float32)
-        dy, dx = y - center[..., 0], x - center[..., 1]
-        radius = _lit_radius(image, np.hypot(dy, dx), calibration)
+        (i, j), (dy, dx) = _places(image.shape, calibration)
+        radius = lit_radius(image, calibration, np.hypot(dy, dx))
         half = np.float32(calibration.lattice.pitch / 2)
         way = dy / half, dx / half
         lenslet = (i - i.min()) * (np.ptp(j) + 1) + j - j.min()
@@ -119,11 +118,23 @@ def _light(
     return turn @ part
 
 
-def _lit_radius(image: np.ndarray, distance: np.ndarray, calibration: Calibration) -> float:
-    """Radius of the lit part of the micro-images [px], a pixel and a half from their edge."""
+def _places(shape: tuple[int, ...], calibration: Calibration) -> tuple[Pair, Pair]:
+    """The lenslet (i, j) of each pixel (y, x), and the way to it from its centre, along y and x [px]."""
+    y, x = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in shape), indexing="ij", sparse=True)
+    i, j = calibration.index(y, x)
+    center = calibration.position(np.stack([i, j], -1)).astype(np.float32)
+    return (i, j), (y - center[..., 0], x - center[..., 1])
+
+
+def lit_radius(image: np.ndarray, calibration: Calibration, distance: np.ndarray | None = None) -> float:
+    """Radius of the lit part of the micro-images of an image (y, x) [px], a pixel and a half from their edge.
+
+    `distance` (y, x) of each pixel from its centre is found where None.
+    """
     half = calibration.lattice.pitch / 2
     if calibration.fill is not None:
         return min(1.0, calibration.fill) * half - _SPARE
+    distance = np.hypot(*_places(image.shape, calibration)[1]) if distance is None else distance
     rings = np.rint(distance).astype(np.int32)
     profile = np.array([np.quantile(image[rings == k], _BRIGHT) for k in range(int(half) + 1)])
     dark = np.flatnonzero(profile < 0.5 * np.median(profile))

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
-from scipy.sparse import csr_array, kron
+from scipy.sparse import csr_array
 
 from lumigraph.core import memory
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.progress import Progress
 from lumigraph.core.raw import RawImage
-from lumigraph.depth.flat import Flat, grey
+from lumigraph.depth.flat import grey, lit_radius
 from lumigraph.rendering import lenslet_indices
 from lumigraph.rendering.interpolate import sample
 
@@ -63,7 +63,7 @@ class MicroImages:
             seen = sample(image, y + steps[:, None], x + steps, "cubic")
             data[part] = np.reshape(seen, (-1, size))
         data -= data.mean(1, keepdims=True)
-        inside = np.hypot(steps[:, None], steps) <= Flat.of(raw, calibration).radius
+        inside = np.hypot(steps[:, None], steps) <= lit_radius(grey(raw), calibration)
         return cls(data, inside.astype(np.float32), indices, calibration)
 
     def scores(self, sizes: np.ndarray, progress: Progress) -> np.ndarray:
@@ -135,13 +135,12 @@ class Reading:
     @classmethod
     def of(cls, inside: np.ndarray, move: np.ndarray) -> "Reading | None":
         """That of a move (dy, dx) [px]; None where too little of the pixels inside (h, w) is shared."""
-        lines = (_line(count, float(part)) for count, part in zip(inside.shape, move, strict=True))
-        matrix = csr_array(kron(*lines))
-        weight = inside.ravel() * (matrix @ inside.ravel())
+        lines = [_line(count, float(part)) for count, part in zip(inside.shape, move, strict=True)]
+        weight = (inside * (lines[0] @ inside @ lines[1].T)).ravel()
         if weight.sum() < _LEAST_SEEN * inside.sum():
             return None
         places = np.flatnonzero(weight)
-        return cls(places, weight[places] / weight.sum(), matrix[places])
+        return cls(places, weight[places] / weight.sum(), _taps(places, inside.shape, move))
 
     def agreement(self, mine: np.ndarray, its: np.ndarray) -> np.ndarray:
         """Normalised correlation (lenslets,) of micro-images (height * width, lenslets), the second moved."""
@@ -159,12 +158,27 @@ def _blocks(count: int) -> Iterator[slice]:
         yield slice(start, min(start + _BLOCK, count))
 
 
-def _line(count: int, move: float) -> csr_array:
+def _line(count: int, move: float) -> np.ndarray:
     """From values (count,) to those at places moved by a distance, read linearly; 0 beyond the ends."""
     below = math.floor(move)
     part = move - below
     weights = (1 - part) * np.eye(count, k=below) + part * np.eye(count, k=below + 1)
-    return csr_array(weights.astype(np.float32))
+    return weights.astype(np.float32)
+
+
+def _taps(places: np.ndarray, shape: tuple[int, ...], move: np.ndarray) -> csr_array:
+    """From pixels (height * width) of a shape to values at numbered places (n,), moved, read linearly."""
+    below = np.floor(move).astype(int)
+    y, x = (np.array([1 - part, part]) for part in move - below)
+    steps = np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) + below
+    at = np.stack(np.divmod(places, shape[1]), -1)[:, None] + steps
+    there = ((at >= 0) & (at < shape)).all(-1)
+    weights = np.outer(y, x).ravel() * there
+    number = np.where(there, at[..., 0] * shape[1] + at[..., 1], 0)
+    rows = np.arange(0, 4 * len(places) + 1, 4)
+    return csr_array(
+        (weights.ravel().astype(np.float32), number.ravel(), rows), (len(places), shape[0] * shape[1])
+    )
 
 
 def _better_half(scores: np.ndarray) -> np.ndarray:

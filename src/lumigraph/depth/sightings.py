@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
 from lumigraph.core.calibration import Calibration
+from lumigraph.depth.beside import Beside
+from lumigraph.depth.blurred import Blurred
 from lumigraph.depth.flat import Flat
 from lumigraph.rendering.patches import Layout
 
@@ -16,11 +17,8 @@ Pair = tuple[np.ndarray, np.ndarray]
 
 _SHARP = 1.5  # px of blur by which another kind of lenslet loses against the sharpest one
 _FARTHEST = 3.0  # pitches to the farthest lenslet that is asked
-_MIDDLE = 0.15  # pitches: lenslets this near to a place stand on both of its sides
-_SIGMA = 0.25  # standard deviation of a disc along an axis, over its diameter
-_COUNTS = 0.1  # weight of the kinds of lenslets whose blur the others are given, too
-_UNKNOWN, _FEW = 0.8, 0.05  # part of the most that lenslets differ by where no two see a place, its weight
-_BAND = 1 << 15  # samples handled at a time: what is read over and over stays in the processor's cache
+_FINE = 64  # weights per px of the distance from a micro-image's centre
+_BAND, _BLOCK = 1 << 15, 32  # samples at a time, and across: so that they stay in the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +63,27 @@ class Sightings:
         """Some rows at a time, each of which remembers what is around its places."""
         rows = max(1, _BAND // len(self.layout.x))
         parts = [slice(k, k + rows) for k in range(0, len(self.layout.y), rows)]
+        return [(part, replace(self, layout=self.layout.part(part))) for part in parts]
+
+    @cached_property
+    def blocks(self) -> list[tuple[slice, slice, "Sightings"]]:
+        """Some rows and columns at a time."""
+        rows, columns = (
+            [slice(k, k + _BLOCK) for k in range(0, len(places), _BLOCK)]
+            for places in (self.layout.y, self.layout.x)
+        )
         return [
-            (part, Sightings(self.flat, self.calibration, self.layout.part(part), self.focus))
-            for part in parts
+            (down, right, replace(self, layout=self.layout.part(down, right)))
+            for down in rows
+            for right in columns
         ]
+
+    def blurred(self, sizes: np.ndarray) -> Blurred:
+        """The raw image for `disagreements`."""
+        trusts = [(float(size), self._trust(float(size))) for size in sizes]
+        return Blurred.of(
+            self.flat.image, self.focus, [(size, trust) for size, trust in trusts if trust is not None]
+        )
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -113,27 +128,49 @@ class Sightings:
             y, x = warp.applied(np.stack([y, x], -1)).T
         return y.astype(np.float32), x.astype(np.float32)
 
-    def alike(self, size: float) -> list[np.ndarray]:
-        """The raw image (y, x) for each kind of lenslets, as blurred as the others' if patches have a size.
+    def disagreements(self, sizes: np.ndarray, most: float, blurred: Blurred) -> np.ndarray:
+        """How much lenslets differ (n, y, x) if all patches have one of `sizes` (n,); see `Beside`."""
+        pitch, even = self.calibration.lattice.pitch, self.flat.even
+        beside = self._beside(float(np.abs(sizes).min()))
+        steps = np.arange(math.ceil(_FINE * (even + 1))).astype(np.float32) / np.float32(_FINE)
+        light = np.clip(even - steps, 0, 1) * self.flat.light(steps / np.float32(pitch / 2)) ** 2
+        light[-1] = 0
+        out = np.empty((len(sizes), *self.shape), np.float32)
+        for k, size in enumerate(sizes):
+            near = beside.within(even / abs(size))
+            far = near.distance * np.float32(_FINE * abs(size))
+            weight = light.take(far.astype(np.int32), mode="clip")
+            trust = self._trust(float(size))
+            if trust is not None:
+                weight *= trust.astype(np.float32).take(near.kind)
+            at = [c - np.float32(size) * a for c, a in zip(near.center, near.away, strict=True)]
+            value = blurred.read(at, near.kind, float(size), trust)
+            out[k] = near.disagreement(weight, value, most).reshape(self.shape)
+        return out
 
-        A lenslet spreads a point over a disc as wide as the size differs from that at which it is sharp. So
-        another size is also told by micro-images that are not blurred as they should be.
-        """
-        trust = self._trust(size)
-        if trust is None or self.focus is None:
-            return [self.flat.image]
-        blur = _SIGMA * np.abs(size - self.focus)
-        more = np.sqrt(np.maximum(blur[trust >= _COUNTS].max() ** 2 - blur**2, 0))
-        return [gaussian_filter(self.flat.image, sigma) for sigma in more]
+    def _beside(self, size: float) -> Beside:
+        """The lenslets that show the places if their patches have a size [px] or more."""
+        lattice, (ny, nx) = self.calibration.lattice, self.calibration.shape
+        pitch, half = np.float32(lattice.pitch), lattice.pitch / 2
+        steps = self._steps((min(self.flat.even / size, _FARTHEST) + 0.75) * lattice.pitch)
+        every = np.arange(self.shape[0] * self.shape[1])
+        move = np.array([lattice.matrix @ step for step in steps], np.float32)
+        away = [(a.ravel() - m[:, None]) / pitch for a, m in zip(self._nearest, move.T, strict=True)]
+        center = [
+            np.stack(part) for part in zip(*(self._centers(every, step) for step in steps), strict=True)
+        ]
+        kinds = np.array([lattice.kind(*map(np.asarray, step)) for step in steps], np.int8)
+        kind = np.mod(self._kinds + kinds[:, None], np.int8(lattice.kinds))
+        cy, cx = center
+        whole = (cy >= half - 1) & (cy + half <= ny) & (cx >= half - 1) & (cx + half <= nx)
+        return Beside.of((away[0], away[1]), (cy, cx), kind, whole, self.flat.even / size)
 
-    def around(
-        self, size: np.ndarray | float, images: Sequence[np.ndarray] = (), fineness: int = 1
-    ) -> Iterator[Sight]:
+    def around(self, size: np.ndarray | float, *, finer: bool = False) -> Iterator[Sight]:
         """What each lenslet near a place shows of it if its patch has a size, one or (y, x) [px].
 
-        `images` are the raw image for each kind of lenslets, or one for all, of so many samples per pixel.
+        Of the raw image, or of the finer one.
         """
-        images = images or [self.flat.image]
+        image, fineness = (self.flat.finer, 2) if finer else (self.flat.image, 1)
         lattice, (ny, nx) = self.calibration.lattice, self.calibration.shape
         reach = min(self.flat.even / float(np.abs(size).min()), _FARTHEST) * lattice.pitch
         ratio, trust = np.asarray(size / lattice.pitch, np.float32), self._trust(size)
@@ -148,16 +185,15 @@ class Sightings:
             light = self.flat.light(distance / np.float32(half))
             whole = (cy >= half - 1) & (cy + half <= ny) & (cx >= half - 1) & (cx + half <= nx)
             weight = np.clip(self.flat.even - distance, 0, 1) * light**2 * whole
-            kind = np.mod(
-                self._kinds[here] + np.int8(lattice.kind(*map(np.asarray, step))), np.int8(lattice.kinds)
-            )
             if trust is not None:
+                there = np.int8(lattice.kind(*map(np.asarray, step)))
+                kind = np.mod(self._kinds[here] + there, np.int8(lattice.kinds))
                 weight *= np.choose(kind, [self._some(part, here) for part in trust])
             if weight.any():
                 slant = self._some(ratio, here)
                 at = [fineness * (c - slant * a.ravel()[here]) for c, a in zip((cy, cx), away, strict=True)]
-                value = _read(images, at, kind)
-                yield Sight(self._spread(weight, here), self._spread(value, here), away, here, at)
+                value = self._spread(_linear(image, at), here)
+                yield Sight(self._spread(weight, here), value, away, here, at)
 
     def _some(self, values: np.ndarray, here: np.ndarray) -> np.ndarray:
         """Values, one or (y, x), at numbered places (n,)."""
@@ -190,28 +226,6 @@ class Sightings:
             weights += sight.weight
         return total / weights
 
-    def disagreement(self, size: float, most: float, images: Sequence[np.ndarray]) -> np.ndarray:
-        """How much lenslets differ (y, x) from the nearest sharp one if all patches have a size, to 2 `most`.
-
-        What stands before a place hides it from the lenslets on one side; so the better of the left and the
-        right ones counts, and the better of the upper and the lower.
-        """
-        sights = list(self.around(size, images))
-        pitch = self.calibration.lattice.pitch
-        near = np.stack([sight.weight / (1 + np.hypot(*sight.away) / pitch) for sight in sights]).argmax(0)
-        mine = np.take_along_axis(np.stack([sight.value for sight in sights]), near[None], 0)[0]
-        sums = np.zeros((4, 2, *self.shape), np.float32)
-        for k, sight in enumerate(sights):
-            weight = sight.weight * (near != k)
-            off = weight * np.minimum(np.abs(sight.value - mine), np.float32(most))
-            for axis, away in enumerate(sight.away):
-                for side, total in zip((away, -away), sums[2 * axis : 2 * axis + 2], strict=True):
-                    here = side < np.float32(_MIDDLE * pitch)
-                    total[0] += off * here
-                    total[1] += weight * here
-        means = (sums[:, 0] + np.float32(_FEW * _UNKNOWN * most)) / (sums[:, 1] + np.float32(_FEW))
-        return np.minimum(means[0], means[1]) + np.minimum(means[2], means[3])
-
     def asked(self, size: np.ndarray, noise: float) -> np.ndarray:
         """What lenslets pull at patches (y, x), their information, variance, and disputed part (4, y, x).
 
@@ -219,7 +233,7 @@ class Sightings:
         micro-image's edge. Values that are off by more than their noise count less: as the last says.
         """
         step = np.asarray(size / self.calibration.lattice.pitch / self.flat.even, np.float32)
-        sights = list(self.around(size, [self.flat.finer], 2))
+        sights = list(self.around(size, finer=True))
         values = np.stack([sight.value for sight in sights])
         slopes = np.stack([step * self._slope(sight) for sight in sights])
         weights = seen = np.stack([sight.weight for sight in sights])
@@ -243,17 +257,6 @@ class Sightings:
                 ends.append(_linear(image, at))
             slope -= away.ravel()[sight.here] * (ends[1] - ends[0])
         return self._spread(slope, sight.here)
-
-
-def _read(images: Sequence[np.ndarray], at: Sequence[np.ndarray], kind: np.ndarray) -> np.ndarray:
-    """Values (n,) at places of the image of each one's kind of lenslets."""
-    if len(images) == 1:
-        return _linear(images[0], at)
-    value = np.empty(kind.shape, np.float32)
-    for number, image in enumerate(images):
-        here = kind == number
-        value[here] = _linear(image, [place[here] for place in at])
-    return value
 
 
 def _linear(image: np.ndarray, at: Sequence[np.ndarray]) -> np.ndarray:

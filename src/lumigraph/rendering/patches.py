@@ -211,6 +211,6 @@ class Layout:
             )
         return cls(axes[0][top:bottom], axes[1][left:right], step)
 
-    def part(self, rows: slice) -> "Layout":
-        """Some of its rows."""
-        return replace(self, y=self.y[rows])
+    def part(self, rows: slice, columns: slice = slice(None)) -> "Layout":
+        """Some of its rows and columns."""
+        return replace(self, y=self.y[rows], x=self.x[columns])
