@@ -92,8 +92,10 @@ def test_a_microscope_sees_an_object_that_was_moved():
     place = Grid((1, 1), grid.pitch, (grid.y[row], grid.x[column]))
     first, second, third = operator.parted(operator.forward(x))
     iy, ix = place.samples_to(mine)
-    np.testing.assert_allclose(first, own.psf((1, iy, ix)), atol=1e-6 * first.max())
-    np.testing.assert_allclose(second, own.psf((1, iy + 2, ix - 1)), atol=1e-6 * first.max())
+    # 1e-3: what few patterns of pixels may leave out. A sample farther it is another picture by 0.1.
+    assert relative(first, own.psf((1, iy, ix))) < 1e-3
+    assert relative(second, own.psf((1, iy + 2, ix - 1))) < 1e-3
+    assert relative(second, own.psf((1, iy + 2, ix))) > 0.1
     assert third.sum() == pytest.approx(first.sum(), rel=0.01)
     assert relative(third, first) > 0.05
 

@@ -14,7 +14,14 @@ from lumigraph.operators.microscope_building import Layout, microscope_operator
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_kernels import SHARES, Demand, slice_kernel
 from lumigraph.operators.microscope_operator import _MATRICES
-from lumigraph.operators.microscope_patterns import all_patterns, few_patterns
+from lumigraph.operators.microscope_patterns import (
+    PIXELS,
+    all_patterns,
+    few_of_pixels,
+    few_patterns,
+    parted,
+    whole,
+)
 
 SCOPE = Objective(525e-9, 0.5)
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)
@@ -60,6 +67,54 @@ def test_patterns_are_as_few_as_singular_values_allow(kernel):
     weaker = found.basis[:, np.argsort(np.square(found.basis.T @ images).sum(1))[1:]]
     lost = np.linalg.norm(images - weaker @ (weaker.T @ images), axis=1) / np.linalg.norm(images, axis=1)
     assert lost.max() > 1e-2  # one fewer is one too few
+
+
+@pytest.fixture(scope="module")
+def fine():
+    """Kernels of two depths, sampled more finely than their light asks for."""
+    return [
+        slice_kernel([SCOPE], LENSLET, CellSampling(3, 31, 1 / 31), z, Demand(2e-2, 20)) for z in DEPTHS[:2]
+    ]
+
+
+@pytest.mark.parametrize("allowed", [3e-2, 3e-3])
+def test_no_points_image_loses_more_by_patterns_of_its_pixels_than_is_said(fine, allowed):
+    found, lost = few_of_pixels(fine, allowed), []
+    for kernel in fine:
+        s, N, n = kernel.sampling.points, kernel.sampling.pixels, len(kernel.offsets)
+        cells = kernel.matrix().reshape(n, s * s, N * N).transpose(1, 0, 2).astype(float)
+        rest = cells - cells @ found.basis @ found.basis.T
+        lost.append(np.linalg.norm(rest, axis=(1, 2)) / np.linalg.norm(cells, axis=(1, 2)))
+    assert found.left_out == pytest.approx(np.max(lost), rel=1e-3)
+    assert found.left_out <= allowed
+    assert found.count < 0.7 * 31**2
+    np.testing.assert_allclose(found.basis.T @ found.basis, np.eye(found.count), atol=1e-12)
+
+
+def test_patterns_of_pixels_are_taken_from_a_plane_as_their_values_say(fine, xp, rng):
+    """And put back: by even and odd sums along the axes, and by all values of each pattern."""
+    found, plane = few_of_pixels(fine, 1e-2), rng.random((2 * 31, 3 * 31))
+    cells = plane.reshape(2, 31, 3, 31).transpose(0, 2, 1, 3).reshape(2, 3, -1)
+    parts = np.asarray(parted(xp.asarray(plane), found))
+    np.testing.assert_allclose(parts, cells @ found.basis, atol=1e-12)
+    back = np.asarray(whole(xp.asarray(parts), found)).reshape(2, 31, 3, 31).transpose(0, 2, 1, 3)
+    np.testing.assert_allclose(back.reshape(2, 3, -1), parts @ found.basis.T, atol=1e-12)
+
+
+def test_images_by_few_patterns_of_pixels_differ_by_what_the_operator_says():
+    """All s² patterns of points are followed there: what is lost the pixels' lose."""
+    layout = Layout((7, 8), CellSampling(3, 31, 1 / 31))
+    one = microscope_operator([SCOPE], LENSLET, layout, DEPTHS, accuracy=2e-2)
+    one = dataclasses.replace(one, by_frequency=True, _spectra={})
+    exact, lost = dataclasses.replace(one, by_frequency=False, _spectra={}), []
+    for place in ((0, 10, 11), (1, 10, 12), (2, 11, 10)):
+        point = np.zeros(one.shape[1])
+        point[place] = 1
+        expected = exact.psf(place)
+        lost.append(np.linalg.norm(one.forward(point) - expected) / np.linalg.norm(expected))
+    assert 0.3 < max(lost) / (PIXELS * one.left_out) < 1.05
+    assert math.hypot(exact.error, max(lost)) < 1.05 * one.error
+    assert one.memory_bytes < dataclasses.replace(one, left_out=0.0, _spectra={}).memory_bytes
 
 
 def test_patterns_are_orthonormal_and_even_or_odd_as_they_say(kernel):

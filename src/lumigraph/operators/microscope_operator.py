@@ -23,7 +23,7 @@ from lumigraph.core.matrix import Matrix
 from lumigraph.operators import microscope_spectrum
 from lumigraph.operators.microscope_far import FarLight
 from lumigraph.operators.microscope_kernels import SliceKernel
-from lumigraph.operators.microscope_patterns import Patterns, patterns
+from lumigraph.operators.microscope_patterns import Patterns, patterns, pixel_patterns
 from lumigraph.operators.microscope_tiles import Tiling
 
 GATHERED = 2**27
@@ -54,8 +54,8 @@ class MicroscopeOperator(Linear):
         Whether `forward` and `adjoint` go through the lenslets' frequencies (`microscope_spectrum`), where
         rounding may leave -1e-6 of the highest value instead of 0; else by products over all offsets.
     left_out
-        Relative rms of a point's image that fewer patterns may leave out there (`microscope_patterns`); 0 for
-        all patterns.
+        Relative rms of a point's image that fewer patterns of the points may leave out there, and a third
+        of it those of the pixels (`microscope_patterns`); 0 for all patterns.
     """
 
     kernels: tuple[SliceKernel, ...]
@@ -87,8 +87,8 @@ class MicroscopeOperator(Linear):
         """Relative rms of points' images, of the worst depth, with what is left out of them."""
         if not self.by_frequency:
             return max(kernel.error for kernel in self.kernels)
-        pairs = zip(self.kernels, self._points, strict=True)
-        return max(math.hypot(kernel.error, points.left_out) for kernel, points in pairs)
+        pairs, pixels = zip(self.kernels, self._points, strict=True), self._pixels.left_out
+        return max(math.hypot(kernel.error, points.left_out, pixels) for kernel, points in pairs)
 
     @property
     def multiply_adds(self) -> int:
@@ -108,7 +108,7 @@ class MicroscopeOperator(Linear):
         """Of the kernels, of the matrices, and of what `forward` or `adjoint` holds [bytes]."""
         N, given = self.kernels[0].sampling.pixels, sum(math.prod(shape) for shape in self.shape)
         if self.by_frequency:
-            held = microscope_spectrum.held_numbers(self._tiling, self._points, N)
+            held = microscope_spectrum.held_numbers(self._tiling, self._points, self._pixels)
             return self.nbytes + 4.0 * (self._matrix_numbers + given + held)
         most = max(len(kernel.offsets) * kernel.sampling.classes for kernel in self.kernels)
         gathered = min(2 * most * math.prod(self.cells), 2 * GATHERED)
@@ -156,8 +156,8 @@ class MicroscopeOperator(Linear):
     @property
     def _tiling(self) -> Tiling:
         if "tiling" not in self._spectra:
-            channels = _channels(self._points)
-            told = microscope_spectrum.tiling(self.kernels, self.cells, self.margin, channels)
+            counts = _counts(self._points, self._pixels)
+            told = microscope_spectrum.tiling(self.kernels, self.cells, self.margin, counts)
             self._spectra["tiling"] = told
         return self._spectra["tiling"]
 
@@ -169,9 +169,15 @@ class MicroscopeOperator(Linear):
         return self._spectra["points"]
 
     @property
+    def _pixels(self) -> Patterns:
+        """Patterns of a cell's image."""
+        if "pixels" not in self._spectra:
+            self._spectra["pixels"] = pixel_patterns(self.kernels, self.left_out)
+        return self._spectra["pixels"]
+
+    @property
     def _matrix_numbers(self) -> int:
-        N = self.kernels[0].sampling.pixels
-        return microscope_spectrum.matrix_numbers(self._tiling, _channels(self._points), N)
+        return microscope_spectrum.matrix_numbers(self._tiling, *_counts(self._points, self._pixels))
 
     def _forward(self, intensity: Array) -> Array:
         volume = intensity if self.depths is not None else intensity[None, ...]
@@ -197,7 +203,7 @@ class MicroscopeOperator(Linear):
         key = arrays.placement(like)
         if key not in self._spectra:
             self._spectra[key] = microscope_spectrum.Spectra.of(
-                self.kernels, self._points, self._tiling, like
+                self.kernels, (self._points, self._pixels), self._tiling, like
             )
         return self._spectra[key]
 
@@ -262,15 +268,15 @@ def suits_frequencies(
     """Whether the way through the lenslets' frequencies is faster, and its matrices leave memory free."""
     if not all(kernel.symmetric for kernel in kernels):
         return False
-    channels, free = _channels(patterns(kernels, left_out)), memory.available()
-    told = microscope_spectrum.tiling(kernels, cells, margin, channels)
-    needed = 4.0 * microscope_spectrum.matrix_numbers(told, channels, kernels[0].sampling.pixels)
+    counts = _counts(patterns(kernels, left_out), pixel_patterns(kernels, left_out))
+    told, free = microscope_spectrum.tiling(kernels, cells, margin, counts), memory.available()
+    needed = 4.0 * microscope_spectrum.matrix_numbers(told, *counts)
     fits = free is None or needed < free * SHARE
-    return fits and microscope_spectrum.is_faster(kernels, told, channels)
+    return fits and microscope_spectrum.is_faster(kernels, told, counts)
 
 
-def _channels(points: Sequence[Patterns]) -> int:
-    return sum(one.count for one in points)
+def _counts(points: Sequence[Patterns], pixels: Patterns) -> tuple[int, int]:
+    return sum(one.count for one in points), pixels.count
 
 
 def _products(

@@ -1,16 +1,20 @@
-r"""Patterns of a cell's points, even or odd along y and x, as which a depth's light is followed.
+r"""Patterns of a cell's points and pixels, even or odd along y and x, as which light is followed.
 
 Points stand as close at all depths as the depth that is seen most finely asks for. At others their images
 differ by less: the matrix from a cell's points to the pixels of all cells is of low rank but for a small
 rest. Its singular vectors are the few patterns that hold every point's image but for the relative rms that is
-allowed. What they leave out is measured, and counts in the operator's error.
+allowed. Images are sampled as finely as their steepest places ask for: of a cell's image, too, fewer patterns
+than samples hold the light of all depths. What is left out is measured, and counts in the operator's error.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
+from lumigraph.core import arrays
+from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache, remembered
 from lumigraph.core.threads import each, single_products
 from lumigraph.operators.microscope_cell import parts
@@ -19,39 +23,79 @@ from lumigraph.operators.microscope_kernels import SliceKernel
 WORTH = 0.8
 """Part of all patterns: if more are wanted all of them are followed, which leaves nothing out."""
 
+PIXELS = 1 / 3
+"""Part of what patterns of the points may leave out that those of the pixels may: in squares a ninth."""
+
+SEPARATE = 8
+"""Places along a side of a cell from which on patterns are taken along y and then along x."""
+
+PARITIES = (0, 0), (0, 1), (1, 0), (1, 1)
+"""Whether patterns are odd along y, and along x."""
+
 _FOUND = ByteCache()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Patterns:
     """Orthonormal patterns over the places of a cell.
 
     Parameters
     ----------
-    basis
-        (n², r): each pattern's value at the cell's places.
+    along
+        (n, n), orthonormal rows, first even, then odd: products of two of them, one along y and one along x,
+        are all patterns that there can be.
     odd
         (2, r) of 0 and 1: whether a pattern is odd along y, and along x.
+    vectors
+        Of each parity (0, 0), (0, 1), (1, 0), (1, 1), its patterns (products, r) in terms of the products of
+        that parity; the patterns follow one another in this order. None where they are all products.
     left_out
         Relative rms of the image of a point as the sum of its patterns, the worst of all points.
-    along
-        (n, n), of which they are all products of two rows, one along y and one along x; None for others.
     """
 
-    basis: np.ndarray
+    along: np.ndarray
     odd: np.ndarray
+    vectors: tuple[np.ndarray, ...] | None = None
     left_out: float = 0.0
-    along: np.ndarray | None = None
+    _held: dict = field(default_factory=dict, repr=False)
 
     @property
     def count(self) -> int:
         """Patterns, r."""
-        return self.basis.shape[1]
+        return self.odd.shape[1]
+
+    @cached_property
+    def basis(self) -> np.ndarray:
+        """(n², r): each pattern's value at the cell's places."""
+        products = np.kron(self.along, self.along).T
+        if self.vectors is None:
+            return products
+        whole, parities = all_patterns(len(self.along)), zip(PARITIES, self.vectors, strict=True)
+        return np.concatenate([products[:, whole.of_parity(*odd)] @ own for odd, own in parities], axis=1)
 
     @property
     def nbytes(self) -> int:
         """Of the arrays."""
-        return self.basis.nbytes + self.odd.nbytes
+        return len(self.along) ** 2 * (self.count + 1) * 8
+
+    def held(self, like: Array) -> tuple[Array | None, tuple[Array, ...]]:
+        """`along` and `vectors`, none where they are all products, in the library and precision of an array.
+
+        Of small cells None, and the `basis` alone: one product takes less time there.
+        """
+        key = arrays.placement(like)
+        if key not in self._held:
+            small = len(self.along) < SEPARATE
+            vectors = (self.basis,) if small else self.vectors or ()
+            along = None if small else arrays.like(self.along, like)
+            self._held[key] = along, tuple(arrays.like(one, like) for one in vectors)
+        return self._held[key]
+
+    def blocks(self, vectors: Sequence[Array]) -> Iterator[tuple[tuple[slice, slice], Array]]:
+        """Where (y, x) the products of each parity stand among (n, n), and its vectors."""
+        n, half = len(self.along), (len(self.along) + 1) // 2
+        sides = slice(0, half), slice(half, n)
+        return (((sides[y], sides[x]), own) for (y, x), own in zip(PARITIES, vectors, strict=True))
 
     def of_parity(self, odd_y: int, odd_x: int) -> np.ndarray:
         """Numbers of the patterns of a parity."""
@@ -67,12 +111,11 @@ def all_patterns(n: int) -> Patterns:
     """
     one, half = parts(n), (n + 1) // 2
     odd_y, odd_x = np.divmod(np.arange(n * n), n)
-    odd = np.stack([odd_y >= half, odd_x >= half]).astype(np.int8)
-    return Patterns(np.kron(one, one).T, odd, along=one)
+    return Patterns(one, np.stack([odd_y >= half, odd_x >= half]).astype(np.int8))
 
 
 def patterns(kernels: Sequence[SliceKernel], left_out: float) -> list[Patterns]:
-    """Of each depth, so few that no point's image loses more than a relative rms `left_out`.
+    """Of the points of each depth, so few that no point's image loses more than a relative rms `left_out`.
 
     Parameters
     ----------
@@ -90,33 +133,89 @@ def patterns(kernels: Sequence[SliceKernel], left_out: float) -> list[Patterns]:
     return list(each(found, kernels))
 
 
+def pixel_patterns(kernels: Sequence[SliceKernel], left_out: float) -> Patterns:
+    """Of the image's samples, for all depths; they leave out `PIXELS` of what those of the points may."""
+    if left_out <= 0:
+        return all_patterns(kernels[0].sampling.pixels)
+    key = (*kernels, left_out, "pixels")
+    return _FOUND.get(key, lambda: few_of_pixels(kernels, PIXELS * left_out))
+
+
 @single_products()
 def few_patterns(kernel: SliceKernel, left_out: float) -> Patterns:
     """The strongest patterns of a depth: singular vectors of each parity (C. Eckart & G. Young, 1936)."""
-    whole = all_patterns(kernel.sampling.points)
-    vectors, energy = _strongest_first(kernel, whole)
-    shares = np.square(whole.basis @ vectors) * energy  # of each point's image
-    left = np.cumsum(shares[:, ::-1], 1)[:, ::-1]  # without that pattern and all weaker ones
+    whole, (blocks, weights) = all_patterns(kernel.sampling.points), quadrant(kernel)
+    rows = whole.basis.T.astype(np.float32) @ blocks
+    found, shares = [], []
+    for places in map(whole.of_parity, *zip(*PARITIES, strict=True)):
+        part = rows[:, places].astype(np.float64)
+        energy, vectors = np.linalg.eigh(np.tensordot(weights, part @ part.transpose(0, 2, 1), 1))
+        found.append((energy, vectors))
+        shares.append(np.square(whole.basis[:, places] @ vectors) * np.maximum(energy, 0))
+    return _strongest(whole, found, np.concatenate(shares, axis=1), left_out)
+
+
+@single_products()
+def few_of_pixels(kernels: Sequence[SliceKernel], left_out: float) -> Patterns:
+    """The strongest patterns of the samples of a cell's image; each depth counts as much."""
+    whole = all_patterns(kernels[0].sampling.pixels)
+
+    def light(kernel: SliceKernel) -> list[np.ndarray]:
+        """ΣwIIᵀ of each parity, of a depth's images I."""
+        parts, weights = _images(kernel, whole)
+        found = [np.tensordot(weights, part.transpose(0, 2, 1) @ part, 1) for part in parts]
+        power = sum(float(np.trace(one)) for one in found)
+        return [one / power for one in found]
+
+    def shares(kernel: SliceKernel) -> np.ndarray:
+        """Of each point's image (s², N²)."""
+        parts = _images(kernel, whole)[0]
+        own = (np.square(part @ vectors) for part, (_, vectors) in zip(parts, found, strict=True))
+        return np.concatenate([_of_all_cells(one, kernel) for one in own], axis=1)
+
+    found = [np.linalg.eigh(sum(one)) for one in zip(*map(light, kernels), strict=True)]
+    return _strongest(whole, found, np.concatenate([shares(one) for one in kernels]), left_out)
+
+
+def _images(kernel: SliceKernel, every: Patterns) -> tuple[list[np.ndarray], np.ndarray]:
+    """Images (n, s², products) of each parity, of points in cells above and left; and their weights."""
+    blocks, weights = quadrant(kernel)
+    products = of_images(blocks, every)
+    places = map(every.of_parity, *zip(*PARITIES, strict=True))
+    return [products[..., own].astype(np.float64) for own in places], weights
+
+
+def _of_all_cells(energy: np.ndarray, kernel: SliceKernel) -> np.ndarray:
+    """Sums (s², r) over all cells of the light² (n, s², r) in those below and right of a point's own.
+
+    In the other cells flipped points have the same: a pattern's square does not tell.
+    """
+    s, offsets = kernel.sampling.points, kernel.offsets
+    whole = energy.reshape(len(energy), s, s, -1)
+    for axis, places in enumerate(offsets[(offsets >= 0).all(1)].T):
+        whole = whole + np.flip(whole, axis + 1) * (places > 0)[:, None, None, None]
+    return whole.sum(0).reshape(s * s, -1)
+
+
+def _strongest(
+    whole: Patterns, found: Sequence[tuple[np.ndarray, np.ndarray]], shares: np.ndarray, left_out: float
+) -> Patterns:
+    """The strongest of the patterns found, by light² and vectors of each parity.
+
+    `shares` (points, patterns) are the patterns' of each point's light².
+    """
+    order = np.argsort(-np.concatenate([energy for energy, _ in found]), kind="stable")
+    left = np.cumsum(shares[:, order[::-1]], 1)[:, ::-1]  # without that pattern and all weaker ones
     missing = np.sqrt(np.max(left / np.maximum(left[:, :1], np.finfo(float).tiny), axis=0))
     kept = int((missing > left_out).sum())
     if kept > WORTH * whole.count:
         return whole
-    chosen = vectors[:, :kept]
-    odd = whole.odd[:, np.abs(chosen).argmax(0)]
-    return Patterns(whole.basis @ chosen, odd, float(missing[kept]))
-
-
-def _strongest_first(kernel: SliceKernel, whole: Patterns) -> tuple[np.ndarray, np.ndarray]:
-    """Singular vectors (s², s²) in terms of all patterns, and the light² of each in all cells, falling."""
-    blocks, weights = quadrant(kernel)
-    rows = whole.basis.T.astype(np.float32) @ blocks
-    vectors, energy = np.zeros((whole.count, whole.count)), np.zeros(whole.count)
-    for places in map(whole.of_parity, (0, 0, 1, 1), (0, 1, 0, 1)):
-        part = rows[:, places].astype(np.float64)
-        products = np.tensordot(weights, part @ part.transpose(0, 2, 1), 1)
-        energy[places], vectors[np.ix_(places, places)] = np.linalg.eigh(products)
-    order = np.argsort(-energy, kind="stable")
-    return vectors[:, order], np.maximum(energy[order], 0)
+    chosen = np.zeros(len(order), bool)
+    chosen[order[:kept]] = True
+    parts = np.split(chosen, np.cumsum([len(energy) for energy, _ in found])[:-1])
+    vectors = tuple(one[:, own] for (_, one), own in zip(found, parts, strict=True))
+    odd = np.repeat(np.array(PARITIES, np.int8).T, [one.shape[1] for one in vectors], axis=1)
+    return Patterns(whole.along, odd, vectors, float(missing[kept]))
 
 
 def quadrant(kernel: SliceKernel) -> tuple[np.ndarray, np.ndarray]:
@@ -125,3 +224,47 @@ def quadrant(kernel: SliceKernel) -> tuple[np.ndarray, np.ndarray]:
     n, s, N = len(first), kernel.sampling.points, kernel.sampling.pixels
     weights = np.where(kernel.offsets[first] > 0, 2.0, 1.0).prod(1)
     return kernel.matrix().reshape(n, s * s, N * N)[first], weights
+
+
+def of_images(blocks: np.ndarray, patterns: Patterns) -> np.ndarray:
+    """Images (n, k, N²) to patterns (n, k, r)."""
+    N = len(patterns.along)
+    return parted(blocks.reshape(-1, N), patterns).reshape(*blocks.shape[:2], -1)
+
+
+def parted(plane: Array, patterns: Patterns) -> Array:
+    """Plane (rows n, columns n) to patterns of each cell (rows, columns, r)."""
+    xp, n, (along, vectors) = arrays.namespace(plane), len(patterns.along), patterns.held(plane)
+    shape = plane.shape[0] // n, plane.shape[1] // n
+    if along is None:
+        cells = xp.reshape(arrays.tiled(plane, (n, n)), (-1, n * n))
+        return xp.reshape(cells @ vectors[0], (*shape, patterns.count))
+    products = _turned(plane, along)
+    if not vectors:
+        return xp.reshape(arrays.tiled(products, (n, n)), (*shape, n * n))
+    products = arrays.tiled(products, (n, n))
+    own = (xp.reshape(products[..., y, x], (-1, v.shape[0])) @ v for (y, x), v in patterns.blocks(vectors))
+    return xp.reshape(xp.concat(list(own), axis=-1), (*shape, patterns.count))
+
+
+def whole(parts: Array, patterns: Patterns) -> Array:
+    """Transpose of `parted`, its inverse where all patterns are there: a plane (rows n, columns n)."""
+    xp, n, (along, vectors) = arrays.namespace(parts), len(patterns.along), patterns.held(parts)
+    shape, flat = parts.shape[:2], xp.reshape(parts, (-1, patterns.count))
+    if along is None:
+        return arrays.untiled(xp.reshape(flat @ xp.matrix_transpose(vectors[0]), (*shape, n, n)))
+    if not vectors:
+        return _turned(arrays.untiled(xp.reshape(flat, (*shape, n, n))), xp.matrix_transpose(along))
+    products, first = xp.empty((*shape, n, n), dtype=parts.dtype, device=arrays.device(parts)), 0
+    for (y, x), v in patterns.blocks(vectors):
+        own = flat[:, first : first + v.shape[1]] @ xp.matrix_transpose(v)
+        products[..., y, x] = xp.reshape(own, (*shape, y.stop - y.start, x.stop - x.start))
+        first += v.shape[1]
+    return _turned(arrays.untiled(products), xp.matrix_transpose(along))
+
+
+def _turned(plane: Array, along: Array) -> Array:
+    """Each cell (n, n) of a plane, times a matrix (n, n) along both axes: products of few large matrices."""
+    xp, n, shape = arrays.namespace(plane), along.shape[0], plane.shape
+    down = along @ xp.reshape(plane, (-1, n, shape[1]))
+    return xp.reshape(xp.reshape(down, (-1, n)) @ xp.matrix_transpose(along), shape)

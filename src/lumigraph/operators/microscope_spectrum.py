@@ -7,9 +7,9 @@ blocks over the offsets d is real but for a factor, and the four frequencies (±
 .. math:: \hat y_q = (-i)^{|q|} R\, (-i)^{|c|} \hat x_c, \quad
           R = (-1)^{q \cdot c} \sum_d K_{qc}(d)\, \mathrm{tr}(2\pi f_y d_y)\, \mathrm{tr}(2\pi f_x d_x)
 
-with tr the cosine where q and c have the same parity along that axis, the sine where not. Of the points few
-patterns are followed where they hold all images (`microscope_patterns`). It takes the same time however many
-lenslets a point lights. Large arrays of lenslets are treated in tiles (`microscope_tiles`).
+with tr the cosine where q and c have the same parity along that axis, the sine where not. Of the points and
+of the pixels few patterns are followed where they hold all images (`microscope_patterns`). It takes the same
+time however many lenslets a point lights. Large arrays of lenslets are treated in tiles (`microscope_tiles`).
 """
 
 import itertools
@@ -23,7 +23,7 @@ from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 from lumigraph.core.threads import each, single_products
 from lumigraph.operators.microscope_kernels import SliceKernel
-from lumigraph.operators.microscope_patterns import Patterns, all_patterns, quadrant
+from lumigraph.operators.microscope_patterns import Patterns, of_images, parted, quadrant, whole
 from lumigraph.operators.microscope_tiles import Span, Tiling, tilings
 
 LEAST = 8
@@ -36,15 +36,14 @@ READ, PASSED = 24, 150
 """Multiply-adds of a matrix product in the time of reading one number of `R` from memory, and of what is done
 to one number of a tile (transforms, parts and copies). The former was measured, the latter is a guess."""
 
-SEPARATE = 8
-"""Places along a side of a cell from which on patterns are taken along y and then along x."""
-
 GROUP = 2**22
 """Numbers of the transforms of all tiles that are treated at a time, at most, if one depth has fewer: they
 should stay in the processor's cache."""
 
 
-def tiling(kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int, channels: int) -> Tiling:
+def tiling(
+    kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int, counts: tuple[int, int]
+) -> Tiling:
     """The fastest whose matrices are at most `MOST`; the fewest matrices where none is.
 
     Parameters
@@ -55,45 +54,46 @@ def tiling(kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int, 
         Lenslets (rows, columns) whose images are followed.
     margin
         Lenslets that the object reaches beyond them on each side.
-    channels
-        Patterns of all depths.
+    counts
+        Patterns of the points of all depths, and of the image.
     """
     reach = max(int(np.abs(kernel.offsets).max()) for kernel in kernels)
-    least, N = min(LEAST, *cells), kernels[0].sampling.pixels
+    least = min(LEAST, *cells)
     found = list(tilings(cells, margin, reach, least))
-    fitting = [told for told in found if 4 * matrix_numbers(told, channels, N) <= MOST]
+    fitting = [told for told in found if 4 * matrix_numbers(told, *counts) <= MOST]
     if not fitting:
         return min(found, key=lambda told: told.frequencies)
-    return min(fitting, key=lambda told: cost(told, channels, N))
+    return min(fitting, key=lambda told: cost(told, *counts))
 
 
-def matrix_numbers(told: Tiling, channels: int, pixels: int) -> int:
-    """How many `matrices` has, for patterns of all depths and N × N pixels."""
-    return told.frequencies * channels * pixels**2
+def matrix_numbers(told: Tiling, points: int, pixels: int) -> int:
+    """How many `matrices` has, for patterns of the points of all depths and of the image."""
+    return told.frequencies * points * pixels
 
 
-def held_numbers(told: Tiling, points: Sequence[Patterns], pixels: int) -> int:
+def held_numbers(told: Tiling, points: Sequence[Patterns], pixels: Patterns) -> int:
     """How many one application holds at most, beside `matrices`, the object and the image."""
     counts = [sum(one.count for one in points[depths]) for depths in groups(points, told)]
     threads, columns = min(arrays.WORKERS, len(counts)), 4 * told.frequencies * told.count
     cells = max(math.prod(row.cells + 2 * max(row.margin, 0) for row in (told.rows, told.columns)), 1)
     transformed = 6 * told.lengths[0] * (told.lengths[1] // 2 + 1)  # three times real and imaginary parts
     ahead = min(2 * threads, len(counts)) + 1
-    of_groups = threads * max(counts) * (2 * cells + columns + transformed) + ahead * columns * pixels**2
-    return max(of_groups, pixels**2 * (2 * columns + transformed + 3 * math.prod(told.cells)))
+    of_groups = threads * max(counts) * (2 * cells + columns + transformed) + ahead * columns * pixels.count
+    of_image = pixels.count * (2 * columns + transformed) + 3 * len(pixels.along) ** 2 * math.prod(told.cells)
+    return max(of_groups, of_image)
 
 
-def cost(told: Tiling, channels: int, pixels: int) -> float:
+def cost(told: Tiling, points: int, pixels: int) -> float:
     """Of one application of the operator or of its transpose [multiply-adds]."""
-    passed = told.count * math.prod(told.lengths) * (channels + pixels**2)
-    return matrix_numbers(told, channels, pixels) * (READ + 4.0 * told.count) + PASSED * passed
+    passed = told.count * math.prod(told.lengths) * (points + pixels)
+    return matrix_numbers(told, points, pixels) * (READ + 4.0 * told.count) + PASSED * passed
 
 
-def is_faster(kernels: Sequence[SliceKernel], told: Tiling, channels: int) -> bool:
+def is_faster(kernels: Sequence[SliceKernel], told: Tiling, counts: tuple[int, int]) -> bool:
     """Whether it takes less time than the products over all offsets."""
     sampling = kernels[0].sampling
     products = sum(len(kernel.offsets) for kernel in kernels) * math.prod(told.cells) * sampling.classes
-    return products * sampling.pixels**2 > cost(told, channels, sampling.pixels)
+    return products * sampling.pixels**2 > cost(told, *counts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,7 +109,7 @@ class Spectra:
     pixels
         Patterns of the image.
     matrices
-        R (frequencies, patterns of some depths, N²), of the depths of each of `groups`.
+        R (frequencies, patterns of some depths, those of the image), of the depths of each of `groups`.
     """
 
     told: Tiling
@@ -120,20 +120,24 @@ class Spectra:
     @classmethod
     @single_products()
     def of(
-        cls, kernels: Sequence[SliceKernel], points: Sequence[Patterns], told: Tiling, like: Array
+        cls,
+        kernels: Sequence[SliceKernel],
+        patterns: tuple[Sequence[Patterns], Patterns],
+        told: Tiling,
+        like: Array,
     ) -> "Spectra":
-        """In the library and precision of an array."""
+        """In the library and precision of an array, for patterns of each depth and of the image."""
+        points, pixels = patterns
 
         def found(depths: slice) -> Array:
             chosen = points[depths]
             shape = told.frequencies, sum(one.count for one in chosen), pixels.count
             matrix, first = np.empty(shape, np.float32), 0
             for kernel, one in zip(kernels[depths], chosen, strict=True):
-                _fill(matrix[:, first : first + one.count], (kernel, one), told)
+                _fill(matrix[:, first : first + one.count], kernel, (one, pixels), told)
                 first += one.count
             return arrays.like(matrix, like)
 
-        pixels = all_patterns(kernels[0].sampling.pixels)
         return cls(told, points, pixels, list(each(found, groups(points, told))))
 
     def forward(self, volume: Array) -> Array:
@@ -143,7 +147,7 @@ class Spectra:
         def lit(group: tuple[slice, Array]) -> Array:
             depths, matrix = group
             chosen = self.points[depths]
-            cells = [_parted(volume[k + depths.start, ...], one) for k, one in enumerate(chosen)]
+            cells = [parted(volume[k + depths.start, ...], one) for k, one in enumerate(chosen)]
             cells = cells[0] if len(cells) == 1 else xp.concat(cells, axis=-1)
             return _columns(cells, self.told, _odd(chosen), of_image=False) @ matrix
 
@@ -152,12 +156,12 @@ class Spectra:
         shape = (*self.told.cells, self.pixels.count)
         image = xp.zeros(shape, dtype=volume.dtype, device=arrays.device(volume))
         _add_cells(image, columns, self.told, self.pixels.odd, of_image=True)
-        return _whole(image, self.pixels)
+        return whole(image, self.pixels)
 
     def adjoint(self, image: Array, even: Array | None = None) -> Array:
         """Transpose of `forward`: (z, rows s, columns s), and `even` (z, rows, columns) on all of a cell."""
         xp, told = arrays.namespace(image), self.told
-        columns = _columns(_parted(image, self.pixels), told, self.pixels.odd, of_image=True)
+        columns = _columns(parted(image, self.pixels), told, self.pixels.odd, of_image=True)
         shape = tuple(row.cells + 2 * row.margin for row in (told.rows, told.columns))
         s, like = (
             math.isqrt(len(self.points[0].basis)),
@@ -172,7 +176,10 @@ class Spectra:
             _add_cells(cells, columns @ xp.matrix_transpose(matrix), told, _odd(chosen), of_image=False)
             for k, one in enumerate(chosen, depths.start):
                 own = cells[..., first : first + one.count]
-                volume[k, ...] = _whole(own, one, None if even is None else even[k, ..., None])
+                plane = whole(own, one)
+                if even is not None:
+                    plane = arrays.untiled(arrays.tiled(plane, (s, s)) + even[k, ..., None, None])
+                volume[k, ...] = plane
                 first += one.count
 
         for _ in each(seen, zip(groups(self.points, told), self.matrices, strict=True)):
@@ -191,19 +198,18 @@ def groups(points: Sequence[Patterns], told: Tiling) -> list[slice]:
     return [*found, slice(start, len(points))]
 
 
-def _fill(matrix: np.ndarray, depth: tuple[SliceKernel, Patterns], told: Tiling) -> None:
-    """Write R (frequencies, r, N²) of a depth."""
-    kernel, points = depth
-    pixels, blocks = all_patterns(kernel.sampling.pixels), quadrant(kernel)[0]
-    basis, onto = (one.basis.astype(np.float32) for one in (points, pixels))
-    whole = basis.T @ blocks @ onto
+def _fill(matrix: np.ndarray, kernel: SliceKernel, patterns: tuple[Patterns, Patterns], told: Tiling) -> None:
+    """Write R (frequencies, patterns of the points, those of the image) of a depth."""
+    (points, pixels), blocks = patterns, quadrant(kernel)[0]
+    images = points.basis.T.astype(np.float32) @ blocks
+    parts = of_images(images, pixels)
     steps = kernel.offsets[(kernel.offsets >= 0).all(1)]
     waves = [_waves(length, steps[:, axis]) for axis, length in enumerate(told.lengths)]
     for cy, cx, qy, qx in itertools.product((0, 1), repeat=4):
         rows, columns = points.of_parity(cy, cx), pixels.of_parity(qy, qx)
         sign = np.float32(-1 if cy * qy ^ cx * qx else 1)
         trigonometric = sign * waves[0][cy ^ qy][:, None] * waves[1][cx ^ qx]
-        part = whole[:, rows[:, None], columns]
+        part = parts[:, rows[:, None], columns]
         product = trigonometric.reshape(told.frequencies, -1) @ part.reshape(len(part), -1)
         matrix[:, rows[:, None], columns] = product.reshape(told.frequencies, *part.shape[1:])
 
@@ -286,34 +292,3 @@ def _turns(odd: np.ndarray, like: Array, *, back: bool) -> tuple[Array, Array]:
     """(-i)^|c| and (-1)^c_y of channels of these parities."""
     turn, sign = np.array([1, -1j, -1])[odd.sum(0)], np.where(odd[0], -1.0, 1.0)
     return arrays.like(turn.conj() if back else turn, like), arrays.like(sign, like)
-
-
-def _parted(plane: Array, patterns: Patterns) -> Array:
-    """Plane (rows n, columns n) to patterns of each cell (rows, columns, r)."""
-    xp, n = arrays.namespace(plane), math.isqrt(len(patterns.basis))
-    cells = arrays.tiled(plane, (n, n))
-    if (along := _along(patterns, plane)) is not None:
-        parts = along @ cells @ xp.matrix_transpose(along)
-    else:
-        parts = xp.reshape(cells, (-1, n * n)) @ arrays.like(patterns.basis, plane)
-    return xp.reshape(parts, (*cells.shape[:2], patterns.count))
-
-
-def _whole(cells: Array, patterns: Patterns, even: Array | None = None) -> Array:
-    """Transpose of `_parted`, its inverse where all patterns are there; with `even` added to each cell."""
-    xp, (rows, columns, channels) = arrays.namespace(cells), cells.shape
-    n = math.isqrt(len(patterns.basis))
-    shape = rows, columns, n, n
-    if (along := _along(patterns, cells)) is not None:
-        whole = xp.matrix_transpose(along) @ xp.reshape(cells, shape) @ along
-    else:
-        basis = arrays.like(patterns.basis, cells)
-        whole = xp.reshape(xp.reshape(cells, (-1, channels)) @ xp.matrix_transpose(basis), shape)
-    return arrays.untiled(whole if even is None else whole + even[..., None])
-
-
-def _along(patterns: Patterns, like: Array) -> Array | None:
-    """What makes patterns axis by axis, where that takes less time than one product."""
-    if patterns.along is None or len(patterns.along) < SEPARATE:
-        return None
-    return arrays.like(patterns.along, like)
