@@ -6,6 +6,7 @@ import pytest
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.linear import Linear
+from lumigraph.core.matrix import Matrix
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import FormatError, GeometryError, SamplingError
 from lumigraph.operators import microscope_building as building
@@ -14,6 +15,7 @@ from lumigraph.operators.microscope_building import Layout, microscope_operator
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_kernels import Demand, octant, slice_kernel
 from lumigraph.operators.microscope_pixels import FRAME, placement
+from lumigraph.operators.resampling import Resampling
 
 SCOPE = Objective(525e-9, 0.5)
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)
@@ -259,3 +261,16 @@ def test_a_disk_without_room_is_refused_before_anything_is_computed(tmp_path, mo
         SamplingError, match=r"images of points need up to .* GiB but the disk of .* has .* free"
     ):
         microscope_operator([SCOPE], LENSLET, LAYOUT, DEPTHS, folder=tmp_path / "new")
+
+
+def test_straight_pixels_are_read_along_y_and_then_along_x():
+    # Turned by 2e-8 rad they wind by 1e-6 px, too much for two matrices, and see the same to rounding.
+    straight, turned = (
+        placement(lattice_calibration((60, 64), 9.3, rotation=angle), 16, 3)[0] for angle in (0.0, 2e-8)
+    )
+    assert isinstance(straight, Resampling)
+    assert isinstance(turned, Matrix)
+    plane = np.random.default_rng(0).random(straight.shape[1])
+    np.testing.assert_allclose(straight.forward(plane), turned.forward(plane), rtol=2e-6)
+    raw = np.random.default_rng(1).random((60, 64))
+    np.testing.assert_allclose(straight.adjoint(raw), turned.adjoint(raw), rtol=2e-6, atol=1e-6)

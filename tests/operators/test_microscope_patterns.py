@@ -10,12 +10,12 @@ import pytest
 from lumigraph.core.volume import Volume
 from lumigraph.deconvolution import deconvolve
 from lumigraph.elements.objective import Objective
+from lumigraph.instruments import LightFieldMicroscope
 from lumigraph.operators.microscope_building import Layout, microscope_operator
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_kernels import SHARES, Demand, slice_kernel
 from lumigraph.operators.microscope_operator import _MATRICES
 from lumigraph.operators.microscope_patterns import (
-    PIXELS,
     all_patterns,
     few_of_pixels,
     few_patterns,
@@ -112,9 +112,35 @@ def test_images_by_few_patterns_of_pixels_differ_by_what_the_operator_says():
         point[place] = 1
         expected = exact.psf(place)
         lost.append(np.linalg.norm(one.forward(point) - expected) / np.linalg.norm(expected))
-    assert 0.3 < max(lost) / (PIXELS * one.left_out) < 1.05
+    assert 0.3 < max(lost) / one._pixels.left_out < 1.05
     assert math.hypot(exact.error, max(lost)) < 1.05 * one.error
     assert one.memory_bytes < dataclasses.replace(one, left_out=0.0, _spectra={}).memory_bytes
+
+
+def test_patterns_of_pixels_leave_out_what_pixels_hardly_see():
+    """Pixels of any place average over samples: what they lose is what is said, by fewer patterns."""
+    scope = LightFieldMicroscope.from_catalogue("lfm-guv").replace(
+        lenslets={"count": (7, 7)}, sensor={"shape": (106, 106)}
+    )
+    one = scope.operator((-8e-6,), 3, accuracy=1e-2)
+    exact, lost = dataclasses.replace(one, by_frequency=False, _spectra={}), []
+    assert one.by_frequency
+    for place in ((0, 9, 10), (0, 10, 10), (0, 8, 10)):
+        point = np.zeros(one.shape[1])
+        point[place] = 1
+        expected = exact.psf(place)
+        lost.append(np.linalg.norm(one.forward(point) - expected) / np.linalg.norm(expected))
+    found, sampling = one._pixels, one.kernels[0].sampling
+    assert sampling.degree == 3
+    assert 0.5 < max(lost) / found.left_out < 1.1
+    assert one.error <= 1e-2
+    samples = [replace_sampling(kernel, dataclasses.replace(sampling, degree=0)) for kernel in one.kernels]
+    assert found.count < 0.85 * few_of_pixels(samples, found.left_out).count
+
+
+def replace_sampling(kernel, sampling):
+    """The same numbers, as pixels' own where the degree is 0."""
+    return dataclasses.replace(kernel, sampling=sampling)
 
 
 def test_patterns_are_orthonormal_and_even_or_odd_as_they_say(kernel):

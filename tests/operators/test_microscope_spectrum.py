@@ -118,3 +118,21 @@ def test_the_way_is_chosen_by_time_memory_and_symmetry(monkeypatch):
     assert suits_frequencies(deep.kernels, cells, 0)
     monkeypatch.setattr("lumigraph.core.memory.available", lambda: 14 * 10**5)
     assert not suits_frequencies(deep.kernels, cells, 0)
+
+
+@pytest.mark.parametrize("depths", [DEPTHS, None])
+def test_objects_side_by_side_give_what_each_gives_and_no_bit_depends_on_the_others(depths, xp, rng):
+    layout = Layout((6, 7), CellSampling(3, 8, 1 / 8))
+    one = microscope_operator([SCOPE], LENSLET, layout, depths, accuracy=2e-2)
+    one = dataclasses.replace(one, by_frequency=True, _spectra={})
+    assert one.side_by_side == 4
+    for shape, alone, together in (
+        (one.shape[1], one._forward, one._forwards), (one.shape[0], one._adjoint, one._adjoints)
+    ):  # fmt: skip
+        given = [xp.asarray(rng.random(shape, np.float32)) for _ in range(4)]
+        expected, found = (
+            [np.asarray(image) for image in some] for some in (map(alone, given), together(given))
+        )
+        np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6 * np.max(expected))
+        (lonely,) = together(given[2:3])
+        np.testing.assert_array_equal(np.asarray(lonely), found[2])

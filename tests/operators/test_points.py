@@ -64,7 +64,7 @@ def test_points_are_as_exact_as_asked_inside_at_the_border_and_outside(name):
             assert off < accuracy
             assert raw.metadata["error"]["rms"] <= accuracy
             if k < 2 and off > 1e-4:  # references are off by 2e-5, and 1e-4 beside the array
-                assert 0.5 < raw.metadata["error"]["rms"] / off < 1.5
+                assert 0.5 < raw.metadata["error"]["rms"] / off < 1.4
 
 
 @pytest.mark.parametrize("name", ["2.0", "1.0", "round", "three kinds"])
@@ -84,19 +84,27 @@ def test_light_that_opaque_rims_send_far_aside_is_not_lost(shape, layout, fill):
     """Some 1e-2 goes farther than it is followed at 1e-2; at 5e-4 it is followed through the whole array."""
     lenslets = {"count": (15, 15), "shape": shape, "layout": layout, "fill_factor": fill}
     camera = cameras.focused(**lenslets, pixel_pitch=20 * um)
-    image, fringes = white.white_image(camera, 1e-2)
-    whole, none = white.white_image(camera, 5e-4)
+    image, said = white.image_and_error(camera, 1e-2)
+    whole, little = white.image_and_error(camera, 5e-4)
     assert image.mean() == pytest.approx(whole.mean(), rel=5e-3)
     assert relative(image, whole) < 1e-2
-    assert 1e-4 < fringes < 1e-2
-    assert none < 1e-4
+    assert 0.5 < said / relative(image, whole) < 2
+    assert little < 2e-4
 
 
 def test_cells_in_the_middle_of_a_long_array_are_alike():
     """An array that is computed as a shorter one has the image of all its lenslets."""
     camera = cameras.focused(count=(4, 27), layout="hex", pixel_pitch=25 * um)
-    long = white.white_image(camera, 1e-2)[0]
+    long = white.white_image(camera, 1e-2)
     optics = Optics.of(camera, camera.object_distance, 1e-2)
     assert len(set(Side.of(optics, 1, 6.0).like)) < optics.cells.image[1]
-    whole = white.white_image(camera, 1e-3)[0]
+    whole = white.white_image(camera, 1e-3)
     assert relative(long, whole) < 1e-2
+
+
+def test_points_leave_warning_filters_alone_that_other_threads_share(monkeypatch):
+    camera = CAMERAS["2.0"].replace(main_lens={"aberrations": {7: 0.1}})
+    with monkeypatch.context() as without:
+        without.setattr("warnings.catch_warnings", None)
+        image = simulate(camera, targets.points([(0, 0, DZ)]), Incoherent(accuracy=1e-2)).data
+    assert image.sum() > 0

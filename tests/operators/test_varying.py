@@ -214,3 +214,43 @@ def test_opaque_slices_and_exact_lenslets_are_refused():
     with pytest.raises(GeometryError, match='model is "exact" but the main lens changes'):
         aberrated(model="exact").optics()
     assert aberrated(model="auto").optics().model == "auto"
+
+
+def test_a_sketch_keeps_distances_of_images(rng):
+    """Of smooth ones and of sharp ones: 8192 numbers for a million, to the few percent that lenses allow."""
+    images = [rng.random(10**6) * np.linspace(0, 1, 10**6) ** power for power in (0, 5, 60)]
+    images.append(np.eye(1, 10**6, 4321)[0])
+    sketches = [varying.sketch(image) for image in images]
+    assert {len(one) for one in sketches} == {varying.KEPT}
+    for k, (one, mine) in enumerate(zip(images, sketches, strict=True)):
+        for other, its in zip(images[:k], sketches[:k], strict=True):
+            assert np.linalg.norm(mine - its) == pytest.approx(np.linalg.norm(one - other), rel=0.05)
+    np.testing.assert_array_equal(varying.sketch(images[0][:100]), images[0][:100])
+
+
+def test_the_lens_of_the_axis_is_chosen_first():
+    """Its light is the same in mirrors: blocks are computed for a quarter of a plane."""
+    camera, fields = aberrated(MILD).optics(), np.linspace(-1.2e-3, 1.2e-3, 9)
+
+    def image(one):
+        waves = {j: rms for p in one.lens.elements for j, rms in dict(getattr(p, "coefficients", {})).items()}
+        return np.array([1.0, waves.get(7, 0.0), waves.get(8, 0.0)])
+
+    first = varying.lenses(camera, (fields, fields), image, 1e-2).chosen[0]
+    assert first.field == pytest.approx((0.0, 0.0), abs=1e-15)
+
+
+def test_counts_of_nodes_that_would_not_do_are_left_out(monkeypatch):
+    """Each leaves a part of what the one before it left: from 0.1 and 0.03 that is 5e-4 at 11."""
+    camera, fields, asked = aberrated(MILD).optics(), np.linspace(-1.2e-3, 1.2e-3, 9), []
+
+    def with_nodes(_, count):
+        asked.append(count)
+        return varying.Lenses((), np.zeros((0, count, count)), (0.0, 0.0), (1.0, 1.0), left[count])
+
+    monkeypatch.setattr(varying._Search, "with_nodes", with_nodes)
+    left = dict(zip(varying.COUNTS, (0.1, 0.03, 6e-3, 2e-3, 5e-4), strict=True))
+    assert varying.lenses(camera, (fields, fields), np.ravel, 1e-3).left == 5e-4
+    left = dict(zip(varying.COUNTS, (0.1, 0.2, 0.03, 5e-3, 5e-4), strict=True))
+    assert varying.lenses(camera, (fields, fields), np.ravel, 1e-2).left == 5e-3
+    assert asked == [3, 5, 11, 3, 5, 7, 9]

@@ -74,6 +74,18 @@ class Linear(ABC):
         """
         return self._adjoint(_accepted(GIVEN[1], raw, self.shape[0]))
 
+    @property
+    def side_by_side(self) -> int:
+        """Objects, or raw images, that are mapped together in less time than one after the other."""
+        return 1
+
+    def _forwards(self, intensities: Sequence[Array]) -> list[Array]:
+        """`_forward` of at most `side_by_side` objects; which others there are does not change a bit."""
+        return [self._forward(one) for one in intensities]
+
+    def _adjoints(self, raws: Sequence[Array]) -> list[Array]:
+        return [self._adjoint(one) for one in raws]
+
     def psf(self, index: tuple[int, ...], /) -> np.ndarray:
         """Raw image (ny, nx), float32 of NumPy, of one object sample of intensity 1.
 

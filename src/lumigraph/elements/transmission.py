@@ -1,7 +1,7 @@
 """What thin elements share: a factor for each sample, computed once for each grid."""
 
 import warnings
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,6 +18,7 @@ TRANSMISSIONS = ByteCache()
 """Transmissions by (element, grid, wavelength, placement); bounded, the least recently used go first."""
 
 
+@runtime_checkable
 class Thin(Protocol):
     """A hashable element that multiplies a field by one factor for each sample."""
 

@@ -46,6 +46,38 @@ def noll_to_nm(j: int) -> tuple[int, int]:
     return n, order if j % 2 == 0 else -order
 
 
+FAMILIES = ("spherical aberration", "coma", "astigmatism", "trefoil", "quadrafoil", "pentafoil")
+"""By the order over the angle."""
+
+ORDERS = ("", "secondary ", "tertiary ")
+
+
+def zernike_name(j: int) -> str:
+    """What a Zernike polynomial of Noll's index j is called.
+
+    Raises
+    ------
+    GeometryError
+        j is not a whole number of at least 1.
+
+    Examples
+    --------
+    >>> [zernike_name(j) for j in (1, 2, 4, 6, 7, 11, 12, 22)]  # doctest: +NORMALIZE_WHITESPACE
+    ['piston', 'tilt along x', 'defocus', 'astigmatism, cos 2θ', 'coma along y', 'spherical aberration',
+     'secondary astigmatism, cos 2θ', 'secondary spherical aberration']
+    """
+    n, m = noll_to_nm(j)
+    order = abs(m)
+    beyond = (n - order) // 2 - (2 - order if order < 2 else 0)  # the lowest are piston, defocus and tilt
+    if beyond < 0:
+        return ("piston", "defocus")[n // 2] if order == 0 else f"tilt along {'x' if m > 0 else 'y'}"
+    family = FAMILIES[order] if order < len(FAMILIES) else f"{order}-foil"
+    name = (ORDERS[beyond] if beyond < len(ORDERS) else f"{beyond + 1}th ") + family
+    if order == 1:
+        return f"{name} along {'x' if m > 0 else 'y'}"
+    return name if order == 0 else f"{name}, {'cos' if m > 0 else 'sin'} {order}θ"
+
+
 def zernike(j: int, rho: np.ndarray, theta: np.ndarray) -> np.ndarray:
     r"""Zernike polynomial of Noll's index j, with rms 1 over the unit disc.
 

@@ -166,8 +166,8 @@ class LightFieldMicroscope(DescribedMicroscope):
     def point_image(self, y: float, x: float, dz: float = 0.0, *, accuracy: float = 1e-3) -> np.ndarray:
         """Raw image (ny, nx) of a point anywhere [m] that is as bright as a sample of `object_grid` of 1.
 
-        `accuracy` is the relative rms error. A Fourier microscope spreads a point over the four samples
-        around it, as fine as its pixels.
+        `accuracy` is the relative rms error; a Fourier microscope has none, and sees no points beside its
+        `object_grid`.
 
         Examples
         --------
@@ -181,8 +181,7 @@ class LightFieldMicroscope(DescribedMicroscope):
         """As `point_image`, with the estimated relative rms error."""
         y, x, dz = (checks.finite(name, at) for name, at in zip(("y", "x", "dz"), (y, x, dz), strict=True))
         if self.configuration == "fourier":
-            operator = fourier_operator(self.objectives, self._mosaic(), (dz,))
-            return operator.point_image(y, x), operator.error
+            return self._fourier_point(y, x, dz), math.nan
         beside = any(
             abs(at) > n * self.lenslet_size / 2 for at, n in zip((y, x), self.lenslets.count, strict=True)
         )
@@ -190,6 +189,12 @@ class LightFieldMicroscope(DescribedMicroscope):
         layout = self._layout(SAMPLES, None, (dz,), finer)
         image, error = point_image(self.objectives, self.lenslet, layout, (y, x, dz), finer)
         return image, error / OUTSIDE if beside else error
+
+    def _fourier_point(self, y: float, x: float, dz: float) -> np.ndarray:
+        grid = self.object_grid
+        if any(abs(at) > size / 2 for at, size in zip((y, x), grid.size, strict=True)):
+            return np.zeros(self.sensor.shape)
+        return self.fourier_points().image(y, x, dz)
 
     def fourier_points(self) -> FourierPoints:
         """Images of points anywhere as a Fourier microscope sees them, with derivatives by their place.

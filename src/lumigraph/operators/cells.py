@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.elements import CircularAperture, LensletArray, ThinLens, Train, ZernikePlate, noll_to_nm
+from lumigraph.elements.lens import lens_phase
 from lumigraph.elements.train import Element
+from lumigraph.elements.transmission import Thin, transmit
 from lumigraph.errors import GeometryError
 from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics
@@ -331,6 +334,19 @@ def _upright(plate: ZernikePlate) -> bool:
     if plate.center != (0.0, 0.0) or plate.axes[0] != plate.axes[1]:
         return False
     return all(_even(j, coefficient) for j, coefficient in dict(plate.coefficients).items())
+
+
+def over_lens(camera: CameraOptics, lens: Train, distance: float, grid: Grid) -> np.ndarray:
+    """A point's wave behind the main lens (y, x), over one that converges in the lenslet plane.
+
+    That is smooth where neither of them is, so that samples need hold their product alone.
+    """
+    bent = -1 / (1 / distance + 1 / camera.separation)
+    wave = np.outer(*(lens_phase(c, bent, camera.wavelength) for c in (grid.y, grid.x)))
+    field = Field(wave, grid, camera.wavelength)
+    for element in lens.elements:
+        field = transmit(element, field) if isinstance(element, Thin) else element(field)
+    return field.data
 
 
 def stop_reach(lens: Train) -> float:

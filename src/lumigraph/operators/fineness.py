@@ -74,8 +74,13 @@ class Fineness:
         return self.accuracy / 6
 
     def border(self, fresnel_number: float, blur: float) -> float:
-        """Lenslets that are missing farther than this from a cell [pitches] are not missed."""
-        return (4 + _farther(blur)) * (1e-3 / self.accuracy) ** 0.25 * tail(fresnel_number)
+        """Lenslets that are missing farther than this from a cell [pitches] are not missed.
+
+        Where points light more of them than the constants were found on, smaller Fresnel numbers send light
+        farther, too: a camera 1.0 of 1.9, radius 2.4, was off by 1.08 times 1e-3, now by 0.62.
+        """
+        aside = math.sqrt(3 / fresnel_number) if blur > 2 else tail(fresnel_number)
+        return (4 + _farther(blur)) * (1e-3 / self.accuracy) ** 0.25 * aside
 
     def corner(self, fresnel_number: float, edges: Edges = "meet") -> float:
         """The same for what is missing on two sides of a corner: farther, each counts by itself.

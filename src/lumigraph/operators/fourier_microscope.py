@@ -28,6 +28,8 @@ from lumigraph.core.linear import Linear, Shape
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError, SamplingError
 
+Window = tuple[slice, slice]
+
 TAIL = 4.0
 """Half width of the window of a point's image beyond its displacement, in λ f_µ/d."""
 
@@ -146,21 +148,6 @@ class FourierMicroscopeOperator(Linear):
             planes.append(xp.real(arrays.ifft2(spectrum))[: shape[0], : shape[1]])
         return planes[0] if self.depths is None else xp.stack(planes)
 
-    def point_image(self, y: float, x: float) -> Array:
-        """Raw image (ny, nx) of a point [m] of intensity 1 at the first depth, shared by samples around."""
-        grid, volume = self.object_grid, np.zeros(self.shape[1], np.float32)
-        assert grid is not None
-        places = [
-            (at - middle) / pitch + n // 2
-            for at, middle, pitch, n in zip((y, x), grid.center, grid.pitch, grid.shape, strict=True)
-        ]
-        for row in range(math.floor(places[0]), math.floor(places[0]) + 2):
-            for column in range(math.floor(places[1]), math.floor(places[1]) + 2):
-                if 0 <= row < grid.shape[0] and 0 <= column < grid.shape[1]:
-                    share = (1 - abs(places[0] - row)) * (1 - abs(places[1] - column))
-                    volume[..., row, column].flat[0] = share
-        return self.forward(volume)
-
     @property
     def _size(self) -> tuple[int, int]:
         """Of the convolutions: field and image together, rounded up to a smooth number."""
@@ -177,18 +164,21 @@ class FourierMicroscopeOperator(Linear):
             self._spectra[key] = arrays.like(arrays.fft2(padded), like)
         return self._spectra[key]
 
-    def _windows(self) -> list[tuple[tuple[slice, slice], tuple[slice, slice]]]:
+    def _windows(self) -> list[tuple[Window, Window]]:
         """For each lenslet the pixels of the raw image, and which of its convolution fall on them."""
-        found, w = [], self.images.shape[-1]
-        for corner in self.corners:
-            raw, own = [], []
-            for axis in (0, 1):
-                length = self.plane[axis] + w - 1
-                start, stop = max(0, int(corner[axis])), min(self.raw_shape[axis], int(corner[axis]) + length)
-                raw.append(slice(start, max(start, stop)))
-                own.append(slice(start - int(corner[axis]), max(start, stop) - int(corner[axis])))
-            found.append(((raw[0], raw[1]), (own[0], own[1])))
-        return found
+        w = self.images.shape[-1]
+        size = self.plane[0] + w - 1, self.plane[1] + w - 1
+        return [overlap(corner, size, self.raw_shape) for corner in self.corners.tolist()]
+
+
+def overlap(corner: Sequence[int], size: tuple[int, int], shape: tuple[int, int]) -> tuple[Window, Window]:
+    """Pixels of a raw image that a window from a corner on covers, and which of its own these are."""
+    raw, own = [], []
+    for first, length, n in zip(corner, size, shape, strict=True):
+        start, stop = (min(max(0, at), n) for at in (first, first + length))
+        raw.append(slice(start, stop))
+        own.append(slice(start - first, stop - first))
+    return (raw[0], raw[1]), (own[0], own[1])
 
 
 def fourier_operator(
@@ -222,7 +212,7 @@ def fourier_operator(
         for j, rest in enumerate(places - nearest):
             view = View.of(objective, mosaic, j, half)
             for k, dz in enumerate(planes):
-                images[k, j] += _image(objective, view, rest, dz) / len(objectives)
+                images[k, j] += image_behind(view, objective, rest, dz) / len(objectives)
     n = mosaic.field
     pitch = mosaic.pixel_pitch / mosaic.total_magnification
     # Sample n // 2 of the object stands on the axis, and its image on the lenslet's pixel.
@@ -316,8 +306,11 @@ class View:
         return np.einsum("yixj,i,j->yx", parts, weights, weights, optimize=True) * self.scale
 
 
-def _image(objective: Objective, view: View, rest: np.ndarray, dz: float) -> np.ndarray:
-    """Image (2 half + 1)² behind a lenslet, of a point that sends 1 through a whole one on the axis."""
+def image_behind(view: View, objective: Objective, rest: np.ndarray, dz: float) -> np.ndarray:
+    """Image (2 half + 1)² behind a lenslet, of a point that sends 1 through a whole one on the axis.
+
+    Around the pixel that stands `rest` [px] before the point's place, at depth `dz` [m].
+    """
     pupil = view.amplitude * np.exp(1j * objective.phase(*view.q, dz))
     field = view.waves(rest[0]) @ pupil @ view.waves(rest[1]).T
     return view.pixels(np.square(np.abs(field)))

@@ -7,13 +7,23 @@ A point's place changes the phase of its light alone: with U = W_y P W_x behind 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from lumigraph.elements.objective import Objective
-from lumigraph.operators.fourier_microscope import Mosaic, View, half_window, lit_lenslets
+from lumigraph.operators.fourier_microscope import (
+    Mosaic,
+    View,
+    half_window,
+    image_behind,
+    lit_lenslets,
+    overlap,
+)
+
+Behind = Callable[[View, Objective, np.ndarray, float], np.ndarray]
+"""What is found behind a lenslet of a point `rest` [px] from a pixel, at a depth."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,34 +51,31 @@ class FourierPoints:
             shares.append(area * (self.mosaic.fourier_lens / self.mosaic.magnification) ** 2)
         return float(np.mean(shares)) / self.mosaic.width**2
 
+    def image(self, y: float, x: float, dz: float) -> np.ndarray:
+        """Raw image (ny, nx) of a point [m]."""
+        return self._seen((y, x, dz), 1, image_behind)[0]
+
     def lit(self, y: float, x: float, dz: float) -> np.ndarray:
         """Raw image and its derivatives by y, x and dz [1/m], (4, ny, nx)."""
-        found = np.zeros((4, *self.mosaic.shape))
-        for objective in self.objectives:
-            lit = lit_lenslets(objective, self.mosaic)
-            half = half_window(objective, lit, (dz,))
-            for j, center in enumerate(lit.centers):
-                view = View.of(objective, lit, j, half)
-                self._add(found, center, view, objective, (y, x, dz))
-        return found / len(self.objectives)
+        found = self._seen((y, x, dz), 4, _images)
+        found[1:3] *= self.mosaic.total_magnification / self.mosaic.pixel_pitch
+        return found
 
-    def _add(
-        self, found: np.ndarray, center: np.ndarray, view: View, objective: Objective,
-        position: Sequence[float],
-    ) -> None:  # fmt: skip
-        """Add what a lenslet shows."""
-        mosaic, half, count = self.mosaic, view.half, 2 * view.half + 1
-        at = (center + mosaic.total_magnification * np.array(position[:2])) / mosaic.pixel_pitch
-        nearest = np.round(at).astype(int)
-        corner = nearest - half + np.array(mosaic.shape) // 2
-        raw, own = [], []
-        for first, n in zip(corner.tolist(), mosaic.shape, strict=True):
-            start, stop = min(max(0, first), n), min(max(0, first + count), n)
-            raw.append(slice(start, stop))
-            own.append(slice(start - first, stop - first))
-        image = _images(view, objective, at - nearest, position[2])
-        image[1:3] *= mosaic.total_magnification / mosaic.pixel_pitch
-        found[:, raw[0], raw[1]] += image[:, own[0], own[1]]
+    def _seen(self, position: tuple[float, float, float], count: int, behind: Behind) -> np.ndarray:
+        """What all lenslets show (count, ny, nx), of what is found behind each."""
+        found, mosaic = np.zeros((count, *self.mosaic.shape)), self.mosaic
+        moved = mosaic.total_magnification * np.array(position[:2])
+        for objective in self.objectives:
+            lit = lit_lenslets(objective, mosaic)
+            half = half_window(objective, lit, position[2:])
+            for j, center in enumerate(lit.centers):
+                at = (center + moved) / mosaic.pixel_pitch
+                nearest = np.round(at).astype(int)
+                image = behind(View.of(objective, lit, j, half), objective, at - nearest, position[2])
+                corner = nearest - half + np.array(mosaic.shape) // 2
+                raw, own = overlap(corner.tolist(), (2 * half + 1, 2 * half + 1), mosaic.shape)
+                found[(slice(None), *raw)] += image[(..., *own)]
+        return found / len(self.objectives)
 
 
 def _images(view: View, objective: Objective, rest: np.ndarray, dz: float) -> np.ndarray:

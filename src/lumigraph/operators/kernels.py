@@ -5,6 +5,7 @@ light there has patterns: over a hundred in front of a lenslet, one or two far f
 """
 
 import math
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,11 +15,11 @@ from lumigraph import store
 from lumigraph.core import memory
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.progress import Progress
-from lumigraph.errors import SamplingError
+from lumigraph.errors import SamplingError, SamplingWarning
 from lumigraph.operators.blocks import Part, build
 from lumigraph.operators.glare import Glare, aside, glare
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.sizes import build_bytes, build_operations
+from lumigraph.operators.sizes import build_bytes, build_operations, stream_operations
 from lumigraph.operators.streamed import Streamed, stream_bytes, streamed
 from lumigraph.operators.white import endless
 
@@ -54,7 +55,7 @@ HELD = 2.0**32
 """Matrices that take more than this to build [bytes] are computed whenever they are applied."""
 
 LONGEST = 3e14
-"""Operations that building may take: some 50 minutes of one processor that does 1e11 a second."""
+"""Operations that building may take, or a streamed image: 50 minutes of one processor at 1e11 a second."""
 
 A_MINUTE = 6e12
 """Operations in a minute of that processor."""
@@ -75,18 +76,40 @@ def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None
     Raises
     ------
     SamplingError
-        It does not fit in memory.
+        It does not fit in memory, or takes more than `LONGEST`.
+
+    Warns
+    -----
+    SamplingWarning
+        It takes more than a minute, each time that it is computed.
     """
     if not _held(optics):
         _require(optics)
+        said(operations(optics), "each image through the periodic operator, too large to keep, takes")
         return streamed(optics, progress)
 
     def built() -> dict[str, np.ndarray]:
+        said(operations(optics), "the periodic operator takes once")
         return _build(optics, progress)
 
     # Packed and unpacked, built or found: products with other strides would round otherwise.
     key = optics.key
     return _MATRICES.get((key, folder), lambda: _unpacked(store.kept(key, built, folder), optics))
+
+
+def operations(optics: Optics) -> float:
+    """Of building it or, where it is streamed, of each image."""
+    return build_operations(optics) if _held(optics) or not optics.straight else stream_operations(optics)
+
+
+def said(operations: float, what: str) -> None:
+    """Warn of what takes longer than a minute."""
+    if operations > A_MINUTE:
+        message = (
+            f"{what} some {operations / A_MINUTE:.2g} min of a processor that does 1e11 operations a second. "
+            "Ask for a coarser accuracy where that is too long."
+        )
+        warnings.warn(message, SamplingWarning, stacklevel=3)
 
 
 def _held(optics: Optics) -> bool:
@@ -98,7 +121,9 @@ def _held(optics: Optics) -> bool:
 
 def _streams(optics: Optics) -> bool:
     """Whether blocks are computed fast enough to be let go: those of lenslets whose axes are apart."""
-    return optics.straight and stream_bytes(optics) <= (memory.available() or math.inf)
+    if not optics.straight or stream_operations(optics) > LONGEST:
+        return False
+    return stream_bytes(optics) <= (memory.available() or math.inf)
 
 
 def _require(optics: Optics) -> None:
@@ -109,9 +134,10 @@ def _require(optics: Optics) -> None:
     others = (Optics.of(optics.camera, optics.distance, a, optics.blurred).bricks for a in coarser)
     fits = next((o for o in others if _held(o) or _streams(o)), None)
     remedy = "Use slower lenslets" if fits is None else f"{_price(fits)}: ask for that"
-    if (operations := build_operations(optics)) > LONGEST:
+    if (needed := operations(optics)) > LONGEST:
+        what = "for each image" if optics.straight else "to build"
         raise SamplingError(
-            f"the periodic operator takes {operations:.0e} operations to build, {operations / A_MINUTE:.0f} "
+            f"the periodic operator takes {needed:.0e} operations {what}, {needed / A_MINUTE:.0f} "
             f"min of a processor that does 1e11 a second; {LONGEST:.0e} are allowed. "
             f"{remedy}, or use Snapshots."
         )
@@ -122,8 +148,8 @@ def _require(optics: Optics) -> None:
 def _price(fits: Optics) -> str:
     """What an operator that can be had takes."""
     needed = build_bytes(fits) if _held(fits) else stream_bytes(fits)
-    minutes = build_operations(fits) / A_MINUTE
-    time = f", some {minutes:.2g} min of a processor" if minutes > 1 else ""
+    minutes, each = operations(fits) / A_MINUTE, "" if _held(fits) else " for each image"
+    time = f", some {minutes:.2g} min of a processor{each}" if minutes > 1 else ""
     return f"An accuracy of {fits.fineness.accuracy:g} fits ({needed / 2**30:.2g} GiB{time})"
 
 

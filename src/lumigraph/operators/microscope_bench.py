@@ -53,7 +53,7 @@ def spline_response(f: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]
 
     `f` is in cycles per sample.
     """
-    power = np.sinc(f[:, None] + ALIASES) ** (2 * degree + 2)
+    power = np.sinc((f - np.rint(f))[:, None] + ALIASES) ** (2 * degree + 2)  # which repeats
     own = np.sinc(f) ** (degree + 1)
     return own / power.sum(1), own**2 / power.sum(1)
 
@@ -90,15 +90,16 @@ def _waves(finest: int, samples: int) -> np.ndarray:
 
 
 class Bench:
-    """The lenslets around a point's own, and the way from there to the pixels."""
+    """The lenslets around a point's own, and the way from there to the pixels; see `Crossed`."""
 
     def __init__(
-        self, objective: Objective, lenslet: Lenslet, sampling: CellSampling, reach: int, margin: float
-    ) -> None:
+        self, objective: Objective, lenslet: Lenslet, sampling: CellSampling, reach: int, margin: float,
+        beside: int = 0,
+    ) -> None:  # fmt: skip
         self.objective, self.lenslet, self.sampling = objective, lenslet, sampling
         wave, p = objective.wavelength, lenslet.pitch
         self.fine = fineness(objective, lenslet, margin, sampling.points)
-        self.guard = guard(objective, lenslet)
+        self.guard = guard(objective, lenslet) + beside
         self.cells = 2 * (reach + self.guard) + 1
         self.step = p / self.fine
         n = self.cells * self.fine

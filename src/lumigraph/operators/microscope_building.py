@@ -12,7 +12,7 @@ import numpy as np
 from lumigraph import store
 from lumigraph.core import checks, memory
 from lumigraph.core.grid import Grid
-from lumigraph.core.matrix import Matrix
+from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import FormatError, GeometryError, SamplingError
@@ -30,7 +30,7 @@ from lumigraph.operators.microscope_kernels import (
 from lumigraph.operators.microscope_operator import MicroscopeOperator, suits_frequencies
 from lumigraph.operators.microscope_pixels import FRAME
 
-VERSION = 5
+VERSION = 6
 """Of the kernels' numbers: a change of theirs makes those that are kept useless."""
 
 
@@ -52,7 +52,7 @@ class Layout:
 
     seen: tuple[int, int]
     sampling: CellSampling
-    placement: Matrix | None = None
+    placement: Linear | None = None
     center: tuple[float, float] = (0.0, 0.0)
 
     @property

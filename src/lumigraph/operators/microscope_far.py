@@ -1,8 +1,10 @@
 """Light in cells far from a point's own: a cell counts as one point, its image as one of a few patterns.
 
-Over lenslets that is one small convolution for each pattern, and a product of few columns.
+Over lenslets that is one small convolution for each depth and pattern, and a product of few columns. All
+depths share the patterns, so that one transform back is enough for each.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +33,37 @@ class Far:
     images: np.ndarray
 
 
+def shared(
+    fars: Sequence[Far], light: Sequence[tuple[float, float]], allowed: float
+) -> tuple[list[Far], float]:
+    """The same with as few patterns as all depths may share: singular vectors (C. Eckart & G. Young, 1936).
+
+    Parameters
+    ----------
+    light
+        Norms of a point's image, and of a cell's image of an even plane, of each depth.
+    allowed
+        Relative rms of both that may be lost; of the plane's, that all directions together may, light of one
+        direction alone, as at borders, counting in full.
+
+    Returns
+    -------
+    tuple
+        Far light of each depth, and what the worst of them loses.
+    """
+    rows = []
+    for far, (point, plane) in zip(fars, light, strict=True):
+        weights = far.weights.astype(np.float64)
+        even = np.sqrt(len(far.images)) * weights.sum(0)[:, None] * far.images / plane
+        rows += [np.linalg.qr(weights, mode="r") @ far.images / point, even]
+    vectors = np.linalg.svd(np.concatenate(rows), full_matrices=False)[2]
+    lost = np.sqrt([np.cumsum(np.square(own @ vectors.T).sum(0)[::-1])[::-1] for own in rows]).max(0)
+    kept = max(int((lost > allowed).sum()), 1)
+    images = vectors[:kept].astype(np.float32)
+    found = [Far(far.offsets, far.weights @ (far.images @ images.T), images) for far in fars]
+    return found, float(lost[kept]) if kept < len(lost) else 0.0
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FarLight:
     """Far light of all depths, for arrays of one library and precision.
@@ -40,7 +73,8 @@ class FarLight:
     spectra
         (z, k, L, L/2 + 1), of the weights.
     images
-        (z k, N²).
+        (1 or z, k, r): those that all depths share, or each depth's own, in terms of r patterns of a cell's
+        image.
     lengths
         Of the transforms (y, x).
     cells, seen
@@ -54,8 +88,13 @@ class FarLight:
     seen: tuple[int, int]
 
     @classmethod
-    def of(cls, fars: list[Far], cells: tuple[int, int], margin: int, like: Array) -> "FarLight":
-        """From the depths' own, of objects that reach `margin` lenslets beyond those of the image."""
+    def of(
+        cls, fars: list[Far], cells: tuple[int, int], margin: int, basis: np.ndarray | None, like: Array
+    ) -> "FarLight":
+        """From the depths' own, of objects that reach `margin` lenslets beyond those of the image.
+
+        `basis` (N², r) are the patterns of a cell's image; None for its samples themselves.
+        """
         seen = cells[0] + 2 * margin, cells[1] + 2 * margin
         y, x = (
             int(scipy.fft.next_fast_len(n + m - 1, real=True) or n + m)
@@ -69,23 +108,34 @@ class FarLight:
             row, column = (steps[inside] % (y, x)).T
             wide[row, column] = far.weights[inside]
             spectra.append(np.fft.rfft2(wide, axes=(0, 1)).transpose(2, 0, 1))
-        images = np.concatenate([far.images for far in fars])
+        alike = all(far.images is fars[0].images for far in fars)
+        images = np.stack([far.images for far in (fars[:1] if alike else fars)])
+        images = images if basis is None else images @ basis
         return cls(arrays.like(np.stack(spectra), like), arrays.like(images, like), (y, x), cells, seen)
 
     def forward(self, volume: Array, points: int) -> Array:
-        """Light (N², rows, columns) from a volume (z, rows s, columns s)."""
+        """Light (rows, columns, r) from a volume (z, rows s, columns s)."""
         xp, (rows, columns) = arrays.namespace(volume), self.cells
         cells = _summed(volume, points)
         spectrum = arrays.rfft2(cells, self.lengths, axes=(1, 2))[:, None, ...] * self.spectra
+        if self.images.shape[0] == 1:
+            spectrum = xp.sum(spectrum, axis=0, keepdims=True)
         light = arrays.irfft2(spectrum, self.lengths, axes=(2, 3))[..., :rows, :columns]
-        light = xp.reshape(light, (self.images.shape[0], -1))
-        return xp.reshape(xp.matrix_transpose(self.images) @ light, (-1, rows, columns))
+        light = xp.reshape(light, (-1, rows * columns))
+        return xp.reshape(xp.matrix_transpose(light) @ self._patterns, (rows, columns, -1))
+
+    @property
+    def _patterns(self) -> Array:
+        """(k or z k, r)."""
+        return arrays.namespace(self.images).reshape(self.images, (-1, self.images.shape[-1]))
 
     def adjoint(self, light: Array) -> Array:
-        """What each point of a cell (z, rows, columns) sees of light (N², rows, columns)."""
+        """What each point of a cell (z, rows, columns) sees of light (rows, columns, r)."""
         xp, (rows, columns) = arrays.namespace(light), self.cells
-        parts = self.images @ xp.reshape(light, (light.shape[0], -1))
-        parts = xp.reshape(parts, (*self.spectra.shape[:2], rows, columns))
+        flat = xp.reshape(light, (-1, light.shape[-1]))
+        parts = xp.reshape(
+            self._patterns @ xp.matrix_transpose(flat), (*self.images.shape[:2], rows, columns)
+        )
         spectrum = arrays.rfft2(parts, self.lengths, axes=(2, 3)) * xp.conj(self.spectra)
         cells = arrays.irfft2(xp.sum(spectrum, axis=1), self.lengths, axes=(1, 2))
         return cells[:, : self.seen[0], : self.seen[1]]

@@ -19,15 +19,17 @@ from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear, Shape
-from lumigraph.core.matrix import Matrix
 from lumigraph.operators import microscope_spectrum
-from lumigraph.operators.microscope_far import FarLight
-from lumigraph.operators.microscope_kernels import SliceKernel
+from lumigraph.operators.microscope_far import Far, FarLight, shared
+from lumigraph.operators.microscope_kernels import SHARES, SliceKernel
 from lumigraph.operators.microscope_patterns import Patterns, patterns, pixel_patterns
 from lumigraph.operators.microscope_tiles import Tiling
 
 GATHERED = 2**27
 """Numbers that are gathered for one product."""
+
+FINEST = 1e-6
+"""Relative rms that far light loses where nothing else may."""
 
 SHARE = 0.3
 """Part of the free memory that matrices of the lenslets' frequencies may take."""
@@ -54,13 +56,13 @@ class MicroscopeOperator(Linear):
         Whether `forward` and `adjoint` go through the lenslets' frequencies (`microscope_spectrum`), where
         rounding may leave -1e-6 of the highest value instead of 0; else by products over all offsets.
     left_out
-        Relative rms of a point's image that fewer patterns of the points may leave out there, and a third
-        of it those of the pixels (`microscope_patterns`); 0 for all patterns.
+        Relative rms of a point's image that fewer patterns of the points may leave out there, those of the
+        pixels what is left (`microscope_patterns.pixel_patterns`); 0 for all patterns.
     """
 
     kernels: tuple[SliceKernel, ...]
     cells: tuple[int, int]
-    placement: Matrix | None = None
+    placement: Linear | None = None
     margin: int = 0
     by_frequency: bool = False
     left_out: float = 0.0
@@ -72,7 +74,7 @@ class MicroscopeOperator(Linear):
     def shape(self) -> tuple[Shape, Shape]:
         """Pixels (ny, nx) of the raw image, samples (y, x) or (z, y, x) of the object."""
         s, N = self.kernels[0].sampling.points, self.kernels[0].sampling.pixels
-        raw = (self.cells[0] * N, self.cells[1] * N) if self.placement is None else self.placement.raw_shape
+        raw = (self.cells[0] * N, self.cells[1] * N) if self.placement is None else self.placement.shape[0]
         volume = () if self.depths is None else (len(self.kernels),)
         rows, columns = self._seen
         return raw, (*volume, rows * s, columns * s)
@@ -87,8 +89,12 @@ class MicroscopeOperator(Linear):
         """Relative rms of points' images, of the worst depth, with what is left out of them."""
         if not self.by_frequency:
             return max(kernel.error for kernel in self.kernels)
-        pairs, pixels = zip(self.kernels, self._points, strict=True), self._pixels.left_out
-        return max(math.hypot(kernel.error, points.left_out, pixels) for kernel, points in pairs)
+        pairs, pixels, far = (
+            zip(self.kernels, self._points, strict=True),
+            self._pixels.left_out,
+            self._shared[1],
+        )
+        return max(math.hypot(kernel.error, points.left_out, pixels, far) for kernel, points in pairs)
 
     @property
     def multiply_adds(self) -> int:
@@ -172,39 +178,78 @@ class MicroscopeOperator(Linear):
     def _pixels(self) -> Patterns:
         """Patterns of a cell's image."""
         if "pixels" not in self._spectra:
-            self._spectra["pixels"] = pixel_patterns(self.kernels, self.left_out)
+            self._spectra["pixels"] = pixel_patterns(self.kernels, self.left_out, self._points)
         return self._spectra["pixels"]
 
     @property
     def _matrix_numbers(self) -> int:
         return microscope_spectrum.matrix_numbers(self._tiling, *_counts(self._points, self._pixels))
 
-    def _forward(self, intensity: Array) -> Array:
-        volume = intensity if self.depths is not None else intensity[None, ...]
-        if self.by_frequency:
-            plane = self._by_frequencies(volume).forward(volume)
-        else:
-            plane = self._by_offsets(volume)
-        if (far := self._far(volume)) is not None:
-            N = self.kernels[0].sampling.pixels
-            plane = plane + _plane(far.forward(volume, self.kernels[0].sampling.points), N)
-        return plane if self.placement is None else self.placement._forward(plane)
+    @property
+    def side_by_side(self) -> int:
+        """Objects that share a product by frequencies in less time than one after the other."""
+        if not self.by_frequency:
+            return 1
+        return microscope_spectrum.sharing(self._tiling)
 
-    def _far(self, like: Array) -> FarLight | None:
-        key = "far", arrays.placement(like)
-        fars = [kernel.far for kernel in self.kernels if kernel.far is not None]
-        if len(fars) < len(self.kernels):
+    def _forward(self, intensity: Array) -> Array:
+        return self._lit([intensity], 1)[0]
+
+    def _forwards(self, intensities: Sequence[Array]) -> list[Array]:
+        return self._lit(intensities, self.side_by_side)
+
+    def _lit(self, intensities: Sequence[Array], side: int) -> list[Array]:
+        volumes = intensities if self.depths is not None else [one[None, ...] for one in intensities]
+        if self.by_frequency:
+            planes = self._by_frequencies(volumes[0]).forward(volumes, side)
+        else:
+            planes = [self._by_offsets(volume) + self._far_plane(volume) for volume in volumes]
+        placement = self.placement
+        return planes if placement is None else [placement._forward(plane) for plane in planes]
+
+    def _far(self, like: Array, pixels: Patterns | None = None) -> FarLight | None:
+        """Far light, on patterns of a cell's image by those that depths share, on samples by their own."""
+        if not self._own_fars:
             return None
+        key = "far", pixels is None, arrays.placement(like)
         if key not in self._spectra:
-            self._spectra[key] = FarLight.of(fars, self.cells, self.margin, like)
+            fars, basis = (
+                (self._own_fars, None) if pixels is None else (self._shared[0], pixels.nearest.basis)
+            )
+            self._spectra[key] = FarLight.of(fars, self.cells, self.margin, basis, like)
         return self._spectra[key]
+
+    @property
+    def _own_fars(self) -> list[Far]:
+        """Of each depth; none where one has none."""
+        fars = [kernel.far for kernel in self.kernels if kernel.far is not None]
+        return fars if len(fars) == len(self.kernels) else []
+
+    @property
+    def _shared(self) -> tuple[list[Far], float]:
+        """Far light of each depth by patterns that they share, and the relative rms that those lose."""
+        if "shared" not in self._spectra:
+            accuracy, spent = self.left_out / SHARES["patterns"], max(one.error for one in self.kernels)
+            left = 0.5 * math.sqrt(max(accuracy**2 - spent**2, 0.0))
+            allowed = max(min(SHARES["rank"] * accuracy, left), FINEST)
+            light = [_norms(kernel) for kernel in self.kernels]
+            self._spectra["shared"] = shared(self._own_fars, light, allowed) if self._own_fars else ([], 0.0)
+        return self._spectra["shared"]
+
+    def _far_plane(self, volume: Array) -> Array | float:
+        if (far := self._far(volume)) is None:
+            return 0.0
+        N = self.kernels[0].sampling.pixels
+        light = far.forward(volume, self.kernels[0].sampling.points)
+        return arrays.untiled(arrays.namespace(light).reshape(light, (*self.cells, N, N)))
 
     def _by_frequencies(self, like: Array) -> microscope_spectrum.Spectra:
         key = arrays.placement(like)
         if key not in self._spectra:
             self._spectra[key] = microscope_spectrum.Spectra.of(
-                self.kernels, (self._points, self._pixels), self._tiling, like
-            )
+                self.kernels, (self._points, self._pixels), self._tiling, like,
+                self._far(like, self._pixels),
+            )  # fmt: skip
         return self._spectra[key]
 
     def _by_offsets(self, volume: Array) -> Array:
@@ -220,26 +265,33 @@ class MicroscopeOperator(Linear):
         return _plane(xp.reshape(image, (N * N, *self.cells)), N)
 
     def _adjoint(self, raw: Array) -> Array:
-        volume = self._volume(raw)
-        return volume if self.depths is not None else volume[0, ...]
+        return self._seen_by([raw], 1)[0]
 
-    def _volume(self, raw: Array) -> Array:
-        xp = arrays.namespace(raw)
-        plane = raw if self.placement is None else self.placement._adjoint(raw)
-        s, N = self.kernels[0].sampling.points, self.kernels[0].sampling.pixels
-        light, far = _class_first(plane, N), self._far(raw)
-        even = None if far is None else far.adjoint(light)
+    def _adjoints(self, raws: Sequence[Array]) -> list[Array]:
+        return self._seen_by(raws, self.side_by_side)
+
+    def _seen_by(self, raws: Sequence[Array], side: int) -> list[Array]:
+        planes = raws if self.placement is None else [self.placement._adjoint(raw) for raw in raws]
         if self.by_frequency:
-            return self._by_frequencies(raw).adjoint(plane, even)
+            volumes = self._by_frequencies(raws[0]).adjoint(planes, side)
+        else:
+            volumes = [self._by_offsets_back(plane) for plane in planes]
+        return volumes if self.depths is not None else [volume[0, ...] for volume in volumes]
+
+    def _by_offsets_back(self, plane: Array) -> Array:
+        xp, s, N = arrays.namespace(plane), self.kernels[0].sampling.points, self.kernels[0].sampling.pixels
+        light = _class_first(plane, N)
         flat = xp.reshape(light, (N * N, -1))
         volume = xp.stack([self._back(kernel, flat) for kernel in self.kernels])
-        return volume if even is None else volume + xp.repeat(xp.repeat(even, s, axis=1), s, axis=2)
+        if (far := self._far(plane)) is None:
+            return volume
+        even = far.adjoint(xp.permute_dims(light, (1, 2, 0)))
+        return volume + xp.repeat(xp.repeat(even, s, axis=1), s, axis=2)
 
     def _of_point(self, point: np.ndarray) -> np.ndarray:
-        volume, sampling = point.reshape(-1, *point.shape[-2:]), self.kernels[0].sampling
+        volume = point.reshape(-1, *point.shape[-2:])
         plane = self._by_offsets(volume)  # dark pixels stay 0
-        if (far := self._far(volume)) is not None:
-            plane += np.maximum(_plane(far.forward(volume, sampling.points), sampling.pixels), 0)
+        plane += np.maximum(self._far_plane(volume), 0)
         return plane if self.placement is None else self.placement._forward(plane)
 
     def _back(self, kernel: SliceKernel, flat: Array) -> Array:
@@ -262,13 +314,21 @@ class MicroscopeOperator(Linear):
         return points[:, top : top + self.cells[0], left : left + self.cells[1]]
 
 
+def _norms(kernel: SliceKernel) -> tuple[float, float]:
+    """Of the image of the point that has least, in cells that are not far, and of an even plane's."""
+    return math.sqrt(min(float(np.vdot(one, one)) for one in kernel.blocks)), float(
+        np.linalg.norm(kernel.white())
+    )
+
+
 def suits_frequencies(
     kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int, left_out: float = 0.0
 ) -> bool:
     """Whether the way through the lenslets' frequencies is faster, and its matrices leave memory free."""
     if not all(kernel.symmetric for kernel in kernels):
         return False
-    counts = _counts(patterns(kernels, left_out), pixel_patterns(kernels, left_out))
+    points = patterns(kernels, left_out)
+    counts = _counts(points, pixel_patterns(kernels, left_out, points))
     told, free = microscope_spectrum.tiling(kernels, cells, margin, counts), memory.available()
     needed = 4.0 * microscope_spectrum.matrix_numbers(told, *counts)
     fits = free is None or needed < free * SHARE
@@ -299,7 +359,7 @@ def _followed(kernel: SliceKernel, least: float) -> int:
     """Lenslets beyond a straight border that send at least a part of their light across it."""
     light = kernel.matrix().reshape(len(kernel.offsets), -1).sum(1, dtype=np.float64)
     beyond = [float(light[kernel.offsets[:, 0] >= k].sum()) for k in range(_reach(kernel) + 1)]
-    return sum(part >= least * light.sum() for part in beyond[1:])
+    return sum(bool(part >= least * light.sum()) for part in beyond[1:])
 
 
 def _class_first(plane: Array, n: int) -> Array:

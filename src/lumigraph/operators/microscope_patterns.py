@@ -3,28 +3,32 @@ r"""Patterns of a cell's points and pixels, even or odd along y and x, as which 
 Points stand as close at all depths as the depth that is seen most finely asks for. At others their images
 differ by less: the matrix from a cell's points to the pixels of all cells is of low rank but for a small
 rest. Its singular vectors are the few patterns that hold every point's image but for the relative rms that is
-allowed. Images are sampled as finely as their steepest places ask for: of a cell's image, too, fewer patterns
-than samples hold the light of all depths. What is left out is measured, and counts in the operator's error.
+allowed. Images are sampled as finely as their steepest places ask for, and pixels average over samples: of a
+cell's image, too, fewer patterns than samples hold the light that pixels of all depths see. What is left out
+is measured, and counts in the operator's error.
 """
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import toeplitz
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache, remembered
 from lumigraph.core.threads import each, single_products
 from lumigraph.operators.microscope_cell import parts
-from lumigraph.operators.microscope_kernels import SliceKernel
+from lumigraph.operators.microscope_kernels import SHARES, SliceKernel
+from lumigraph.operators.microscope_pixels import b_spline
 
 WORTH = 0.8
 """Part of all patterns: if more are wanted all of them are followed, which leaves nothing out."""
 
-PIXELS = 1 / 3
-"""Part of what patterns of the points may leave out that those of the pixels may: in squares a ninth."""
+WHOLE = 0.9
+"""Of the accuracy, that patterns of the pixels may fill up: the rest is for the sampling of slices."""
 
 SEPARATE = 8
 """Places along a side of a cell from which on patterns are taken along y and then along x."""
@@ -37,7 +41,7 @@ _FOUND = ByteCache()
 
 @dataclass(frozen=True, eq=False)
 class Patterns:
-    """Orthonormal patterns over the places of a cell.
+    """Patterns over the places of a cell, orthonormal as the light that they make.
 
     Parameters
     ----------
@@ -51,12 +55,16 @@ class Patterns:
         that parity; the patterns follow one another in this order. None where they are all products.
     left_out
         Relative rms of the image of a point as the sum of its patterns, the worst of all points.
+    duals
+        Of each parity (products, r): products with an image say how much of each pattern comes nearest to it.
+        None where the patterns' own do.
     """
 
     along: np.ndarray
     odd: np.ndarray
     vectors: tuple[np.ndarray, ...] | None = None
     left_out: float = 0.0
+    duals: tuple[np.ndarray, ...] | None = None
     _held: dict = field(default_factory=dict, repr=False)
 
     @property
@@ -72,6 +80,11 @@ class Patterns:
             return products
         whole, parities = all_patterns(len(self.along)), zip(PARITIES, self.vectors, strict=True)
         return np.concatenate([products[:, whole.of_parity(*odd)] @ own for odd, own in parities], axis=1)
+
+    @cached_property
+    def nearest(self) -> "Patterns":
+        """Patterns that an image is `parted` by so that `whole` comes nearest to it."""
+        return self if self.duals is None else replace(self, vectors=self.duals, duals=None, _held={})
 
     @property
     def nbytes(self) -> int:
@@ -133,12 +146,21 @@ def patterns(kernels: Sequence[SliceKernel], left_out: float) -> list[Patterns]:
     return list(each(found, kernels))
 
 
-def pixel_patterns(kernels: Sequence[SliceKernel], left_out: float) -> Patterns:
-    """Of the image's samples, for all depths; they leave out `PIXELS` of what those of the points may."""
-    if left_out <= 0:
+def pixel_patterns(kernels: Sequence[SliceKernel], left_out: float, points: Sequence[Patterns]) -> Patterns:
+    """Of the image's samples, for all depths.
+
+    They leave out what they may, `SHARES`, or less where the kernels' own errors and `points` leave less of
+    `WHOLE` of what the operator was asked for.
+    """
+    accuracy = WHOLE * left_out / SHARES["patterns"]
+    spent = max(
+        math.hypot(kernel.error, one.left_out, SHARES["rank"] * accuracy)
+        for kernel, one in zip(kernels, points, strict=True)
+    )
+    if not spent < accuracy:
         return all_patterns(kernels[0].sampling.pixels)
-    key = (*kernels, left_out, "pixels")
-    return _FOUND.get(key, lambda: few_of_pixels(kernels, PIXELS * left_out))
+    allowed = min(SHARES["pixels"] * accuracy, math.sqrt(accuracy**2 - spent**2))
+    return _FOUND.get((*kernels, allowed, "pixels"), lambda: few_of_pixels(kernels, allowed))
 
 
 @single_products()
@@ -157,32 +179,55 @@ def few_patterns(kernel: SliceKernel, left_out: float) -> Patterns:
 
 @single_products()
 def few_of_pixels(kernels: Sequence[SliceKernel], left_out: float) -> Patterns:
-    """The strongest patterns of the samples of a cell's image; each depth counts as much."""
+    """The strongest patterns of a cell's image, by what pixels see of it; each depth counts as much."""
     whole = all_patterns(kernels[0].sampling.pixels)
+    roots = _roots(whole, kernels[0].sampling.degree)
 
     def light(kernel: SliceKernel) -> list[np.ndarray]:
         """ΣwIIᵀ of each parity, of a depth's images I."""
-        parts, weights = _images(kernel, whole)
+        parts, weights = _images(kernel, whole, roots)
         found = [np.tensordot(weights, part.transpose(0, 2, 1) @ part, 1) for part in parts]
         power = sum(float(np.trace(one)) for one in found)
         return [one / power for one in found]
 
     def shares(kernel: SliceKernel) -> np.ndarray:
         """Of each point's image (s², N²)."""
-        parts = _images(kernel, whole)[0]
+        parts = _images(kernel, whole, roots)[0]
         own = (np.square(part @ vectors) for part, (_, vectors) in zip(parts, found, strict=True))
         return np.concatenate([_of_all_cells(one, kernel) for one in own], axis=1)
 
     found = [np.linalg.eigh(sum(one)) for one in zip(*map(light, kernels), strict=True)]
-    return _strongest(whole, found, np.concatenate([shares(one) for one in kernels]), left_out)
+    few = _strongest(whole, found, np.concatenate([shares(one) for one in kernels]), left_out)
+    if few.vectors is None:
+        return few
+    pairs = list(zip(roots, few.vectors, strict=True))
+    vectors, duals = zip(*((np.linalg.solve(root, v), root @ v) for root, v in pairs), strict=True)
+    return replace(few, vectors=vectors, duals=duals, _held={})
 
 
-def _images(kernel: SliceKernel, every: Patterns) -> tuple[list[np.ndarray], np.ndarray]:
-    """Images (n, s², products) of each parity, of points in cells above and left; and their weights."""
+def _roots(every: Patterns, degree: int) -> list[np.ndarray]:
+    """S of each parity (products, products): |Sp|² is the light² that pixels make of samples p.
+
+    It is that of B-splines of a degree, whose coefficients samples are, the mean over all places of pixels.
+    """
+    n = len(every.along)
+    gram = every.along @ toeplitz(b_spline(np.arange(float(n)), 2 * degree + 1)) @ every.along.T
+    half = (n + 1) // 2
+    along = []
+    for side in (slice(0, half), slice(half, n)):
+        energy, vectors = np.linalg.eigh(gram[side, side])
+        along.append((vectors * np.sqrt(energy)) @ vectors.T)
+    return [np.kron(along[y], along[x]) for y, x in PARITIES]
+
+
+def _images(
+    kernel: SliceKernel, every: Patterns, roots: Sequence[np.ndarray]
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Light (n, s², products) of each parity, of points in cells above and left; and their weights."""
     blocks, weights = quadrant(kernel)
     products = of_images(blocks, every)
     places = map(every.of_parity, *zip(*PARITIES, strict=True))
-    return [products[..., own].astype(np.float64) for own in places], weights
+    return [products[..., own] @ root for own, root in zip(places, roots, strict=True)], weights
 
 
 def _of_all_cells(energy: np.ndarray, kernel: SliceKernel) -> np.ndarray:
@@ -227,9 +272,9 @@ def quadrant(kernel: SliceKernel) -> tuple[np.ndarray, np.ndarray]:
 
 
 def of_images(blocks: np.ndarray, patterns: Patterns) -> np.ndarray:
-    """Images (n, k, N²) to patterns (n, k, r)."""
+    """Images (n, k, N²) to the nearest sums of patterns (n, k, r)."""
     N = len(patterns.along)
-    return parted(blocks.reshape(-1, N), patterns).reshape(*blocks.shape[:2], -1)
+    return parted(blocks.reshape(-1, N), patterns.nearest).reshape(*blocks.shape[:2], -1)
 
 
 def parted(plane: Array, patterns: Patterns) -> Array:

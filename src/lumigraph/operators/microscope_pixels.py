@@ -6,10 +6,18 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.linear import Linear
 from lumigraph.core.matrix import Matrix
+from lumigraph.operators.resampling import Banded, Resampling, banded
 
 SLIVER = 1.2
 """Lenslets of which fewer pixels than this are seen along an axis are left out [px]."""
+
+STRAIGHT = 1e-9
+"""Lenslets that a row or column of pixels may wind if it counts as straight along those of the lattice."""
+
+ROWS = 16
+"""Of the blocks of banded matrices: with more of them they hold more zeros."""
 
 FRAME = 1
 """Lenslets around those that are seen, to each side, whose light falls on pixels."""
@@ -17,7 +25,7 @@ FRAME = 1
 
 def placement(
     calibration: Calibration, pixels: int, degree: int
-) -> tuple[Matrix, tuple[int, int], np.ndarray]:
+) -> tuple[Linear, tuple[int, int], np.ndarray]:
     """From the micro-images of a raw image, with N samples along each side of a cell.
 
     Parameters
@@ -32,7 +40,7 @@ def placement(
     Returns
     -------
     tuple
-        Matrix from samples, of `FRAME` more cells to each side, to pixels (ny, nx); the cells (rows, columns)
+        Map from samples, of `FRAME` more cells to each side, to pixels (ny, nx); the cells (rows, columns)
         that are seen; and the pixel (y, x) at the middle of them.
     """
     ny, nx = calibration.shape
@@ -46,16 +54,33 @@ def placement(
     last = np.floor(place.reshape(-1, 2).max(0) + 0.5 - least).astype(int)
     cells = (int(last[0] - first[0]) + 1, int(last[1] - first[1]) + 1)
     samples = (cells[0] + 2 * FRAME) * pixels, (cells[1] + 2 * FRAME) * pixels
-    at = ((place - first + FRAME + 0.5) * pixels - 0.5).reshape(-1, 2)
+    at = (place - first + FRAME + 0.5) * pixels - 0.5
     middle = calibration.position((first + last) / 2)
-    return Matrix(_interpolation(at, samples, degree), (ny, nx), samples), cells, middle
+    return _interpolation(at, samples, degree, STRAIGHT * pixels), cells, middle
 
 
-def _interpolation(at: np.ndarray, samples: tuple[int, int], degree: int) -> csr_array:
-    """Matrix of B-splines at places (pixels, 2) among samples; what lies outside them is dark.
+def _interpolation(at: np.ndarray, samples: tuple[int, int], degree: int, straight: float) -> Linear:
+    """B-splines at places (ny, nx, 2) among samples; what lies outside them is dark.
 
     All weights are at least 0: an operator that rings below zero makes Richardson-Lucy explode.
     """
+    y, x = at[:, 0, 0], at[0, :, 1]
+    if max(np.ptp(at[..., 0], axis=1).max(), np.ptp(at[..., 1], axis=0).max()) > straight:
+        return Matrix(_splines(at.reshape(-1, 2), samples, degree), (len(y), len(x)), samples)
+    return Resampling(*(_spline(places, n, degree) for places, n in zip((y, x), samples, strict=True)))
+
+
+def _spline(at: np.ndarray, samples: int, degree: int) -> Banded:
+    """B-splines at places along one axis."""
+
+    def weights(d: np.ndarray) -> np.ndarray:
+        return b_spline(d, degree)
+
+    return banded(at, np.arange(samples), weights, (degree + 1) / 2, ROWS, np.float32)
+
+
+def _splines(at: np.ndarray, samples: tuple[int, int], degree: int) -> csr_array:
+    """Matrix of B-splines at places (pixels, 2) among samples."""
     columns, weights, taps = [], [], degree + 1
     for axis in (0, 1):
         n, places = samples[axis], at[:, axis]
@@ -67,8 +92,9 @@ def _interpolation(at: np.ndarray, samples: tuple[int, int], degree: int) -> csr
         weights.append(weight.astype(np.float32))
     index = columns[0][:, :, None] * samples[1] + columns[1][:, None, :]
     weight = weights[0][:, :, None] * weights[1][:, None, :]
-    start = np.arange(len(at) + 1) * taps**2
-    matrix = csr_array((weight.ravel(), index.ravel(), start), shape=(len(at), math.prod(samples)))
+    start, shape = np.arange(len(at) + 1) * taps**2, (len(at), math.prod(samples))
+    short = np.int32 if max(start[-1], shape[1]) <= np.iinfo(np.int32).max else np.int64  # read each time
+    matrix = csr_array((weight.ravel(), index.ravel().astype(short), start.astype(short)), shape=shape)
     matrix.sum_duplicates()
     return matrix
 

@@ -188,7 +188,8 @@ class PupilImages:
     def shape(self) -> tuple[int, int]:
         """Of a raw image."""
         if self.layout.placement is not None:
-            return self.layout.placement.raw_shape[0], self.layout.placement.raw_shape[1]
+            ny, nx = self.layout.placement.shape[0]
+            return ny, nx
         return self._samples
 
     @property

@@ -14,7 +14,7 @@ time however many lenslets a point lights. Large arrays of lenslets are treated 
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ import numpy as np
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 from lumigraph.core.threads import each, single_products
+from lumigraph.operators.microscope_far import FarLight
 from lumigraph.operators.microscope_kernels import SliceKernel
 from lumigraph.operators.microscope_patterns import Patterns, of_images, parted, quadrant, whole
 from lumigraph.operators.microscope_tiles import Span, Tiling, tilings
@@ -35,6 +36,9 @@ MOST = 2**32
 READ, PASSED = 24, 150
 """Multiply-adds of a matrix product in the time of reading one number of `R` from memory, and of what is done
 to one number of a tile (transforms, parts and copies). The former was measured, the latter is a guess."""
+
+SIDE = 4
+"""Objects that share a product, at most: with more of them their columns leave the cache."""
 
 GROUP = 2**22
 """Numbers of the transforms of all tiles that are treated at a time, at most, if one depth has fewer: they
@@ -96,6 +100,16 @@ def is_faster(kernels: Sequence[SliceKernel], told: Tiling, counts: tuple[int, i
     return products * sampling.pixels**2 > cost(told, *counts)
 
 
+def sharing(told: Tiling) -> int:
+    """Objects whose tiles fill a product, so that reading `R` counts for little: at most `SIDE`.
+
+    >>> from lumigraph.operators.microscope_tiles import Row
+    >>> [sharing(Tiling(*[Row(29, 0, 4, n)] * 2)) for n in (1, 2, 3)]
+    [4, 2, 1]
+    """
+    return max(min(round(READ / (4 * told.count)), SIDE), 1)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Spectra:
     """The operator between patterns of points and of pixels.
@@ -110,12 +124,15 @@ class Spectra:
         Patterns of the image.
     matrices
         R (frequencies, patterns of some depths, those of the image), of the depths of each of `groups`.
+    far
+        Light that goes farther than those follow it; None where there is none.
     """
 
     told: Tiling
     points: Sequence[Patterns]
     pixels: Patterns
     matrices: Sequence[Array]
+    far: FarLight | None = None
 
     @classmethod
     @single_products()
@@ -125,6 +142,7 @@ class Spectra:
         patterns: tuple[Sequence[Patterns], Patterns],
         told: Tiling,
         like: Array,
+        far: FarLight | None = None,
     ) -> "Spectra":
         """In the library and precision of an array, for patterns of each depth and of the image."""
         points, pixels = patterns
@@ -138,53 +156,83 @@ class Spectra:
                 first += one.count
             return arrays.like(matrix, like)
 
-        return cls(told, points, pixels, list(each(found, groups(points, told))))
+        return cls(told, points, pixels, list(each(found, groups(points, told))), far)
 
-    def forward(self, volume: Array) -> Array:
-        """Samples (rows N, columns N) of a volume (z, rows s, columns s)."""
-        xp, columns = arrays.namespace(volume), 0.0
+    def forward(self, volumes: Sequence[Array], side: int = 1) -> list[Array]:
+        """Samples (rows N, columns N) of volumes (z, rows s, columns s), at most `side` of them.
+
+        They share each product. It has rows for `side` volumes, be they there or not: the bits of a sum may
+        depend on how many there are.
+        """
+        xp, told, columns = arrays.namespace(volumes[0]), self.told, 0.0
 
         def lit(group: tuple[slice, Array]) -> Array:
             depths, matrix = group
             chosen = self.points[depths]
-            cells = [parted(volume[k + depths.start, ...], one) for k, one in enumerate(chosen)]
-            cells = cells[0] if len(cells) == 1 else xp.concat(cells, axis=-1)
-            return _columns(cells, self.told, _odd(chosen), of_image=False) @ matrix
 
-        for part in each(lit, zip(groups(self.points, self.told), self.matrices, strict=True)):
+            def cells(volume: Array) -> Array:
+                found = [parted(volume[k + depths.start, ...], one) for k, one in enumerate(chosen)]
+                return found[0] if len(found) == 1 else xp.concat(found, axis=-1)
+
+            return _columns(map(cells, volumes), side, told, _odd(chosen), of_image=False) @ matrix
+
+        for part in each(lit, zip(groups(self.points, told), self.matrices, strict=True)):
             columns = columns + part
-        shape = (*self.told.cells, self.pixels.count)
-        image = xp.zeros(shape, dtype=volume.dtype, device=arrays.device(volume))
-        _add_cells(image, columns, self.told, self.pixels.odd, of_image=True)
-        return whole(image, self.pixels)
+        images = [self._far_image(volume) for volume in volumes]
+        _add_cells(images, columns, side, told, self.pixels.odd, of_image=True)
+        return [whole(image, self.pixels) for image in images]
 
-    def adjoint(self, image: Array, even: Array | None = None) -> Array:
-        """Transpose of `forward`: (z, rows s, columns s), and `even` (z, rows, columns) on all of a cell."""
-        xp, told = arrays.namespace(image), self.told
-        columns = _columns(parted(image, self.pixels), told, self.pixels.odd, of_image=True)
-        shape = tuple(row.cells + 2 * row.margin for row in (told.rows, told.columns))
-        s, like = (
-            math.isqrt(len(self.points[0].basis)),
-            {"dtype": image.dtype, "device": arrays.device(image)},
-        )
-        volume = xp.empty((len(self.points), shape[0] * s, shape[1] * s), **like)
+    def _far_image(self, volume: Array) -> Array:
+        """Patterns (rows, columns, r) of far light."""
+        if self.far is not None:
+            return self.far.forward(volume, self._points)
+        xp, shape = arrays.namespace(volume), (*self.told.cells, self.pixels.count)
+        return xp.zeros(shape, dtype=volume.dtype, device=arrays.device(volume))
+
+    @property
+    def _points(self) -> int:
+        """Along a side of a cell."""
+        return math.isqrt(len(self.points[0].basis))
+
+    def adjoint(self, images: Sequence[Array], side: int = 1) -> list[Array]:
+        """Transpose of `forward`: volumes (z, rows s, columns s)."""
+        xp, told, n, evens = arrays.namespace(images[0]), self.told, len(images), []
+
+        def parts() -> Iterator[Array]:
+            for image in images:
+                yield (part := parted(image, self.pixels))
+                evens.append(None if self.far is None else self.far.adjoint(part))
+
+        columns = _columns(parts(), side, told, self.pixels.odd, of_image=True)
+        shape, s = tuple(row.cells + 2 * row.margin for row in (told.rows, told.columns)), self._points
+        like = {"dtype": images[0].dtype, "device": arrays.device(images[0])}
+        volumes = [xp.empty((len(self.points), shape[0] * s, shape[1] * s), **like) for _ in images]
 
         def seen(group: tuple[slice, Array]) -> None:
             depths, matrix = group
-            chosen, first = self.points[depths], 0
-            cells = xp.zeros((*shape, matrix.shape[1]), **like)
-            _add_cells(cells, columns @ xp.matrix_transpose(matrix), told, _odd(chosen), of_image=False)
-            for k, one in enumerate(chosen, depths.start):
-                own = cells[..., first : first + one.count]
-                plane = whole(own, one)
-                if even is not None:
-                    plane = arrays.untiled(arrays.tiled(plane, (s, s)) + even[k, ..., None, None])
-                volume[k, ...] = plane
-                first += one.count
+            chosen = self.points[depths]
+            cells = [xp.zeros((*shape, matrix.shape[1]), **like) for _ in range(n)]
+            product = columns @ xp.matrix_transpose(matrix)
+            _add_cells(cells, product, side, told, _odd(chosen), of_image=False)
+            for volume, own, even in zip(volumes, cells, evens, strict=True):
+                _put_planes(volume, own, even, chosen, depths.start)
 
         for _ in each(seen, zip(groups(self.points, told), self.matrices, strict=True)):
             pass
-        return volume
+        return volumes
+
+
+def _put_planes(
+    volume: Array, cells: Array, even: Array | None, chosen: Sequence[Patterns], start: int
+) -> None:
+    """Write depths of a volume, from `start` on, whose patterns in cells stand one after the other."""
+    first = 0
+    for k, one in enumerate(chosen, start):
+        plane, s = whole(cells[..., first : first + one.count], one), math.isqrt(len(one.basis))
+        if even is not None:
+            plane = arrays.untiled(arrays.tiled(plane, (s, s)) + even[k, ..., None, None])
+        volume[k, ...] = plane
+        first += one.count
 
 
 def groups(points: Sequence[Patterns], told: Tiling) -> list[slice]:
@@ -234,20 +282,24 @@ def _odd(points: Sequence[Patterns]) -> np.ndarray:
     return np.concatenate([one.odd for one in points], axis=1)
 
 
-def _columns(cells: Array, told: Tiling, odd: np.ndarray, *, of_image: bool) -> Array:
-    """Real and imaginary parts at f_y and at -f_y of all tiles (frequencies, 4 tiles, channels)."""
-    xp, (ly, lx), channels = arrays.namespace(cells), told.lengths, cells.shape[-1]
-    half, turn, sign = ly // 2 + 1, *_turns(odd, cells, back=of_image)
-    shape = (half, lx // 2 + 1, told.count, 4, channels)
-    found = xp.empty(shape, dtype=cells.dtype, device=arrays.device(cells))
-    for k, spans in told.tiles():
-        (rows, columns), (y, x) = _places(spans, of_image)
-        spectrum = _along_y(_along_x(cells[rows, columns, :], x, lx) * turn, y, ly)
-        below = xp.concat([spectrum[:1, ...], xp.flip(spectrum[ly - half + 1 :, ...], axis=0)])
-        above = spectrum[:half, ...]
-        found[:, :, k, 0, :], found[:, :, k, 1, :] = xp.real(above), xp.imag(above)
-        found[:, :, k, 2, :], found[:, :, k, 3, :] = xp.real(below) * sign, xp.imag(below) * sign
-    return xp.reshape(found, (told.frequencies, 4 * told.count, channels))
+def _columns(parts: Iterable[Array], side: int, told: Tiling, odd: np.ndarray, *, of_image: bool) -> Array:
+    """Real and imaginary parts at f_y and at -f_y (frequencies, side · 4 tiles, channels) of cells' parts."""
+    parts = iter(parts)
+    first = next(parts)
+    xp, (ly, lx), channels = arrays.namespace(first), told.lengths, first.shape[-1]
+    half, turn, sign = ly // 2 + 1, *_turns(odd, first, back=of_image)
+    shape, n = (half, lx // 2 + 1, side, told.count, 4, channels), 0
+    found = xp.empty(shape, dtype=first.dtype, device=arrays.device(first))
+    for n, cells in enumerate(itertools.chain([first], parts)):
+        for k, spans in told.tiles():
+            (rows, columns), (y, x) = _places(spans, of_image)
+            spectrum = _along_y(_along_x(cells[rows, columns, :], x, lx) * turn, y, ly)
+            below = xp.concat([spectrum[:1, ...], xp.flip(spectrum[ly - half + 1 :, ...], axis=0)])
+            above, place = spectrum[:half, ...], found[:, :, n, k, ...]
+            place[:, :, 0, :], place[:, :, 1, :] = xp.real(above), xp.imag(above)
+            place[:, :, 2, :], place[:, :, 3, :] = xp.real(below) * sign, xp.imag(below) * sign
+    found[:, :, n + 1 :, ...] = 0
+    return xp.reshape(found, (told.frequencies, side * 4 * told.count, channels))
 
 
 def _along_x(cells: Array, first: int, length: int) -> Array:
@@ -270,18 +322,20 @@ def _along_y(spectrum: Array, first: int, length: int) -> Array:
     return arrays.fft(spectrum, length, axis=0, overwrite=True)
 
 
-def _add_cells(cells: Array, columns: Array, told: Tiling, odd: np.ndarray, *, of_image: bool) -> None:
-    """Add to cells (rows, columns, channels) what `_columns` of all tiles say of them."""
-    xp, (ly, lx), channels = arrays.namespace(cells), told.lengths, cells.shape[-1]
-    half, turn, sign = ly // 2 + 1, *_turns(odd, cells, back=not of_image)
-    columns = xp.reshape(columns, (half, lx // 2 + 1, told.count, 4, channels))
-    for k, spans in told.tiles():
+def _add_cells(
+    parts: Sequence[Array], columns: Array, side: int, told: Tiling, odd: np.ndarray, *, of_image: bool
+) -> None:
+    """Add to cells' parts (rows, columns, channels) what `_columns` say of them."""
+    xp, (ly, lx), channels = arrays.namespace(columns), told.lengths, columns.shape[-1]
+    half, turn, sign = ly // 2 + 1, *_turns(odd, columns, back=not of_image)
+    columns = xp.reshape(columns, (half, lx // 2 + 1, side, told.count, 4, channels))
+    for (n, cells), (k, spans) in itertools.product(enumerate(parts), told.tiles()):
         (rows, places), (y, x) = _places(spans, of_image)
         height, width = rows.stop - rows.start, places.stop - places.start
         spectrum = xp.empty((ly, lx // 2 + 1, channels), dtype=turn.dtype, device=arrays.device(cells))
-        parts = [columns[:, :, k, part, :] for part in range(4)]
-        below = [xp.flip(part[1 : ly - half + 1, ...] * sign, axis=0) for part in parts[2:]]
-        arrays.put_complex(spectrum[:half, ...], *parts[:2])
+        four = [columns[:, :, n, k, part, :] for part in range(4)]
+        below = [xp.flip(part[1 : ly - half + 1, ...] * sign, axis=0) for part in four[2:]]
+        arrays.put_complex(spectrum[:half, ...], *four[:2])
         arrays.put_complex(spectrum[half:, ...], *below)
         spectrum = arrays.ifft(spectrum, axis=0, overwrite=True)[y : y + height, ...] * turn
         place = cells[rows, places, :]

@@ -72,6 +72,8 @@ class Crossed:
         Samples of the light, over what its band without diffraction at lenslets asks for.
     left_out
         Relative rms of fields that a low rank may leave out.
+    beside
+        Lenslets beyond `guard` whose light is followed into the window, to each side.
     """
 
     def __init__(
@@ -82,10 +84,11 @@ class Crossed:
         reach: int,
         margin: float,
         left_out: float = 0.0,
+        beside: int = 0,
     ) -> None:
         self.objective, self.lenslet, self.sampling = objective, lenslet, sampling
         self.reach, self.left_out = reach, left_out
-        self.fine, self.guard = fineness(objective, lenslet, margin), guard(objective, lenslet)
+        self.fine, self.guard = fineness(objective, lenslet, margin), guard(objective, lenslet) + beside
         self.steepest = (
             objective.numerical_aperture / lenslet.magnification / objective.wavelength * lenslet.pitch
         )

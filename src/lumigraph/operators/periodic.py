@@ -39,7 +39,7 @@ from lumigraph.operators.blocks import Part
 from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.cell_response import Pair
 from lumigraph.operators.cells import Cells, blur, check_alike
-from lumigraph.operators.kernels import A_MINUTE, LONGEST, Matrix, matrix
+from lumigraph.operators.kernels import A_MINUTE, LONGEST, Matrix, matrix, operations, said
 from lumigraph.operators.leaning import leaning_operator
 from lumigraph.operators.mirrors import Mirror
 from lumigraph.operators.optics import Optics
@@ -47,7 +47,6 @@ from lumigraph.operators.over_field import over_field
 from lumigraph.operators.paraxial import field_matters, resolved
 from lumigraph.operators.places import Turn
 from lumigraph.operators.points import seen
-from lumigraph.operators.sizes import build_operations
 from lumigraph.operators.streamed import Streamed
 from lumigraph.operators.tiles import as_plane, by_cell, readout, spread
 
@@ -348,7 +347,7 @@ def _varying(camera: CameraOptics, grid: Grid, dz: float, making: _Making) -> Li
         mirrors.of_fields(turns, optics.rotation),
     )  # fmt: skip
     count, number = len(found.sources), iter(range(len(found.sources)))
-    _check_price(optics.bricks, count)
+    _check_price(optics.bricks, found.sources)
 
     def of(one: CameraOptics) -> PeriodicOperator:
         mine = making.of(next(number), count)
@@ -386,14 +385,17 @@ def mirrored_operator(operator: PeriodicOperator, turn: Turn) -> PeriodicOperato
     return replace(operator, planes=planes, readout=Chain((image, operator.readout)))
 
 
-def _check_price(optics: Optics, count: int) -> None:
-    """Refuse what would take too long to build."""
-    if (operations := count * build_operations(optics)) > LONGEST:
+def _check_price(optics: Optics, sources: Sequence[Pair]) -> None:
+    """Refuse what would take too long, behind the lenses of some fields; warn of minutes."""
+    each = (replace(optics, camera=varying.at(optics.camera, *source)) for source in sources)
+    told, total = f"the operators of {len(sources)} lenses over the field", sum(map(operations, each))
+    if total > LONGEST:
         raise SamplingError(
-            f"the operators of {count} lenses over the field take {operations:.0e} operations to build, "
-            f"{operations / A_MINUTE:.0f} min of a processor that does 1e11 a second; {LONGEST:.0e} are "
-            "allowed. Ask for a coarser accuracy, or use square lenslets."
+            f"{told} take {total:.0e} operations, {total / A_MINUTE:.0f} min of a processor that does 1e11 "
+            f"a second; {LONGEST:.0e} are allowed. Ask for a coarser accuracy, or use "
+            f"{'slower' if optics.straight else 'square'} lenslets."
         )
+    said(total, f"{told} take, where they are not kept already,")
 
 
 def _plane(optics: Optics, matrix: Matrix | Streamed, grid: Grid) -> Plane:

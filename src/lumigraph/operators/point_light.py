@@ -1,7 +1,6 @@
 """Light of a point in the lenslet plane, at any place there: the main lens' diffraction, in focus or not."""
 
 import math
-import warnings
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -11,12 +10,10 @@ from scipy.special import j0
 
 from lumigraph.core.grid import Grid
 from lumigraph.elements import ThinLens, Train
-from lumigraph.errors import SamplingWarning
 from lumigraph.operators import cells as _cells
 from lumigraph.operators import exact_light
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.cell_response import legendre
-from lumigraph.scene import sources
 
 PUPIL = 1024
 """Samples across the main lens, or more where its light is followed far."""
@@ -98,12 +95,8 @@ class Sampled:
             count = max(self.samples, math.ceil(3 * self.widest / _cells.airy(self.camera)))
             wide = math.ceil(count * _cells.stop_reach(self.lens))
             grid = Grid.square(wide + 8, self.camera.pupil_diameter / count)
-            with warnings.catch_warnings():  # what is sampled is the product of all phases
-                warnings.simplefilter("ignore", SamplingWarning)
-                point = sources.point_source(grid, self.camera.wavelength, self.distance, paraxial=True)
-                pupil = self.lens(point).data
+            pupil = _cells.over_lens(self.camera, self.lens, self.distance, grid)
             squared = self.camera.wavelength * self.camera.separation
-            pupil = pupil * np.outer(*(np.exp(1j * np.pi * c**2 / squared) for c in (grid.y, grid.x)))
             light = (np.abs(pupil) ** 2).sum() * squared**2 / np.prod(grid.pitch)
             self._pupil.extend((grid, pupil * np.sqrt(_cells.stop_area(self.lens) / light)))
         return self._pupil[0], self._pupil[1]

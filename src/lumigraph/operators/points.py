@@ -23,11 +23,11 @@ from lumigraph.scene import Points
 LEFT_OUT = 0.3
 """Part of the accuracy that cells may have that are left dark."""
 
-FINER = 4.0
-"""How much less exact the image is that one is compared with, where one may be."""
+FINER, ALIKE = 4.0, 1.05
+"""How much more exact the image is that one is set beside; how much more it is off than the two are apart."""
 
-ALIKE = 0.6
-"""Part of its error that the coarser image has as well; so twelve of four cameras come out at .5 to 1.5."""
+COARSER, AS_WELL = 4.0, 0.6
+"""Where none is finer, how much less exact the image is, and the part of the error that it has as well."""
 
 OUTSIDE = 0.1
 """Factor of the accuracy for points beyond the array: the little of their light that arrives is all."""
@@ -63,19 +63,23 @@ def points_image(
 
 
 def image_and_error(camera: HasOptics, points: Points, accuracy: float) -> tuple[np.ndarray, float]:
-    """`points_image`, and its relative rms error: of the brightest point, beside a coarser image of it."""
+    """`points_image`, and its relative rms error: of the brightest point, beside a finer image of it."""
     camera, known = camera.optics(), {}
     image = points_image(camera, points, accuracy, known)
     if not np.any(points.intensities):
         return image, 0.0
     optics = Optics.of(camera, camera.object_distance, accuracy)
     places = on_lenslets(optics, points.positions[:, :2], camera.object_distance + points.positions[:, 2])
-    k = int(np.argmax(np.where(_within(optics, places), points.intensities, 0)))  # some point, if none is
+    within = _within(optics, places)
+    k = int(np.argmax(np.where(within, points.intensities, 0)))  # some point, if none is
     one = Points(points.positions[k : k + 1], points.intensities[k : k + 1])
-    coarser = min(accuracy * FINER, COARSEST / SPARE)
-    alone = points_image(camera, one, accuracy, known)
-    off = np.linalg.norm(points_image(camera, one, coarser) - alone)
-    return image, float(off) / (coarser / accuracy - ALIKE) / (float(np.linalg.norm(alone)) or 1.0)
+    alone = image if len(points.intensities) == 1 else points_image(camera, one, accuracy, known)
+    other, more = accuracy / FINER, ALIKE
+    if other * (SPARE if within[k] else OUTSIDE) < FINEST:
+        other = min(accuracy * COARSER, COARSEST / SPARE)
+        more = 1 / (other / accuracy - AS_WELL)
+    off = np.linalg.norm(points_image(camera, one, other) - alone)
+    return image, more * float(off) / (float(np.linalg.norm(alone)) or 1.0)
 
 
 def _relay(

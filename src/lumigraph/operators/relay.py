@@ -63,10 +63,10 @@ class _Cells:
 
     optics: Optics
     which: int
+    axis: Axis = field(init=False)
 
-    @property
-    def axis(self) -> Axis:
-        return self.optics.axes[self.which]
+    def __post_init__(self) -> None:
+        self.axis = self.optics.axes[self.which]  # once: how far light goes is asked of the main lens
 
     def center(self, cell: int) -> float:
         """Of a cell of the image [m]; 0 is the outermost of the ring."""
@@ -101,13 +101,15 @@ class Straight:
     optics: Optics
     _known: dict[tuple[int, Limits, float, Box], np.ndarray] = field(default_factory=dict)
     _lenslets: Lenslets = field(init=False)
+    _sides: tuple[_Cells, _Cells] = field(init=False)
 
     def __post_init__(self) -> None:
         self._lenslets = lenslets_of(self.optics)
+        self._sides = _Cells(self.optics, 0), _Cells(self.optics, 1)
 
     def places(self, rows: range, columns: range) -> tuple[np.ndarray, np.ndarray]:
         """As `Relay.places`."""
-        return _Cells(self.optics, 0).places(rows), _Cells(self.optics, 1).places(columns)
+        return self._sides[0].places(rows), self._sides[1].places(columns)
 
     def field(self, light: np.ndarray, rows: range, columns: range) -> np.ndarray:
         """As `Relay.field`."""
@@ -118,20 +120,20 @@ class Straight:
     def _box(self, rows: range, columns: range) -> Box:
         ends = [
             (mine.center(cells[0]), mine.center(cells[-1]))
-            for mine, cells in ((_Cells(self.optics, 0), rows), (_Cells(self.optics, 1), columns))
+            for mine, cells in zip(self._sides, (rows, columns), strict=True)
         ]
         (top, bottom), (left, right) = ends
         return ((top + bottom) / 2, (left + right) / 2), ((bottom - top) / 2, (right - left) / 2)
 
     def along(self, which: int, light: np.ndarray, cells: range, box: Box) -> np.ndarray:
         """Amplitudes (terms, samples, n) along one axis of light (1 or terms, places, n)."""
-        mine = _Cells(self.optics, which)
+        mine = self._sides[which]
         parts = [self._matrix(which, cell, box) @ light[:, mine.window(k)] for k, cell in enumerate(cells)]
         return np.concatenate(parts, axis=1)
 
     def _matrix(self, which: int, cell: int, box: Box) -> np.ndarray:
         """Amplitudes (terms, samples, window) of one cell along one axis."""
-        mine = _Cells(self.optics, which)
+        mine = self._sides[which]
         middle, limits = mine.center(cell), mine.limits(cell)
         key = which, limits, 0.0 if box is MIDDLE else middle, box
         if key not in self._known:

@@ -147,16 +147,24 @@ def _on_both_axes(matrix: Callable[[int], Banded], *grids: Grid) -> Resampling:
 
 
 def banded(
-    rows: np.ndarray, columns: np.ndarray, entries: Callable[[np.ndarray], np.ndarray], reach: float
+    rows: np.ndarray,
+    columns: np.ndarray,
+    entries: Callable[[np.ndarray], np.ndarray],
+    reach: float,
+    height: int = _ROWS,
+    dtype: type = np.float64,
 ) -> Banded:
-    """Matrix ``entries(row - column)`` of sorted positions; farther apart than `reach` it is zero."""
+    """Matrix ``entries(row - column)`` of sorted positions; farther apart than `reach` it is zero.
+
+    Its blocks have `height` rows.
+    """
     blocks = []
-    for start in range(0, len(rows), _ROWS):
-        mine = rows[start : start + _ROWS]
+    for start in range(0, len(rows), height):
+        mine = rows[start : start + height]
         first = int(np.searchsorted(columns, mine.min() - reach, "left"))
         last = int(np.searchsorted(columns, mine.max() + reach, "right"))
         offsets = mine[:, None] - columns[first:last]
-        near, block = np.abs(offsets) <= reach, np.zeros(offsets.shape)
+        near, block = np.abs(offsets) <= reach, np.zeros(offsets.shape, dtype)
         block[near] = entries(offsets[near])
         blocks.append((first, block))
     return Banded(len(columns), tuple(blocks))

@@ -27,6 +27,9 @@ FARTHEST = 6.0
 BESIDE = 3.0
 """Points whose cone passes edges at more than this [√(λq/2)] are hidden in full, or not at all."""
 
+HELD = 2048
+"""Coordinates of points whose light along an axis is held."""
+
 OPEN, PARTLY, HIDDEN = 0, 1, 2
 """How a point's cone passes the screens."""
 
@@ -122,14 +125,17 @@ class Shadow:
     def _along(self, axis: int, at: float) -> tuple[slice, np.ndarray]:
         """Samples of the opacity, and the amplitude (pupil, samples) that reaches the pupil from them."""
         key = axis, at
-        if key not in self._known:
+        if (found := self._known.get(key)) is None:
             edges, seen = self._edges[axis], self._share * at + self._widening * self.pupil
             far = self._reach * self._zone
             first = int(np.clip(np.searchsorted(edges, seen[0] - far) - 1, 0, len(edges) - 1))
             last = int(np.clip(np.searchsorted(edges, seen[-1] + far) + 1, first + 1, len(edges)))
             t = (edges[first:last] - seen[:, None]) / self._zone
-            self._known[key] = slice(first, last - 1), np.diff(_integral(t, self._reach), axis=1)
-        return self._known[key]
+            found = slice(first, last - 1), np.diff(_integral(t, self._reach), axis=1)
+            if len(self._known) >= HELD:
+                self._known.clear()
+            self._known[key] = found
+        return found
 
 
 def _integral(t: np.ndarray, reach: float) -> np.ndarray:

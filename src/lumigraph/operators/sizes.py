@@ -13,7 +13,7 @@ from lumigraph.operators.exact import terms_of
 from lumigraph.operators.fineness import tail
 from lumigraph.operators.missing import AT_A_TIME, HELD
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.places import INSIDE, Place, State, alike, places, terms
+from lumigraph.operators.places import INSIDE, Place, State, alike, flipped, places, terms
 
 MORE = 1.8
 """Factors that are found at first, of those that are kept in the end."""
@@ -157,16 +157,44 @@ class Few:
 
 
 def build_operations(optics: Optics) -> float:
-    """Multiplications and additions that most of building takes, behind lenslets that are not square."""
-    if optics.straight:
-        return 0.0
+    """Multiplications and additions that most of building takes."""
     points, samples = math.prod(optics.cells.points), math.prod(optics.cells.samples)
+    if optics.straight:
+        inside, border = _blocks(optics)
+        # Factors by products with a fifth of the points.
+        places = len(wanted(optics)) * math.prod(2 * n + 1 for n in optics.near)
+        return (inside + border) * _block(optics) + 2.0 * samples * points**2 * (inside + places)
     few = Few.of(optics)
     # Factors of blocks: three products of theirs, each block and its mirror image once; at the border of the
     # chosen points, a fifteenth of them in the largest block.
     blocks = optics.cells.kinds * math.prod(2 * n + 1 for n in optics.reach) / 2
     border = len(wanted(optics)) * few.chosen**2 / 15
     return few.operations + 3 * 2.0 * samples * (blocks * points**2 + border)
+
+
+def stream_operations(optics: Optics) -> float:
+    """Multiplications and additions of an image whose blocks are computed for it, behind square lenslets."""
+    applied = 2.0 * math.prod((*optics.cells.points, *optics.cells.samples, *optics.cells.count))
+    applied *= math.prod(2 * n + 1 for n in optics.reach)
+    return sum(_blocks(optics)) * _block(optics) + applied
+
+
+def _blocks(optics: Optics) -> tuple[int, int]:
+    """Blocks behind square lenslets that do not mirror others: inside the array, and at its border."""
+    even = _cells.mirrored(optics.camera)
+
+    def count(state: State, reach: tuple[int, int]) -> int:
+        pairs = zip((state.y, state.x), reach, strict=True)
+        return math.prod(n + 1 if even and flipped(limits) == limits else 2 * n + 1 for limits, n in pairs)
+
+    border = states_of(wanted(optics)) - {INSIDE}
+    return count(INSIDE, optics.reach), sum(count(state, optics.near) for state in border)
+
+
+def _block(optics: Optics) -> float:
+    """Multiplications and additions of one: complex products with light in half of a window's points."""
+    y, numbers = optics.axes[0], math.prod((*optics.cells.points, *optics.cells.samples))
+    return 8.0 * terms_of(optics) * (y.margin + y.points / 2) * numbers
 
 
 def states_of(group: Iterable[Place]) -> set[State]:
