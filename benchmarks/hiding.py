@@ -76,12 +76,12 @@ class Bench:
         return self.relay.pixels(total) * (pitch * self.camera.separation / self.distance) ** 2
 
 
-def chart(camera: Any, dz: float, samples: int, bars: int) -> Any:
-    """A small chart of bars of so many samples, of which the camera resolves two, as a slice."""
+def chart(camera: Any, dz: float, samples: int, bars: int, pitch: float | None = None) -> Any:
+    """A small chart of bars of so many samples, as a slice; the camera resolves two of the usual pitch."""
     from lumigraph.core.grid import Grid
     from lumigraph.scene import Slice
 
-    pitch = camera.lattice.pitch * (camera.object_distance + dz) / camera.separation / 8
+    pitch = pitch or camera.lattice.pitch * (camera.object_distance + dz) / camera.separation / 8
     bright = np.arange(samples) // bars % 2 == 0
     shade = 1 + 0.3 * np.sin(np.arange(samples))
     return Slice(np.outer(shade, bright), Grid.square(samples, pitch), dz)

@@ -92,9 +92,9 @@ def test_a_microscope_sees_an_object_that_was_moved():
     place = Grid((1, 1), grid.pitch, (grid.y[row], grid.x[column]))
     first, second, third = operator.parted(operator.forward(x))
     iy, ix = place.samples_to(mine)
-    # 1e-3: what few patterns of pixels may leave out. A sample farther it is another picture by 0.1.
-    assert relative(first, own.psf((1, iy, ix))) < 1e-3
-    assert relative(second, own.psf((1, iy + 2, ix - 1))) < 1e-3
+    # 6e-3: what few patterns leave out. A sample farther it is another picture by 0.1.
+    assert relative(first, own.psf((1, iy, ix))) < 6e-3
+    assert relative(second, own.psf((1, iy + 2, ix - 1))) < 6e-3
     assert relative(second, own.psf((1, iy + 2, ix))) > 0.1
     assert third.sum() == pytest.approx(first.sum(), rel=0.01)
     assert relative(third, first) > 0.05

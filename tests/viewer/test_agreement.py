@@ -83,7 +83,8 @@ def test_depths_of_a_camera_2_agree_in_metres(tmp_path, monkeypatch):
     (tmp_path / "camera.toml").write_text(camera.to_toml())
     y, x = np.meshgrid(*map(np.arange, camera.sensor.shape), indexing="ij")
     (dy, dx), step = camera.calibration.offset(y, x), camera.calibration.lattice.pitch / camera.patch
-    raw = 2 + np.sin(0.4 * (y - dy - dy * step)) + np.cos(0.5 * (x - dx - dx * step))
+    y, x = y - dy - dy * step, x - dx - dx * step
+    raw = 3 + np.sin(0.4 * y) + np.cos(0.5 * x) + np.sin(0.31 * y - 0.17 * x) + np.cos(0.13 * y + 0.27 * x)
     lg.save(lg.RawImage(raw.astype(np.float32)), "raw.tiff")
     assert main(["depth", "raw.tiff", "--camera", "camera.toml", "-o", "map.tiff"]) == 0
     patches = lg.depth.dense(lg.open("raw.tiff"), camera.calibration)

@@ -83,9 +83,8 @@ def _image_of(
         image, left = _without_lenslets(camera, part, accuracy)
         return image, error.SINGLE_LENS.and_also(left, ", lenses over the field" if left else "")
     if isinstance(part, Diffuser):
-        image, fringes = white.white_image(plain, accuracy)
-        reached = error.of_quadrature("white image", accuracy).and_also(fringes)
-        return part.intensity * image, reached.through(plain)
+        image, off = white.image_and_error(plain, accuracy)
+        return part.intensity * image, error.of_white(off, accuracy).through(plain)
     plain = resolved(plain, accuracy)
     if isinstance(part, Points):
         image, off = points.image_and_error(plain, part, accuracy)
@@ -93,8 +92,8 @@ def _image_of(
         return image, reached if plain.model == "exact" else reached.through(plain)
     part = part.trimmed()
     operator = periodic_operator(plain, part.grid, part.dz, accuracy=accuracy, progress=progress)
-    image = operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
-    reached = error.of_quadrature("operator", accuracy)
+    intensity = arrays.to_numpy(part.intensity).astype(np.float32)
+    image, reached = operator.forward(intensity), error.of_operator(intensity, accuracy)
     if plain.model == "exact":
         return image, reached.and_also(left_by_field(plain, accuracy), ", alike over the field")
     if isinstance(operator, FieldOperator):

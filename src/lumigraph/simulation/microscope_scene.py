@@ -5,6 +5,7 @@ All light is incoherent: fluorescence. What stands beyond the field that the len
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -31,6 +32,9 @@ _SOURCE = "cells treated as far, what samples behind a lenslet do not hold, samp
 
 COARSER = 1.5
 """Pitch of the samples that tell the error of an operator's own, over theirs."""
+
+LEAST = 0.5
+"""Of the accuracy asked for, that an operator is made for where samples of a slice take up the rest."""
 
 
 @runtime_checkable
@@ -127,21 +131,39 @@ def _points_image(scope: Microscope, part: Points, accuracy: float) -> tuple[np.
 
 
 def _slice_image(scope: Microscope, part: Slice, accuracy: float) -> tuple[np.ndarray, float]:
-    """By an operator as fine as the slice; where that does not do, as the objective resolves."""
+    """By an operator as fine as the slice; or else as the objective resolves, or else more exact."""
     if part.intensity.ndim != 2:
         raise GeometryError(
             f"a slice has shape {part.intensity.shape} but one wavelength needs grey (y, x). "
             "Give spectrum=Spectrum.rgb() for a coloured scene."
         )
     finest = min(one.wavelength / (4 * one.numerical_aperture) for one in scope.objectives)
-    steps, image, rms = (max(finest, *part.grid.pitch), finest), np.zeros(scope.sensor.shape), 0.0
-    for samples in dict.fromkeys(max(SAMPLES, math.ceil(scope.lenslet_size / p - 1e-6)) for p in steps):
-        operator = scope.operator((part.dz,), samples, accuracy=accuracy)
-        image = operator.forward(_plane(part, operator.object_grid))
-        rms = math.hypot(operator.error, _sampling_error(operator, part, image))
-        if not rms > accuracy:  # nor where it is not known
-            break
-    return image, rms
+    steps, found = (max(finest, *part.grid.pitch), finest), _Found(np.zeros(scope.sensor.shape), 0.0, 0.0)
+    counts = [max(SAMPLES, math.ceil(scope.lenslet_size / p - 1e-6)) for p in steps]
+    for samples in dict.fromkeys(counts):
+        found = _by_operator(scope, part, samples, accuracy)
+        if not found.error > accuracy:  # nor where it is not known
+            return found.image, found.error
+    left = math.sqrt(max(accuracy**2 - found.sampled**2, 0.0))
+    if left > LEAST * accuracy:
+        found = _by_operator(scope, part, counts[-1], left)
+    return found.image, found.error
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """Image of a slice, its relative rms error, and what of it is that of the operator's samples."""
+
+    image: np.ndarray
+    error: float
+    sampled: float
+
+
+def _by_operator(scope: Microscope, part: Slice, samples: int, accuracy: float) -> _Found:
+    operator = scope.operator((part.dz,), samples, accuracy=accuracy)
+    image = operator.forward(_plane(part, operator.object_grid))
+    sampled = _sampling_error(operator, part, image)
+    return _Found(image, math.hypot(operator.error, sampled), sampled)
 
 
 def _plane(part: Slice, grid: Grid) -> np.ndarray:
