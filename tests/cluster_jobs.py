@@ -51,5 +51,29 @@ class Here:
         yield self
 
     def each(self, numbers):
-        for number in numbers:
-            yield number, self.task.do(number)
+        yield from self.task.do(numbers)
+
+
+class Together:
+    """Noise as `picture` gives it, up to three at a time; how many there were is a line in a file."""
+
+    side_by_side = 3
+
+    def __call__(self, item):
+        raise AssertionError("never one alone")
+
+    def several(self, items):
+        with Path(items[0]["groups"]).open("a") as file:
+            file.write(f"{len(items)}\n")
+        if any(item.get("spoils") for item in items):
+            raise ValueError("all of it is bad")
+        yield [_tried(item) for item in items[:2]]
+        if items[2:]:
+            yield [_tried(item) for item in items[2:]]
+
+
+def _tried(item):
+    try:
+        return picture(item)
+    except ValueError as error:
+        return error

@@ -9,6 +9,8 @@ import tifffile
 
 import lumigraph as lg
 from lumigraph.cli.deconvolve_options import depths
+from lumigraph.cli.frames import Frames, items_of
+from lumigraph.operators.microscope_operator import MicroscopeOperator
 from lumigraph.preparation import vignetting
 
 FOCUSED = """
@@ -259,6 +261,34 @@ def test_a_batch_warms_up_in_runs_that_are_the_same_whoever_does_them(lumigraph,
     assert lumigraph(*batch, "-o", "v.ome.zarr").code == 0
     again = lg.open(tmp_path / "v.ome.zarr", page=1)
     np.testing.assert_array_equal(again.data, lg.open(tmp_path / "w-page-1.ome.zarr").data)
+
+
+def test_frames_of_a_batch_that_share_products_are_what_the_verb_alone_gives(
+    lumigraph, tmp_path, rng, monkeypatch
+):
+    """Three at a time; of those with another picture's lenslets, or none to see, none suffers."""
+    (tmp_path / "scope.toml").write_text(SCOPE)
+    film = rng.poisson(200, (6, 41, 41)).astype(np.uint16)
+    film[1] = 0
+    tifffile.imwrite(tmp_path / "film.tif", film, photometric="minisblack")
+    asked = ["--camera", "scope.toml", "--z=-10 um,0 um", "--samples", "1", "--iterations", "2"]
+    monkeypatch.setattr(MicroscopeOperator, "side_by_side", property(lambda _: 3))
+    monkeypatch.chdir(tmp_path)
+    work, (first, *others) = Frames("deconvolve", tuple(asked), str(tmp_path)), items_of(["film.tif"], "all")
+    assert work.side_by_side == 4
+    changed = {**others[3], "size": 7}
+    groups = list(work.several([first, *others[:3], changed, others[4]]))
+    assert [len(group) for group in groups] == [3, 3]
+    found = [thing for group in groups for thing in group]
+    assert "is dark" in str(found.pop(1))
+    assert "has changed since the batch began" in str(found.pop(3))
+    for page, volume in zip((0, 2, 3, 5), found, strict=True):
+        assert (
+            lumigraph("deconvolve", "film.tif", *asked, "--page", str(page), "-o", "one.ome.zarr").code == 0
+        )
+        np.testing.assert_array_equal(lg.open(tmp_path / "one.ome.zarr").data, volume.data)
+    (refused,) = next(Frames("deconvolve", (*asked, "--deviance", "1"), str(tmp_path)).several([first]))
+    assert "does not say how many make a value" in str(refused)
 
 
 PLENOPTIC = """

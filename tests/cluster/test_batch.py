@@ -54,6 +54,45 @@ def test_workers_that_die_are_replaced_and_bits_do_not_depend_on_them(tmp_path):
     assert contents(tmp_path / "one.zarr") == contents(tmp_path / "other.zarr")
 
 
+def together(output, workers, **of_third):
+    """Nine frames by work that takes three at a time; how many there were each time."""
+    groups = output.with_suffix(".groups")
+    whole = items(9, groups=str(groups))
+    whole[2] |= of_third
+    found = cluster.batch(jobs.Together(), whole, output, workers=workers)
+    return found, list(map(int, groups.read_text().split()))
+
+
+@pytest.mark.parametrize("workers", [jobs.Here(), 2])
+def test_work_that_takes_some_frames_at_a_time_gives_the_same(workers, tmp_path):
+    found, groups = together(tmp_path / "some.zarr", workers)
+    assert found.is_whole
+    assert sum(groups) == 9
+    assert max(groups) == 3 if workers == 2 else 6
+    run(tmp_path / "one.zarr", 9)
+    assert contents(tmp_path / "some.zarr") == contents(tmp_path / "one.zarr")
+    times = [entry.seconds for entry in found.entries.values()]
+    assert sum(times) <= found.seconds * 2  # each has its part of the time, not the time of all
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="processes are killed by signals")
+@pytest.mark.parametrize("how", ["bad", "always_deadly", "deadly"])
+def test_of_frames_taken_together_only_those_fail_that_fail_alone(how, tmp_path):
+    place = str(tmp_path / "not-here")
+    found, groups = together(tmp_path / "some.zarr", 1, **{how: place if how == "deadly" else True})
+    assert list(found.failures) == ([] if how == "deadly" else [2])
+    assert found.done == (9 if how == "deadly" else 8)
+    if how != "bad":
+        assert groups.count(1) >= 2  # after a death each alone
+
+
+def test_an_error_of_work_that_takes_some_frames_at_a_time_is_that_of_all_of_them(tmp_path):
+    found, _ = together(tmp_path / "some.zarr", 2, spoils=True)
+    assert 2 in found.failures
+    assert set(found.failures.values()) == {"ValueError: all of it is bad"}
+    assert found.done == 9 - len(found.failures)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="processes are killed by signals")
 def test_a_frame_that_kills_its_workers_fails_and_the_others_are_done(tmp_path):
     whole = [*items(2), {"seed": 2, "always_deadly": True}]
@@ -333,10 +372,10 @@ def test_frames_that_are_missing_or_damaged_are_refused(tmp_path):
 def test_a_frame_that_is_asked_for_twice_is_done_once(tmp_path):
     log, here = tmp_path / "log", jobs.Here()
     cluster.batch(jobs.picture, items(2, log=str(log)), tmp_path / "o.zarr", workers=here)
-    assert here.task.do(1) == "done"
+    assert list(here.task.do([1])) == [(1, "done")]
     assert log.read_text().split() == ["0", "1"]
     with here.task.ledger.claimed(1):
-        assert here.task.do(1) == "busy"
+        assert list(here.task.do([1])) == [(1, "busy")]
 
 
 def test_frames_that_others_keep_are_no_success(tmp_path, monkeypatch):

@@ -1,21 +1,19 @@
 """`lumigraph batch`: another verb for each of many frames."""
 
-import os
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr
+from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import import_module
-from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from lumigraph.cli import files, standing
 from lumigraph.cli.console import line, progress
-from lumigraph.cli.options import COMMAND, COMMON, PARAMETER, Common, Output
+from lumigraph.cli.frames import KINDS, Frames, items_of, runs
+from lumigraph.cli.options import COMMAND, COMMON, Common, Output
 from lumigraph.cli.standing import Standing
 from lumigraph.core import memory
 from lumigraph.core.result import Quantity, Result
@@ -27,32 +25,6 @@ if TYPE_CHECKING:
 
 SERIES, TABLES = (".zarr",), (".csv", ".parquet")
 
-
-@dataclass(frozen=True)
-class Kind:
-    """What a verb gives of a frame.
-
-    Parameters
-    ----------
-    ending
-        Of the file that it writes; empty for one that writes none.
-    leading
-        Words before its input.
-    is_table
-        Whether its numbers are wanted.
-    """
-
-    ending: str
-    leading: int = 0
-    is_table: bool = False
-
-
-KINDS = {
-    "simulate": Kind(".tiff"), "decode": Kind(".zarr"), "render": Kind(".tiff"), "refocus": Kind(".tiff"),
-    "depth": Kind(".tiff"), "deconvolve": Kind(".zarr"), "calibrate": Kind(".toml", is_table=True),
-    "measure": Kind("", 1, is_table=True),
-}  # fmt: skip
-"""Verbs that are taken."""
 
 RUN = 16
 """Frames in a row of warm starts."""
@@ -181,7 +153,7 @@ def batch(
     if kind.is_table:
         require_table(output)
     paths, options = _split(words, kind.leading)
-    items = list(_items(paths, None if kind.is_table or verb == "simulate" else page or "all"))
+    items = list(items_of(paths, None if kind.is_table or verb == "simulate" else page or "all"))
     work, what = Frames(verb, options, str(Path.cwd())), {"verb": verb, "options": list(options)}
     first = items[0]
     if verb == "deconvolve" and "--warm" in options:
@@ -222,64 +194,6 @@ def kept(output: Path) -> Iterator[None]:
         raise KeyboardInterrupt(told) from None
 
 
-@dataclass(frozen=True)
-class Frames:
-    """A verb as the work of a batch.
-
-    Parameters
-    ----------
-    verb
-        Its name.
-    options
-        Its words but for the input, the page and the output.
-    folder
-        That paths among them are relative to.
-    """
-
-    verb: str
-    options: tuple[str, ...]
-    folder: str
-
-    def __call__(self, item: dict[str, Any]) -> Any:
-        """What the verb makes of one frame, as if it had been run for it alone."""
-        from lumigraph.cluster import Several, Values
-
-        if "frames" in item:
-            return Several(item["first"], item["count"], self._run(item["frames"]))
-        os.chdir(self.folder)
-        _check_unchanged(item)
-        with tempfile.TemporaryDirectory(prefix="lumigraph-") as place, redirect_stderr(StringIO()):
-            result = self.bound(item, Path(place))()
-        if KINDS[self.verb].is_table:
-            return Values({"file": item["file"], **_numbers(result)})
-        return result.thing
-
-    def _run(self, items: Sequence[dict[str, Any]]) -> Iterator[Any]:
-        """Results of frames of which each begins with the one before."""
-        from lumigraph.cli.deconvolve import pages_apart
-
-        with pages_apart():
-            yield from map(self, items)
-
-    def bound(self, item: dict[str, Any], folder: Path) -> Any:
-        """The verb with its arguments, which writes into a folder; called, it gives its `Result`.
-
-        Raises
-        ------
-        CycloptsError
-            Words that the verb does not take.
-        """
-        from cyclopts import App
-
-        app, kind = App(default_parameter=PARAMETER), KINDS[self.verb]
-        app.command(getattr(import_module(f"lumigraph.cli.{self.verb}"), self.verb))
-        words = [self.verb, *self.options[: kind.leading], item["file"], *self.options[kind.leading :]]
-        words += [] if item["page"] is None else ["--page", str(item["page"])]
-        words += ["--output", str(folder / f"frame{kind.ending}")] if kind.ending else []
-        command, bound, _ = app.parse_args(words, exit_on_error=False, print_error=False)
-        return lambda: command(*bound.args, **bound.kwargs)
-
-
 def _without(words: Sequence[str], names: Sequence[str]) -> Iterator[str]:
     """Words without some options and the value of each."""
     rest = iter(words)
@@ -296,52 +210,6 @@ def _split(words: Sequence[str], leading: int) -> tuple[list[str], tuple[str, ..
     if first <= leading:
         raise FormatError("no frames are given. Name files, or a pattern in quotes, after the verb.")
     return list(words[leading:first]), (*words[:leading], *words[first:])
-
-
-def _items(paths: Sequence[str], pages: str | None) -> Iterator[dict[str, Any]]:
-    for path in paths:
-        found = [path] if Path(path).exists() else files.matching(path)
-        if not found:
-            raise FormatError(f"{path} is not a file, and no file matches it. Check the path.")
-        for name in found:
-            yield from _frames(Path(name), pages)
-
-
-def runs(items: Sequence[dict[str, Any]], length: int) -> list[dict[str, Any]]:
-    """Frames in a row, `length` in each but the last: the same ones whoever does them.
-
-    >>> [(run["first"], len(run["frames"])) for run in runs([{}] * 5, 2)]
-    [(0, 2), (2, 2), (4, 1)]
-    """
-    if length < 2:
-        raise FormatError(f"--run is {length} but must be at least 2: --warm needs a frame before.")
-    starts = range(0, len(items), length)
-    return [{"first": k, "count": len(items), "frames": list(items[k : k + length])} for k in starts]
-
-
-def _frames(path: Path, pages: str | None) -> Iterator[dict[str, Any]]:
-    from lumigraph.preparation import pages_of
-
-    known = path.stat()
-    about = {"file": str(path.absolute()), "size": known.st_size, "modified": known.st_mtime_ns}
-    for number in [None] if pages is None or path.is_dir() else pages_of(path, pages):
-        yield {**about, "page": number}
-
-
-def _check_unchanged(item: dict[str, Any]) -> None:
-    known = Path(item["file"]).stat()
-    if (known.st_size, known.st_mtime_ns) != (item["size"], item["modified"]):
-        raise FormatError(f"{item['file']} has changed since the batch began.")
-
-
-def _numbers(result: Result) -> dict[str, Any]:
-    """What a row of a table holds: numbers and words, lengths in metres."""
-    import json
-
-    from lumigraph.cli.console import plain
-
-    found = {one.name: json.loads(json.dumps(one.value, default=plain)) for one in result.quantities}
-    return {name: value for name, value in found.items() if not isinstance(value, list | dict)}
 
 
 def require_table(output: Path, axes: "tables.Axes | None" = None) -> None:

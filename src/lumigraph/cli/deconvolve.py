@@ -4,7 +4,9 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import repeat
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from lumigraph.cli import files
@@ -20,10 +22,12 @@ from lumigraph.core.result import Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from inspect import BoundArguments
 
     from lumigraph.core.calibration import Calibration
     from lumigraph.core.linear import Linear
+    from lumigraph.core.prepared import PreparedImage
     from lumigraph.deconvolution import Deconvolver, Step
     from lumigraph.instruments import Instrument
 
@@ -71,11 +75,7 @@ def deconvolve(
     from lumigraph.instruments import load_camera
 
     files.check_output(output, (*files.PICTURES, ".h5", ".hdf5"))
-    for options in (common, seen, way):
-        options.check()
-    wanted.depths()  # refused before anything is read
-    several.check(1 + len(others))
-    bent.check(1 + len(others))
+    _check((common, seen, way), wanted, (several, bent), 1 + len(others))
     described = load_camera(camera)
     frames = seen.frames(raw)
     more = [_only(seen.frames(path), path) for path in others]
@@ -106,6 +106,88 @@ def deconvolve(
             io.save(found, written[-1])
     told = result(found, ready if more else pages[-1][1], steps, tuple(written))
     return told if wavefront is None else with_wavefront(told, wavefront)
+
+
+def _check(
+    options: "tuple[Reported, Seen, Way]", wanted: Wanted, more: tuple[Several, Adaptive], count: int
+) -> None:
+    """Refuse a line that contradicts itself, before anything is read."""
+    for one in options:
+        one.check()
+    wanted.depths()
+    for one in more:
+        one.check(count)
+
+
+def side_by_side(
+    line: "BoundArguments", frames: "Sequence[Callable[[], tuple[Path, str | None]]]"
+) -> "Iterator[list[Any]]":
+    """Objects of several raw images, by the arguments of a `deconvolve` of one, or the error of each.
+
+    Each frame gives its file and page, or an error. Those that share an operator are taken some at a time.
+    """
+    group: list[Any] = []
+    for begun in (_begun(line.arguments, frame) for frame in frames):
+        if not _joins(begun, group):
+            yield _objects(group)
+            group = []
+        group.append(begun)
+    yield _objects(group)
+
+
+@dataclass(frozen=True)
+class _Begun:
+    """A raw image that is ready, and what its operator is made of."""
+
+    ready: "PreparedImage"
+    asked: "_Asked"
+
+    def exposure(self, engine: "Deconvolver") -> Any:
+        """What is known of it."""
+        known = engine.known(self.ready, None)
+        assert not isinstance(known, tuple)  # one raw image
+        _check_gain(self.asked.way, known.gain)
+        return known
+
+
+def _begun(line: "Mapping[str, Any]", frame: "Callable[[], tuple[Path, str | None]]") -> "_Begun | Any":
+    """A raw image that may share an operator; else the object, or the error."""
+    from lumigraph.instruments import load_camera
+
+    try:
+        given = SimpleNamespace(**line)
+        path, page = frame()
+        seen, way = replace(given.seen, page=page), given.way
+        if given.others or way.warm or way.checkpoint is not None or given.bent != ADAPTIVE:
+            more = {name: value for name, value in line.items() if name not in ("raw", "others")}
+            return deconvolve(path, *given.others, **{**more, "seen": seen}).thing
+        _check((given.common, seen, way), given.wanted, (given.several, given.bent), 1)
+        described = load_camera(given.camera)
+        ready = seen.prepared(_only(seen.frames(path), path), described)
+        return _Begun(ready, _Asked.of(described, given.wanted, way, ready.calibration, silent))
+    except Exception as error:
+        return error
+
+
+def _joins(begun: "_Begun | Any", group: list[Any]) -> bool:
+    """Whether it can be taken with the others."""
+    others = [one for one in group if isinstance(one, _Begun)]
+    if not others or not isinstance(begun, _Begun):
+        return True
+    return begun.asked == others[0].asked and len(others) < _engine(others[0].asked).side_by_side
+
+
+def _objects(group: list[Any]) -> list[Any]:
+    """Of those that begun, by one operator."""
+    mine = [one for one in group if isinstance(one, _Begun)]
+    if not mine:
+        return group
+    try:
+        engine = _engine(mine[0].asked)
+        found = iter(engine.several([one.ready for one in mine], [one.exposure(engine) for one in mine]))
+    except Exception as error:
+        found = repeat(error)
+    return [next(found) if isinstance(one, _Begun) else one for one in group]
 
 
 def _only(frames: "list[tuple[str, Any]]", path: Path) -> Any:
@@ -165,11 +247,7 @@ class _Task:
         from lumigraph import deconvolution, io
 
         (exposure, gain), (steps, shown), name = self._known(pages[0][1]), followed, ""
-        if self.way.deviance is not None and gain is None:
-            raise FormatError(
-                "--deviance counts electrons, but the raw image does not say how many make a value. "
-                "Leave it out and use --iterations."
-            )
+        _check_gain(self.way, gain)
 
         def follow(step: "Step") -> None:
             steps.append(step)
@@ -184,6 +262,14 @@ class _Task:
             kept = _named(self.output, f"{name}.partial")
             io.save(stopped.partial, kept)
             raise KeyboardInterrupt(f"{stopped.iterations} iterations are in {kept}.") from None
+
+
+def _check_gain(way: Way, gain: float | None) -> None:
+    if way.deviance is not None and gain is None:
+        raise FormatError(
+            "--deviance counts electrons, but the raw image does not say how many make a value. "
+            "Leave it out and use --iterations."
+        )
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Workers in processes of this machine: one that dies is replaced, and its frame is done again."""
 
+import math
 import multiprocessing
 import os
 import signal
@@ -10,13 +11,11 @@ from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from lumigraph.cluster.task import FAILED, Task
+from lumigraph.cluster.task import FAILED, Outcome, Task
+from lumigraph.core import memory
 
 DEATHS = 3
 """Times that workers may die of one frame before it counts as failed."""
-
-Outcome = tuple[int, str]
-"""Number of a frame and how it ended."""
 
 
 class Pool:
@@ -33,7 +32,7 @@ class Pool:
     def __init__(self, task: Task, count: int) -> None:
         self.task, self.count = task, count
         self._context = multiprocessing.get_context("spawn")
-        self._workers: dict[Connection, tuple[Any, int | None]] = {}
+        self._workers: dict[Connection, tuple[Any, list[int]]] = {}
         self._deaths: Counter[int] = Counter()
 
     def __enter__(self) -> "Pool":
@@ -52,48 +51,55 @@ class Pool:
         """How each frame ended, in the order in which they do."""
         waiting = deque(numbers)
         while waiting or self._busy():
-            for pipe in self._idle(len(waiting)):
-                self._give(pipe, waiting.popleft())
+            while waiting and (pipe := self._idle()) is not None:
+                self._give(pipe, self._next(waiting))
             for pipe in wait(list(self._workers)):
                 assert isinstance(pipe, Connection)
                 yield from self._ended(pipe, waiting)
 
-    def _busy(self) -> int:
-        return sum(number is not None for _, number in self._workers.values())
+    def _next(self, waiting: "deque[int]") -> list[int]:
+        """Frames for one worker: few at the end, for all to have some; alone if one died of it."""
+        most = min(self.task.side_by_side, math.ceil(len(waiting) / self.count))
+        numbers = [waiting.popleft()]
+        while len(numbers) < most and not self._deaths[numbers[0]] + self._deaths[waiting[0]]:
+            numbers.append(waiting.popleft())
+        return numbers
 
-    def _idle(self, wanted: int) -> list[Connection]:
-        """At most so many workers that have nothing to do; new ones while there are too few."""
-        idle = [pipe for pipe, (_, number) in self._workers.items() if number is None][:wanted]
-        while len(idle) < wanted and len(self._workers) < self.count:
-            idle.append(self._started())
-        return idle
+    def _busy(self) -> bool:
+        return any(numbers for _, numbers in self._workers.values())
+
+    def _idle(self) -> Connection | None:
+        """A worker that has nothing to do, a new one while there are too few."""
+        for pipe, (_, numbers) in self._workers.items():
+            if not numbers:
+                return pipe
+        return self._started() if len(self._workers) < self.count else None
 
     def _started(self) -> Connection:
         mine, its = self._context.Pipe()
         process = self._context.Process(target=_serve, args=(its, self.task), daemon=True)
         process.start()
         its.close()
-        self._workers[mine] = process, None
+        self._workers[mine] = process, []
         return mine
 
-    def _give(self, pipe: Connection, number: int) -> None:
-        self._workers[pipe] = self._workers[pipe][0], number
+    def _give(self, pipe: Connection, numbers: list[int]) -> None:
+        self._workers[pipe] = self._workers[pipe][0], numbers
         with suppress(OSError):  # it has died: `wait` says so, too
-            pipe.send(number)
+            pipe.send(numbers)
 
     def _ended(self, pipe: Connection, waiting: "deque[int]") -> Iterator[Outcome]:
-        process, number = self._workers[pipe]
+        process, numbers = self._workers[pipe]
         try:
-            outcome = pipe.recv()
+            number, outcome = pipe.recv()
         except (EOFError, OSError):
             del self._workers[pipe]
             pipe.close()
             process.join()
-            if number is not None:
+            for number in numbers:
                 yield from self._died(number, process.exitcode, waiting)
             return
-        self._workers[pipe] = process, None
-        assert number is not None
+        numbers.remove(number)
         yield number, outcome
 
     def _died(self, number: int, code: int | None, waiting: "deque[int]") -> Iterator[Outcome]:
@@ -108,15 +114,17 @@ class Pool:
 
 
 def _serve(pipe: Connection, task: Task) -> None:
-    """Answer numbers of frames with how they ended, until the pipe is closed."""
+    """Answer numbers of frames with how each ended, until the pipe is closed."""
+    memory.keep()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes: the first one decides
     while True:
         try:
-            number = pipe.recv()
+            numbers = pipe.recv()
         except (EOFError, OSError):  # who started it has ended
             return
         try:
-            pipe.send(task.do(number))
+            for outcome in task.do(numbers):
+                pipe.send(outcome)
         except BrokenPipeError:
             return
         except BaseException:  # the ledger itself cannot be written

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 
 from lumigraph.cluster.estimate import Estimate, many
 from lumigraph.cluster.ledger import LINK, PAGE, Entry, Ledger
-from lumigraph.cluster.pool import Outcome, Pool
-from lumigraph.cluster.task import BUSY, Task, Work
+from lumigraph.cluster.pool import Pool
+from lumigraph.cluster.task import BUSY, Outcome, Task, Work
 from lumigraph.core import arrays, checks
 from lumigraph.core.progress import Progress, Stage, silent
 from lumigraph.errors import LumigraphError

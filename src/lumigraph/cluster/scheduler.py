@@ -1,5 +1,6 @@
 """Workers of a running dask cluster: the only home of dask."""
 
+import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -8,8 +9,8 @@ from typing import Any
 from uuid import uuid4
 
 from lumigraph.cluster.ledger import LINK
-from lumigraph.cluster.pool import DEATHS, Outcome
-from lumigraph.cluster.task import FAILED, Task
+from lumigraph.cluster.pool import DEATHS
+from lumigraph.cluster.task import FAILED, Outcome, Task
 from lumigraph.errors import LumigraphError
 
 _WAIT = 20.0
@@ -86,30 +87,40 @@ class _Group:
         """
         from distributed import as_completed  # pyright: ignore[reportMissingImports] - an extra
 
-        futures = {self._begun(number): number for number in numbers}
-        for future in as_completed(futures, loop=self.client.loop):
+        left = list(numbers)
+        side = min(self.task.side_by_side, math.ceil(len(left) / self.count))
+        parts = (left[k : k + side] for k in range(0, len(left), max(side, 1)))
+        futures = {self._begun(part): part for part in parts}
+        running = as_completed(futures, loop=self.client.loop)
+        for future in running:
             if future.status == "finished":
-                yield futures[future], future.result()
+                yield from future.result()
+            elif future.status == "error" and len(futures[future]) > 1:  # of one of them: each alone
+                more = {self._begun([number]): [number] for number in futures[future]}
+                futures |= more
+                running.update(more)
             elif future.status == "error":
-                self.task.ledger.fail(futures[future], f"its worker ended: {future.exception()}"[:400])
-                yield futures[future], FAILED
+                (number,) = futures[future]
+                self.task.ledger.fail(number, f"its worker ended: {future.exception()}"[:400])
+                yield number, FAILED
             else:
                 raise LumigraphError(
                     f"the scheduler was lost ({future.status}). What is done is kept: start it again."
                 )
 
-    def _begun(self, number: int) -> Any:
-        one = replace(self.task, items={number: self.task.items[number]})  # the other items stay here
-        return self.client.submit(_do, one, number, self.key, pure=False, retries=DEATHS)
+    def _begun(self, numbers: list[int]) -> Any:
+        items = {number: self.task.items[number] for number in numbers}  # the other items stay here
+        task = replace(self.task, items=items)
+        return self.client.submit(_do, task, numbers, self.key, pure=False, retries=DEATHS)
 
 
 _WORK: dict[str, Any] = {}
 
 
-def _do(task: Task, number: int, key: str) -> str:
+def _do(task: Task, numbers: list[int], key: str) -> list[Outcome]:
     """What a worker does; the work is the process' own, as each frame brings a copy that keeps nothing."""
     with _ONE:
         if key not in _WORK:
             _WORK.clear()
             _WORK[key] = task.work
-        return replace(task, work=_WORK[key]).do(number)
+        return list(replace(task, work=_WORK[key]).do(numbers))

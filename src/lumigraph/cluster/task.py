@@ -5,11 +5,13 @@ import platform
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from lumigraph.cluster.ledger import Entry, Ledger
 from lumigraph.core.threads import single_products
@@ -18,6 +20,9 @@ from lumigraph.io import series
 
 Work = Callable[[Any], Any]
 """Gives what is wanted of one item: a picture, views, a volume, a depth map, arrays by name; or `Values`."""
+
+Outcome = tuple[int, str]
+"""Number of a frame and how it ended."""
 
 DONE, FAILED, BUSY = "done", "failed", "busy"
 """How a frame ended: noted as done, noted as failed, claimed by somebody else."""
@@ -52,6 +57,23 @@ class Several:
     things: Iterable[Any]
 
 
+@runtime_checkable
+class SideBySide(Protocol):
+    """Work that does some items in less time than one after the other."""
+
+    @property
+    def side_by_side(self) -> int:
+        """How many it wants at a time, at most."""
+        ...
+
+    def several(self, items: Sequence[Any]) -> Iterator[Sequence[Any]]:
+        """What is wanted of each item, or the exception that it ended by, in order; some of them at a time.
+
+        Which items there are does not change a bit of what it gives of one.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Task:
     """A job as a worker sees it; it is sent to other processes and machines.
@@ -78,39 +100,67 @@ class Task:
         """What is done."""
         return Ledger.beside(self.output)
 
-    def do(self, number: int) -> str:
-        """Compute one frame unless it is done or somebody does so: `DONE`, `FAILED` or `BUSY`."""
-        with self.ledger.claimed(number) as mine:
-            if not mine:
-                return BUSY
-            if self.is_done(number):
-                return DONE
-            try:
-                self.ledger.record(self._made(number))
-                return DONE
-            except (KeyboardInterrupt, SystemExit):
-                raise
-            except BaseException as error:
-                self.ledger.fail(number, _line(error))
-                return FAILED
+    @property
+    def side_by_side(self) -> int:
+        """Frames that a worker is given at a time, at most."""
+        return self.work.side_by_side if isinstance(self.work, SideBySide) else 1
+
+    def do(self, numbers: Sequence[int]) -> Iterator[Outcome]:
+        """Compute frames unless they are done or somebody does so: `DONE`, `FAILED` or `BUSY` of each."""
+        with ExitStack() as claims:
+            mine = []
+            for number in numbers:
+                if not claims.enter_context(self.ledger.claimed(number)):
+                    yield number, BUSY
+                elif self.is_done(number):
+                    yield number, DONE
+                else:
+                    mine.append(number)
+            yield from self._do(mine)
+
+    def _do(self, numbers: list[int]) -> Iterator[Outcome]:
+        """Frames that nobody else does."""
+        results, left = self._results([self.items[number] for number in numbers]), deque(numbers)
+        while left:
+            with _measured() as cost:
+                found = _tried(next, results)
+            if isinstance(found, BaseException):  # of the work as a whole
+                found = [found] * len(left)
+            cost.share(len(found))
+            for thing in found:
+                number = left.popleft()
+                yield number, self._noted(number, thing, cost)
+
+    def _results(self, items: list[Any]) -> Iterator[Sequence[Any]]:
+        """What the work gives of some items at a time, or what it raises."""
+        if isinstance(self.work, SideBySide):
+            yield from self.work.several(items)
+        else:
+            yield from ([_tried(self.work, item)] for item in items)
+
+    def _noted(self, number: int, thing: Any, cost: "_Cost") -> str:
+        """Write a result, and note it or why there is none."""
+        noted = thing if isinstance(thing, BaseException) else _tried(self._record, number, thing, cost)
+        if noted is None:
+            return DONE
+        self.ledger.fail(number, _line(noted))
+        return FAILED
+
+    def _record(self, number: int, thing: Any, made: "_Cost") -> None:
+        with _measured() as cost:
+            files, values = self._written_of(number, thing)
+        notes = list(dict.fromkeys(made.notes + cost.notes))
+        self.ledger.record(Entry(
+            number, made.seconds + cost.seconds, peak(), sum(size for size, _ in files.values()),
+            f"{platform.node()}:{os.getpid()}", files, values, notes, made.busy + cost.busy,
+        ))  # fmt: skip
 
     def is_done(self, number: int, *, content: bool = False) -> bool:
         """Whether a frame is noted, and what it wrote is there; as its checksums say, if `content`."""
         entry = self.ledger.entry(number)
         return entry is not None and series.is_whole(self.output, entry.files, content=content)
 
-    def _made(self, number: int) -> Entry:
-        began, busy = time.perf_counter(), time.process_time()
-        with warnings.catch_warnings(record=True) as caught, single_products():
-            warnings.simplefilter("default")
-            files, values = self._done(number, self.work(self.items[number]))
-        notes = list(dict.fromkeys(str(one.message)[:_LONGEST] for one in caught))
-        return Entry(
-            number, time.perf_counter() - began, peak(), sum(size for size, _ in files.values()),
-            f"{platform.node()}:{os.getpid()}", files, values, notes, time.process_time() - busy,
-        )  # fmt: skip
-
-    def _done(self, number: int, found: Any) -> tuple[series.Checksums, dict[str, Any]]:
+    def _written_of(self, number: int, found: Any) -> tuple[series.Checksums, dict[str, Any]]:
         """Files that were written, and values."""
         if isinstance(found, Values):
             return {}, dict(found.row)
@@ -127,6 +177,40 @@ class Task:
                 if not (self.output / "zarr.json").exists():
                     series.create(self.output, frame, count)
         return series.write(self.output, number, frame)
+
+
+@dataclass(slots=True)
+class _Cost:
+    """Time and processor time of something [s], and the warnings of it."""
+
+    seconds: float = 0.0
+    busy: float = 0.0
+    notes: list[str] = field(default_factory=list)
+
+    def share(self, count: int) -> None:
+        """Make it that of one of several frames that were done together."""
+        self.seconds, self.busy = self.seconds / count, self.busy / count
+
+
+@contextmanager
+def _measured() -> Iterator[_Cost]:
+    """Context whose cost is known when it ends."""
+    cost, began, busy = _Cost(), time.perf_counter(), time.process_time()
+    with warnings.catch_warnings(record=True) as caught, single_products():
+        warnings.simplefilter("default")
+        yield cost
+    cost.notes = list(dict.fromkeys(str(one.message)[:_LONGEST] for one in caught))
+    cost.seconds, cost.busy = time.perf_counter() - began, time.process_time() - busy
+
+
+def _tried(function: Callable[..., Any], *given: Any) -> Any:
+    """What a function gives, or the error that it raises."""
+    try:
+        return function(*given)
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:
+        return error
 
 
 def peak() -> int:

@@ -2,6 +2,7 @@
 
 - `deconvolve`: `deconvolve`; for time series `deconvolve_series`, `Deconvolver`
 - `run`: from the first state to the last; `Step`, `Interrupted`
+- `side_by_side`: runs of several raw images that share each product of the operator
 - `together`: several raw images of one object
 - `beyond`: objects that reach beyond the picture, as far as light comes from
 - `exposure`: `Exposure`, what is known of the raw image besides its values

@@ -2,7 +2,8 @@
 
 import math
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, overload
 
 from lumigraph.core import arrays, checks, memory
@@ -18,6 +19,7 @@ from lumigraph.deconvolution.methods import Method, Stop, check_offers
 from lumigraph.deconvolution.problem import Problem, Scale, values
 from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
 from lumigraph.deconvolution.run import Report, Result, Run, finished
+from lumigraph.deconvolution.side_by_side import side_by_side
 from lumigraph.deconvolution.together import (
     Raws,
     check_count,
@@ -26,13 +28,16 @@ from lumigraph.deconvolution.together import (
     together,
     warn_of_brightness,
 )
-from lumigraph.errors import CalibrationError, GeometryError, SamplingError
+from lumigraph.errors import CalibrationError, GeometryError, LumigraphError, SamplingError
 
 FRESH = 0.05
 """Part of an even object in a warm start: where nothing was, something may be now."""
 
 COPIES = 12
 """Arrays of the object's size that an iteration holds at most, a prior's memory included."""
+
+SHARE = 0.2
+"""Part of the free memory that raw images side by side may take."""
 
 
 @overload
@@ -242,6 +247,18 @@ class Deconvolver:
         checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
     ) -> Result:
         """The result of one raw image, or of several; parameters and errors are those of `deconvolve`."""
+        run, like = self._run(raw, exposure, progress, checkpoint)
+        state = finished(run, like)
+        if isinstance(self.operator, Joint):
+            warn_of_brightness(run.problem, state.model, self.operator)
+        self._last = state.estimate if self.warm else None
+        return run.result(state, like)
+
+    def _run(
+        self, raw: RawImage | Array | Raws, exposure: Exposure | Sequence[Exposure] | None,
+        progress: Report | None = None, checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
+    ) -> tuple[Run, RawImage | Array]:  # fmt: skip
+        """What is to be done, and what tells where the result stands."""
         like, raw, exposure = self._row(raw, self.known(raw, exposure))
         data = values(raw, self.operator, exposure)
         problem = Problem.of(raw, exposure, self._scaled(exposure, data))
@@ -250,11 +267,45 @@ class Deconvolver:
         if checkpoint is not None:
             run.checkpoint = Checkpoint.of(checkpoint)
             run.key = fingerprint(data, exposure, self.method, run.start)
-        state = finished(run, like)
-        if isinstance(self.operator, Joint):
-            warn_of_brightness(problem, state.model, self.operator)
-        self._last = state.estimate if self.warm else None
-        return run.result(state, like)
+        return run, like
+
+    @property
+    def side_by_side(self) -> int:
+        """Raw images that `several` takes in less time than one after the other, as memory has room."""
+        count, free = 1 if self.warm else self._wide.side_by_side, memory.available()
+        held = COPIES * 4 * math.prod(self._wide.shape[1])
+        return count if free is None else max(min(count, int(free * SHARE / held)), 1)
+
+    @single_products()
+    def several(
+        self, raws: Sequence[RawImage | Array], exposures: Sequence[Exposure | None]
+    ) -> list[Result | Exception]:
+        """The results of at most `side_by_side` raw images, or the error of each that has none.
+
+        They share the products of the operator. Which others there are does not change a bit of a result;
+        beside that of a call for it alone, it may be off by rounding.
+        """
+        found: list[Result | Exception] = []
+        begun: list[tuple[int, Callable[[Linear], Result]]] = []
+        for number, (raw, exposure) in enumerate(zip(raws, exposures, strict=True)):
+            try:
+                begun.append((number, self._alone(*self._run(raw, exposure))))
+                found.append(LumigraphError("it did not end"))
+            except LumigraphError as error:
+                found.append(error)
+        outcomes = side_by_side(self._wide, [run for _, run in begun]) if begun else []
+        for (number, _), outcome in zip(begun, outcomes, strict=True):
+            found[number] = outcome
+        return found
+
+    def _alone(self, run: Run, like: RawImage | Array) -> Callable[[Linear], Result]:
+        """A run by an operator that it is given."""
+
+        def result(operator: Linear) -> Result:
+            run.problem = replace(run.problem, scale=replace(run.problem.scale, operator=operator))
+            return run.result(finished(run, like), like)
+
+        return result
 
     def known(
         self, raw: RawImage | Array | Raws, exposure: Exposure | Sequence[Exposure] | None

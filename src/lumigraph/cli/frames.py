@@ -1,0 +1,186 @@
+"""Frames of a batch: what a verb makes of each, and which there are."""
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import redirect_stderr
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lumigraph.cli import files
+from lumigraph.cli.options import PARAMETER
+from lumigraph.core.result import Result
+from lumigraph.errors import FormatError
+
+if TYPE_CHECKING:
+    from inspect import BoundArguments
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a verb gives of a frame.
+
+    Parameters
+    ----------
+    ending
+        Of the file that it writes; empty for one that writes none.
+    leading
+        Words before its input.
+    is_table
+        Whether its numbers are wanted.
+    """
+
+    ending: str
+    leading: int = 0
+    is_table: bool = False
+
+
+KINDS = {
+    "simulate": Kind(".tiff"), "decode": Kind(".zarr"), "render": Kind(".tiff"), "refocus": Kind(".tiff"),
+    "depth": Kind(".tiff"), "deconvolve": Kind(".zarr"), "calibrate": Kind(".toml", is_table=True),
+    "measure": Kind("", 1, is_table=True),
+}  # fmt: skip
+"""Verbs that are taken."""
+
+SIDE = 4
+"""Frames of 'deconvolve' that a worker is given at a time; how many of them share products, it finds out."""
+
+
+@dataclass(frozen=True)
+class Frames:
+    """A verb as the work of a batch.
+
+    Parameters
+    ----------
+    verb
+        Its name.
+    options
+        Its words but for the input, the page and the output.
+    folder
+        That paths among them are relative to.
+    """
+
+    verb: str
+    options: tuple[str, ...]
+    folder: str
+
+    def __call__(self, item: dict[str, Any]) -> Any:
+        """What the verb makes of one frame, as if it had been run for it alone."""
+        from lumigraph.cluster import Several, Values
+
+        if "frames" in item:
+            return Several(item["first"], item["count"], self._run(item["frames"]))
+        os.chdir(self.folder)
+        _check_unchanged(item)
+        with tempfile.TemporaryDirectory(prefix="lumigraph-") as place, redirect_stderr(StringIO()):
+            command, bound = self.bound(item, Path(place))
+            result = command(*bound.args, **bound.kwargs)
+        if KINDS[self.verb].is_table:
+            return Values({"file": item["file"], **_numbers(result)})
+        return result.thing
+
+    @property
+    def side_by_side(self) -> int:
+        """Frames that are taken together, at most."""
+        return SIDE if self.verb == "deconvolve" and "--warm" not in self.options else 1
+
+    def several(self, items: Sequence[dict[str, Any]]) -> Iterator[list[Any]]:
+        """What the verb makes of each of some frames, or the error that it ends by; some at a time."""
+        from lumigraph.cli.deconvolve import side_by_side
+
+        if self.side_by_side == 1:
+            yield from ([self(item)] for item in items)
+            return
+        os.chdir(self.folder)
+        with tempfile.TemporaryDirectory(prefix="lumigraph-") as place:
+            line = self.bound(items[0], Path(place))[1]
+            line.apply_defaults()
+            groups = side_by_side(line, [partial(_place, item) for item in items])
+            while True:
+                with redirect_stderr(StringIO()):
+                    found = next(groups, None)
+                if found is None:
+                    return
+                yield found
+
+    def _run(self, items: Sequence[dict[str, Any]]) -> Iterator[Any]:
+        """Results of frames of which each begins with the one before."""
+        from lumigraph.cli.deconvolve import pages_apart
+
+        with pages_apart():
+            yield from map(self, items)
+
+    def bound(self, item: dict[str, Any], folder: Path) -> "tuple[Callable[..., Result], BoundArguments]":
+        """The verb and its arguments, by which it writes into a folder and gives its `Result`.
+
+        Raises
+        ------
+        CycloptsError
+            Words that the verb does not take.
+        """
+        from cyclopts import App
+
+        app, kind = App(default_parameter=PARAMETER), KINDS[self.verb]
+        app.command(getattr(import_module(f"lumigraph.cli.{self.verb}"), self.verb))
+        words = [self.verb, *self.options[: kind.leading], item["file"], *self.options[kind.leading :]]
+        words += [] if item["page"] is None else ["--page", str(item["page"])]
+        words += ["--output", str(folder / f"frame{kind.ending}")] if kind.ending else []
+        command, bound, _ = app.parse_args(words, exit_on_error=False, print_error=False)
+        return command, bound
+
+
+def items_of(paths: Sequence[str], pages: str | None) -> Iterator[dict[str, Any]]:
+    """Of files and patterns, with the pages of a stack that are asked for; None for files as a whole."""
+    for path in paths:
+        found = [path] if Path(path).exists() else files.matching(path)
+        if not found:
+            raise FormatError(f"{path} is not a file, and no file matches it. Check the path.")
+        for name in found:
+            yield from _frames(Path(name), pages)
+
+
+def runs(items: Sequence[dict[str, Any]], length: int) -> list[dict[str, Any]]:
+    """Frames in a row, `length` in each but the last: the same ones whoever does them.
+
+    >>> [(run["first"], len(run["frames"])) for run in runs([{}] * 5, 2)]
+    [(0, 2), (2, 2), (4, 1)]
+    """
+    if length < 2:
+        raise FormatError(f"--run is {length} but must be at least 2: --warm needs a frame before.")
+    starts = range(0, len(items), length)
+    return [{"first": k, "count": len(items), "frames": list(items[k : k + length])} for k in starts]
+
+
+def _frames(path: Path, pages: str | None) -> Iterator[dict[str, Any]]:
+    from lumigraph.preparation import pages_of
+
+    known = path.stat()
+    about = {"file": str(path.absolute()), "size": known.st_size, "modified": known.st_mtime_ns}
+    for number in [None] if pages is None or path.is_dir() else pages_of(path, pages):
+        yield {**about, "page": number}
+
+
+def _place(item: dict[str, Any]) -> tuple[Path, str | None]:
+    """File and page of a frame."""
+    _check_unchanged(item)
+    return Path(item["file"]), None if item["page"] is None else str(item["page"])
+
+
+def _check_unchanged(item: dict[str, Any]) -> None:
+    known = Path(item["file"]).stat()
+    if (known.st_size, known.st_mtime_ns) != (item["size"], item["modified"]):
+        raise FormatError(f"{item['file']} has changed since the batch began.")
+
+
+def _numbers(result: Result) -> dict[str, Any]:
+    """What a row of a table holds: numbers and words, lengths in metres."""
+    import json
+
+    from lumigraph.cli.console import plain
+
+    found = {one.name: json.loads(json.dumps(one.value, default=plain)) for one in result.quantities}
+    return {name: value for name, value in found.items() if not isinstance(value, list | dict)}
