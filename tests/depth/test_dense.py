@@ -5,12 +5,14 @@ import pytest
 from scenes import texture, traced_raw
 from scipy.ndimage import distance_transform_edt
 
+from lumigraph import targets
 from lumigraph.core.arrays import namespace
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.depth import cloud, correlation, dense, metric
 from lumigraph.errors import CalibrationError, GeometryError, SamplingWarning
 from lumigraph.instruments import FocusedPlenopticCamera
+from lumigraph.preparation import prepare
 from lumigraph.rendering import render, sight_grid
 from lumigraph.rendering.patches import Layout, Patches
 from lumigraph.scene import Scene, Slice
@@ -88,6 +90,21 @@ def test_a_bent_surface_is_not_flattened_and_its_error_is_told(name):
     assert 0.6 < np.mean(found.error) / np.mean(error) < 1.7
 
 
+def test_a_texture_that_repeats_is_not_trusted():
+    """Waves of 6 px are as well explained by patches 28 % larger or smaller: off by 3.3 px, told as 0.08."""
+
+    def waves(y, x):
+        return 1 + 0.4 * np.cos(2 * np.pi / 6 * y + 1) + 0.4 * np.cos(2 * np.pi / 6 * x + 2)
+
+    surfaces = ((waves, lambda y, x: 5.08, None),)
+    with pytest.warns(SamplingWarning, match="about as well as those from"):
+        found, truth = measured("three kinds", surfaces, lambda y, x: 5.08 + 0 * y * x)
+    error = np.abs(found.values - truth)
+    assert np.median(error) > 1
+    assert np.median(found.confidence) < 0.1
+    assert found.error.mean() > 0.5
+
+
 def test_libraries_progress_and_grid(xp):
     lattice, focus = CAMERAS["square"]
     surfaces = ((texture(np.random.default_rng(1), waves=12, longest=0.6), lambda y, x: 6.0, None),)
@@ -160,14 +177,15 @@ def stepped(camera, near, far, count=8):
 
 @pytest.mark.long  # 20 and 80 s of wave optics
 @pytest.mark.parametrize(
-    ("lenslets", "planes"),
+    ("lenslets", "planes", "divide"),
     [
-        ({"focal_length": "3 mm", "count": (11, 11)}, 8),
-        ({"focal_length": ["3 mm", "3.1 mm", "2.9 mm"], "count": (9, 9), "layout": "hex"}, 5),
+        ({"focal_length": "3 mm", "count": (11, 11)}, 8, False),
+        ({"focal_length": "3 mm", "count": (11, 11)}, 8, True),
+        ({"focal_length": ["3 mm", "3.1 mm", "2.9 mm"], "count": (9, 9), "layout": "hex"}, 5, False),
     ],
-    ids=["one kind", "three kinds"],
+    ids=["one kind", "divided by white", "three kinds"],
 )
-def test_wave_optics_of_two_planes_and_a_slanted_one(lenslets, planes):
+def test_wave_optics_of_two_planes_and_a_slanted_one(lenslets, planes, divide):
     """Within 5 % of the depth of field of the whole aperture, 1.7 mm, and edges within two samples."""
     camera = FocusedPlenopticCamera(
         wavelength="633 nm", object_distance="120 mm", main_lens={"focal_length": "60 mm"},
@@ -175,6 +193,8 @@ def test_wave_optics_of_two_planes_and_a_slanted_one(lenslets, planes):
     )  # fmt: skip
     scene, truth = stepped(camera, -1.5e-3, 3e-3, planes)
     raw, calibration = simulate(camera, scene, Incoherent(1e-2)), camera.calibration
+    if divide:  # what was divided out still tells where lenslets are lit in part: without it 0.21 mm
+        raw = prepare(raw, calibration, white=simulate(camera, targets.white(), Incoherent(1e-2)))
     focus = camera.patches_on_raw() if calibration.lattice.kinds > 1 else None
     lenslets = correlation(raw, calibration)
     found = dense(raw, calibration, lenslets, focus=focus)
@@ -185,7 +205,7 @@ def test_wave_optics_of_two_planes_and_a_slanted_one(lenslets, planes):
     error = np.abs(found.values - truth(y, x))
     field = next(row.value for row in camera.trade_offs() if row.name == "depth of field")
     assert np.median(error) < 0.05 * field
-    assert np.mean(found.error) / np.mean(error) == pytest.approx(1, abs=0.3)
+    assert np.mean(found.error) / np.mean(error) == pytest.approx(1, abs=0.4 if divide else 0.3)
     above = y[:, 0] < -0.1e-3
     wrong = (np.asarray(found.values)[above] > 0.75e-3) != (x > 0)
     assert wrong.sum(1).max() <= 2

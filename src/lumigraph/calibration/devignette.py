@@ -44,6 +44,17 @@ def devignette(
     >>> float(np.ptp(devignette(2 * white, white).data))
     0.0
     """
+    return divided(raw, white, dark=dark, floor=floor)[0]
+
+
+def divided(
+    raw: RawImage | Array,
+    white: RawImage | Array,
+    *,
+    dark: RawImage | Array | None = None,
+    floor: float = 0.1,
+) -> tuple[RawImage, np.ndarray]:
+    """`devignette`, and what it divides by (y, x[, c])."""
     raw, white = as_raw(raw), as_raw(white)
     if not 0 < checks.finite("floor", floor, "1", CalibrationError) < 1:
         raise CalibrationError(f"floor is {floor:g} but must be between 0 and 1, such as 0.1.")
@@ -56,9 +67,8 @@ def devignette(
     if dark is not None:
         data = data - like(_aligned(np.asarray(to_numpy(pictures["dark"].data), np.float64), raw), data)
     divisor = np.maximum(light_of(white, pictures.get("dark"), raw.bayer), floor)
-    return RawImage(
-        data / like(_aligned(divisor, raw), data), raw.pixel_pitch, None, raw.bayer, dict(raw.metadata)
-    )
+    found = data / like(_aligned(divisor, raw), data)
+    return RawImage(found, raw.pixel_pitch, None, raw.bayer, dict(raw.metadata)), divisor
 
 
 def light_of(white: RawImage, dark: RawImage | None = None, bayer: str | None = None) -> np.ndarray:

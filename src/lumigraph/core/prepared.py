@@ -78,6 +78,8 @@ class PreparedImage(RawImage):
         it has been subtracted.
     response
         Light that reaches each micro-image (y, x), up to 1; None where unknown, or divided out.
+    divisor
+        Light of the white image that was divided out (y, x), up to 1, float16; None where none was.
     notes
         What was done and found, one sentence each.
     """
@@ -87,6 +89,7 @@ class PreparedImage(RawImage):
     lenslets: Verdicts | None = None
     background: float | Array | None = None
     response: Array | None = None
+    divisor: np.ndarray | None = None
     notes: tuple[str, ...] = ()
 
     __repr__ = brief

@@ -1,5 +1,7 @@
 """Patch size of each plenoptic 2.0 lenslet, from how its micro-image agrees with its neighbours'."""
 
+import warnings
+
 import numpy as np
 
 from lumigraph.core import checks
@@ -11,7 +13,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.depth.micro_images import MicroImages
 from lumigraph.depth.smooth import Stiffness, update
 from lumigraph.depth.volume import cheapest, semi_global
-from lumigraph.errors import CalibrationError, GeometryError
+from lumigraph.errors import CalibrationError, GeometryError, SamplingWarning
 from lumigraph.preparation import of_raw
 from lumigraph.rendering import lenslet_indices
 from lumigraph.rendering.decode import check_raw
@@ -23,6 +25,8 @@ WIDEST = 0.08, 0.6
 _FEWEST_LENSLETS = 3
 _FEWEST_PIXELS = 6  # pitch below which a micro-image has nothing to compare
 _TIE = 1e-6  # by which the ends of the range agree less: places that show nothing have its middle
+_ALIKE = 0.7  # of the better sign's score; textures that do not repeat reach 0.61, wrong signs begin at 0.71
+_SEEN = 0.35  # score below which a picture shows nothing, as its confidence says: white noise has 0.32
 _BEND = 0.01  # of the correlation's peak: what a texture of waves 60 px long has [1/px²]
 
 
@@ -75,6 +79,11 @@ def correlation(
     LumigraphError
         It would not fit in memory.
 
+    Warns
+    -----
+    SamplingWarning
+        Patches above and below 0 explain the picture about as well, as for textures that repeat.
+
     References
     ----------
     Georgiev and Lumsdaine, "Reducing plenoptic camera artifacts", Comput. Graph. Forum 29, 1955 (2010);
@@ -99,7 +108,9 @@ def correlation(
     for some in sizes:
         scores.append(micro.scores(some, within(progress, done / total, (done + len(some)) / total)))
         done += len(some)
-    best = int(np.argmax([_overall(score) for score in scores]))
+    overall = [_overall(score) for score in scores]
+    best = int(np.argmax(overall))
+    _check_signs(overall, ranges)
     values, trust = _joined(scores[best], sizes[best])
     low, high = ranges[best]
     return DepthMap(like(np.clip(values, low, high), raw.data), like(trust, raw.data), "patch")
@@ -122,6 +133,23 @@ def _overall(scores: np.ndarray) -> float:
     """How well the best sizes of a range explain the picture, and how much better than others do."""
     best = scores.max(0)
     return float((2 * best - np.median(scores, axis=0)).mean())
+
+
+def _check_signs(overall: list[float], ranges: list[tuple[float, float]]) -> None:
+    """Warn where the range of the other sign explains the picture about as well as the better one."""
+    if len(ranges) == 1 or min(overall) < max(_ALIKE * max(overall), _SEEN):
+        return
+    best = int(np.argmax(overall))
+    (least, most), (low, high) = ranges[best], ranges[1 - best]
+    warnings.warn(
+        f"patches from {low:.3g} to {high:.3g} px explain the picture about as well as those from "
+        f"{least:.3g} to {most:.3g} px, which are taken (scores of {overall[1 - best]:.2f} and "
+        f"{overall[best]:.2f}): "
+        "textures that repeat do not show the sign. Give patches=(least, most), or --between least:most, if "
+        "it is known: above 0 for a Keplerian camera, below for a Galilean one.",
+        SamplingWarning,
+        stacklevel=4,
+    )
 
 
 def _joined(scores: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,7 @@ from lumigraph.depth.flat import Flat
 from lumigraph.depth.pictures import LEAST_NOISE, noise_of
 from lumigraph.depth.sightings import Sightings
 from lumigraph.depth.smooth import Stiffness, tears, update
-from lumigraph.depth.volume import box, cheapest, guided, semi_global
+from lumigraph.depth.volume import box, cheapest, guided, rivals, semi_global
 from lumigraph.errors import SamplingWarning
 from lumigraph.preparation import of_raw
 from lumigraph.rendering.decode import check_raw
@@ -154,8 +154,8 @@ def _check_ends(found: np.ndarray, error: np.ndarray, moves: np.ndarray, ends: n
 
 def _swept(
     sights: Sightings, moves: np.ndarray, how: tuple[float, np.ndarray], progress: Progress
-) -> np.ndarray:
-    """The label (y, x) of each place, to a fraction of a step."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """The label (y, x) of each place, to a fraction of a step, and its `rivals`."""
     (sign, guide), reach = how, sights.flat.even
     memory.require(
         4.5 * 4 * len(moves) * guide.size,
@@ -169,15 +169,19 @@ def _swept(
         cost[:, rows, columns] = part.disagreements(sizes, _MOST, blurred)
         progress((k + 1) / len(sights.blocks))
     cost = semi_global(guided(cost, guide, 3), guide, 0.2 * _MOST, _MOST)
-    first = moves[0] + cheapest(cost)[0] * (moves[1] - moves[0])
-    return np.clip(median_filter(first, 5), moves[0], moves[-1]).astype(np.float32)
+    step = moves[1] - moves[0]
+    first = median_filter(moves[0] + cheapest(cost)[0] * step, 5)
+    return np.clip(first, moves[0], moves[-1]).astype(np.float32), rivals(cost, _MOST) * step
 
 
 def _refined(
-    sights: Sightings, moves: np.ndarray, how: tuple[float, np.ndarray], progress: Progress
+    sights: Sightings,
+    first: tuple[np.ndarray, np.ndarray],
+    how: tuple[float, np.ndarray],
+    progress: Progress,
 ) -> tuple[np.ndarray, Evidence]:
     """Labels (y, x) refined on all micro-images by least squares, and what they rest on."""
-    (sign, guide), noise = how, noise_of(sights.flat.image)
+    (sign, guide), noise, (moves, others) = how, noise_of(sights.flat.image), first
     pull = information = variance = disputed = np.zeros_like(moves)
     for k, jump in enumerate(_ROUNDS):
         sizes = sign * np.exp(moves / sights.flat.even)
@@ -192,7 +196,7 @@ def _refined(
         progress((k + 1) / len(_ROUNDS))
     residual = np.sqrt(np.maximum(box(variance, 2), noise**2))
     deviation = _deviation(residual, information, pull)
-    return moves, Evidence(deviation, box(disputed, 1), contrast(guide))
+    return moves, Evidence(deviation, box(disputed, 1), contrast(guide), others)
 
 
 def _deviation(residual: np.ndarray, information: np.ndarray, pull: np.ndarray) -> np.ndarray:

@@ -48,7 +48,8 @@ def epi(
         Disparities (t, s): positive is nearer than the plane in focus; NaN where the middle view is not
         `valid`, such as in vignetted corners. `error` is the mean distance from
         the truth to expect, by what noise and contrast allow in a 7 x 7 window and what is at stake beside an
-        edge of depth, where the map may be on the wrong side. Confidence is exp(-error/0.65 px).
+        edge of depth, where the map may be on the wrong side; and by how far other disparities lie that
+        explain an area as well, such as a texture that repeats. Confidence is exp(-error/0.65 px).
 
     Raises
     ------
@@ -100,9 +101,9 @@ def lines_of(
         low, high = _range(disparities, pictures.reach)
     moves = labels(low, high)
     share = len(moves) / (len(moves) + 20)
-    first = swept(pictures, moves, shading, within(progress, 0, share))
+    first, rivals = swept(pictures, moves, shading, within(progress, 0, share))
     first = np.clip(median_filter(first, 5), moves[0], moves[-1])
-    return refined(pictures, first, shading, within(progress, share, 1))
+    return refined(pictures, (first, rivals), shading, within(progress, share, 1))
 
 
 def _known(views: LightField) -> np.ndarray:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.ndimage import grey_closing, grey_opening, maximum_filter, minimum_filter
 
 FACTORS = {
     "noise": 0.26,
@@ -17,6 +17,10 @@ FACTORS = {
 
 _FADED = {"faint": 5, "wide": 9}  # windows beside whose edges no edge of the picture shows
 _AROUND = 15
+_RIVALS = 0.5  # of how far other values lie: so large are errors where they explain *antinous* as well
+_CHANCE = 0.5  # px: what lies nearer is noise of the costs, as on slants
+_GAPS = 3  # samples across that an area of rivals closes over
+_AREA = 7  # samples across that it has: beside an edge of depth there are fewer
 _FAINT = 0.005  # contrast between neighbours by which an edge of depth shows
 
 
@@ -32,11 +36,14 @@ class Evidence:
         Part (y, x) of what sees a place that shows something else there.
     contrast
         Between neighbours of the picture (y, x), of 0 to 1.
+    rivals
+        How far (y, x) other values lie that explain a place as well; see `lumigraph.depth.volume.rivals`.
     """
 
     deviation: np.ndarray
     disputed: np.ndarray
     contrast: np.ndarray
+    rivals: np.ndarray
 
 
 def contrast(picture: np.ndarray) -> np.ndarray:
@@ -47,10 +54,13 @@ def contrast(picture: np.ndarray) -> np.ndarray:
 def expected(values: np.ndarray, evidence: Evidence, *, slants: bool = True) -> np.ndarray:
     """Mean distance from the truth (y, x) to expect, in the unit of the values and their deviation.
 
-    `values` (y, x) are greater where nearer. `slants`: see `terms`.
+    `values` (y, x) are greater where nearer. `slants`: see `terms`. Where other values explain an area as
+    well, as in a texture that repeats, it is at least a part of how far they lie.
     """
     parts = terms(values, evidence, slants=slants)
-    return sum((FACTORS[name] * part for name, part in parts.items()), np.zeros_like(values))
+    usual = sum((FACTORS[name] * part for name, part in parts.items()), np.zeros_like(values))
+    rivals = np.where(evidence.rivals > _CHANCE, evidence.rivals, 0)
+    return np.maximum(usual, _RIVALS * grey_opening(grey_closing(rivals, _GAPS), _AREA))
 
 
 def terms(values: np.ndarray, evidence: Evidence, *, slants: bool = True) -> dict[str, np.ndarray]:

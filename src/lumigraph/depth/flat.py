@@ -10,6 +10,7 @@ from scipy.ndimage import convolve1d, spline_filter1d
 
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.raw import RawImage
 from lumigraph.rendering.interpolate import as_float
 
@@ -44,18 +45,21 @@ class Flat:
         """A raw image, divided by how light falls off from the middle of its micro-images to their edge.
 
         That shading stands still while details move from one micro-image to the next, and would pull patches
-        to 0. Without a white image it is what all micro-images have in common.
+        to 0. Without a white image it is what all micro-images have in common. A white image that has been
+        divided out tells it, and how far all of a lenslet is lit.
         """
-        image = grey(raw)
+        image, divisor = grey(raw), raw.divisor if isinstance(raw, PreparedImage) else None
+        shaded = image if divisor is None else divisor.astype(np.float32)
         (i, j), (dy, dx) = _places(image.shape, calibration)
-        radius = lit_radius(image, calibration, np.hypot(dy, dx))
+        radius = lit_radius(shaded, calibration, np.hypot(dy, dx))
         half = np.float32(calibration.lattice.pitch / 2)
         way = dy / half, dx / half
         lenslet = (i - i.min()) * (np.ptp(j) + 1) + j - j.min()
-        factors = _light(image, way, np.hypot(*way) < radius / half, lenslet)
+        factors = _light(shaded, way, np.hypot(*way) < radius / half, lenslet)
         terms = zip(factors, _shapes(*way), strict=True)
         light = sum((np.float32(factor) * term for factor, term in terms), np.float32(0))
-        flat = cls(np.sqrt(image / np.clip(light, *_FALL_OFF)), radius, radius, factors[:_POWERS])
+        even = image if divisor is not None else image / np.clip(light, *_FALL_OFF)
+        flat = cls(np.sqrt(even), radius, radius, factors[:_POWERS])
         steps = np.linspace(0, radius, 101, dtype=np.float32)
         dim = np.flatnonzero(flat.light(steps / half) < _EVEN * flat.light(np.zeros(1, np.float32)))
         return replace(flat, even=max(float(steps[dim[0]]), radius / 2) if len(dim) else radius)

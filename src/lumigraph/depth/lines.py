@@ -32,9 +32,11 @@ _BESIDE = 2  # px beside an occluder whose differences show its edge
 
 
 def refined(
-    pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Progress
+    pictures: Pictures, swept: tuple[np.ndarray, np.ndarray], shading: Shading, progress: Progress
 ) -> tuple[np.ndarray, Evidence]:
     """Movements (y, x) in the outermost view [px], refined on all views, and what they rest on.
+
+    `swept` are the first movements (y, x), and how far others lie that explain a place as well.
 
     Each round asks every view that sees a place by how much it should move there, r = g Δ: the residual r
     against the middle view, and the gradient g along the view's own direction. The answers, weighted by what
@@ -42,7 +44,7 @@ def refined(
     """
     grey = pictures.data.mean(2)
     lines = np.stack([[_spline(view, 3, output=np.float32) for view in row] for row in grey])
-    moves = moves.astype(np.float32)
+    moves, rivals = (part.astype(np.float32) for part in swept)
     edged = contrast(grey[pictures.middle])
     edges, asked = _edges(edged), _asked(pictures, lines, moves, shading)
     stiffness = _STIFFNESS * pictures.noise**2 * _lever(pictures)
@@ -53,7 +55,7 @@ def refined(
         change = update(moves, asked.information, asked.pull, how, edges, tears(moves, _TEAR)) - moves
         moves = moves + np.clip(change, -_BEFORE, _BEFORE)
         progress((k + 1) / len(_JUMPS))
-    return moves, Evidence(_deviation(pictures, asked), box(asked.disputed, 1), edged)
+    return moves, Evidence(_deviation(pictures, asked), box(asked.disputed, 1), edged, rivals)
 
 
 def _deviation(pictures: Pictures, asked: "_Asked") -> np.ndarray:

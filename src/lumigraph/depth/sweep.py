@@ -15,7 +15,7 @@ from lumigraph.core import memory
 from lumigraph.core.progress import Progress, silent
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import WINDOW, Fit, Shading
-from lumigraph.depth.volume import box, cheapest, guided, semi_global
+from lumigraph.depth.volume import box, cheapest, guided, rivals, semi_global
 from lumigraph.errors import GeometryError
 
 _STEP = 0.4  # between labels: how far a point moves in the outermost view [px]
@@ -40,8 +40,10 @@ def labels(low: float, high: float) -> np.ndarray:
     return (middle + _STEP * np.linspace(-half, half, count + 4)).astype(np.float32)
 
 
-def swept(pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Progress) -> np.ndarray:
-    """Movement (y, x) of each place in the outermost view [px], to a fraction of a label.
+def swept(
+    pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Progress
+) -> tuple[np.ndarray, np.ndarray]:
+    """Movement (y, x) of each place in the outermost view [px], to a fraction of a label; its `rivals` [px].
 
     Raises
     ------
@@ -59,7 +61,8 @@ def swept(pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Pro
     guide = pictures.center.mean(0)
     cost = guided(cost, guide, 3)
     cost = semi_global(cost, guide, 0.2 * most, most)
-    return moves[0] + cheapest(cost)[0] * (moves[1] - moves[0])
+    step = moves[1] - moves[0]
+    return moves[0] + cheapest(cost)[0] * step, rivals(cost, most) * step
 
 
 def costs(

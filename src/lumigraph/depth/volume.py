@@ -103,3 +103,34 @@ def cheapest(cost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     usual = np.median(cost, axis=0)
     contrast = (usual - cost.min(0)) / np.where(usual > 0, usual, 1)
     return best + move, np.clip(contrast, 0, 1)
+
+
+_VALLEY = 0.1  # of a jump on each path: what a rival's cost must fall below that between it and the best
+
+
+def rivals(total: np.ndarray, jump: float) -> np.ndarray:
+    """How far (y, x) a label may be off because others explain a place as well, in steps.
+
+    Every other valley of the costs counts by its distance, times the square of how deep it is beside the
+    valley of the best label. Textures that repeat have such valleys, and so do places beside an edge of
+    depth.
+
+    Parameters
+    ----------
+    total
+        Costs (n, y, x) by `semi_global`.
+    jump
+        As it was given there.
+    """
+    best, low = total.argmin(0), total.min(0)
+    away, least = np.zeros_like(low), np.float32(8 * _VALLEY * jump)
+    for side in (1, -1):
+        order, top = total[::side], low
+        start = best if side > 0 else len(total) - 1 - best
+        for k in range(1, len(total)):
+            here, beyond = order[k], order[min(k + 1, len(total) - 1)]
+            top = np.where(k > start, np.maximum(top, here), low)
+            fall = top - here
+            valley = (fall > least) & (here < order[k - 1]) & (here <= beyond)
+            away += valley * (k - start) * np.square(fall / np.maximum(top - low, least))
+    return away

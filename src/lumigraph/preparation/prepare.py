@@ -9,8 +9,8 @@ from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 import numpy as np
 
 from lumigraph import rendering
-from lumigraph.calibration import aligned, calibrate, devignette
-from lumigraph.calibration.devignette import as_raw
+from lumigraph.calibration import aligned, calibrate
+from lumigraph.calibration.devignette import as_raw, divided
 from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.prepared import PreparedImage, Reason, Verdicts
@@ -96,7 +96,7 @@ def prepare(
     notes = (*notes, *beside.notes(raw, divide=divide), *_counted(reasons, lenslets))
     known: dict[str, Any] = {"calibration": found, "reasons": reasons, "lenslets": lenslets, "notes": notes}
     if divide:
-        ready = _pictured(raw, beside)
+        ready, known["divisor"] = _pictured(raw, beside)
     else:
         ready, known = raw, known | _modelled(raw, beside, found)
     return PreparedImage(ready.data, ready.pixel_pitch, ready.bit_depth, ready.bayer, ready.metadata, **known)
@@ -158,14 +158,15 @@ def _mask(mask: Array | None, raw: RawImage) -> np.ndarray | None:
     return used
 
 
-def _pictured(raw: RawImage, beside: Beside) -> RawImage:
-    """Values that pictures are made of: above the dark, evenly lit, in colour."""
-    dark = beside.dark or black_plane(raw)
+def _pictured(raw: RawImage, beside: Beside) -> tuple[RawImage, np.ndarray | None]:
+    """Values that pictures are made of, above the dark, evenly lit, in colour; and what divided them."""
+    dark, light = beside.dark or black_plane(raw), None
     if beside.white is not None:
-        even = devignette(raw, beside.white, dark=dark)
+        even, light = divided(raw, beside.white, dark=dark)
+        light = (light if light.ndim == 2 else light.mean(2)).astype(np.float16)
     else:
         even = raw if dark is None else above(raw, dark)
-    return even if raw.bayer is None else coloured(even, raw)
+    return even if raw.bayer is None else coloured(even, raw), light
 
 
 def _modelled(raw: RawImage, beside: Beside, found: Calibration | None) -> dict[str, Any]:
