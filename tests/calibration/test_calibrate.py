@@ -1,6 +1,7 @@
 """Lattices drawn pixel by pixel from their definition, and real white images."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,10 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import calibration_drawing
+import lumigraph as lg
 from data_folder import real
 from lumigraph import io
-from lumigraph.calibration import calibrate
+from lumigraph.calibration import calibrate, fitting
+from lumigraph.calibration.centres import Spots
 from lumigraph.calibration.devignette import grey
+from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.raw import RawImage
 from lumigraph.core.warp import Warp
@@ -281,6 +285,43 @@ def test_centres_are_true_on_noisy_tilted_pictures_with_dead_lenslets(layout, pi
 @pytest.mark.parametrize("layout", ["square", "hex"])
 def test_centres_are_true_at_all_pitches(layout, pitch, seed):
     check_truth(layout, pitch, seed)
+
+
+def test_a_tilt_is_fitted_although_micro_images_at_the_border_stand_inwards(rng):
+    """By less than a tilt moves them: they are outliers of the fit with it, not of the one without."""
+    middle = (391.0, 391.0)
+    lattice, warp = Lattice.square(31.25, origin=middle), Warp(middle, (1.9e-6, 0.0))
+    indices = np.stack(np.meshgrid(*2 * [np.arange(-12, 13)], indexing="ij"), -1).reshape(-1, 2)
+    inwards = np.select([np.abs(indices) == 12, np.abs(indices) == 11], [0.06, 0.03])
+    centers = warp.applied(lattice.position(indices)) - np.sign(indices) * inwards
+    centers += rng.normal(0, 0.003, centers.shape)
+    none = np.zeros((0, 2), int)
+    model = Calibration(lattice, (783, 783), none, none.astype(float), 0.0)
+    found = fitting.fit(Spots(indices, centers, np.ones(len(indices))), model)
+    assert found.warp is not None
+    assert found.warp.tilt == pytest.approx(warp.tilt, abs=5e-8)
+    assert len(found.spots.indices) == len(indices)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "built", [{"sensor_tilt": ("95 mrad", "0 mrad")}, {"array_tilt": ("0 mrad", "80 mrad")}]
+)
+def test_a_camera_that_leans_is_calibrated_by_its_own_white_image(built):
+    """Micro-images of simulated light stand where the fit says, to 0.05 px; a straight lattice is off."""
+    camera = lg.PlenopticCamera.from_catalogue("thesis-plenoptic-1")
+    camera = camera.replace(lenslets={"count": (25, 25)}, built=built)
+    found, rays = (
+        lg.calibrate(lg.simulate(camera, lg.targets.white(), lg.Incoherent(1e-2))),
+        camera.calibration,
+    )
+
+    def off(model):
+        at = np.stack(model.index(*rays.centers.T), -1)
+        return float(np.hypot(*(model.position(at) - rays.centers).T).max())
+
+    assert off(found) < 0.05
+    assert off(replace(found, warp=None)) > 0.2
 
 
 def test_a_tilt_and_a_radial_distortion_are_fitted():

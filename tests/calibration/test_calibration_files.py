@@ -1,6 +1,7 @@
 """Everything that a calibration knows survives its file."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.warp import Warp
 from lumigraph.errors import FormatError
+from lumigraph.io import calibration
 from lumigraph.io.calibration import load_calibration, save_calibration
 
 
@@ -35,6 +37,42 @@ def test_every_field_survives_its_file(tmp_path, rng):
     for found in (full(rng), dataclasses.replace(full(rng), warp=None, light=None, notes=(), sharpness=())):
         save_calibration(found, tmp_path / "c.toml")
         same(load_calibration(tmp_path / "c.toml"), found)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "other", "left"),
+    [
+        (r"$^", "", set()),
+        (r"indices = \[\n  \[", "indices = [\n  [ ", {"indices"}),
+        (r"centers = \[\n  \[[^,]*", "centers = [\n  [1_0.5", {"centers"}),
+        (r"light = \[[^,]*", "light = [1_0.5", {"light"}),
+        (r"\],\n\]", "]\n]", {"indices", "centers"}),
+        (r"kind = ", 'x = """\n"""\nkind = ', {"indices", "centers", "light"}),
+    ],
+)
+def test_many_lenslets_are_read_by_numpy_as_tomllib_reads_them(
+    tmp_path, rng, monkeypatch, pattern, other, left
+):
+    """Rows that are written in another way are left to tomllib."""
+    path = tmp_path / "c.toml"
+    save_calibration(full(rng), path)
+    path.write_text(re.sub(pattern, other, path.read_text()))
+    found, names = load_calibration(path), {"indices", "centers", "light"}
+    assert set(calibration._taken(path.read_text())[1]) == names - left
+    monkeypatch.setattr(calibration, "_taken", lambda text: (text, {}))
+    same(found, load_calibration(path))
+
+
+@pytest.mark.parametrize("number", ["1..2", "1 2", "1, 2, 3", "one", "0_"])
+def test_what_is_no_number_is_refused(tmp_path, rng, number):
+    path = tmp_path / "c.toml"
+    save_calibration(full(rng), path)
+    for name in ("centers = [\n  [", "light = ["):
+        text = path.read_text()
+        path.write_text(text.replace(name, f"{name}{number}, ", 1))
+        with pytest.raises(FormatError):
+            load_calibration(path)
+        path.write_text(text)
 
 
 @pytest.mark.parametrize(

@@ -215,6 +215,10 @@ def test_binary_and_oversized_toml_are_refused(tmp_path, monkeypatch):
     (tmp_path / "c.toml").write_bytes(b"\xff\xfe\x00garbage")
     with pytest.raises(FormatError, match="is not TOML"):
         io.open(tmp_path / "c.toml")
+    (tmp_path / "d.toml").write_text("a = 1\nb = 2\nkind = 'calibration'\n")
+    monkeypatch.setattr("lumigraph.io.calibration._LARGEST_TEXT", 4)
+    with pytest.raises(FormatError, match="characters beside its lenslets, too many"):
+        io.open(tmp_path / "d.toml")
     monkeypatch.setattr("lumigraph.io.calibration._LARGEST", 4)
     with pytest.raises(FormatError, match="too many for a calibration"):
         io.open(tmp_path / "c.toml")

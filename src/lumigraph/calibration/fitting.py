@@ -87,7 +87,9 @@ def _fitted(spots: Spots, model: Calibration, warped: bool) -> Fitted:
         for tilt, radial in _FREE[1:]:
             other = _robust(spots, model, (tilt, radial))
             value = _criterion(other, 6 + 2 * tilt + radial)
+            # Those at the array's border, which stand inwards, are outliers only of a fit that is good.
             kept = len(other.spots.indices) >= len(best.spots.indices) * 0.95 - 1
+            kept = kept or _rms(other._replace(spots=best.spots)) < _GAIN * straight
             gained = value < least - _EVIDENCE and _rms(other) < _GAIN * straight
             if kept and gained:
                 best, least, straight = other, value, _rms(other)

@@ -24,7 +24,7 @@ _GOOD = 0.5  # of the best score: what the coarsest must have
 _MARGIN = 0.85  # the second candidate must stay below this part of the first
 _THIRDS = (8, 8), (16, 16)
 _ALIASED = 12.0  # px of pitch below which whole pixels make neighbours differ
-_ABSENT = 0.12  # of the weakest first harmonic of the finer lattice: what only the coarser one has
+_ABSENT = 0.12  # of the weakest first harmonic of the finer, or better, lattice: what only another one has
 _KEPT = 0.55  # of the score of a candidate must its regular lattice keep
 _SHEARED = 1.06  # two pitches that a search finds
 _FOLDED = 768  # px of the middle that are folded
@@ -130,7 +130,7 @@ def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
         if math.hypot(*second) > _SHEARED * math.hypot(*first):
             raise CalibrationError(_nothing([(first, second)], []))
         best = _ranked(spectra, chosen)
-    return _best(best, request, middles[0].shape)
+    return _best(best, request, middles[0].shape, (light, gaps))
 
 
 def _polished(gaps: Gaps, vectors: Vectors) -> Vectors:
@@ -317,7 +317,9 @@ def _area(vectors: Vectors) -> float:
     return abs(float(vectors.row[0] * vectors.column[1] - vectors.row[1] * vectors.column[0]))
 
 
-def _best(ranked: list[_Candidate], request: Request, shape: tuple[int, ...]) -> Vectors:
+def _best(
+    ranked: list[_Candidate], request: Request, shape: tuple[int, ...], pictures: tuple[Gaps, ...]
+) -> Vectors:
     allowed = [c for c in ranked if request.allows(c.vectors, _pitch(c.vectors) / min(shape) / 2)]
     if not allowed:
         best = ranked[0].vectors
@@ -335,12 +337,31 @@ def _best(ranked: list[_Candidate], request: Request, shape: tuple[int, ...]) ->
     slack = min(0.2, 1.5 * _pitch(best.vectors) / min(shape))  # one bin and a half of the spectrum
     others = [c for c in allowed[1:] if c.score > _MARGIN * best.score]
     others = [c for c in others if not _same(c.vectors, best.vectors, slack)]
+    others = [c for c in others if not all(_faint(one, c.vectors, best.vectors) for one in pictures)]
     if others:
         raise CalibrationError(
             f"the image shows {1 + len(others)} pitches that are about equally likely, "
             f"a {_told(best.vectors)} and a {_told(others[0].vectors)}. Pass pitch=, layout= or rotation=."
         )
     return best.vectors
+
+
+def _faint(picture: Gaps, vectors: Vectors, best: Vectors) -> bool:
+    """Whether a candidate's first harmonics are next to nothing beside those of the best one.
+
+    Lines count by how far they stand out of their surroundings: on a clean picture, a coarser lattice has
+    one at each beat of the true one with the pixels or with a pattern of dead lenslets.
+    """
+    mine, rest = (picture.heights(_first(one)) for one in (best, vectors))
+    return bool(rest.max() < _ABSENT * mine.min())
+
+
+def _first(vectors: Vectors) -> np.ndarray:
+    """First harmonics (2 or 3, 2) of a lattice, of one half plane [1/px]."""
+    steps = np.stack(np.meshgrid(*2 * [np.arange(-1, 2)], indexing="ij"), -1).reshape(-1, 2)
+    waves = steps @ np.linalg.inv(np.stack([vectors.column, vectors.row], -1))
+    waves = waves[(waves[:, 1] > 0) | ((waves[:, 1] == 0) & (waves[:, 0] > 0))]
+    return waves[np.argsort(np.hypot(*waves.T))[: 3 if vectors.layout == "hex" else 2]]
 
 
 def _pitch(vectors: Vectors) -> float:
