@@ -41,6 +41,25 @@ def test_what_is_missing_is_named(table, capsys, words, said) -> None:
     assert said in capsys.readouterr().err
 
 
+def test_a_plan_for_a_camera_1_says_what_stays_unknown(capsys) -> None:
+    words = [
+        "board",
+        "plan",
+        "--camera",
+        "thesis-plenoptic-1",
+        "--board",
+        "4 x 3 corners, 3 mm",
+        "--pictures",
+        "3",
+    ]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert said.count(" mm  ") >= 3
+    assert "f, and with it L and distances, stays as well known as it is beforehand" in said
+    assert main([*words, "--focal-length-error", "40 mm"]) == 0
+    assert "stays as well known" not in capsys.readouterr().out
+
+
 def test_a_plan_says_which_pictures_to_take(capsys) -> None:
     words = [
         "board",
@@ -55,6 +74,7 @@ def test_a_plan_says_which_pictures_to_take(capsys) -> None:
     assert main(words) == 0
     printed = capsys.readouterr().out.splitlines()
     assert printed[0].split()[:2] == ["picture", "distance"]
-    assert len(printed) == 4
+    assert len(printed) == 5
+    assert printed[4].startswith("note: f, and with it L")
     assert main([*words[:2], *words[4:]]) == 1
     assert "a plan needs --camera" in capsys.readouterr().err

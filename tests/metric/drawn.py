@@ -39,13 +39,18 @@ def pose(turn: tuple[float, float, float], distance: float = 0.45, board: Board 
 
 
 def raw(
-    seen_by: MetricCamera, where: np.ndarray, kinds: int = 1, blur: float = 0.7, board: Board = BOARD
+    seen_by: MetricCamera,
+    where: np.ndarray,
+    kinds: int = 1,
+    blur: float = 0.7,
+    board: Board = BOARD,
+    rng: np.random.Generator | None = None,
 ) -> np.ndarray:
     """Raw image (y, x) of an evenly lit board, with 1 % of noise."""
     place, center, kind = _pixels(kinds)
     at, scale = _on_board(seen_by, where, place, center, kind)
     lit = _lit(place, center)
-    noise = np.random.default_rng(0).normal(0, 0.01, SHAPE)
+    noise = (rng or np.random.default_rng(0)).normal(0, 0.01, SHAPE)
     return (gaussian_filter((lit * painted(at, scale, board)).reshape(SHAPE), blur) + noise).astype(
         np.float32
     )
@@ -73,12 +78,12 @@ def _on_board(
     seen_by: MetricCamera, where: np.ndarray, pixel: np.ndarray, center: np.ndarray, kind: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points of the board (n, 2) [m] that pixels see, by Newton's method, and metres a pixel (n,)."""
-    at = np.full((len(pixel), 2), 8e-3)
-    for _ in range(5):
-        here, down, across = (
-            _seen(seen_by, where, at + step, center, kind) for step in ((0, 0), (1e-6, 0), (0, 1e-6))
-        )
-        slope = np.stack([down - here, across - here], -1) / 1e-6
+    at, slope = np.full((len(pixel), 2), 8e-3), np.zeros((len(pixel), 2, 2))
+    for k in range(5):
+        here = _seen(seen_by, where, at, center, kind)
+        if k < 2:  # it hardly changes afterwards
+            ends = (_seen(seen_by, where, at + step, center, kind) for step in ((1e-6, 0), (0, 1e-6)))
+            slope = np.stack([one - here for one in ends], -1) / 1e-6
         at = at - np.clip(np.linalg.solve(slope, (here - pixel)[..., None])[..., 0], -0.02, 0.02)
     return at, 1 / np.sqrt(np.abs(np.linalg.det(slope)))
 

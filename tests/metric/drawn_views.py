@@ -23,13 +23,21 @@ def calibration() -> Calibration:
     return Calibration(lattice, SHAPE, none.astype(int), none, 0.0, pixel_pitch=PIXEL, fill=0.96)
 
 
-def raw(where: np.ndarray, rng: np.random.Generator, noise: float = 0.01, board: Board = BOARD) -> np.ndarray:
+def raw(
+    where: np.ndarray,
+    rng: np.random.Generator,
+    noise: float = 0.01,
+    board: Board = BOARD,
+    seen_by: MetricCamera = CAMERA,
+) -> np.ndarray:
     """Raw image (y, x) of an evenly lit board at a pose."""
     known, place = calibration(), np.stack([each.ravel() for each in np.indices(SHAPE)], 1).astype(float)
     center = known.position(np.stack(known.index(*place.T), -1))
     lit = _lit(place - center)
     seen, bright = np.zeros(len(place)), lit > 0
-    seen[bright] = drawn.painted(*_on_board(where, place[bright] - center[bright], center[bright]), board)
+    seen[bright] = drawn.painted(
+        *_on_board(where, place[bright] - center[bright], center[bright], seen_by), board
+    )
     return (lit * seen + rng.normal(0, noise, len(seen))).reshape(SHAPE).astype(np.float32)
 
 
@@ -45,16 +53,20 @@ def _lit(way: np.ndarray) -> np.ndarray:
     return np.clip(0.96 * PITCH / 2 - np.hypot(*way.T) + 0.5, 0, 1)
 
 
-def _on_board(where: np.ndarray, way: np.ndarray, center: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _on_board(
+    where: np.ndarray, way: np.ndarray, center: np.ndarray, seen_by: MetricCamera
+) -> tuple[np.ndarray, np.ndarray]:
     """Points of the board (n, 2) [m] that ways from centres see, by Newton's method; a lenslet there (n,)."""
     at, kind = np.zeros((len(way), 2)) + 4e-3, np.zeros(len(way), int)
 
     def shown(at: np.ndarray) -> np.ndarray:
         points = geometry.moved(np.concatenate([np.zeros((len(at), 1)), at], 1), where)
-        return geometry.centers(CAMERA.numbers, points, (center + way, center), kind, PIXEL)
+        return geometry.centers(seen_by.numbers, points, (center + way, center), kind, PIXEL)
 
-    for _ in range(4):
-        here, down, across = (shown(at + step) for step in ((0, 0), (1e-6, 0), (0, 1e-6)))
-        slope = np.stack([down - here, across - here], -1) / 1e-6
+    slope = np.zeros((len(way), 2, 2))
+    for k in range(4):
+        here = shown(at)
+        if k < 2:  # it hardly changes afterwards
+            slope = np.stack([shown(at + step) - here for step in ((1e-6, 0), (0, 1e-6))], -1) / 1e-6
         at = at - np.clip(np.linalg.solve(slope, (here - center)[..., None])[..., 0], -0.05, 0.05)
     return at, PITCH / np.sqrt(np.abs(np.linalg.det(slope)))

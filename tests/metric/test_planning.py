@@ -1,13 +1,17 @@
 """Plans of pictures of a board."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import lumigraph as lg
 from lumigraph import metric
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.lattice import Lattice
 from lumigraph.errors import CalibrationError
-from lumigraph.metric import planning
-from metric import drawn
+from lumigraph.metric import geometry, planning
+from metric import drawn, scenes
 
 NOMINAL = metric.Nominal(50e-3, drawn.PIXEL, drawn.SHAPE)
 
@@ -17,12 +21,16 @@ def plan():
     return metric.plan(drawn.camera(-1.0), drawn.calibration(), drawn.BOARD, NOMINAL, pictures=6)
 
 
+def before(camera):
+    noise = metric.noise.Noise(np.array([0.1]), 0.05)
+    return planning._Before(camera, drawn.calibration(), drawn.BOARD, noise, in_views=False)
+
+
 def test_the_errors_of_a_plan_are_those_of_the_pictures_taken(plan) -> None:
     rng, rows = np.random.default_rng(3), []
     for frame, step in enumerate(plan.steps):
-        seen = planning._seen(
-            plan.camera, drawn.calibration(), drawn.BOARD, drawn.pose(step.turn, step.distance)
-        )
+        points = geometry.moved(drawn.BOARD.points(), drawn.pose(step.turn, step.distance))
+        seen = before(plan.camera).by_lenslets(points)
         shared = rng.normal(0, 0.05, (20, 2))[seen.corner]
         place = seen.place + rng.normal(0, 0.1, seen.place.shape) + shared
         rows.append((np.full(len(seen), frame), seen.corner, place, seen.center, seen.kind))
@@ -37,14 +45,7 @@ def test_every_picture_of_a_plan_tells_more_and_tilted_ones_come_first(plan) -> 
     errors = np.array([step.errors for step in plan.steps])
     assert (np.diff(errors, axis=0) <= 0).all()
     assert errors[-1, 2] < 0.5 * errors[0, 2]
-    straight = planning._shot(
-        plan.camera,
-        drawn.calibration(),
-        drawn.BOARD,
-        metric.noise.Noise(np.array([0.1]), 0.05),
-        0.45,
-        (0.0, 0.0, 0.0),
-    )
+    straight = before(plan.camera).shot(0.45, (0.0, 0.0, 0.0))
     (_, only), best = list(planning._chosen([straight], plan.camera, NOMINAL, 2)), plan.steps[1]
     assert sum(best.errors / plan.camera.numbers[:3]) < sum(only.errors / plan.camera.numbers[:3])
 
@@ -66,3 +67,31 @@ def test_a_board_that_cannot_be_used_is_refused() -> None:
         metric.plan(drawn.camera(1.0), drawn.calibration(), metric.Board((4, 5), 80e-3), NOMINAL)
     with pytest.raises(CalibrationError, match="pictures is 2"):
         metric.plan(drawn.camera(1.0), drawn.calibration(), drawn.BOARD, NOMINAL, pictures=2)
+
+
+def test_a_plan_for_views_says_what_boards_in_views_will_tell() -> None:
+    """Of a camera 1.0: b well, f and L no better than what is known of f, as the exit pupil is free."""
+    camera = dataclasses.replace(scenes.VIEWS_CAMERA, tilt=(0.0, 0.0))
+    none = np.zeros((0, 2))
+    calibration = Calibration(
+        Lattice.square(scenes.PITCH), scenes.NOMINAL.shape, none.astype(int), none, 0.0, fill=0.94
+    )
+    found = metric.plan(camera, calibration, scenes.BOARD, scenes.NOMINAL, pictures=6, in_views=True)
+    errors = np.array([step.errors for step in found.steps]) / camera.numbers[:3]
+    assert errors[-1, :2] == pytest.approx(0.02, rel=0.1)
+    assert errors[-1, 2] < 0.012 < 0.5 * errors[0, 2]
+    assert any(max(np.abs(step.turn)) > 0.6 for step in found.steps)
+    own, shared = 0.02 * scenes.PITCH, 0.01 * scenes.PITCH
+    before = planning._Before(camera, calibration, scenes.BOARD, metric.noise.Noise(np.ones(1), 0.0), True)
+    rng, rows = np.random.default_rng(5), []
+    for frame, step in enumerate(found.steps):
+        where = drawn.pose(step.turn, step.distance, scenes.BOARD)
+        seen = before.by_views(geometry.moved(scenes.BOARD.points(), where))
+        assert len(seen) == step.places
+        off = rng.normal(0, own, seen.center.shape) + rng.normal(0, shared, (35, 2))[seen.corner]
+        rows.append((np.full(len(seen), frame), seen.corner, seen.place + off, seen.center + off, seen.kind))
+    columns = (np.concatenate(column) for column in zip(*rows, strict=True))
+    measured = metric.board(metric.Corners(*columns, in_views=True), scenes.BOARD, scenes.NOMINAL)
+    assert np.allclose(measured.errors[:3], found.steps[-1].errors, rtol=0.2)
+    away = measured.camera.numbers[:3] - camera.numbers[:3]
+    assert (np.abs(away) < 3.5 * np.array(found.steps[-1].errors)).all()

@@ -77,7 +77,7 @@ def test_a_bench_that_is_all_out_of_place_is_found_in_one_picture(bench, camera)
         true = out_of_place(rng)
         light = bench.white(true)
         raw, dark = (camera.sensor.expose(one, reference=light.max(), rng=rng) for one in (light, 0 * light))
-        found = twin([raw], bench, dark=dark)
+        found = twin([raw], bench, dark=dark, pitch_error=1e-5)
         off = np.abs(found.values - true)
         assert off[0] < 10e-6
         assert off[1:3].max() < math.radians(0.02)
@@ -92,7 +92,7 @@ def test_a_bench_in_its_place_has_no_instructions(bench, camera):
     rng = np.random.default_rng(5)
     light = bench.white(np.zeros(7))
     raw, dark = (camera.sensor.expose(one, reference=light.max(), rng=rng) for one in (light, 0 * light))
-    assert twin([raw], bench, dark=dark).instructions() == ()
+    assert twin([raw], bench, dark=dark, pitch_error=1e-5).instructions() == ()
 
 
 def told(**values):
@@ -130,6 +130,27 @@ def test_an_array_far_from_its_place_is_no_instruction(small, monkeypatch):
     assert found["height"] == pytest.approx(-2e-3, rel=0.1)
     assert any("have no instructions" in note for note in found.notes)
     assert not any("raise" in line or "lower" in line or "stop" in line for line in found.instructions())
+
+
+def test_lenslets_of_another_pitch_are_no_instruction_unless_the_pitch_is_said_to_be_known(
+    small, monkeypatch
+):
+    """0.04 % of pitch look like 0.1 mm of height, and like 1 % of the stop."""
+    monkeypatch.setattr(import_module("lumigraph.metric.twin"), "_ROUNDS", 1)
+    monkeypatch.setitem(small.__dict__, "slopes", SLOPES)
+    camera = small.camera
+    pitch = {"lenslets": {"pitch": 150e-6 * (1 + 4e-4)}, "sensor": {"shape": camera.sensor.shape}}
+    other = Bench(camera.replace(**pitch, main_lens={"diameter": camera.pupil_diameter}))
+    white = [lg.RawImage(other.white(np.zeros(7)))]
+    found, claimed = twin(white, small), twin(white, small, pitch_error=1e-5)
+    assert found["height"] == pytest.approx(4e-4 * camera.separation, rel=0.4)
+    assert found.instructions() == ()
+    assert found.errors[0] == pytest.approx(3e-4 * camera.separation, rel=0.1)
+    assert any(
+        "known to 0.03%, so the height is known to ± 0.137 mm and the stop" in one for one in found.notes
+    )
+    assert claimed["height"] > 2.5 * claimed.errors[0]
+    assert not any("known to 0.03%" in one for one in claimed.notes)
 
 
 def test_the_corrected_file_of_a_camera_2_0_has_the_benches_distances():

@@ -63,6 +63,23 @@ def test_corners_in_views_are_where_rays_say() -> None:
         metric.find_corners([raw], metric.Board((3, 5), 1e-3), drawn_views.calibration(), in_views=True)
 
 
+def test_corners_between_markers_are_where_rays_say_in_views(monkeypatch) -> None:
+    """Each by its number, in squares of 19 samples: windows as wide as a chessboard's are 0.25 off."""
+    pytest.importorskip("cv2", reason="OpenCV reads the markers")
+    monkeypatch.setattr(drawn_views, "SHAPE", shape := (round(91 * drawn_views.PITCH),) * 2)
+    camera = replace(drawn_views.CAMERA, axis=(shape[0] / 2 + 3, shape[1] / 2 - 4))
+    board = metric.Board.from_text("3 x 3 charuco, 9.5 mm, markers 7.1 mm, DICT_4X4_50")
+    where = drawn.pose((0.05, 0.2, -0.15), 0.45, board)
+    raw = RawImage(drawn_views.raw(where, np.random.default_rng(0), board=board, seen_by=camera))
+    found = metric.find_corners([raw], board, drawn_views.calibration(), in_views=True)
+    assert np.bincount(found.corner, minlength=9).min() >= 9
+    points, seen_at = geometry.moved(board.points(), where)[found.corner], (found.place, found.center)
+    true = geometry.centers(camera.numbers, points, seen_at, found.kind, drawn_views.PIXEL)
+    off = (true - found.center) / drawn_views.PITCH  # samples of a view
+    assert np.sqrt((off**2).mean()) < 0.06
+    assert np.abs(off).max() < 0.15
+
+
 @pytest.fixture(scope="module")
 def measured():
     seen = scenes.corners_in_views(np.random.default_rng(7), frames=4, views=3)

@@ -17,7 +17,7 @@ from lumigraph.core.result import Figure, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
-    from lumigraph.metric import Board, Corners, Measured, Nominal
+    from lumigraph.metric import Board, Corners, Measured, Nominal, Plan
 
 
 @Parameter(name="*")
@@ -83,7 +83,7 @@ def board(
     lenslets show them, with the columns frame, corner, y, x, center_y, center_x, kind, and in_views of a
     camera 1.0; or one folder of COMPOTE's (bap.csv, centers.csv, camera.json, scene.json), which also says
     what the board and the camera are. Or the word plan: which pictures of the board to take with --camera,
-    a camera 2.0, and how well they will tell its lengths.
+    and how well they will tell its lengths.
 
     Example: `lumigraph board plan --camera camera.toml --board "9 x 5 corners, 10 mm"`
 
@@ -183,21 +183,33 @@ def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int)
     """Pictures to take."""
     from lumigraph import metric
     from lumigraph.instruments import LensletCamera
+    from lumigraph.instruments.capabilities import Rendered
 
-    camera = origin.described("render")
+    camera = origin.described()
     if board is None or not isinstance(camera, LensletCamera):
-        raise FormatError("a plan needs --camera, a file of a plenoptic camera 2.0, and --board.")
+        raise FormatError("a plan needs --camera, a file of a plenoptic camera, and --board.")
     ideal = metric.MetricCamera.of(camera)
     told = {name: getattr(ideal, name) for name in ("focal_length", "pixel_pitch")}
     nominal = known.nominal(told | {"shape": camera.sensor.shape})
-    found = metric.plan(ideal, camera.calibration, board, nominal, pictures=pictures)
+    in_views = not isinstance(camera, Rendered)
+    found = metric.plan(ideal, camera.calibration, board, nominal, pictures=pictures, in_views=in_views)
     table = found.table()
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in table]
     return Result(
         "Plan", f"{pictures} pictures of a board to take, the most telling first.", found, tuple(lines),
-        found.quantities(), lambda: iter((Figure(table, section="Pictures"),)),
+        found.quantities(), lambda: iter((Figure(table, section="Pictures"),)), _hardly_told(found, nominal),
     )  # fmt: skip
+
+
+def _hardly_told(found: "Plan", nominal: "Nominal") -> tuple[str, ...]:
+    """A note where pictures tell f hardly better than it is known without them."""
+    if found.steps[-1].errors[0] < 0.7 * nominal.focal_length_error * nominal.focal_length:
+        return ()
+    return (
+        f"f, and with it L and distances, stays as well known as it is beforehand "
+        f"(± {1.96 * nominal.focal_length_error:.2g} of it): measure it, and give --focal-length-error",
+    )
 
 
 def _headline(found: "Measured") -> tuple[str, ...]:

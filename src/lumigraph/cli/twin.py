@@ -29,7 +29,7 @@ def twin(
     *,
     camera: str,
     dark: Path | None = None,
-    pitch_error: float = 1e-5,
+    pitch_error: float | None = None,
     watch: Path | None = None,
     output: Output | None = None,
     common: Reported = REPORTED,
@@ -52,7 +52,8 @@ def twin(
     dark
         Picture without light.
     pitch_error
-        How well the lenslets' pitch over the pixels' is known, one standard deviation over it.
+        How well the lenslets' pitch over the pixels' is known, one standard deviation over it; 3e-4 if left
+        out. Height and stop are known no better than that allows.
     watch
         Folder: every new picture in it is compared, until Ctrl-C; the last result is the command's.
     output

@@ -5,6 +5,7 @@
 - `MetricCamera`: main lens, lenslets, sensor, as a geometry of rays (`geometry`).
 - `board`: the camera from corners, by bundle adjustment (`adjustment`) from a coarse search (`start`),
   with the noise of corners that are seen many times (`noise`). `Measured` holds it, its errors, the poses.
+- `chart`: boards and other charts to print, in true size (`printed`).
 - `plan`: how to take pictures of the board, and how well they will tell the camera.
 - `triangulate`: positions of points from their micro-images.
 - `datasheet`: what a camera does, on `Charts` that `read_charts` finds in a folder or `simulate_charts` takes
@@ -26,6 +27,7 @@ from lumigraph.metric.datasheet import datasheet
 from lumigraph.metric.files import load, load_compote, load_corners, save, save_corners
 from lumigraph.metric.finding import find_corners
 from lumigraph.metric.planning import Plan, plan
+from lumigraph.metric.printed import chart
 from lumigraph.metric.sheet import Entry, Plane, Sheet
 from lumigraph.metric.simulated import MEASURES, is_measure, simulated
 from lumigraph.metric.triangulation import Triangulated, triangulate
@@ -49,6 +51,7 @@ __all__ = [
     "Triangulated",
     "Twin",
     "board",
+    "chart",
     "corrected",
     "datasheet",
     "find_corners",

@@ -191,6 +191,35 @@ def adjust(
     return Adjusted(camera.with_numbers(numbers), poses, covariance, problem.noise, misfit, kept)
 
 
+def placed(
+    corners: Corners, board: Board, camera: MetricCamera, noise: Noise, start: np.ndarray
+) -> tuple[Problem, np.ndarray]:
+    """One picture's problem before a camera that is known, and its unknowns with the best pose (6,) last.
+
+    Parameters
+    ----------
+    corners, board
+        What was seen on the picture, of what.
+    camera, noise
+        As they are known.
+    start
+        A first pose (6,).
+    """
+    frame = np.zeros(len(corners), int)
+    problem = Problem(corners, board, frame, camera, [], noise, corners.sights())
+    fixed = np.zeros(problem.free.shape[1])
+
+    def unknowns(pose: np.ndarray) -> np.ndarray:
+        return np.concatenate([fixed, pose])
+
+    def slopes(pose: np.ndarray) -> np.ndarray:
+        return problem.jacobian(unknowns(pose))[:, len(fixed) :]
+
+    jacobian: Any = slopes  # SciPy's types know names of methods only
+    found = least_squares(lambda p: problem.residual(unknowns(p)), start, jacobian, x_scale="jac")
+    return problem, unknowns(found.x)
+
+
 def _again(first: Problem, misfit: np.ndarray) -> tuple[Problem, np.ndarray]:
     """The problem with the noise of a misfit (n, 2), without its wild corners."""
     kind = first.corners.kind

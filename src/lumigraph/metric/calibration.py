@@ -4,20 +4,19 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from lumigraph.core.brief import brief
 from lumigraph.core.result import Quantity
 from lumigraph.errors import CalibrationError
 from lumigraph.metric import geometry
-from lumigraph.metric.adjustment import Adjusted, Problem, adjust
+from lumigraph.metric.adjustment import Adjusted, Problem, adjust, placed
 from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.metric.noise import Noise
 from lumigraph.metric.start import LEAST_CORNERS, search
+from lumigraph.metric.twofold import turned_over
 
 LEAST_FRAMES = 3
 """Pictures of the board."""
@@ -153,21 +152,10 @@ class Measured:
 
     def _located(self, corners: Corners) -> Pose:
         start = _start(corners, self.board, self.camera)
-        frame = np.zeros(len(corners), int)
-        problem = Problem(corners, self.board, frame, self.camera, [], self.noise, corners.sights())
-        fixed = np.zeros(problem.free.shape[1])
-
-        def unknowns(pose: np.ndarray) -> np.ndarray:
-            return np.concatenate([fixed, pose])
-
-        def slopes(pose: np.ndarray) -> np.ndarray:
-            return problem.jacobian(unknowns(pose))[:, len(fixed) :]
-
-        jacobian: Any = slopes  # SciPy's types know names of methods only
-        found = least_squares(lambda p: problem.residual(unknowns(p)), start, jacobian, x_scale="jac")
-        covariance, expected = self._predicted(problem, unknowns(found.x))
-        residual = math.sqrt(float(np.mean(problem.misfit(unknowns(found.x)) ** 2)))
-        return Pose(int(corners.frame[0]), found.x[:3], found.x[3:], covariance, residual, expected)
+        problem, found = placed(corners, self.board, self.camera, self.noise, start)
+        covariance, expected = self._predicted(problem, found)
+        residual = math.sqrt(float(np.mean(problem.misfit(found) ** 2)))
+        return Pose(int(corners.frame[0]), found[-6:-3], found[-3:], covariance, residual, expected)
 
     def _predicted(self, problem: Problem, unknowns: np.ndarray) -> tuple[np.ndarray, float]:
         """Covariance (6, 6) of a pose by a camera that is uncertain, and the rms that is expected [px]."""
@@ -229,6 +217,7 @@ def board(corners: Corners, board: Board, nominal: Nominal) -> Measured:
     known = np.array(sorted(poses))
     usable = np.isin(corners.frame, known)
     found = adjust(corners[usable], board, nominal, camera, np.array([poses[f] for f in known.tolist()]))
+    found = turned_over(found, corners[usable], board, nominal)
     return _measured(found, corners[usable], board, nominal, len(corners.frames) - len(known))
 
 

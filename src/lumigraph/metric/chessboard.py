@@ -1,10 +1,12 @@
 """Boards on pictures, by OpenCV: chessboards, dots, and chessboards with markers (ChArUco)."""
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
-from lumigraph.errors import CalibrationError, LumigraphError
+from lumigraph.analysis import find_chart
+from lumigraph.errors import CalibrationError, LumigraphError, SamplingError
 from lumigraph.metric.corners import Board
 from lumigraph.metric.order import ordered, told_of
 
@@ -36,12 +38,7 @@ def find(picture: np.ndarray, board: Board, what: str) -> np.ndarray:
     LumigraphError
         OpenCV is not installed, or does not know the dictionary of markers.
     """
-    try:
-        import cv2
-    except ImportError as error:
-        raise LumigraphError(
-            "finding the board needs OpenCV. Install it with: pip install 'lumigraph[board]'."
-        ) from error
+    cv2 = _opencv("finding the board")
     look = {"corners": _corners, "charuco": _charuco}.get(board.pattern, _dots)
     found = look(cv2, _eight_bits(picture), board)
     seen = np.isfinite(found[:, 0])
@@ -64,7 +61,24 @@ def _corners(cv2: Any, picture: np.ndarray, board: Board) -> np.ndarray:
     down, across = board.shape
     flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
     found, corners = cv2.findChessboardCornersSB(picture, (across, down), flags=flags)
-    return _upright(corners) if found else np.full((down * across, 2), np.nan)
+    return _upright(corners) if found else whole(picture, board)[0]
+
+
+def whole(picture: np.ndarray, board: Board) -> tuple[np.ndarray, int]:
+    """Corners (n, 2) of a whole chessboard (`find_chart`), NaN where it is not seen, and how many are seen.
+
+    It finds boards of few squares on small pictures, which OpenCV misses, and none that others hide in part.
+    """
+    (down, across), seen = board.shape, 0
+    with suppress(SamplingError):
+        chart = find_chart(picture)
+        index, seen = chart.indices - chart.indices.min(0), len(chart)
+        if seen == down * across and sorted(index.max(0) + 1) == sorted(board.shape):
+            grid = np.zeros((*(index.max(0) + 1), 2))
+            grid[tuple(index.T)] = chart.corners
+            grid = grid if grid.shape[:2] == board.shape else grid.swapaxes(0, 1)
+            return grid.reshape(-1, 2), seen
+    return np.full((down * across, 2), np.nan), seen
 
 
 def _dots(cv2: Any, picture: np.ndarray, board: Board) -> np.ndarray:
@@ -107,6 +121,31 @@ def _dictionary(cv2: Any, board: Board) -> Any:
     if (held := len(found.bytesList)) < needed:
         raise LumigraphError(f"{board.dictionary} has {held} markers but the board {needed}.")
     return found
+
+
+def markers(board: Board) -> np.ndarray:
+    """Dark cells (n, k, k) of a ChArUco board's markers with their borders, row by row of its white squares.
+
+    Raises
+    ------
+    LumigraphError
+        OpenCV is not installed, or does not know the dictionary.
+    """
+    cv2 = _opencv("drawing markers")
+    found, (down, across) = _dictionary(cv2, board), board.shape
+    cells = found.markerSize + 2
+    count = (down + 1) * (across + 1) // 2
+    return np.stack([found.generateImageMarker(k, cells, borderBits=1) == 0 for k in range(count)])
+
+
+def _opencv(what: str) -> Any:
+    try:
+        import cv2
+    except ImportError as error:
+        raise LumigraphError(
+            f"{what} needs OpenCV. Install it with: pip install 'lumigraph[board]'."
+        ) from error
+    return cv2
 
 
 def _upright(found: np.ndarray) -> np.ndarray:

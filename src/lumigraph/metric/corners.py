@@ -141,6 +141,19 @@ class Board:
         return (self.spacing / 2 if self.size is None else self.size) / 2
 
     @property
+    def text(self) -> str:
+        """As `from_text` takes it.
+
+        >>> Board.from_text("9 x 6 charuco, 10 mm, markers 7 mm, DICT_4X4_50").text
+        '9 x 6 charuco, 10 mm, markers 7 mm, DICT_4X4_50'
+        """
+        down, across = self.shape
+        words = [f"{across} x {down} {self.pattern}", f"{self.spacing * 1e3:.10g} mm"]
+        if self.size is not None:
+            words.append(f"{'markers' if self.dictionary else 'dots'} {self.size * 1e3:.10g} mm")
+        return ", ".join([*words, *([self.dictionary] if self.dictionary else [])])
+
+    @property
     def what(self) -> str:
         """In words, such as "chessboard of 9 x 5 inner corners"."""
         down, across = self.shape

@@ -19,6 +19,7 @@ from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.metric.finding import LEAST_SEEN, lit_radius
 from lumigraph.metric.noise import Noise
+from lumigraph.metric.views import DIRECTIONS
 from lumigraph.metric.windows import LEAST_SQUARE, nearest
 
 Turn = tuple[float, float, float]
@@ -27,6 +28,12 @@ _TILTS = (0.0, 0.35, -0.35, 0.7, -0.7)  # rad: beyond, the squares are too narro
 _RATIOS = (0.08, 0.6)  # how far a corner moves against a lenslet, as `depth.correlation` looks for it
 _DISTANCES = 6
 _FARTHEST = 200.0  # focal lengths
+
+_MOVED = 3.0
+"""Lenslets by which views may move a corner over the stop: so much blurs a seventh of it by half a sample."""
+
+_MARGIN = 4.0
+"""Lenslets around a corner that its saddle is looked for in."""
 
 _SURE = (0.1, 0.3)
 """Of L and b: how well they are known without any picture, over themselves."""
@@ -101,14 +108,15 @@ def plan(
     nominal: Nominal,
     *,
     pictures: int = 8,
-    noise_px: float = 0.1,
-    shared_px: float = 0.05,
+    in_views: bool = False,
+    noise_px: tuple[float, float] | None = None,
 ) -> Plan:
     """Poses of a board, one after the other those that tell f, L and b best together.
 
-    Boards stand on the axis where three lenslets or more show each corner, straight or tilted. What a
-    picture tells of the camera is known before it is taken: its Fisher information, less what its own pose
-    takes. Each picture is the one that makes the sum of the relative variances of f, L and b least.
+    Boards stand on the axis where three lenslets or more show each corner, straight or tilted; before a
+    camera 1.0, where views over the stop move no corner by more than three lenslets. What a picture tells of
+    the camera is known before it is taken: its Fisher information, less what its own pose takes. Each picture
+    is the one that makes the sum of the relative variances of f, L and b least.
 
     Parameters
     ----------
@@ -122,8 +130,11 @@ def plan(
         How well the data sheet is known. L is taken as known to 10 %, b to 30 %.
     pictures
         How many; 3 at least.
-    noise_px, shared_px
-        Of one place, and of what all places of a corner share (see `Noise`) [px].
+    in_views
+        Whether it is a camera 1.0, whose views show the corners.
+    noise_px
+        Of one place, and of what all places of a corner share (see `Noise`) [px]; None for 0.1 and 0.05, in
+        views for 2 % and 1 % of a pitch.
 
     Raises
     ------
@@ -131,16 +142,20 @@ def plan(
         Fewer than three pictures, or no distance at which the board can be used.
     """
     checks.whole("pictures", pictures, LEAST_FRAMES, CalibrationError)
-    own = checks.positive("noise_px", noise_px, "px"), checks.positive("shared_px", shared_px, "px")
-    noise = Noise(np.full(len(camera.gains), own[0]), own[1])
-    places = product(_distances(camera), product((0.0,), _TILTS, _TILTS))
-    shots = [_shot(camera, calibration, board, noise, *place) for place in places]
+    pitch = calibration.lattice.pitch
+    usual = (0.02 * pitch, 0.01 * pitch) if in_views else (0.1, 0.05)
+    own, shared = (checks.positive("noise_px", one, "px") for one in noise_px or usual)
+    before = _Before(camera, calibration, board, Noise(np.full(len(camera.gains), own), shared), in_views)
+    distances = _in_views(camera, pitch) if in_views else _distances(camera)
+    shots = [before.shot(*place) for place in product(distances, product((0.0,), _TILTS, _TILTS))]
     useful = [shot for shot in shots if shot is not None]
     if not useful:
+        seen = "in squares 6 samples of a view wide" if in_views else (
+            f"and {LEAST_SEEN} lenslets show each corner, in squares {LEAST_SQUARE:.2g} px wide"
+        )  # fmt: skip
         raise CalibrationError(
-            f"there is no place where the whole {board.what}, "
-            f"{board.spacing * 1e3:.3g} mm, is in the picture and {LEAST_SEEN} lenslets show each corner, in "
-            f"squares {LEAST_SQUARE:.2g} px wide or wider. Try squares of another size."
+            f"there is no place where the whole {board.what}, {board.spacing * 1e3:.3g} mm, is in the "
+            f"picture {seen} or wider. Try squares of another size."
         )
     return Plan(camera, board, tuple(_chosen(useful, camera, nominal, pictures)))
 
@@ -171,41 +186,84 @@ def _distances(camera: MetricCamera) -> list[float]:
     return usable[np.linspace(0, len(usable) - 1, min(_DISTANCES, len(usable))).astype(int)].tolist()
 
 
-def _shot(
-    camera: MetricCamera, calibration: Calibration, board: Board, noise: Noise, distance: float, turn: Turn
-) -> _Shot | None:
-    """A board at a distance; None where not all of its corners can be used."""
-    still = np.array([*turn, 0.0, 0.0, 0.0])
-    pose = np.concatenate([turn, np.array([distance, 0.0, 0.0]) - geometry.moved(board.middle, still)])
-    seen = _seen(camera, calibration, board, pose)
-    if seen is None:
-        return None
-    frame, sights = np.zeros(len(seen), int), seen.sights()
-    problem = Problem(seen, board, frame, camera, [], noise, sights)
-    own = problem.free.shape[1]
-    slopes = problem.jacobian(np.concatenate([np.zeros(own), pose]))
-    of_camera, of_pose = slopes[:, :own], slopes[:, own:]
-    across = of_pose.T @ of_camera
-    told = of_camera.T @ of_camera - across.T @ np.linalg.solve(of_pose.T @ of_pose, across)
-    return _Shot(distance, turn, len(seen), told)
+def _in_views(camera: MetricCamera, pitch: float) -> list[float]:
+    """At which views are sharp and can be compared, from near to far, evenly in the image."""
+    f = camera.focal_length
+    every = 1 / np.linspace(1 / (1.02 * f), 1 / (_FARTHEST * f), 400)
+    points = np.stack([every, 0 * every, 0 * every], 1)
+    moved = [_centers(camera, points, np.array([0.0, side * pitch / 2])) for side in (1, -1)]
+    usable = every[np.abs(moved[0] - moved[1]).max(1) <= _MOVED * pitch]
+    return usable[np.linspace(0, len(usable) - 1, min(_DISTANCES, len(usable))).astype(int)].tolist()
 
 
-def _seen(camera: MetricCamera, calibration: Calibration, board: Board, pose: np.ndarray) -> Corners | None:
-    """Places of all corners behind lenslets; None where one cannot be found."""
-    (rows, columns), points = calibration.shape, geometry.moved(board.points(), pose)
-    if points[:, 0].min() <= 1.02 * camera.focal_length:
-        return None
-    index = calibration.indices_within((0, rows - 1), (0, columns - 1))
-    center, kinds = calibration.position(index), calibration.lattice.kind(*index.T)
-    corner, lenslet = (each.ravel() for each in np.indices((len(points), len(center))))
-    place = camera.project(points[corner], center[lenslet], kinds[lenslet])
-    shown = np.hypot(*(place - center[lenslet]).T) <= lit_radius(calibration)
-    if np.bincount(corner[shown], minlength=len(points)).min() < LEAST_SEEN:
-        return None
-    if _square(camera, points) < LEAST_SQUARE:
-        return None
-    corner, lenslet, place = corner[shown], lenslet[shown], place[shown]
-    return Corners(np.zeros(len(corner), int), corner, place, center[lenslet], kinds[lenslet])
+def _centers(camera: MetricCamera, points: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """Centres (n, 2) of the micro-images that show points (n, 3) at ways from them, (2,) or (n, 2) [px]."""
+    ways = np.broadcast_to(way, (len(points), 2))
+    kind = np.zeros(len(points), int)
+    return geometry.centers(camera.numbers, points, (ways, np.zeros_like(ways)), kind, camera.pixel_pitch)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Before:
+    """A camera before a board, and the noise of its corners."""
+
+    camera: MetricCamera
+    calibration: Calibration
+    board: Board
+    noise: Noise
+    in_views: bool
+
+    def shot(self, distance: float, turn: Turn) -> _Shot | None:
+        """A board at a distance; None where not all of its corners can be used."""
+        still = np.array([*turn, 0.0, 0.0, 0.0])
+        middle = geometry.moved(self.board.middle, still)
+        pose = np.concatenate([turn, np.array([distance, 0.0, 0.0]) - middle])
+        points = geometry.moved(self.board.points(), pose)
+        if points[:, 0].min() <= 1.02 * self.camera.focal_length:
+            return None
+        seen = self.by_views(points) if self.in_views else self.by_lenslets(points)
+        if seen is None:
+            return None
+        frame, sights = np.zeros(len(seen), int), seen.sights()
+        problem = Problem(seen, self.board, frame, self.camera, [], self.noise, sights)
+        own = problem.free.shape[1]
+        slopes = problem.jacobian(np.concatenate([np.zeros(own), pose]))
+        of_camera, of_pose = slopes[:, :own], slopes[:, own:]
+        across = of_pose.T @ of_camera
+        told = of_camera.T @ of_camera - across.T @ np.linalg.solve(of_pose.T @ of_pose, across)
+        return _Shot(distance, turn, len(seen), told)
+
+    def by_lenslets(self, points: np.ndarray) -> Corners | None:
+        """Places of all corners behind lenslets; None where one cannot be found."""
+        camera, calibration = self.camera, self.calibration
+        rows, columns = calibration.shape
+        index = calibration.indices_within((0, rows - 1), (0, columns - 1))
+        center, kinds = calibration.position(index), calibration.lattice.kind(*index.T)
+        corner, lenslet = (each.ravel() for each in np.indices((len(points), len(center))))
+        place = camera.project(points[corner], center[lenslet], kinds[lenslet])
+        shown = np.hypot(*(place - center[lenslet]).T) <= lit_radius(calibration)
+        if np.bincount(corner[shown], minlength=len(points)).min() < LEAST_SEEN:
+            return None
+        if _square(camera, points) < LEAST_SQUARE:
+            return None
+        corner, lenslet, place = corner[shown], lenslet[shown], place[shown]
+        return Corners(np.zeros(len(corner), int), corner, place, center[lenslet], kinds[lenslet])
+
+    def by_views(self, points: np.ndarray) -> Corners | None:
+        """Centres of micro-images showing the corners in each view; None where one is not in the picture."""
+        pitch, size = self.calibration.lattice.pitch, np.array(self.calibration.shape)
+        reach = lit_radius(self.calibration) - pitch / DIRECTIONS / math.sqrt(2)
+        at = (np.arange(DIRECTIONS) - DIRECTIONS // 2) * pitch / DIRECTIONS
+        ways = np.stack(np.meshgrid(at, at, indexing="ij"), -1).reshape(-1, 2)
+        ways = ways[np.hypot(*ways.T) <= reach]
+        corner, view = (each.ravel() for each in np.indices((len(points), len(ways))))
+        center = _centers(self.camera, points[corner], ways[view])
+        middle = center.reshape(len(points), len(ways), 2).mean(1)
+        wide, margin = nearest(middle) / pitch, _MARGIN * pitch
+        if wide < LEAST_SQUARE or not ((center > margin) & (center < size - 1 - margin)).all():
+            return None
+        frame = np.zeros(len(corner), int)
+        return Corners(frame, corner, center + ways[view], center, frame, in_views=True)
 
 
 def _square(camera: MetricCamera, points: np.ndarray) -> float:

@@ -56,7 +56,14 @@ UNITS = ("m", "rad", "rad", "m", "m", "rad", "1")
 SURE = 3.0
 """Standard deviations from which on an instruction is given."""
 
+PITCH_ERROR = 3e-4
+"""Of the lenslets' pitch over the pixels', one standard deviation, unless one is given.
+
+A moulded array's scale changes by 7e-5 a kelvin (PMMA), and no white image tells it from the array's height.
+"""
+
 _STEPS = (50e-6, 2e-3, 2e-3, 3e-6, 3e-6, 2e-3, 0.01)  # of the derivatives
+_PLACED = 1e-3  # px: of the lattice's origin, by what pixels do to all places alike (benchmarks.twin)
 _USED = slice(9)  # of what is shown: the blur is looked at afterwards
 _ROUNDS = 3
 _BLUR = 0.03  # part by which the blur of micro-images may differ before it is a cause of its own
@@ -173,7 +180,7 @@ class Bench:
             optics, lenslet_distance=b + height, separation=L - height,
             pupil_diameter=optics.pupil_diameter * (1 + aperture), lens=_stopped(self.camera, aperture),
         )  # fmt: skip
-        image = np.asarray(to_numpy(white_image(moved, _ACCURACY)[0]), float)
+        image = np.asarray(to_numpy(white_image(moved, _ACCURACY)), float)
         if not any((tilt_y, tilt_x, shift_y, shift_x, turn)):
             return image
         pixel = self.camera.sensor.pixel_pitch
@@ -276,7 +283,7 @@ def twin(
     camera: LensletCamera | Bench,
     *,
     dark: RawImage | None = None,
-    pitch_error: float = 1e-5,
+    pitch_error: float | None = None,
     progress: Progress = silent,
 ) -> Twin:
     """What is out of place, by white images of one state of the bench.
@@ -291,7 +298,8 @@ def twin(
         Picture without light.
     pitch_error
         How well the lenslets' pitch over the pixels' is known, one standard deviation: the array's height is
-        known no better than this part of its distance from the main lens.
+        known no better than this part of its distance from the main lens, and the stop's diameter no better
+        than the height over the lenslets' distance from the sensor. `PITCH_ERROR` and a note if None.
     progress
         Called as ``progress(fraction)``.
 
@@ -302,14 +310,14 @@ def twin(
         that is not the camera's.
     """
     bench = camera if isinstance(camera, Bench) else Bench(camera)
-    checks.positive("pitch_error", pitch_error, "1")
+    known = PITCH_ERROR if pitch_error is None else checks.positive("pitch_error", pitch_error, "1")
     seen = _mean([shown(_bare(one, dark, bench.camera)) for one in whites])
     progress(0.1)
     expected = bench.start
     _check_pitch(seen, expected)
     slopes = bench.slopes
     progress(0.7)
-    weight = _weight(seen, expected, pitch_error)
+    weight = _weight(seen, expected, known)
     normal = slopes[_USED].T @ weight @ slopes[_USED]
     values = np.zeros(len(CAUSES))
     for k in range(_ROUNDS):
@@ -325,14 +333,16 @@ def twin(
     covariance = np.linalg.inv(normal) * max(1.0, left / freedom)
     misfit, far = float(chi2.sf(left, freedom)), _far(float(values[0]), bench.camera.lenslet_distance)
     doubtful = ("height", "aperture") if far else ()
-    return Twin(values, covariance, (ratio, error), misfit, (*_notes(ratio, error, misfit), *far), doubtful)
+    notes = (*_notes(ratio, error, misfit), *far, *(_of_pitch(covariance) if pitch_error is None else ()))
+    return Twin(values, covariance, (ratio, error), misfit, notes, doubtful)
 
 
 def _weight(seen: _Shown, expected: _Shown, pitch_error: float) -> np.ndarray:
     """Inverse covariance of what is used; an unknown pitch scales both lattice vectors alike."""
     scale = np.concatenate([seen.values[:4], np.zeros(5)])
-    variance = np.diag((seen.errors**2 + expected.errors**2)[_USED])
-    return np.linalg.inv(variance + pitch_error**2 * np.outer(scale, scale))
+    variance = (seen.errors**2 + expected.errors**2)[_USED]
+    variance[4:6] += _PLACED**2
+    return np.linalg.inv(np.diag(variance) + pitch_error**2 * np.outer(scale, scale))
 
 
 def _far(height: float, b: float) -> tuple[str, ...]:
@@ -343,6 +353,16 @@ def _far(height: float, b: float) -> tuple[str, ...]:
         f"the pitch of the micro-images asks for an array {abs(height) * 1e3:.3g} mm from its place, "
         f"{b * 1e3:.4g} mm above the sensor: more likely the camera file's pitch, pixels or distances "
         "are wrong, so height and stop have no instructions",
+    )
+
+
+def _of_pitch(covariance: np.ndarray) -> Iterator[str]:
+    """What height and stop rest on if nobody says how well the pitch is known."""
+    height, stop = 1.96 * np.sqrt(covariance[[0, -1], [0, -1]])
+    yield (
+        f"the lenslets' pitch over the pixels' is taken as known to {PITCH_ERROR:.2%}, so the height is known"
+        f" to ± {height * 1e3:.3g} mm and the stop to ± {stop:.2g} of its diameter: no white image tells "
+        "pitch from height. Give the error of the pitch (pitch_error) if you have measured it"
     )
 
 

@@ -1,17 +1,15 @@
 """Corners or dots of a board in the views of raw images of a plenoptic 1.0 camera."""
 
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, spline_filter
 
-from lumigraph.analysis import find_chart
 from lumigraph.analysis.saddles import settle
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.raw import RawImage
-from lumigraph.errors import CalibrationError, SamplingError
+from lumigraph.errors import CalibrationError
 from lumigraph.metric import chessboard, windows
 from lumigraph.metric.corners import Board
 from lumigraph.metric.order import ordered, told_of
@@ -21,7 +19,9 @@ from lumigraph.rendering.geometry import raw_places
 LEAST_VIEWS = 5
 """In which a corner must be seen."""
 
-_DIRECTIONS = 7  # views along an axis: the fewer, the less noise and the less of it is shared
+DIRECTIONS = 7
+"""Views along an axis: the fewer, the less noise and the less of it is shared."""
+
 _SOFT = 1.0  # samples: of a blur that moves no corner, but keeps samples from pulling at them
 _STRAY = 1.5  # samples: from where a corner is expected
 _RIM = 1.0  # px: of a micro-image, whose blur moves what views there see
@@ -37,7 +37,7 @@ def on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: int
     from view to view.
     """
     pitch = calibration.lattice.pitch
-    count = min(_DIRECTIONS, int(pitch) - (int(pitch) + 1) % 2)
+    count = min(DIRECTIONS, int(pitch) - (int(pitch) + 1) % 2)
     views = decode(raw, calibration, directions=count)
     data = np.asarray(to_numpy(views.data), np.float64)
     data = data.mean(4) if data.ndim == 5 else data
@@ -66,16 +66,10 @@ def _board(middle: np.ndarray, board: Board, what: str) -> np.ndarray:
     """Corners (n, 2) on the middle view [samples], from either end of a board that looks the same turned."""
     if board.pattern != "corners":
         return chessboard.find(middle, board, what)
-    (down, across), seen = board.shape, 0
-    with suppress(SamplingError):
-        chart = find_chart(middle)
-        index, seen = chart.indices - chart.indices.min(0), len(chart)
-        if seen == down * across and sorted(index.max(0) + 1) == sorted(board.shape):
-            grid = np.zeros((*(index.max(0) + 1), 2))
-            grid[tuple(index.T)] = chart.corners
-            grid = grid if grid.shape[:2] == board.shape else grid.swapaxes(0, 1)
-            with told_of(what):
-                return ordered(grid.reshape(-1, 2), board.points()[:, 1:])
+    found, seen = chessboard.whole(middle, board)
+    if np.isfinite(found).all():
+        with told_of(what):
+            return ordered(found, board.points()[:, 1:])
     raise CalibrationError(
         f"{what} does not show a whole {board.what}; {seen} corners of a board are seen. Leave the picture "
         "out, or give the board's own numbers."

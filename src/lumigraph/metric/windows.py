@@ -41,4 +41,11 @@ def radius(places: np.ndarray, board: Board, frame: int, where: str) -> int:
         )
     if board.radius:
         return max(LEAST, math.ceil(apart * board.radius / nearest(board.points()[:, 1:]) + _RIM))
-    return max(LEAST, min(_MOST, int(apart * _PART)))
+    return max(LEAST, min(_MOST, int(apart * _PART), int(apart * _free(board))))
+
+
+def _free(board: Board) -> float:
+    """Way from a corner to the nearest marker, whose dark rim would pull at it, over the squares' width."""
+    if board.pattern != "charuco" or board.size is None:
+        return 1.0
+    return (1 - board.size / board.spacing) / math.sqrt(2)

@@ -1,0 +1,173 @@
+"""Cameras drawn by chance, measured by boards from raw pictures: how often the truth is in the intervals.
+
+``python -m benchmarks.boards focused | kinds | views [--runs 25] [--first 0] [--seed 0] [--known 0.02]``:
+each run draws a camera (focal length, distances, exit pupil, axis, tilt, distortion, gains of the kinds). It
+gives a white image and pictures of a board at drawn poses, by rays and with 1 % of noise. The array is
+calibrated on the white image, corners are found, and `lg.metric.board` measures the camera, told a focal
+length that is off by chance, as a data sheet's is, by ``--known`` (one standard deviation). A point that took
+no part is triangulated with the result, from places as exact as corners are.
+"""
+
+import argparse
+import sys
+import time
+import warnings
+from dataclasses import replace
+
+import numpy as np
+
+import lumigraph as lg
+
+NAMES = ("focal_length", "separation", "lenslet_distance", "distance of a point")
+
+
+def camera_2_0(rng, kinds):
+    """Keplerian or Galilean, in focus near 0.45 m."""
+    from metric import drawn
+
+    meant = drawn.camera(rng.choice([-1.0, 1.0]), kinds)
+    gains = 1 + rng.normal(0, 5e-3, kinds)
+    b = meant.lenslet_distance * rng.uniform(0.95, 1.05)
+    image = meant.focal_length * 0.45 / (0.45 - meant.focal_length)
+    separation = image + (meant.separation - image) * rng.uniform(0.9, 1.1)
+    gains = tuple(gains / gains.mean())
+    return replace(
+        meant, separation=separation, lenslet_distance=b, exit_pupil=rng.uniform(0.75, 1.1) * separation,
+        **beside(rng, meant), gains=gains,
+    )  # fmt: skip
+
+
+def beside(rng, meant):
+    """Axis, tilt and distortion."""
+    axis = tuple(np.array(meant.axis) + rng.normal(0, 5, 2))
+    radial = (rng.normal(0, 0.05), 0.0, 0.0)
+    return {"axis": axis, "tilt": tuple(rng.normal(0, 7e-4, 2)), "radial": radial}
+
+
+def camera_1_0(rng):
+    """In focus near 0.41 m."""
+    from metric import drawn_views
+
+    meant = drawn_views.CAMERA
+    return replace(
+        meant, separation=57e-3 * rng.uniform(0.997, 1.003), lenslet_distance=0.9e-3 * rng.uniform(0.9, 1.1),
+        exit_pupil=57e-3 * rng.uniform(0.75, 1.1), **beside(rng, meant),
+    )  # fmt: skip
+
+
+def pose(rng, distance, board):
+    """Where a board is: its middle near the axis, leaning up to 0.45 rad about both axes."""
+    from metric import drawn
+
+    turn = (rng.uniform(-0.1, 0.1), *rng.uniform(-0.45, 0.45, 2))
+    return drawn.pose(turn, float(distance + rng.uniform(-3e-3, 3e-3)), board)
+
+
+def pictures(rng, true, white, found, kinds):
+    """Corners on 5 pictures, 6 of a camera 1.0 (kinds 0), and how many were taken again."""
+    from metric import drawn, drawn_views
+
+    views, again, frames = not kinds, 0, []
+    board = drawn_views.BOARD if views else drawn.BOARD
+    for distance in rng.permutation(np.linspace(0.36, 0.46, 6) if views else np.linspace(0.43, 0.47, 5)):
+        while True:
+            where = pose(rng, distance, board)
+            raw = (
+                drawn_views.raw(where, rng, seen_by=true) if views else drawn.raw(true, where, kinds, rng=rng)
+            )
+            ready = lg.prepare(lg.RawImage(raw), found, white=white)
+            try:
+                one = lg.metric.find_corners([ready], board, found, in_views=views)
+                break
+            except lg.LumigraphError:
+                again += 1
+        frames.append(replace(one, frame=0 * one.frame + len(frames)))
+    columns = ("frame", "corner", "place", "center", "kind")
+    whole = (np.concatenate([getattr(one, name) for one in frames]) for name in columns)
+    return lg.metric.Corners(*whole, in_views=views), board, again
+
+
+def run(rng, what, known):
+    """Deviations of `NAMES` over the truth, and over what is said; residual [px]; pictures taken again."""
+    from metric import drawn, drawn_views
+
+    kinds = {"focused": 1, "kinds": 3, "views": 0}[what]
+    drawing = drawn if kinds else drawn_views
+    true = camera_2_0(rng, kinds) if kinds else camera_1_0(rng)
+    white = drawing.white(kinds) if kinds else drawing.white()
+    found = lg.calibrate(white)
+    if kinds == 3:  # which lenslets are of which kind no white image tells
+        found = drawing.calibration(kinds)
+    corners, board, again = pictures(rng, true, white, found, kinds)
+    told = true.focal_length * (1 + rng.normal(0, known))
+    nominal = lg.metric.Nominal(told, true.pixel_pitch, drawing.SHAPE, focal_length_error=known)
+    measured = lg.metric.board(corners, board, nominal)
+    off = measured.camera.numbers[:3] - true.numbers[:3]
+    point = np.array([rng.uniform(0.43, 0.47), *rng.uniform(-3e-3, 3e-3, 2)])
+    seen, noise = sighted(true, point, found, not kinds), measured.residual_px
+    seen = (seen[0] + rng.normal(0, noise, seen[0].shape), seen[1])
+    place = lg.metric.triangulate(measured, *seen, in_views=not kinds)
+    off = np.append(off, place.position[0] - point[0])
+    truth = np.append(true.numbers[:3], point[0])
+    said = np.append(measured.errors[:3], place.errors[0])
+    return off / truth, off / said, measured.residual_px, again
+
+
+def sighted(true, point, found, views):
+    """Places and centres of the micro-images that show a point."""
+    if views:
+        from metric import scenes
+
+        way = np.stack(np.meshgrid(*2 * [np.linspace(-4, 4, 7)]), -1).reshape(-1, 2)
+        center = scenes.in_views(true, point, way)
+        return center + way, center
+    y, x = np.mgrid[-4:5, -4:5].reshape(2, -1)
+    middle = true.project(point, np.array([[210.0, 250.0]]))[0]
+    near = np.rint(np.stack(found.index(*middle), -1))
+    center = found.position((near + np.stack([y, x], 1)).astype(int))
+    place = true.project(point, center)
+    shown = np.hypot(*(place - center).T) < 0.42 * found.lattice.pitch
+    return place[shown], center[shown]
+
+
+def main():
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=("focused", "kinds", "views"))
+    parser.add_argument("--runs", type=int, default=25)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--known", type=float, default=0.02)
+    given = parser.parse_args()
+    sys.path.insert(0, "tests")
+    warnings.simplefilter("ignore")
+    part, sure, px, again, refused, started = [], [], [], 0, 0, time.process_time()
+    for k in range(given.first, given.first + given.runs):
+        try:
+            one = run(np.random.default_rng([given.seed, k]), given.what, given.known)
+        except lg.LumigraphError as error:
+            print(f"run {k}: {error}", flush=True)
+            refused += 1
+            continue
+        part.append(one[0])
+        sure.append(one[1])
+        px.append(one[2])
+        again += one[3]
+        print(k, *(f"{100 * a:+.3f} % ({b:+.2f})" for a, b in zip(*one[:2], strict=True)), flush=True)
+    part, sure = np.array(part), np.abs(sure)
+    for k, name in enumerate(NAMES):
+        inside, worst = int((sure[:, k] < 1.96).sum()), np.abs(part[:, k]).max()
+        rms, of_said = (np.sqrt((one[:, k] ** 2).mean()) for one in (part, sure))
+        print(
+            f"{name:20s} rms {rms:.3%}, worst {worst:.3%}; {of_said:.2f} of what is said; in the interval "
+            f"{inside} of {len(part)}"
+        )
+    cost = (time.process_time() - started) / given.runs
+    print(
+        f"residual {np.median(px):.3f} px in the median; {again} pictures taken again, {refused} runs "
+        f"refused; {cost:.1f} CPU s a run"
+    )
+
+
+if __name__ == "__main__":
+    main()
