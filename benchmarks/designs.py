@@ -3,7 +3,8 @@
 Before a Fourier microscope each lenslet of a regular array is sharp at the same depth. Of the same objective,
 sensor and light, is a point's depth better known over a volume if some lenslets focus nearer, others farther?
 Microscopes that searches found are set side by side: bounds at the depths of the search, at others between,
-and fits to drawn noise. `python -m benchmarks.designs search` searches, in some minutes.
+and fits to drawn noise. `python -m benchmarks.designs search` searches, in some minutes; names after it, or
+without it, such as `"2 x 2, two focal lengths"`, do a part.
 """
 
 import sys
@@ -83,6 +84,7 @@ def judge(name: str) -> None:
 
 
 if __name__ == "__main__":
-    search_for, names = (search, SEARCHES) if sys.argv[1:] == ["search"] else (judge, FOUND)
-    for one in names:
-        search_for(one)
+    asked = sys.argv[1:]
+    done, names = (search, SEARCHES) if asked[:1] == ["search"] else (judge, FOUND)
+    for one in asked[asked[:1] == ["search"] :] or names:
+        done(one)

@@ -1,7 +1,8 @@
 """The factors of expected errors, `lumigraph.depth.expected.FACTORS`: found on rendered scenes with truth.
 
 An error at a place is taken to be of the mean Σ factor · term; the factors are those of the greatest Poisson
-likelihood of all errors, found by Richardson and Lucy's steps, which keep them above zero. Scenes
+likelihood of all errors, found by Richardson and Lucy's steps, which keep them above zero. What `expected`
+adds where other values explain an area as well is left out. Scenes
 that are not there (LUMIGRAPH_DATA) are left out.
 
     python -m benchmarks.expected [scene ...]

@@ -172,9 +172,13 @@ def scenes() -> None:
             raw = rng.poisson(light / light.sum() * photons).astype(np.float32)
             found = start(raw, camera, MODES)
             off = np.array(list(found.coefficients.values())) - true
-            said = np.linalg.norm(list(found.deviations.values()))
-            left = 2 * math.pi * np.linalg.norm(off)
-            print(f"scene {seed}, {photons:.0e} photons: {left:.3f} rad left, {2 * math.pi * said:.3f} said")
+            said = np.array(list(found.deviations.values()))
+            left, known = (2 * math.pi * np.linalg.norm(one) for one in (off, said))
+            part = np.sqrt(np.mean((off / said) ** 2))
+            print(
+                f"scene {seed}, {photons:.0e} photons: {left:.3f} rad left, {known:.3f} said; term by term "
+                f"{part:.2f} of what is said"
+            )
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import lumigraph as lg
 from lumigraph.adaptive import MODES, sense, start
 from lumigraph.adaptive.checked import bent
 from lumigraph.adaptive.star import Star
+from lumigraph.adaptive.start import _left, _scatter, _slopes
 from lumigraph.deconvolution import Exposure
 from lumigraph.elements.zernike import noll_to_nm
 from lumigraph.information.points import CameraSource
@@ -127,3 +128,29 @@ def test_slopes_of_a_scene_before_a_camera(tmp_path):
     found = start(np.maximum(operator.forward(scene), 0), camera, MODES)
     off = np.array(list(found.coefficients.values())) - true
     assert np.linalg.norm(off) < 0.35 * np.linalg.norm(true)
+    sure = np.array(list(found.deviations.values()))
+    assert sure == pytest.approx(np.sqrt(np.diag(found.covariance)))
+    assert 0.5 < np.sqrt(np.mean((off / sure) ** 2)) < 1.4
+
+
+def test_deviations_of_slopes_count_errors_that_views_share():
+    """Noise that eight views share, 60 draws: what is said is what coefficients scatter by.
+
+    As if views were independent, residuals of shifts say half of it.
+    """
+    rng, places = np.random.default_rng(0), np.random.default_rng(1).uniform(-0.6, 0.6, (32, 2))
+    places = places[np.argsort(places[:, 0])]
+    flat = _slopes(places, (5, 6, 8)).reshape(-1, 3)
+    inverse, texture = np.linalg.pinv(flat), gaussian_filter(rng.normal(size=(40, 40)), 1.5)
+    found, said, residuals = [], [], []
+    for _ in range(60):
+        shared = gaussian_filter(rng.normal(size=(4, 40, 40)), (0, 0.7, 0.7))
+        seen = texture / texture.std() + 0.2 * np.repeat(shared / shared.std(), 8, 0)
+        left = _left(seen, np.zeros((32, 2))).ravel()
+        found.append(inverse @ left)
+        said.append(np.trace(_scatter(seen, np.zeros((32, 2)), inverse)))
+        rest = left - flat @ found[-1]
+        residuals.append(rest @ rest / (left.size - 3) * np.trace(inverse @ inverse.T))
+    true = np.trace(np.cov(np.array(found).T))
+    assert np.mean(said) == pytest.approx(true, rel=0.25)
+    assert np.mean(residuals) < 0.3 * true

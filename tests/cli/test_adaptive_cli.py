@@ -20,8 +20,8 @@ def wavefront(tmp_path):
     none = lg.Points(np.zeros((0, 3)), np.zeros(0))
     return Wavefront(
         (6, 8), np.array([[[0.3, -0.4]]]), np.array([[[0.01, 0.02]]]), (np.zeros(1), np.zeros(1)),
-        {4: "the volume's depth explains it"}, none, (2.0, 1.0), 1.0, 1, 3, scope, np.diag([1e-4, 4e-4]), None,
-        {6: 0.5, 8: 0.25},
+        {4: "the volume's depth explains it"}, none, (2.0, 1.0), 1.0, 1, 3, scope, np.diag([1e-4, 4e-4]),
+        None, {6: 0.5, 8: 0.25},
     )  # fmt: skip
 
 

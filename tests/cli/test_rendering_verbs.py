@@ -47,6 +47,7 @@ def focused(bench):
     size = camera.patch / lattice.pitch
     row, column = y - dy - dy / size, x - dx - dx / size
     raw = 100 + 30 * np.sin(row / 5) * np.cos(column / 7) + 20 * np.sin(column / 3.1 + row / 9)
+    raw += 20 * np.sin(row / 3.7 - column / 5.3) + 20 * np.cos(row / 4.3 + column / 11)
     io.save(RawImage(raw.astype(np.float32)), bench / "focused.tiff")
     return camera
 

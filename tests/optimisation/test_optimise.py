@@ -14,6 +14,8 @@ from lumigraph.errors import FormatError, GeometryError, SamplingWarning
 from lumigraph.information import Light
 from lumigraph.information.points import collected
 from lumigraph.optimisation import Goal, Optimum
+from lumigraph.optimisation.front import front, trace
+from lumigraph.optimisation.goals import Judged
 from lumigraph.optimisation.optimise import _warn_of_luck
 from lumigraph.optimisation.search import grid, refined
 from lumigraph.optimisation.space import Space
@@ -46,6 +48,32 @@ def test_the_largest_is_the_other_end():
     assert 0 < found.gain(found.start) < 0.1
 
 
+def test_a_front_of_two_goals_is_where_neither_can_be_better(tmp_path, capsys):
+    """The shorter focal length is better in both; the magnification trades one for the other."""
+    vary = {"lenslets.magnification": "0.3:0.6:3", "lenslets.focal_length": "5 mm:6 mm:2"}
+    goals = {"goal": "least cross-talk", "against": "least lateral resolution"}
+    found = lg.optimise(CAMERA, vary, **goals, evaluations=40)
+    assert len(found.rows) <= 1 + 6 + 80
+    assert {row["lenslets.focal_length"] for row in found.front} == {"5 mm"}
+    m = np.array([row["lenslets.magnification"] for row in found.front])
+    assert m.tolist() == sorted(m)
+    assert (m[0], m[-1]) == (0.3, 0.6)
+    assert np.diff(m).max() < 0.05
+    b = 5e-3 * (1 + m)
+    talk = np.array([row["cross-talk"] for row in found.front])
+    np.testing.assert_allclose(talk, np.sqrt(2.44 * 633e-9 * b) / 150e-6, rtol=1e-3)
+    best = tmp_path / "best.toml"
+    words = ["optimise", CAMERA, *(f"--vary={key}={values}" for key, values in vary.items()), "-o", str(best)]
+    words += ["--goal", goals["goal"], "--against", goals["against"], "--evaluations", "40"]
+    assert main([*words, "--report", str(tmp_path / "r.html")]) == 0
+    said = capsys.readouterr().out
+    assert f"{len(m)} cameras that no other beats in both goals, from cross-talk 0.66789 with lateral" in said
+    assert "magnification = 0.6" in said
+    assert "Of two goals" in (tmp_path / "r.html").read_text()
+    with pytest.raises(FormatError, match="has no number 'beauty'"):
+        lg.optimise(CAMERA, vary, against="largest beauty", goal="least cross-talk")
+
+
 class Known:
     """Cameras whose cost is known: least at given parts of two ranges, and none beyond a border."""
 
@@ -61,6 +89,28 @@ class Known:
             )
             self.seen[str(item)] = math.inf if y + x > 1.2 else away
         return self.seen[str(item)]
+
+
+def test_a_front_whose_middle_is_hollow_is_reached_between_its_ends():
+    """a against 1 - a²: no weighted sum of the two has its least inside."""
+
+    class Hollow(Known):
+        def row(self, item):
+            if str(item) not in self.seen:
+                (y,) = self.space.parts(item)
+                self.seen[str(item)] = {**item, "y": y, "z": 1 - y**2}
+                self.rows.append(self.seen[str(item)])
+            return self.seen[str(item)]
+
+    space, goals = Space.of(["a=0:1:2"]), (Goal("y"), Goal("z"))
+    cameras = Hollow(space, None)
+    for item in space.combinations():
+        cameras.row(item)
+    trace(cameras, space, goals, ("local", 60, 0))
+    found = np.array([row["y"] for row in front(cameras.rows, goals)])
+    for weight in (0.2, 0.5, 0.8):  # where the weighted ways to the ends are alike
+        here = (-weight + math.sqrt(weight**2 + 4 * (1 - weight) ** 2)) / (2 * (1 - weight))
+        assert np.abs(found - here).min() < 5e-3
 
 
 @pytest.mark.parametrize("search", ["local", "global"])
@@ -89,17 +139,20 @@ def test_the_best_bound_carries_the_error_of_its_derivatives():
     camera = lg.load_camera(CAMERA).replace(main_lens={"diameter": "3 mm"})
     goal, first = Goal("lateral", depths=(2e-3,), light=Light(5000), places=1), collected(camera)
     rough = goal.values(camera, first)
-    value, error = goal.checked(camera, first, rough)
+    value, error, over_depths = goal.checked(camera, first, rough)
     again = lg.information.bounds(camera, (2e-3,), Light(5000), places=range(1, 5))
     assert value == pytest.approx(again.lateral, rel=1e-9)
+    assert over_depths == pytest.approx(again.of("lateral"), rel=1e-9)
     assert error >= np.max(again.errors) > 0
     assert error >= abs(rough["lateral"] / value - 1) > 0
     exact = lg.optimise(SCOPE, {"fourier_lens": "60 mm:90 mm:1"}, depths=(2e-6,), search="grid")
     assert (
-        exact.checked["best"] == exact.checked["swept"] == (pytest.approx(exact.best["depth"], rel=1e-2), ANY)
+        exact.checked["best"]
+        == exact.checked["swept"]
+        == (pytest.approx(exact.best["depth"], rel=1e-2), ANY, ANY)
     )
     assert exact.best["fourier_lens"] == "75 mm"
-    shown = dataclasses.replace(exact, checked={"best": (8e-8, 0.25)}).quantities()
+    shown = dataclasses.replace(exact, checked={"best": Judged(8e-8, 0.25, np.zeros(1))}).quantities()
     assert shown[2].interval == pytest.approx((6e-8, 1e-7))
 
 
@@ -242,7 +295,11 @@ def test_the_verb_writes_a_camera_and_says_before_and_after(tmp_path, capsys):
     ]
     words += ["--evaluations", "3"]
     assert main([*words, "--report", str(tmp_path / "r.html")]) == 0
-    said = capsys.readouterr().out
+    said, page = capsys.readouterr().out, (tmp_path / "r.html").read_text()
+    assert all(words in page for words in ("depth bound", "75 mm", "At other places than those of"))
+    assert (
+        "e-0" not in said + page[page.index("<body") : page.index("<img")]
+    )  # lengths have a unit that suits
     assert "as given" in said
     assert "fourier_lens = " in said
     assert main([*words, "--json"]) == 0

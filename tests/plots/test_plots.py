@@ -167,3 +167,16 @@ def test_notebooks_show_every_drawing():
     for figure in drawings:
         assert figure._repr_png_().startswith(b"\x89PNG")
     assert not Gcf.figs
+
+
+def test_curves_over_depth_have_units_that_suit_and_are_in_order():
+    figure = plots.over_depth([2e-3, -1e-3, 0.0], {"a": [3e-6, 1e-6, np.inf], "b": [2e-6] * 3}, "error")
+    axes = figure.axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_yscale()) == ("depth [mm]", "error [µm]", "linear")
+    drawn = axes.lines[0].get_xydata()
+    assert drawn[:, 0] == pytest.approx([-1, 0, 2])
+    assert drawn[:, 1] == pytest.approx([1, np.nan, 3], nan_ok=True)
+    far = plots.over_depth([0.0, 1e-3], {"a": [1e-6, 1e-6], "b": [3e-5, 4e-5]}, "error").axes[0]
+    assert far.get_yscale() == "log"
+    parts = plots.over_depth([0.0, 1e-3], {"a": [0.1, 0.2]}, "error", lengths=False).axes[0]
+    assert parts.get_ylabel() == "error"

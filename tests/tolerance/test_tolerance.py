@@ -109,6 +109,16 @@ def test_depth_is_read_as_the_camera_that_was_meant_would_explain_the_images(cam
     assert told == pytest.approx(read - camera.object_distance, rel=1e-6)
 
 
+def test_what_only_rounding_changes_is_nothing(camera):
+    """The distance of the plane of focus from itself, 1e-20 m as computed, is 0 and does not change."""
+    name = "blur at the object"
+    computed = next(row.value for row in lg.tolerance.measures(camera, camera) if row.name == name)
+    found = study(camera, {"lenslets.pitch": "±0.1 um"}, draws=3, measure=[name])[name]
+    assert 0 < abs(computed) < 1e-15
+    assert found.nominal == 0.0
+    assert not found.changes
+
+
 def test_first_order_agrees_with_a_thousand_cameras(camera):
     """To 10 %, the statistical error of 1,000 being 2 to 3 %; without one of the terms it is far off."""
     found = study(camera, SMALL, draws=1000, seed=1)

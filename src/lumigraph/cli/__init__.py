@@ -6,8 +6,8 @@
 - `console`: results on standard output, progress on standard error
 - `reporting`: `--report` of every verb that computes
 - `serving`: where a page is served, and opening a browser
-- `demo`, `design`, `simulate`, `calibrate`, `decode`, `render`, `refocus`, `depth`, `deconvolve`, `measure`,
-  `batch`, `sweep`, `dataset`, `board`, `view`, `samples`, `catalogue`,
+- `demo`, `design`, `simulate`, `calibrate`, `decode`, `render`, `refocus`, `depth`, `deconvolve`,
+  `wavefront`, `measure`, `batch`, `sweep`, `dataset`, `board`, `chart`, `view`, `samples`, `catalogue`,
   `reproduce`: the verbs
 
 Modules of verbs import what is slow inside their functions, so that `--help` answers at once.

@@ -1,8 +1,10 @@
 """What `lumigraph deconvolve` is told of aberrations to find, and what it reports of them."""
 
+import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from cyclopts import Parameter
 
@@ -22,6 +24,25 @@ TERMS = "5-11"
 
 HIGHEST = 66
 """Noll index: order 10. More of them than a light field tells."""
+
+
+def indices(text: str) -> tuple[int, ...]:
+    """Noll indices, each once.
+
+    >>> indices("5-7, 11")
+    (5, 6, 7, 11)
+    """
+    found: list[int] = []
+    for part in text.split(","):
+        ends = re.fullmatch(r"\s*(\d{1,3})(?:\s*-\s*(\d{1,3}))?\s*", part)
+        first, last = (int(ends[1]), int(ends[2] or ends[1])) if ends else (0, 0)
+        if not 1 <= first <= last <= HIGHEST:
+            raise FormatError(
+                f"--terms is {text!r} but must be Noll indices from 1 to {HIGHEST}, such as '5-11' "
+                "or '5, 6, 8'."
+            )
+        found += range(first, last + 1)
+    return tuple(dict.fromkeys(found))
 
 
 @Parameter(name="*")
@@ -53,22 +74,8 @@ class Adaptive:
         self.indices()
 
     def indices(self) -> tuple[int, ...]:
-        """Noll indices, each once.
-
-        >>> Adaptive(terms="5-7, 11").indices()
-        (5, 6, 7, 11)
-        """
-        found: list[int] = []
-        for part in (self.terms or TERMS).split(","):
-            ends = re.fullmatch(r"\s*(\d{1,3})(?:\s*-\s*(\d{1,3}))?\s*", part)
-            first, last = (int(ends[1]), int(ends[2] or ends[1])) if ends else (0, 0)
-            if not 1 <= first <= last <= HIGHEST:
-                raise FormatError(
-                    f"--terms is {self.terms!r} but must be Noll indices from 1 to {HIGHEST}, such as '5-11' "
-                    "or '5, 6, 8'."
-                )
-            found += range(first, last + 1)
-        return tuple(dict.fromkeys(found))
+        """Noll indices, each once."""
+        return indices(self.terms or TERMS)
 
     def found(
         self, raw: "PreparedImage", camera: "Instrument", planes: tuple[float, ...] | None, shown: Progress
@@ -94,36 +101,101 @@ class Adaptive:
 ADAPTIVE = Adaptive()
 
 
-def with_wavefront(result: Result, found: "Wavefront") -> Result:
-    """A result of the deconvolution with what was found of the wavefront."""
-    deviations = dict(zip(found.terms, found.deviations.mean((0, 1)).tolist(), strict=True))
-    known = found.coefficients
-    text = ", ".join(f"Z{j} {known[j]:+.3f} ± {deviations[j]:.3f}" for j in found.terms)
-    lines = [f"wavefront of {found.rms:.3f} waves rms: {text}"]
-    lines += [f"Z{j} is not known: {reason}" for j, reason in found.untold.items()]
-    terms = {
-        str(j): {"waves": known[j], "deviation": deviations[j], "explained": found.explained.get(j)}
-        for j in found.terms
-    }
-    told = {"rms_waves": found.rms, "terms": terms, "untold": {str(j): r for j, r in found.untold.items()}}
-    quantities = tuple(
-        Quantity(f"Z{j}", known[j], "waves", (known[j] - deviations[j], known[j] + deviations[j]))
-        for j in found.terms
-    )
+def signed(value: float, deviation: float) -> tuple[str, str]:
+    """A value with its sign and its deviation, to thousandths or as finely as the deviation needs.
 
-    def figures() -> "Iterator[Figure]":
+    >>> signed(0.1, 0.0123), signed(-0.08, 0.00042)
+    (('+0.100', '0.012'), ('-0.0800', '0.0004'))
+    """
+    small = 0 < deviation < 1e-3
+    digits = min(-math.floor(math.log10(deviation)), 9) if small else 3
+    return f"{value:+.{digits}f}", f"{deviation:.{digits}f}"
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Zernike terms that were found, as the command line says them.
+
+    Parameters
+    ----------
+    coefficients, deviations
+        Noll index to waves rms.
+    untold
+        Why others are not known.
+    explained
+        Part of a term's information that the object takes; empty where that is not known.
+    """
+
+    coefficients: Mapping[int, float]
+    deviations: Mapping[int, float]
+    untold: Mapping[int, str]
+    explained: Mapping[int, float]
+
+    @classmethod
+    def of(cls, found: "Wavefront") -> "Modes":
+        """Of a wavefront, in the mean over the field."""
+        deviations = dict(zip(found.terms, found.deviations.mean((0, 1)).tolist(), strict=True))
+        return cls(found.coefficients, deviations, found.untold, found.explained)
+
+    @property
+    def rms(self) -> float:
+        """Of the wavefront [waves]."""
+        return math.hypot(*self.coefficients.values())
+
+    def lines(self) -> tuple[str, ...]:
+        """For people."""
+        known = (signed(c, self.deviations[j]) for j, c in self.coefficients.items())
+        text = ", ".join(f"Z{j} {c} ± {d}" for j, (c, d) in zip(self.coefficients, known, strict=True))
+        untold = (f"Z{j} is not known: {reason}" for j, reason in self.untold.items())
+        return (f"wavefront of {self.rms:.3f} waves rms: {text}", *untold)
+
+    def values(self) -> dict[str, Any]:
+        """For programs."""
+        terms = {
+            str(j): {"waves": c, "deviation": self.deviations[j], "explained": self.explained.get(j)}
+            for j, c in self.coefficients.items()
+        }
+        return {"rms_waves": self.rms, "terms": terms, "untold": {str(j): r for j, r in self.untold.items()}}
+
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Each term, within one standard deviation."""
+        known = ((j, c, self.deviations[j]) for j, c in self.coefficients.items())
+        return tuple(Quantity(f"Z{j}", c, "waves", (c - d, c + d)) for j, c, d in known)
+
+    def table(self) -> list[list[str]]:
+        """Terms by name, the header first."""
+        from lumigraph.elements.zernike import zernike_name
+
+        rows = [["term", "name", "waves rms", "standard deviation"]]
+        for j, c in self.coefficients.items():
+            rows.append([f"Z{j}", zernike_name(j), *signed(c, self.deviations[j])])
+        return rows + [[f"Z{j}", zernike_name(j), "not known", reason] for j, reason in self.untold.items()]
+
+    def figures(self) -> "Iterator[Figure]":
+        """The map over the pupil, and the terms."""
         import numpy as np
 
         from lumigraph import plots
+        from lumigraph.adaptive import wavefront_map
 
-        phase = found.phase()
+        phase = wavefront_map(self.coefficients)
         most = float(np.nanmax(np.abs(phase))) or 1.0
         drawn = plots.show(phase, label="wavefront [waves]", cmap="RdBu_r", limits=(-most, most))
         drawn.axes[0].set_axis_off()
-        yield Figure(drawn, "Over the objective's pupil, as the raw image says.", "Wavefront")
+        yield Figure(drawn, "Over the pupil as the raw image says, y downwards.", "Wavefront")
+        yield Figure(self.table(), section="Wavefront")
+
+
+def with_wavefront(result: Result, found: "Wavefront") -> Result:
+    """A result of the deconvolution with what was found of the wavefront."""
+    modes = Modes.of(found)
+
+    def figures() -> "Iterator[Figure]":
+        yield from modes.figures()
         yield from result.figures()
 
     return replace(
-        result, headline=(*lines, *result.headline), quantities=(*result.quantities, *quantities),
-        extra={**result.extra, "wavefront": told}, figures=figures,
+        result, headline=(*modes.lines(), *result.headline),
+        quantities=(*result.quantities, *modes.quantities()),
+        extra={**result.extra, "wavefront": modes.values()}, figures=figures,
     )  # fmt: skip

@@ -19,6 +19,7 @@ from lumigraph.cli.batch import batch
 from lumigraph.cli.board import board
 from lumigraph.cli.calibrate import calibrate
 from lumigraph.cli.catalogue import catalogue
+from lumigraph.cli.chart import chart
 from lumigraph.cli.dataset import dataset
 from lumigraph.cli.datasheet import datasheet
 from lumigraph.cli.decode import decode
@@ -40,6 +41,7 @@ from lumigraph.cli.sweep import sweep
 from lumigraph.cli.tolerance import tolerance
 from lumigraph.cli.twin import twin
 from lumigraph.cli.view import view
+from lumigraph.cli.wavefront import wavefront
 from lumigraph.errors import LumigraphError
 
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
@@ -48,8 +50,9 @@ FAILED, USAGE, INTERRUPTED = 1, 2, 130
 _LONGEST = 400  # characters of a line on standard error
 
 VERBS = (
-    demo, design, information, simulate, calibrate, decode, render, refocus, depth, deconvolve, measure,
-    batch, sweep, optimise, tolerance, dataset, board, datasheet, twin, view, samples, catalogue, reproduce,
+    demo, design, information, simulate, calibrate, decode, render, refocus, depth, deconvolve, wavefront,
+    measure, batch, sweep, optimise, tolerance, dataset, board, chart, datasheet, twin, view, samples,
+    catalogue, reproduce,
 )  # fmt: skip
 """In the order of their use."""
 

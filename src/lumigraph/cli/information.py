@@ -110,7 +110,8 @@ def _figures(found: "Bounds", rows: list[tuple[str, ...]]) -> Iterator[Figure]:
 
     yield Figure(rows, section="Bounds")
     if len(found.depths) > 1:
-        places = found.depths * 1e3
-        curves = {name: (places, found.over_depths[:, k] * 1e6) for k, name in enumerate(("y", "x", "dz"))}
-        drawn = plots.curves([], curves, xlabel="depth [mm]", ylabel="least standard deviation [µm]")
+        drawn = plots.over_depth(
+            found.depths, dict(zip(("y", "x", "dz"), found.over_depths.T, strict=False)),
+            "least standard deviation",
+        )  # fmt: skip
         yield Figure(drawn, "Least standard deviations over depth.", "Bounds")

@@ -14,6 +14,7 @@ from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.core.result import Figure, Result
 
 if TYPE_CHECKING:
+    from lumigraph.instruments import Instrument
     from lumigraph.optimisation import Goal, Optimum
 
 NAMES = {"start": "as given", "swept": "the best of the first values"}
@@ -31,6 +32,9 @@ class Aim:
         depth, lateral or brightness: bounds of a point's errors over --depths. Or 'largest' or 'least' and a
         number's name: light caught, one that 'lumigraph design' prints, or a simulated one of 'lumigraph
         sweep', such as 'largest mtf@10/mm'.
+    against
+        A second goal, as --goal: prints and draws the cameras that no other beats in both. Searches for it
+        may take as many --evaluations again.
     depths
         From the focused plane, such as '-5 mm:5 mm:5 mm'.
     photons
@@ -43,6 +47,7 @@ class Aim:
     """
 
     goal: str = "depth"
+    against: str | None = None
     depths: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
     photons: Annotated[float, Parameter(allow_leading_hyphen=True)] = 10_000.0
     background: Annotated[float, Parameter(allow_leading_hyphen=True)] = 0.0
@@ -117,15 +122,17 @@ def optimise(
     given = load_camera(camera)
     with progress("optimise") as shown:
         found = best_of(
-            given, vary, goal, search=how.search, evaluations=how.evaluations, seed=how.seed, output=output,
-            progress=shown, estimated=lambda seconds, count: line(_estimate(seconds, count)),
+            given, vary, goal, against=aim.against, search=how.search, evaluations=how.evaluations,
+            seed=how.seed, output=output, progress=shown,
+            estimated=lambda seconds, count: line(_estimate(seconds, count)),
         )  # fmt: skip
     store.write_bytes(output, found.camera.to_toml().encode())
     return Result(
         "Optimum", "The camera that reaches a goal best, of all that can be made.", found,
-        tuple(_lines(found)), found.quantities(), lambda: _figures(found), tuple(_notes(found)), (output,),
+        tuple(_lines(found)), found.quantities(), lambda: _figures(found, given), tuple(_notes(found)),
+        (output,),
         {"best": found.best, "start": found.start, "swept": found.swept, "active": found.active,
-         "cameras computed": found.rows},
+         "cameras computed": found.rows, **({"front": found.front} if found.against else {})},
     )  # fmt: skip
 
 
@@ -146,6 +153,17 @@ def _lines(found: "Optimum") -> Iterator[str]:
     )
     yield f"better by {gains[0]}, by {gains[1]}"
     yield ", ".join(f"{key} = {value}" for key, value in _changed(found).items())
+    if found.against is not None and found.front:
+        yield f"{len(found.front)} cameras that no other beats in both goals, from {_both(found, 0)}"
+        yield f"to {_both(found, -1)}"
+
+
+def _both(found: "Optimum", k: int) -> str:
+    """Values of both goals of a camera of the front, and what it has of its own."""
+    row, goals = found.front[k], (found.goal, found.against)
+    reached = " with ".join(f"{one.name} {one.told(row[one.name])}" for one in goals if one)
+    own = ", ".join(f"{key} = {row[key]}" for key in _changed(found) if key in row)
+    return f"{reached} ({own or 'as given'})"
 
 
 def _changed(found: "Optimum") -> dict[str, Any]:
@@ -155,15 +173,16 @@ def _changed(found: "Optimum") -> dict[str, Any]:
 
 def _notes(found: "Optimum") -> Iterator[str]:
     if "best" in found.checked:
-        best, error = found.checked["best"]
+        best, error, _ = found.checked["best"]
         beside = ", ".join(
-            f"{words} {found.checked[which][0]:.4g}"
+            f"{words} {found.goal.told(found.checked[which].value)}"
             for which, words in NAMES.items()
             if which in found.checked
         )
         yield (
             "at other places than the search's, by two steps where derivatives are not exact, the best bound "
-            f"is {best:.4g} within {error:.1%} (searched: {found.best[found.goal.name]:.4g}), {beside}"
+            f"is {found.goal.told(best)} within {error:.1%} "
+            f"(searched: {found.goal.told(found.best[found.goal.name])}), {beside}"
         )
     if found.gain(found.start) < 0:
         yield "the camera as given is better than all of these: give other ranges"
@@ -175,23 +194,98 @@ def _notes(found: "Optimum") -> Iterator[str]:
         yield f"{len(bad)} of {len(found.rows)} cameras cannot be, such as: {bad[0]}"
 
 
-def _figures(found: "Optimum") -> Iterator[Figure]:
+def _figures(found: "Optimum", given: "Instrument") -> Iterator[Figure]:
+    yield Figure(_before_and_after(found, given), section="Before and after")
+    yield from _over_depth(found)
+    yield from _front(found, given)
+    yield from _search(found)
+
+
+def _before_and_after(found: "Optimum", given: "Instrument") -> list[tuple[str, ...]]:
+    """Values that vary and the goal, of the camera as given, of the best first one and of the best."""
+    from lumigraph.instruments.varied import value
+
+    changes, goal = _changed(found), found.goal
+    own = {key: value(given, key) for key in changes}
+    rows: list[tuple[str, ...]] = [("", *changes, _label(found))]
+    for name, some in (("as given", found.start), ("first values", found.swept), ("best", found.best)):
+        values = (some.get(key, own[key]) for key in changes)
+        reached = some.get(goal.name)
+        told = "not known" if reached is None else goal.told(reached)
+        rows.append((name, *("-" if one is None else str(one) for one in values), told))
+    return rows
+
+
+def _label(found: "Optimum") -> str:
+    """The goal's number, in words."""
+    from lumigraph.optimisation.goals import BOUNDS
+
+    return f"{found.goal.name} bound" if found.goal.name in BOUNDS else found.goal.name
+
+
+def _over_depth(found: "Optimum") -> Iterator[Figure]:
+    """The bound over depth, before and after."""
+    from lumigraph import plots
+    from lumigraph.optimisation.goals import BOUNDS
+
+    if "best" not in found.checked or len(found.goal.depths) < 2:
+        return
+    shown = {"as given": "start", "the best of the first values": "swept", "best": "best"}
+    curves = {
+        words: found.checked[which].over_depths for words, which in shown.items() if which in found.checked
+    }
+    lengths = BOUNDS[found.goal.name] == "m"
+    drawn = plots.over_depth(found.goal.depths, curves, _label(found), lengths=lengths)
+    yield Figure(drawn, "At other places than those of the search.", "Before and after")
+
+
+def _front(found: "Optimum", given: "Instrument") -> Iterator[Figure]:
+    """Cameras that no other beats in both goals."""
+    from lumigraph import plots
+    from lumigraph.instruments.varied import value
+
+    other = found.against
+    if other is None or not found.front:
+        return
+    goals, keys = (found.goal, other), list(_changed(found))
+    rows: list[tuple[str, ...]] = [(*(one.name for one in goals), *keys)]
+    for row in found.front:
+        own = (row.get(key, value(given, key)) for key in keys)
+        rows.append((*(one.told(row[one.name]) for one in goals), *map(str, own)))
+    yield Figure(rows, section="Of two goals")
+    if len(found.front) > 1:
+        (x, xlabel), (y, ylabel) = (_scaled(one, [row[one.name] for row in found.front]) for one in goals)
+        drawn = plots.curves(x, {"no other is better in both": y}, xlabel=xlabel, ylabel=ylabel)
+        yield Figure(drawn, "Where they were searched; not judged at other places.", "Of two goals")
+
+
+def _scaled(goal: "Goal", values: list[float]) -> tuple[list[float], str]:
+    """Values in a unit that suits them, and the axis' label."""
+    from lumigraph.optimisation.goals import BOUNDS
+    from lumigraph.plots.axes import length_unit
+
+    if BOUNDS.get(goal.name) != "m":
+        return values, goal.name
+    size, unit = length_unit(max(values))
+    return [one / size for one in values], f"{goal.name} bound [{unit}]"
+
+
+def _search(found: "Optimum") -> Iterator[Figure]:
+    """The best so far over the cameras in turn."""
     import math
 
     from lumigraph import plots
+    from lumigraph.optimisation.goals import BOUNDS
+    from lumigraph.plots.axes import length_unit
 
-    changes = _changed(found)
-    header = ("", *changes, found.goal.name)
-    rows: list[tuple[str, ...]] = [header]
-    for name, some in (("as given", found.start), ("first values", found.swept), ("best", found.best)):
-        rows.append(
-            (name, *(str(some.get(key, "")) for key in changes), f"{some.get(found.goal.name, math.nan):.4g}")
-        )
-    yield Figure(rows, section="Before and after")
     costs = [found.goal.cost(row) for row in found.rows]
     so_far = [min(costs[: k + 1]) for k in range(len(costs))]
+    if not all(map(math.isfinite, so_far)):
+        return
     sign = -1.0 if found.goal.largest else 1.0
-    curve = {"best so far": ([float(k) for k in range(len(so_far))], [sign * cost for cost in so_far])}
-    if all(map(math.isfinite, so_far)):
-        drawn = plots.curves([], curve, xlabel="camera", ylabel=found.goal.name)
-        yield Figure(drawn, "The best camera so far.", "Search")
+    lengths = BOUNDS.get(found.goal.name) == "m"
+    size, unit = length_unit(max(so_far)) if lengths else (1.0, "")
+    curve = {"best so far": ([float(k) for k in range(len(so_far))], [sign * cost / size for cost in so_far])}
+    label = f"{_label(found)} [{unit}]" if unit else _label(found)
+    drawn = plots.curves([], curve, xlabel="cameras computed", ylabel=label)
+    yield Figure(drawn, "The best camera so far; the first one is the camera as given.", "Search")

@@ -31,6 +31,9 @@ from lumigraph.sensor import Sensor
 
 MOST_PLACES, MOST_DEPTHS = 1000, 1000
 
+PARTS = {"lateral": slice(0, 2), "depth": slice(2, 3), "brightness": slice(3, 4)}
+"""Of what is unknown of a point, by name."""
+
 DOUBTFUL = 0.05
 """Relative error of a derivative that is warned of."""
 
@@ -97,6 +100,10 @@ class Bounds:
         """(nz, n): roots of the mean variances over the places of each depth."""
         return np.sqrt(np.mean(self.deviations**2, axis=1))
 
+    def of(self, name: str) -> np.ndarray:
+        """Of "lateral", "depth" or "brightness" at each depth (nz,), rms; the first two in metres."""
+        return np.sqrt(np.mean(self.deviations[..., PARTS[name]] ** 2, axis=(1, 2)))
+
     @property
     def lateral(self) -> float:
         """Of y and x over the volume, rms [m]."""
@@ -119,8 +126,7 @@ class Bounds:
         evenly, so that errors fall faster than those of places drawn by chance. NaN of one place, and of what
         is not told.
         """
-        which = {"lateral": slice(0, 2), "depth": slice(2, 3), "brightness": slice(3, 4)}[name]
-        variances = np.mean(self.deviations[..., which] ** 2, axis=(0, 2))
+        variances = np.mean(self.deviations[..., PARTS[name]] ** 2, axis=(0, 2))
         count = len(variances)
         if count < 2 or not np.isfinite(variances).all():
             return math.nan

@@ -32,6 +32,8 @@ class Evaluations:
         Where it is noted; None for nowhere.
     done
         Called with the number of cameras so far.
+    beside
+        Another goal, computed too.
     """
 
     start: Instrument
@@ -39,6 +41,7 @@ class Evaluations:
     first: float
     ledger: Ledger | None
     done: Callable[[int], None]
+    beside: Goal | None = None
     rows: list[dict[str, Any]] = field(default_factory=list)
     seconds: float = 0.0
     computed: int = 0
@@ -69,12 +72,18 @@ class Evaluations:
     def _computed(self, item: Mapping[str, Any]) -> tuple[dict[str, Any], float]:
         began = time.perf_counter()
         try:
-            row = {**item, **self.goal.values(changed(self.start, item), self.first)}
+            row = {**item, **self._values(changed(self.start, item))}
         except (LumigraphError, SamplingWarning) as error:
             row = {**item, ERROR: " ".join(str(error).split())}
         seconds = time.perf_counter() - began
         self.seconds, self.computed = self.seconds + seconds, self.computed + 1
         return row, seconds
+
+    def _values(self, camera: Instrument) -> dict[str, float]:
+        found = self.goal.values(camera, self.first)
+        if self.beside is not None and self.beside.name not in found:
+            return {**self.beside.values(camera, self.first), **found}
+        return found
 
 
 @contextmanager

@@ -4,11 +4,12 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lumigraph import metric
+from lumigraph.core.result import Quantity
 from lumigraph.errors import FormatError, GeometryError, SamplingWarning
 from lumigraph.information import Bounds, Light, bounds
 from lumigraph.information.bounds import checked_depths, checked_places
@@ -29,6 +30,24 @@ ROUNDS = (range(2), range(2, 4), range(4, 8), range(8, 16))
 
 OTHERS = 4
 """Places at which bounds are judged, at least."""
+
+
+class Judged(NamedTuple):
+    """A bound at other places than those of a search.
+
+    Parameters
+    ----------
+    value
+        Over the volume.
+    error
+        Relative: of the derivatives, or what places and steps change of the bound where that is more.
+    over_depths
+        The bound at each depth (nz,); infinite where it is not told.
+    """
+
+    value: float
+    error: float
+    over_depths: np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +106,10 @@ class Goal:
             )
         return cls(rest.strip(), word == "largest", planes, light, places)
 
+    def told(self, value: float) -> str:
+        """A value in words: lengths with a unit that suits them."""
+        return str(Quantity(self.name, float(value), BOUNDS.get(self.name, "")))
+
     @property
     def of_points(self) -> bool:
         """Whether it follows from images of points."""
@@ -134,10 +157,8 @@ class Goal:
             return {self.name: math.nan if found is None else float(found)}
         return {row.name: float(row.value) for row in instrument.quantities() if row.name == self.name}
 
-    def checked(self, instrument: Instrument, first: float, rough: Mapping[str, Any]) -> tuple[float, float]:
-        """A bound at other places, by derivatives of two steps, and its relative error.
-
-        The error is that of the derivatives, or what places and steps change of the bound where that is more.
+    def checked(self, instrument: Instrument, first: float, rough: Mapping[str, Any]) -> Judged:
+        """A bound at other places, by derivatives of two steps.
 
         Parameters
         ----------
@@ -150,7 +171,8 @@ class Goal:
         others = range(used, used + max(used, OTHERS))
         found = bounds(instrument, self.depths, light, places=others)
         value = float(getattr(found, self.name))
-        return value, max(float(np.max(found.errors)), abs(rough[self.name] / value - 1))
+        error = max(float(np.max(found.errors)), abs(rough[self.name] / value - 1))
+        return Judged(value, error, found.of(self.name))
 
     def _light(self, instrument: Instrument, first: float) -> Light:
         return Light(self.light.photons * collected(instrument) / first, self.light.background)
@@ -178,7 +200,7 @@ class Goal:
             found = found.beside(bounds(instrument, self.depths, light, places=numbers, checked=False))
         return found
 
-    def cost(self, values: dict[str, Any]) -> float:
+    def cost(self, values: Mapping[str, Any]) -> float:
         """What a search makes small; infinite where there is no such camera."""
         value = values.get(self.name)
         if value is None or not math.isfinite(value):

@@ -100,13 +100,11 @@ class MaskedPupil:
 
     def transfer(self, waves: np.ndarray) -> np.ndarray:
         """Transfer functions (depths, y, x), frequency 0 first, with so many waves rms of each term."""
-        return np.fft.ifft2(np.square(np.abs(np.fft.fft2(self._fields(waves)))))
+        return self._followed(waves)[2]
 
     def error(self, waves: np.ndarray) -> tuple[float, np.ndarray]:
         """Mean squared error of detail, and its gradient by the waves."""
-        fields = self._fields(waves)
-        spectra = np.fft.fft2(fields)
-        transfer = np.fft.ifft2(np.square(np.abs(spectra)))
+        fields, spectra, transfer = self._followed(waves)
         mean, power = transfer.mean(0), np.square(np.abs(transfer)).mean(0) + self.noise
         kept, count = np.square(np.abs(mean)) / power, self._counted.sum()
         changes = self._counted * (kept / power * transfer - mean / power) / len(transfer)
@@ -116,9 +114,12 @@ class MaskedPupil:
         gradient = 2 * math.pi * np.tensordot(self._shapes, by_phase, 2)
         return float(1 - kept[self._counted].mean()), gradient / count
 
-    def _fields(self, waves: np.ndarray) -> np.ndarray:
+    def _followed(self, waves: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Fields in the pupil, their spectra and transfer functions, (depths, y, x) each."""
         phase = 2 * math.pi * np.tensordot(waves, self._shapes, 1)
-        return self._amplitude * np.exp(1j * phase) * self._beyond
+        fields = self._amplitude * np.exp(1j * phase) * self._beyond
+        spectra = np.fft.fft2(fields)
+        return fields, spectra, np.fft.ifft2(np.square(np.abs(spectra)))
 
 
 def depth_mask(

@@ -3,7 +3,7 @@
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any, get_args
@@ -18,7 +18,8 @@ from lumigraph.instruments import load_camera
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.varied import changed
 from lumigraph.optimisation.evaluations import ERROR, Evaluations, noted
-from lumigraph.optimisation.goals import BOUNDS, PLACES, Goal
+from lumigraph.optimisation.front import front, trace
+from lumigraph.optimisation.goals import BOUNDS, PLACES, Goal, Judged
 from lumigraph.optimisation.search import Search, grid, refined
 from lumigraph.optimisation.space import Space
 
@@ -47,8 +48,12 @@ class Optimum:
         All cameras, in the order of the search; those that cannot be have an "error".
     checked
         Of bounds: by "start", "swept" and "best", the bound at other places than those of the search, by
-        derivatives of two steps where they are not exact, and its relative error; at least what it differs
-        by from the searched one. Empty of other goals.
+        derivatives of two steps where they are not exact, its relative error, at least what it differs
+        by from the searched one, and the bound over depth. Empty of other goals.
+    against
+        The goal that was weighed against it; None for none.
+    front
+        With two goals: the rows that no other beats in both, from the best in the first on.
     """
 
     goal: Goal
@@ -58,7 +63,9 @@ class Optimum:
     best: dict[str, Any]
     active: dict[str, Any]
     rows: list[dict[str, Any]]
-    checked: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    checked: Mapping[str, Judged] = field(default_factory=dict)
+    against: Goal | None = None
+    front: list[dict[str, Any]] = field(default_factory=list)
 
     __repr__ = brief
 
@@ -71,7 +78,7 @@ class Optimum:
     def quantities(self) -> tuple[Quantity, ...]:
         """The goal before, of the best of the grid, and of the best."""
         name, unit = self.goal.name, BOUNDS.get(self.goal.name, "")
-        best, error = self.checked.get("best", (self.best[name], 0.0))
+        best, error, *_ = self.checked.get("best", (self.best[name], 0.0))
         between = (best * (1 - error), best * (1 + error)) if error else None
         return (
             Quantity(f"{name}, as given", self.start.get(name), unit),
@@ -88,6 +95,7 @@ def optimise(
     goal: Goal | str = "depth",
     *,
     depths: Sequence[float] = (),
+    against: Goal | str | None = None,
     search: Search = "local",
     evaluations: int = 200,
     seed: int = 0,
@@ -115,6 +123,9 @@ def optimise(
         views per axis", "largest mtf@10/mm", ...
     depths
         Of the volume, for a goal that is a text [m].
+    against
+        A second goal: after the search for the first, others look for the best of it and between the two,
+        with as many evaluations again. See `Optimum.front`; its bounds are not judged at other places.
     search
         "local", "global", or "grid" for none but the first values.
     evaluations
@@ -151,6 +162,7 @@ def optimise(
     """
     start = instrument if isinstance(instrument, Instrument) else load_camera(instrument)
     aim = Goal.parse(goal, depths) if isinstance(goal, str) else goal
+    other = replace(aim, **_other(against)) if isinstance(against, str) else against
     checks.choice("search", search, get_args(Search))
     most = checks.whole("evaluations", evaluations, 0)
     if most > MOST:
@@ -160,11 +172,13 @@ def optimise(
     items = space.combinations()
     _check(start, items[0])
     aim.check(start)
+    if other is not None:
+        other.check(start)
     beyond = most if space.ranges and search != "grid" else 0
-    total = 1 + len(items) + beyond
+    total = 1 + len(items) + beyond * (1 if other is None else 2)
     what = {
         "camera": start.to_toml(), "values": space.grid, "ranges": list(space.ranges), "goal": asdict(aim),
-        "search": [search, most, seed],
+        "search": [search, most, seed], **({} if other is None else {"against": asdict(other)}),
     }  # fmt: skip
 
     def done(count: int) -> None:
@@ -174,20 +188,29 @@ def optimise(
             progress(Stage(min(count / total, 1.0), f"camera {count} of at most {total}"))
 
     with noted(None if output is None else Path(output), what) as ledger:
-        cameras = Evaluations(start, aim, collected(start), ledger, done)
+        cameras = Evaluations(start, aim, collected(start), ledger, done, other)
         cameras.row({})
         swept = grid(cameras, space)
         if swept is None:
             reason = cameras.rows[1].get(ERROR, f"{aim.name} is not known of it")
             raise GeometryError(f"none of the first {len(items)} cameras can be, such as: {reason}")
         best = _refined(cameras, space, swept, (search, most, seed))
+        if other is not None and beyond:
+            trace(cameras, space, (aim, other), (search, most, seed))
         given, first, last = (dict(cameras.row(item)) for item in ({}, swept, best))
     found = Optimum(
         aim, changed(start, best), given, first, last, space.active(best), cameras.rows,
         _elsewhere(cameras, {"start": {}, "swept": swept, "best": best}),
+        other, [] if other is None else front(cameras.rows, (aim, other)),
     )  # fmt: skip
     _warn_of_luck(found)
     return found
+
+
+def _other(text: str) -> dict[str, Any]:
+    """What a second goal has of its own."""
+    found = Goal.parse(text)
+    return {"name": found.name, "largest": found.largest}
 
 
 def _refined(
@@ -208,13 +231,11 @@ def _refined(
     return min(found, key=cameras.cost)
 
 
-def _elsewhere(
-    cameras: Evaluations, items: Mapping[str, Mapping[str, Any]]
-) -> dict[str, tuple[float, float]]:
+def _elsewhere(cameras: Evaluations, items: Mapping[str, Mapping[str, Any]]) -> dict[str, Judged]:
     """Bounds of some items at places where they were not searched."""
     if cameras.goal.name not in BOUNDS:
         return {}
-    known: dict[str, tuple[float, float]] = {}
+    known: dict[str, Judged] = {}
     for which, item in items.items():
         row = cameras.row(item)
         same = next((one for one in known if items[one] == item), None)
@@ -229,20 +250,20 @@ def _warn_of_luck(found: Optimum) -> None:
     """Say where a bound is of the places at which it was searched, not of the camera."""
     if "best" not in found.checked:
         return
-    name, unit = found.goal.name, BOUNDS[found.goal.name]
-    here, (there, _) = found.best[name], found.checked["best"]
+    name, told = found.goal.name, found.goal.told
+    here, (there, *_) = found.best[name], found.checked["best"]
     said = []
     if there > here * (1 + LUCK):
         said.append(
-            f"the {name} bound of the best is {here:.4g} {unit} at the {found.best[PLACES]} places a depth "
-            f"where it was searched, but {there:.4g} {unit} at others: {there / here - 1:.1%} are chance"
+            f"the {name} bound of the best is {told(here)} at the {found.best[PLACES]} places a depth "
+            f"where it was searched, but {told(there)} at others: {there / here - 1:.1%} are chance"
         )
     for which, words in (("start", "the camera as given"), ("swept", "the best of the first values")):
         other = found.checked.get(which, (math.inf,))[0]
         if other < there and found.gain(getattr(found, which)) > 0:
             said.append(
-                f"{words} has a {name} bound of {other:.4g} {unit} at other places, the best {there:.4g} "
-                f"{unit}: it is better only where it was searched"
+                f"{words} has a {name} bound of {told(other)} at other places, the best {told(there)}: "
+                "it is better only where it was searched"
             )
     for words in said:
         warnings.warn(f"{words}. Search again with more places.", SamplingWarning, stacklevel=3)

@@ -2,12 +2,11 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from scipy import optimize
 
-from lumigraph.optimisation.evaluations import Evaluations
 from lumigraph.optimisation.space import Space
 
 Search = Literal["grid", "local", "global"]
@@ -25,11 +24,24 @@ IMPOSSIBLE = 1e30
 """Cost of what no camera can be."""
 
 
+class Costs(Protocol):
+    """Cameras and what a search makes small of them."""
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """All cameras so far."""
+        ...
+
+    def cost(self, item: Mapping[str, Any]) -> float:
+        """Of an item; infinite where there is no such camera."""
+        ...
+
+
 class _Enough(Exception):  # noqa: N818 - no error
     """All evaluations that were allowed are done."""
 
 
-def grid(cameras: Evaluations, space: Space) -> dict[str, Any] | None:
+def grid(cameras: Costs, space: Space) -> dict[str, Any] | None:
     """The best item of the first values; None where no camera has any."""
     items = space.combinations()
     costs = [cameras.cost(item) for item in items]
@@ -38,7 +50,7 @@ def grid(cameras: Evaluations, space: Space) -> dict[str, Any] | None:
 
 
 def refined(
-    cameras: Evaluations, space: Space, item: Mapping[str, Any], how: tuple[Search, int, int]
+    cameras: Costs, space: Space, item: Mapping[str, Any], how: tuple[Search, int, int]
 ) -> dict[str, Any]:
     """A better item than one given, its stock values kept.
 

@@ -1,5 +1,6 @@
 """Curves over one axis, and several images side by side."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,7 +10,7 @@ from matplotlib.figure import Figure
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import LumigraphError
-from lumigraph.plots.axes import canvas, check_image, draw
+from lumigraph.plots.axes import canvas, check_image, draw, length_unit
 
 MARK_COLOUR = "#444444"
 STYLES = ("-", "--", "-.", ":")
@@ -69,6 +70,49 @@ def curves(
     if len(values) > 1 or any(values):
         axes.legend(fontsize=9, framealpha=0.9)
     return figure
+
+
+WIDE = 20.0
+"""Ratio of the largest to the smallest value above which an axis is logarithmic."""
+
+
+def over_depth(depths: Any, values: Mapping[str, Any], label: str, *, lengths: bool = True) -> Figure:
+    """Figure of curves over depth, in units that suit them, logarithmic where they differ by much.
+
+    Parameters
+    ----------
+    depths
+        (nz,), in any order [m].
+    values
+        Curves (nz,) by their names; infinite values are left out.
+    label
+        What they are; its unit is added.
+    lengths
+        Whether the values are lengths [m].
+
+    Raises
+    ------
+    LumigraphError
+        No curves, or a curve with another number of points.
+
+    Examples
+    --------
+    >>> figure = over_depth([-1e-5, 0.0, 1e-5], {"x": [2e-8, 1e-8, 2e-8]}, "error")
+    >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
+    ('depth [µm]', 'error [nm]')
+    """
+    curves_of = {name: np.asarray(to_numpy(one), np.float64) for name, one in values.items()}
+    sizes = np.abs(np.concatenate([one[np.isfinite(one)] for one in curves_of.values()] or [np.zeros(0)]))
+    largest = float(sizes.max(initial=0.0))
+    size, unit = length_unit(largest) if lengths else (1.0, "")
+    places = np.asarray(to_numpy(depths), np.float64)
+    across, named = length_unit(float(np.abs(places).max(initial=0.0)))
+    order = np.argsort(places)
+    shown = {name: np.where(np.isfinite(one), one, np.nan)[order] / size for name, one in curves_of.items()}
+    return curves(
+        places[order] / across, shown, xlabel=f"depth [{named}]",
+        ylabel=f"{label} [{unit}]" if unit else label, log=largest > WIDE * sizes.min(initial=math.inf),
+    )  # fmt: skip
 
 
 def images(

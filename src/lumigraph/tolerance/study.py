@@ -16,6 +16,9 @@ from lumigraph.tolerance.making import SEED
 from lumigraph.tolerance.outcome import PERCENTS, Outcome
 from lumigraph.tolerance.trials import CAMERA, ERROR, Trials, column, unit_of
 
+ROUNDING = {"m": 1e-12, "rad": 1e-12}
+"""Lengths and angles below these are 0: rounding of what is computed, a hundredth of an atom."""
+
 
 @dataclass(frozen=True, eq=False)
 class Study:
@@ -190,7 +193,11 @@ def _outcome(
     if np.isnan(first).any() or len(sample) < 2:
         return None
     more, less = first[1::2], first[2::2]
-    return Outcome(name, unit, float(first[0]), (more - less) / 2, (more + less) / 2 - first[0], sample)
+    nominal, effects, bends, sample = (
+        np.where(np.abs(values) < ROUNDING.get(unit, 0.0), 0.0, values)
+        for values in (first[0], (more - less) / 2, (more + less) / 2 - first[0], sample)
+    )
+    return Outcome(name, unit, float(nominal), effects, bends, sample)
 
 
 def _quantities(one: Outcome) -> Iterator[Quantity]:
