@@ -168,6 +168,7 @@ def test_a_simulated_camera_tells_patch_and_distance(camera, dz, divided):
 
 
 @pytest.mark.long  # minutes of wave optics: a point far out of focus lights many lenslets
+@pytest.mark.filterwarnings("ignore:.*min of a processor")
 @pytest.mark.parametrize("dz", [-20e-3, 60e-3, -40e-3])
 def test_far_out_of_focus_it_is_right_or_says_that_it_is_not(camera, dz):
     """20 mm nearer than the focus the image lies behind the sensor, and the patch changes its sign."""

@@ -1,6 +1,7 @@
 """Corners found in raw images."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -54,6 +55,22 @@ def test_a_whole_chessboard_that_opencv_misses_is_found(monkeypatch) -> None:
     assert min(np.abs(found - one).max() for one in (true, true[::-1])) < 0.1
     with pytest.raises(CalibrationError, match="it does not show a whole chessboard of 4 x 3"):
         metric.chessboard.find(picture[:80], board, "it")
+
+
+def test_the_board_tells_the_sign_of_the_patches(monkeypatch) -> None:
+    """Its squares repeat: patches of either sign may explain them about as well."""
+    known = metric.finding.of_signs
+
+    def wrong_first(raw, calibration):
+        (right,) = known(raw, calibration)
+        low, high = right.ends
+        return [replace(right, ends=(-high, -low), sizes=-right.sizes), right]
+
+    camera, where = drawn.camera(1.0, 1), drawn.pose((0.05, 0.3, -0.25))
+    ready = prepare(drawn.raw(camera, where, 1), drawn.calibration(1), white=drawn.white(1))
+    sure = metric.find_corners([ready], drawn.BOARD)
+    monkeypatch.setattr(metric.finding, "of_signs", wrong_first)
+    assert np.array_equal(metric.find_corners([ready], drawn.BOARD).place, sure.place)
 
 
 def test_a_picture_without_the_board_is_named() -> None:

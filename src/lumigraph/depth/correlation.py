@@ -1,6 +1,7 @@
 """Patch size of each plenoptic 2.0 lenslet, from how its micro-image agrees with its neighbours'."""
 
 import warnings
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -89,7 +90,40 @@ def correlation(
     Georgiev and Lumsdaine, "Reducing plenoptic camera artifacts", Comput. Graph. Forum 29, 1955 (2010);
     Perwass and Wietzke, "Single lens 3D-camera with extended depth-of-field", Proc. SPIE 8291 (2012).
     """
-    raw = raw if isinstance(raw, RawImage) else RawImage(raw)
+    found = of_signs(raw, calibration, patches, progress)
+    if len(found) > 1:
+        _warn(*found)
+    return found[0].depth(raw.data)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sign:
+    """How well sizes (n,) [px] of one sign explain the picture: overall, and (n, rows, cols) each lenslet.
+
+    `ends` are the least and most size that was asked for [px].
+    """
+
+    overall: float
+    ends: tuple[float, float]
+    sizes: np.ndarray
+    scores: np.ndarray
+
+    def depth(self, data: Array) -> DepthMap:
+        """Of lenslets, in the type of the raw image's pixels."""
+        values, trust = _joined(self.scores, self.sizes)
+        return DepthMap(like(np.clip(values, *self.ends), data), like(trust, data), "patch")
+
+
+def of_signs(
+    raw: RawImage,
+    calibration: Calibration,
+    patches: tuple[float, float] | None = None,
+    progress: Progress = silent,
+) -> list[Sign]:
+    """The sign that fits best, then the other one where it explains the picture about as well.
+
+    Of a range in `patches` there is one. Parameters and errors are those of `correlation`.
+    """
     check_raw(raw, calibration)
     pitch = calibration.lattice.pitch
     if pitch < _FEWEST_PIXELS:
@@ -102,18 +136,14 @@ def correlation(
             f"neighbours and needs {_FEWEST_LENSLETS} at least. Crop less."
         )
     ranges = _ranges(patches, pitch)
-    micro = MicroImages.of(raw, calibration)
-    sizes = [np.arange(low, high + _STEP / 2, _STEP) for low, high in ranges]
-    scores, done, total = [], 0, sum(map(len, sizes))
-    for some in sizes:
-        scores.append(micro.scores(some, within(progress, done / total, (done + len(some)) / total)))
-        done += len(some)
-    overall = [_overall(score) for score in scores]
-    best = int(np.argmax(overall))
-    _check_signs(overall, ranges)
-    values, trust = _joined(scores[best], sizes[best])
-    low, high = ranges[best]
-    return DepthMap(like(np.clip(values, low, high), raw.data), like(trust, raw.data), "patch")
+    micro, found = MicroImages.of(raw, calibration), []
+    for k, (low, high) in enumerate(ranges):
+        sizes = np.arange(low, high + _STEP / 2, _STEP)
+        scores = micro.scores(sizes, within(progress, k / len(ranges), (k + 1) / len(ranges)))
+        found.append(Sign(_overall(scores), (low, high), sizes, scores))
+    found.sort(key=lambda sign: -sign.overall)
+    good = max(_ALIKE * found[0].overall, _SEEN)
+    return found[:1] + [other for other in found[1:] if other.overall >= good]
 
 
 def _ranges(patches: tuple[float, float] | None, pitch: float) -> list[tuple[float, float]]:
@@ -135,16 +165,13 @@ def _overall(scores: np.ndarray) -> float:
     return float((2 * best - np.median(scores, axis=0)).mean())
 
 
-def _check_signs(overall: list[float], ranges: list[tuple[float, float]]) -> None:
-    """Warn where the range of the other sign explains the picture about as well as the better one."""
-    if len(ranges) == 1 or min(overall) < max(_ALIKE * max(overall), _SEEN):
-        return
-    best = int(np.argmax(overall))
-    (least, most), (low, high) = ranges[best], ranges[1 - best]
+def _warn(taken: Sign, other: Sign) -> None:
+    """That the other sign explains the picture about as well as the one that is taken."""
+    (least, most), (low, high) = taken.ends, other.ends
     warnings.warn(
         f"patches from {low:.3g} to {high:.3g} px explain the picture about as well as those from "
-        f"{least:.3g} to {most:.3g} px, which are taken (scores of {overall[1 - best]:.2f} and "
-        f"{overall[best]:.2f}): "
+        f"{least:.3g} to {most:.3g} px, which are taken (scores of {other.overall:.2f} and "
+        f"{taken.overall:.2f}): "
         "textures that repeat do not show the sign. Give patches=(least, most), or --between least:most, if "
         "it is known: above 0 for a Keplerian camera, below for a Galilean one.",
         SamplingWarning,

@@ -11,7 +11,7 @@ from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
-from lumigraph.depth import correlation
+from lumigraph.depth.correlation import of_signs
 from lumigraph.errors import CalibrationError
 from lumigraph.metric import chessboard, views, windows
 from lumigraph.metric.corners import Board, Corners
@@ -92,7 +92,34 @@ def _on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: in
     """Columns of `Corners` of one raw image."""
     image = to_numpy(as_float(raw.data))
     raw = replace(raw, data=image.mean(2) if image.ndim == 3 else image)
-    lines = _Lines.of(raw, calibration, board, frame)
+    found, missed = [], []
+    for sign in of_signs(raw, calibration):
+        try:
+            found.append(_sights(raw, calibration, board, frame, to_numpy(sign.depth(raw.data).values)))
+        except CalibrationError as error:
+            missed.append(error)
+    if not found:
+        raise missed[0]
+    lines, sights = max(found, key=lambda one: len(one[1]))
+    kinds = calibration.lattice.kind(*sights.index.T)
+    return (
+        np.full(len(sights), frame),
+        lines.corner[sights.corner],
+        sights.center + sights.way,
+        sights.center,
+        kinds,
+    )
+
+
+def _sights(
+    raw: RawImage, calibration: Calibration, board: Board, frame: int, sizes: np.ndarray
+) -> tuple["_Lines", "_Sights"]:
+    """Corners seen behind lenslets, from lenslets' patches (rows, cols) [px].
+
+    A board's squares repeat, so patches of either sign may explain them: corners of the board are seen on
+    straight lines behind neighbouring lenslets for the right one alone.
+    """
+    lines = _Lines.of(raw, calibration, board, frame, sizes)
     radius = lines.window(calibration.lattice.pitch, board, frame)
     search = _Search.of(raw.data, radius, dots=board.radius > 0)
     lines, sights = search.found(lines, calibration)
@@ -103,14 +130,7 @@ def _on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: in
             f"picture {frame} shows the board, but no corner behind {LEAST_SEEN} lenslets or more. Move the "
             "board to where the micro-images are sharp."
         )
-    kinds = calibration.lattice.kind(*sights.index.T)
-    return (
-        np.full(len(sights), frame),
-        lines.corner[sights.corner],
-        sights.center + sights.way,
-        sights.center,
-        kinds,
-    )
+    return lines, sights
 
 
 def lit_radius(calibration: Calibration, margin: float = windows.LEAST) -> float:
@@ -147,9 +167,10 @@ class _Lines:
     ratio: np.ndarray
 
     @classmethod
-    def of(cls, raw: RawImage, calibration: Calibration, board: Board, frame: int) -> "_Lines":
-        """From the board on the rendered picture."""
-        sizes = correlation(raw, calibration).values
+    def of(
+        cls, raw: RawImage, calibration: Calibration, board: Board, frame: int, sizes: np.ndarray
+    ) -> "_Lines":
+        """From the board on the picture that lenslets' patches render."""
         patches = Patches.of(sizes, calibration)
         layout = Layout.of(calibration, patches, None)
         seen = chessboard.find(render(raw, calibration, sizes, blend=True), board, f"picture {frame}")
