@@ -90,3 +90,23 @@ def numbers(text, pattern):
     found = re.search(pattern, text)
     assert found, text
     return [float(word) for word in found.groups()]
+
+
+@pytest.mark.filterwarnings("always")
+@pytest.mark.parametrize(
+    ("f_number", "asked", "warns"),
+    [
+        (32, (), False),
+        (32, ("--accuracy", "1e-4"), True),
+        (4, (), True),
+    ],
+)
+def test_what_parabolic_lenses_miss_is_stated_and_warned_of_where_asked_or_large(
+    lumigraph, bench, f_number, asked, warns
+):
+    text = (bench / "camera.toml").read_text()
+    (bench / "lens.toml").write_text(text.replace('"2 mm"', f'"{0.1 * f_number} mm"'))
+    result = lumigraph("simulate", "lens.toml", "--scene", "white", *asked, "-o", "image.tiff")
+    assert result.code == 0
+    assert "by parabolic lenses, which are off by some" in result.out
+    assert ("parabolic lenses put the raw image off by some" in result.err) == warns

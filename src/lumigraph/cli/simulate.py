@@ -1,6 +1,7 @@
 """`lumigraph simulate`."""
 
-from contextlib import suppress
+import warnings
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -12,7 +13,7 @@ from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, length
 from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.core.result import Figure, Quantity, Result
-from lumigraph.errors import FormatError, GeometryError
+from lumigraph.errors import FormatError, GeometryError, ParaxialWarning
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -34,6 +35,8 @@ SCENES = (
     "photo",
 )
 _FINEST_GROUP = 12
+_PARAXIAL = 0.01
+"""Error of parabolic lenses, relative rms, from which a warning says what the result states in any case."""
 _COUNTS = {"snapshots": 100, "tilted": 64}
 
 
@@ -106,6 +109,24 @@ class Light:
         if self.coherence == "tilted":
             return simulation.TiltedWaves(count, self.na)
         return simulation.Snapshots(count, rng=seed)
+
+    @contextmanager
+    def unasked(self) -> "Iterator[None]":
+        """Without --accuracy the result states what parabolic lenses miss: nobody asked for less."""
+        with warnings.catch_warnings():
+            if self.accuracy is None:
+                warnings.simplefilter("ignore", ParaxialWarning)
+            yield
+
+    def warn_of(self, paraxial: float) -> None:
+        """Warn of parabolic lenses that are far off, though no --accuracy was given."""
+        if self.accuracy is None and paraxial > _PARAXIAL:
+            warnings.warn(
+                f"parabolic lenses put the raw image off by some {100 * paraxial:.2g} % rms. With square "
+                'lenslets, model = "exact" in the camera file goes beyond them.',
+                ParaxialWarning,
+                stacklevel=3,
+            )
 
     def _lamp(self, camera: "Instrument") -> Any:
         """A round lamp, imaged into the main lens."""
@@ -257,7 +278,7 @@ def simulate(
     coherence, spectrum = light.chosen(seed, described), light.spectrum()
     scene = stage.built(described)
     try:
-        with progress("simulate") as shown:
+        with progress("simulate") as shown, light.unasked():
             raw = simulate(described, scene, coherence, spectrum=spectrum, progress=shown)
     except Interrupted as stopped:
         kept = output.with_name(f"{output.name.split('.')[0]}.partial{''.join(output.suffixes)}")
@@ -283,6 +304,7 @@ def simulate(
         lines.append(f"estimated error {100 * error:.2g} % rms, from the difference of two halves")
     if paraxial := raw.metadata.get("error", {}).get("paraxial"):
         lines.append(f"by parabolic lenses, which are off by some {100 * paraxial:.2g} % rms")
+        light.warn_of(paraxial)
     values = (
         Quantity("shape", raw.shape, "px"), Quantity("mean", mean, unit), Quantity("largest", largest),
         Quantity("pixel_pitch", raw.pixel_pitch, "m"), Quantity("estimated_error", error),
