@@ -10,6 +10,12 @@ from lumigraph.operators import microscope_spectrum as module
 from lumigraph.operators.microscope_building import Layout, microscope_operator
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_operator import suits_frequencies
+from lumigraph.operators.microscope_patterns import all_patterns, few_of_pixels
+from lumigraph.operators.microscope_pixels import b_spline
+from lumigraph.operators.microscope_sensor import Samples, Straight, sensor
+from lumigraph.operators.microscope_tiles import Row, Tiling
+from lumigraph.operators.microscope_transforms import add_cells, columns
+from lumigraph.operators.resampling import Resampling, banded
 
 SCOPE = Objective(525e-9, 0.5)
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)
@@ -136,3 +142,38 @@ def test_objects_side_by_side_give_what_each_gives_and_no_bit_depends_on_the_oth
         np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6 * np.max(expected))
         (lonely,) = together(given[2:3])
         np.testing.assert_array_equal(np.asarray(lonely), found[2])
+
+
+@pytest.mark.parametrize("few", [False, True])
+def test_pixels_of_a_straight_lattice_see_patterns_as_samples_between_say(few, xp, rng):
+    """One matrix for each cell and axis, against B-splines among samples."""
+    n, at = 9, [np.linspace(-3.0, 31.5, 25), np.linspace(4.0, 37.0, 31)]  # beyond the samples, and not of all
+    along = [banded(y, np.arange(27 + 9 * k), lambda d: b_spline(d, 3), 2.0, 4) for k, y in enumerate(at)]
+    placement, patterns = Resampling(*along), all_patterns(n)
+    if few:
+        kernel = microscope_operator([SCOPE], LENSLET, Layout((3, 4), CellSampling(2, n, 1 / n)), (-30e-6,))
+        patterns = few_of_pixels(kernel.kernels, 0.1)
+        assert patterns.vectors is not None
+    raw, parts = rng.random((25, 31)), rng.random((3, 4, patterns.count))
+    found = sensor(patterns, placement, xp.asarray(raw))
+    assert isinstance(found, Straight)
+    expected = Samples(patterns, placement)
+    np.testing.assert_allclose(np.asarray(found.parted(xp.asarray(raw))), expected.parted(raw), atol=1e-12)
+    np.testing.assert_allclose(np.asarray(found.whole(xp.asarray(parts))), expected.whole(parts), atol=1e-12)
+
+
+@pytest.mark.parametrize("of_image", [False, True])
+def test_sums_are_the_transform_of_cells_turned_and_lead_back_to_them(of_image, rng):
+    """By a fast transform: (-i)^odd times it, of an image its inverse, as real and imaginary parts."""
+    told, odd = Tiling(Row(4, 0, 2, 1), Row(5, 0, 2, 1)), np.array([[0, 0, 1, 1], [0, 1, 0, 1]])
+    cells, (ly, lx) = rng.random((4, 5, 4)), told.lengths
+    found = columns([cells], 2, told, odd, of_image=of_image)
+    turned = np.fft.rfft2(cells, (ly, lx), axes=(0, 1)) * (1j if of_image else -1j) ** odd.sum(0)
+    above, below = turned[: ly // 2 + 1], turned[-np.arange(ly // 2 + 1) % ly] * (-1.0) ** odd[0]
+    cc, cs, sc, ss = np.moveaxis(found.reshape(ly // 2 + 1, lx // 2 + 1, 2, 4, 4)[:, :, 0], 2, 0)
+    np.testing.assert_allclose(cc - ss - 1j * (cs + sc), above, atol=1e-12)
+    np.testing.assert_allclose(cc + ss - 1j * (cs - sc), below, atol=1e-12)
+    assert not found.reshape(told.frequencies, 2, 4, 4)[:, 1].any()
+    again = np.zeros_like(cells)
+    add_cells([again], found, 2, told, odd, of_image=of_image)
+    np.testing.assert_allclose(again, cells, atol=1e-12)

@@ -15,7 +15,8 @@
 - `microscope_operator`: volumes before a light-field microscope; `microscope_building`, how it is made;
   `microscope_cell`, a lenslet and its cell; `microscope_tiles`, lenslets in tiles;
   `microscope_kernels`, images of its points; `microscope_rays`, the same by rays; `microscope_spectrum`, the
-  lenslets' frequencies; `microscope_patterns`, what they follow of a cell's points;
+  lenslets' frequencies; `microscope_transforms`, to those and back; `microscope_patterns`, what they follow
+  of a cell's points; `microscope_sensor`, from those to pixels;
   `microscope_pupil`, points by the pupil's phase; `microscope_pixels`, real pixels; `microscope_samples`, how
   many samples they need; `fourier_microscope`;
   `fourier_points`, its points with derivatives

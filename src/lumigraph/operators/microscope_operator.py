@@ -201,9 +201,8 @@ class MicroscopeOperator(Linear):
     def _lit(self, intensities: Sequence[Array], side: int) -> list[Array]:
         volumes = intensities if self.depths is not None else [one[None, ...] for one in intensities]
         if self.by_frequency:
-            planes = self._by_frequencies(volumes[0]).forward(volumes, side)
-        else:
-            planes = [self._by_offsets(volume) + self._far_plane(volume) for volume in volumes]
+            return self._by_frequencies(volumes[0]).forward(volumes, side)
+        planes = [self._by_offsets(volume) + self._far_plane(volume) for volume in volumes]
         placement = self.placement
         return planes if placement is None else [placement._forward(plane) for plane in planes]
 
@@ -248,7 +247,7 @@ class MicroscopeOperator(Linear):
         if key not in self._spectra:
             self._spectra[key] = microscope_spectrum.Spectra.of(
                 self.kernels, (self._points, self._pixels), self._tiling, like,
-                self._far(like, self._pixels),
+                self.placement, self._far(like, self._pixels),
             )  # fmt: skip
         return self._spectra[key]
 
@@ -271,10 +270,11 @@ class MicroscopeOperator(Linear):
         return self._seen_by(raws, self.side_by_side)
 
     def _seen_by(self, raws: Sequence[Array], side: int) -> list[Array]:
-        planes = raws if self.placement is None else [self.placement._adjoint(raw) for raw in raws]
         if self.by_frequency:
-            volumes = self._by_frequencies(raws[0]).adjoint(planes, side)
+            volumes = self._by_frequencies(raws[0]).adjoint(raws, side)
         else:
+            placed = self.placement
+            planes = raws if placed is None else [placed._adjoint(raw) for raw in raws]
             volumes = [self._by_offsets_back(plane) for plane in planes]
         return volumes if self.depths is not None else [volume[0, ...] for volume in volumes]
 

@@ -9,7 +9,7 @@ is measured, and counts in the operator's error.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -52,7 +52,7 @@ class Patterns:
         (2, r) of 0 and 1: whether a pattern is odd along y, and along x.
     vectors
         Of each parity (0, 0), (0, 1), (1, 0), (1, 1), its patterns (products, r) in terms of the products of
-        that parity; the patterns follow one another in this order. None where they are all products.
+        that parity. None where they are all products. The patterns follow one another in this order.
     left_out
         Relative rms of the image of a point as the sum of its patterns, the worst of all points.
     duals
@@ -75,7 +75,8 @@ class Patterns:
     @cached_property
     def basis(self) -> np.ndarray:
         """(n², r): each pattern's value at the cell's places."""
-        products = np.kron(self.along, self.along).T
+        n, (y, x) = len(self.along), _in_order(len(self.along))
+        products = np.kron(self.along, self.along)[y * n + x].T
         if self.vectors is None:
             return products
         whole, parities = all_patterns(len(self.along)), zip(PARITIES, self.vectors, strict=True)
@@ -104,11 +105,11 @@ class Patterns:
             self._held[key] = along, tuple(arrays.like(one, like) for one in vectors)
         return self._held[key]
 
-    def blocks(self, vectors: Sequence[Array]) -> Iterator[tuple[tuple[slice, slice], Array]]:
-        """Where (y, x) the products of each parity stand among (n, n), and its vectors."""
+    def places(self) -> list[tuple[slice, slice]]:
+        """Where (y, x) the products of each parity stand among (n, n)."""
         n, half = len(self.along), (len(self.along) + 1) // 2
         sides = slice(0, half), slice(half, n)
-        return (((sides[y], sides[x]), own) for (y, x), own in zip(PARITIES, vectors, strict=True))
+        return [(sides[y], sides[x]) for y, x in PARITIES]
 
     def of_parity(self, odd_y: int, odd_x: int) -> np.ndarray:
         """Numbers of the patterns of a parity."""
@@ -120,11 +121,18 @@ def all_patterns(n: int) -> Patterns:
     """As many patterns as a cell of n × n places has.
 
     >>> all_patterns(3).count, all_patterns(3).of_parity(0, 1).tolist()
-    (9, [2, 5])
+    (9, [4, 5])
     """
-    one, half = parts(n), (n + 1) // 2
-    odd_y, odd_x = np.divmod(np.arange(n * n), n)
-    return Patterns(one, np.stack([odd_y >= half, odd_x >= half]).astype(np.int8))
+    one, (y, x) = parts(n), _in_order(n)
+    half = (n + 1) // 2
+    return Patterns(one, np.stack([y >= half, x >= half]).astype(np.int8))
+
+
+def _in_order(n: int) -> np.ndarray:
+    """Of all products (2, n²), their numbers along y and x: parity after parity."""
+    y, x = np.divmod(np.arange(n * n), n)
+    half = (n + 1) // 2
+    return np.stack([y, x])[:, np.argsort(2 * (y >= half) + (x >= half), kind="stable")]
 
 
 def patterns(kernels: Sequence[SliceKernel], left_out: float) -> list[Patterns]:
@@ -285,11 +293,11 @@ def parted(plane: Array, patterns: Patterns) -> Array:
         cells = xp.reshape(arrays.tiled(plane, (n, n)), (-1, n * n))
         return xp.reshape(cells @ vectors[0], (*shape, patterns.count))
     products = _turned(plane, along)
-    if not vectors:
-        return xp.reshape(arrays.tiled(products, (n, n)), (*shape, n * n))
     products = arrays.tiled(products, (n, n))
-    own = (xp.reshape(products[..., y, x], (-1, v.shape[0])) @ v for (y, x), v in patterns.blocks(vectors))
-    return xp.reshape(xp.concat(list(own), axis=-1), (*shape, patterns.count))
+    own = [xp.reshape(products[..., y, x], (math.prod(shape), -1)) for y, x in patterns.places()]
+    if vectors:
+        own = [one @ v for one, v in zip(own, vectors, strict=True)]
+    return xp.reshape(xp.concat(own, axis=-1), (*shape, patterns.count))
 
 
 def whole(parts: Array, patterns: Patterns) -> Array:
@@ -298,13 +306,14 @@ def whole(parts: Array, patterns: Patterns) -> Array:
     shape, flat = parts.shape[:2], xp.reshape(parts, (-1, patterns.count))
     if along is None:
         return arrays.untiled(xp.reshape(flat @ xp.matrix_transpose(vectors[0]), (*shape, n, n)))
-    if not vectors:
-        return _turned(arrays.untiled(xp.reshape(flat, (*shape, n, n))), xp.matrix_transpose(along))
     products, first = xp.empty((*shape, n, n), dtype=parts.dtype, device=arrays.device(parts)), 0
-    for (y, x), v in patterns.blocks(vectors):
-        own = flat[:, first : first + v.shape[1]] @ xp.matrix_transpose(v)
-        products[..., y, x] = xp.reshape(own, (*shape, y.stop - y.start, x.stop - x.start))
-        first += v.shape[1]
+    for k, (y, x) in enumerate(patterns.places()):
+        size = y.stop - y.start, x.stop - x.start
+        count = vectors[k].shape[1] if vectors else math.prod(size)
+        own = flat[:, first : first + count]
+        own = own @ xp.matrix_transpose(vectors[k]) if vectors else own
+        products[..., y, x] = xp.reshape(own, (*shape, *size))
+        first += count
     return _turned(arrays.untiled(products), xp.matrix_transpose(along))
 
 

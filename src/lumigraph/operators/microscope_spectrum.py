@@ -14,18 +14,21 @@ time however many lenslets a point lights. Large arrays of lenslets are treated 
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
+from lumigraph.core.linear import Linear
 from lumigraph.core.threads import each, single_products
 from lumigraph.operators.microscope_far import FarLight
 from lumigraph.operators.microscope_kernels import SliceKernel
 from lumigraph.operators.microscope_patterns import Patterns, of_images, parted, quadrant, whole
-from lumigraph.operators.microscope_tiles import Span, Tiling, tilings
+from lumigraph.operators.microscope_sensor import Sensor, sensor
+from lumigraph.operators.microscope_tiles import Tiling, tilings
+from lumigraph.operators.microscope_transforms import add_cells, columns
 
 LEAST = 8
 """Lenslets along each side of a tile, at least, where there are so many."""
@@ -124,6 +127,8 @@ class Spectra:
         Patterns of the image.
     matrices
         R (frequencies, patterns of some depths, those of the image), of the depths of each of `groups`.
+    sensor
+        From patterns of the image to the image.
     far
         Light that goes farther than those follow it; None where there is none.
     """
@@ -132,6 +137,7 @@ class Spectra:
     points: Sequence[Patterns]
     pixels: Patterns
     matrices: Sequence[Array]
+    sensor: Sensor
     far: FarLight | None = None
 
     @classmethod
@@ -142,6 +148,7 @@ class Spectra:
         patterns: tuple[Sequence[Patterns], Patterns],
         told: Tiling,
         like: Array,
+        placement: Linear | None = None,
         far: FarLight | None = None,
     ) -> "Spectra":
         """In the library and precision of an array, for patterns of each depth and of the image."""
@@ -150,21 +157,21 @@ class Spectra:
         def found(depths: slice) -> Array:
             chosen = points[depths]
             shape = told.frequencies, sum(one.count for one in chosen), pixels.count
-            matrix, first = np.empty(shape, np.float32), 0
-            for kernel, one in zip(kernels[depths], chosen, strict=True):
-                _fill(matrix[:, first : first + one.count], kernel, (one, pixels), told)
-                first += one.count
+            matrix = np.empty(shape, np.float32)
+            for kernel, one, places in zip(kernels[depths], chosen, _places(chosen), strict=True):
+                _fill(matrix, places, kernel, (one, pixels), told)
             return arrays.like(matrix, like)
 
-        return cls(told, points, pixels, list(each(found, groups(points, told))), far)
+        matrices = list(each(found, groups(points, told)))
+        return cls(told, points, pixels, matrices, sensor(pixels, placement, like), far)
 
     def forward(self, volumes: Sequence[Array], side: int = 1) -> list[Array]:
-        """Samples (rows N, columns N) of volumes (z, rows s, columns s), at most `side` of them.
+        """Images (ny, nx) of volumes (z, rows s, columns s), at most `side` of them.
 
         They share each product. It has rows for `side` volumes, be they there or not: the bits of a sum may
         depend on how many there are.
         """
-        xp, told, columns = arrays.namespace(volumes[0]), self.told, 0.0
+        told = self.told
 
         def lit(group: tuple[slice, Array]) -> Array:
             depths, matrix = group
@@ -172,15 +179,17 @@ class Spectra:
 
             def cells(volume: Array) -> Array:
                 found = [parted(volume[k + depths.start, ...], one) for k, one in enumerate(chosen)]
-                return found[0] if len(found) == 1 else xp.concat(found, axis=-1)
+                return _ordered(found, chosen)
 
-            return _columns(map(cells, volumes), side, told, _odd(chosen), of_image=False) @ matrix
+            return columns(map(cells, volumes), side, told, _odd(chosen), of_image=False) @ matrix
 
-        for part in each(lit, zip(groups(self.points, told), self.matrices, strict=True)):
-            columns = columns + part
+        found = each(lit, zip(groups(self.points, told), self.matrices, strict=True))
+        sums = next(found)
+        for part in found:
+            sums += part
         images = [self._far_image(volume) for volume in volumes]
-        _add_cells(images, columns, side, told, self.pixels.odd, of_image=True)
-        return [whole(image, self.pixels) for image in images]
+        add_cells(images, sums, side, told, self.pixels.odd, of_image=True)
+        return [self.sensor.whole(image) for image in images]
 
     def _far_image(self, volume: Array) -> Array:
         """Patterns (rows, columns, r) of far light."""
@@ -200,10 +209,10 @@ class Spectra:
 
         def parts() -> Iterator[Array]:
             for image in images:
-                yield (part := parted(image, self.pixels))
+                yield (part := self.sensor.parted(image))
                 evens.append(None if self.far is None else self.far.adjoint(part))
 
-        columns = _columns(parts(), side, told, self.pixels.odd, of_image=True)
+        sums = columns(parts(), side, told, self.pixels.odd, of_image=True)
         shape, s = tuple(row.cells + 2 * row.margin for row in (told.rows, told.columns)), self._points
         like = {"dtype": images[0].dtype, "device": arrays.device(images[0])}
         volumes = [xp.empty((len(self.points), shape[0] * s, shape[1] * s), **like) for _ in images]
@@ -212,8 +221,8 @@ class Spectra:
             depths, matrix = group
             chosen = self.points[depths]
             cells = [xp.zeros((*shape, matrix.shape[1]), **like) for _ in range(n)]
-            product = columns @ xp.matrix_transpose(matrix)
-            _add_cells(cells, product, side, told, _odd(chosen), of_image=False)
+            product = sums @ xp.matrix_transpose(matrix)
+            add_cells(cells, product, side, told, _odd(chosen), of_image=False)
             for volume, own, even in zip(volumes, cells, evens, strict=True):
                 _put_planes(volume, own, even, chosen, depths.start)
 
@@ -226,13 +235,13 @@ def _put_planes(
     volume: Array, cells: Array, even: Array | None, chosen: Sequence[Patterns], start: int
 ) -> None:
     """Write depths of a volume, from `start` on, whose patterns in cells stand one after the other."""
-    first = 0
-    for k, one in enumerate(chosen, start):
-        plane, s = whole(cells[..., first : first + one.count], one), math.isqrt(len(one.basis))
+    xp = arrays.namespace(cells)
+    for k, one, places in zip(itertools.count(start), chosen, _places(chosen)):
+        own = xp.take(cells, xp.asarray(places, device=arrays.device(cells)), axis=-1)
+        plane, s = whole(own, one), math.isqrt(len(one.basis))
         if even is not None:
             plane = arrays.untiled(arrays.tiled(plane, (s, s)) + even[k, ..., None, None])
         volume[k, ...] = plane
-        first += one.count
 
 
 def groups(points: Sequence[Patterns], told: Tiling) -> list[slice]:
@@ -246,8 +255,14 @@ def groups(points: Sequence[Patterns], told: Tiling) -> list[slice]:
     return [*found, slice(start, len(points))]
 
 
-def _fill(matrix: np.ndarray, kernel: SliceKernel, patterns: tuple[Patterns, Patterns], told: Tiling) -> None:
-    """Write R (frequencies, patterns of the points, those of the image) of a depth."""
+def _fill(
+    matrix: np.ndarray,
+    places: np.ndarray,
+    kernel: SliceKernel,
+    patterns: tuple[Patterns, Patterns],
+    told: Tiling,
+) -> None:
+    """Write R (frequencies, patterns of the points, those of the image) of a depth at its places."""
     (points, pixels), blocks = patterns, quadrant(kernel)[0]
     images = points.basis.T.astype(np.float32) @ blocks
     parts = of_images(images, pixels)
@@ -259,7 +274,7 @@ def _fill(matrix: np.ndarray, kernel: SliceKernel, patterns: tuple[Patterns, Pat
         trigonometric = sign * waves[0][cy ^ qy][:, None] * waves[1][cx ^ qx]
         part = parts[:, rows[:, None], columns]
         product = trigonometric.reshape(told.frequencies, -1) @ part.reshape(len(part), -1)
-        matrix[:, rows[:, None], columns] = product.reshape(told.frequencies, *part.shape[1:])
+        matrix[:, places[rows][:, None], columns] = product.reshape(told.frequencies, *part.shape[1:])
 
 
 def _waves(length: int, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -269,80 +284,27 @@ def _waves(length: int, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return (both * np.cos(phase)).astype(np.float32), (both * np.sin(phase)).astype(np.float32)
 
 
-def _places(spans: tuple[Span, Span], of_image: bool) -> tuple[tuple[slice, slice], tuple[int, int]]:
-    """Cells of a tile, and where the first stands in the transform."""
-    y, x = spans
-    if of_image:
-        return (y.image, x.image), (y.image_at, x.image_at)
-    return (y.points, x.points), (y.points_at, x.points_at)
-
-
 def _odd(points: Sequence[Patterns]) -> np.ndarray:
-    """Parities (2, r) of patterns of several depths, one after the other."""
-    return np.concatenate([one.odd for one in points], axis=1)
+    """Parities (2, r) of patterns of several depths, in `_order`."""
+    return np.concatenate([one.odd for one in points], axis=1)[:, _order(points)]
 
 
-def _columns(parts: Iterable[Array], side: int, told: Tiling, odd: np.ndarray, *, of_image: bool) -> Array:
-    """Real and imaginary parts at f_y and at -f_y (frequencies, side · 4 tiles, channels) of cells' parts."""
-    parts = iter(parts)
-    first = next(parts)
-    xp, (ly, lx), channels = arrays.namespace(first), told.lengths, first.shape[-1]
-    half, turn, sign = ly // 2 + 1, *_turns(odd, first, back=of_image)
-    shape, n = (half, lx // 2 + 1, side, told.count, 4, channels), 0
-    found = xp.empty(shape, dtype=first.dtype, device=arrays.device(first))
-    for n, cells in enumerate(itertools.chain([first], parts)):
-        for k, spans in told.tiles():
-            (rows, columns), (y, x) = _places(spans, of_image)
-            spectrum = _along_y(_along_x(cells[rows, columns, :], x, lx) * turn, y, ly)
-            below = xp.concat([spectrum[:1, ...], xp.flip(spectrum[ly - half + 1 :, ...], axis=0)])
-            above, place = spectrum[:half, ...], found[:, :, n, k, ...]
-            place[:, :, 0, :], place[:, :, 1, :] = xp.real(above), xp.imag(above)
-            place[:, :, 2, :], place[:, :, 3, :] = xp.real(below) * sign, xp.imag(below) * sign
-    found[:, :, n + 1 :, ...] = 0
-    return xp.reshape(found, (told.frequencies, side * 4 * told.count, channels))
+def _order(points: Sequence[Patterns]) -> np.ndarray:
+    """Of patterns of several depths: parity after parity, and in each depth after depth."""
+    odd = np.concatenate([one.odd for one in points], axis=1)
+    return np.argsort(2 * odd[0] + odd[1], kind="stable")
 
 
-def _along_x(cells: Array, first: int, length: int) -> Array:
-    """Transform of cells (rows, columns, channels) whose first column stands at `first`."""
-    if first:
-        xp, (rows, columns, channels) = arrays.namespace(cells), cells.shape
-        wide = xp.zeros((rows, first + columns, channels), dtype=cells.dtype, device=arrays.device(cells))
-        wide[:, first:, :] = cells
-        cells = wide
-    return arrays.rfft(cells, length, axis=1)
+def _places(points: Sequence[Patterns]) -> Iterator[np.ndarray]:
+    """Where the patterns of each depth stand in `_order`."""
+    stops = np.cumsum([one.count for one in points])
+    return iter(np.split(np.argsort(_order(points)), stops[:-1]))
 
 
-def _along_y(spectrum: Array, first: int, length: int) -> Array:
-    if first:
-        xp, (rows, columns, channels) = arrays.namespace(spectrum), spectrum.shape
-        shape = (length, columns, channels)
-        wide = xp.zeros(shape, dtype=spectrum.dtype, device=arrays.device(spectrum))
-        wide[first : first + rows, ...] = spectrum
-        spectrum = wide
-    return arrays.fft(spectrum, length, axis=0, overwrite=True)
-
-
-def _add_cells(
-    parts: Sequence[Array], columns: Array, side: int, told: Tiling, odd: np.ndarray, *, of_image: bool
-) -> None:
-    """Add to cells' parts (rows, columns, channels) what `_columns` say of them."""
-    xp, (ly, lx), channels = arrays.namespace(columns), told.lengths, columns.shape[-1]
-    half, turn, sign = ly // 2 + 1, *_turns(odd, columns, back=not of_image)
-    columns = xp.reshape(columns, (half, lx // 2 + 1, side, told.count, 4, channels))
-    for (n, cells), (k, spans) in itertools.product(enumerate(parts), told.tiles()):
-        (rows, places), (y, x) = _places(spans, of_image)
-        height, width = rows.stop - rows.start, places.stop - places.start
-        spectrum = xp.empty((ly, lx // 2 + 1, channels), dtype=turn.dtype, device=arrays.device(cells))
-        four = [columns[:, :, n, k, part, :] for part in range(4)]
-        below = [xp.flip(part[1 : ly - half + 1, ...] * sign, axis=0) for part in four[2:]]
-        arrays.put_complex(spectrum[:half, ...], *four[:2])
-        arrays.put_complex(spectrum[half:, ...], *below)
-        spectrum = arrays.ifft(spectrum, axis=0, overwrite=True)[y : y + height, ...] * turn
-        place = cells[rows, places, :]
-        place += arrays.irfft(spectrum, lx, axis=1)[:, x : x + width, :]
-
-
-def _turns(odd: np.ndarray, like: Array, *, back: bool) -> tuple[Array, Array]:
-    """(-i)^|c| and (-1)^c_y of channels of these parities."""
-    turn, sign = np.array([1, -1j, -1])[odd.sum(0)], np.where(odd[0], -1.0, 1.0)
-    return arrays.like(turn.conj() if back else turn, like), arrays.like(sign, like)
+def _ordered(parts: Sequence[Array], points: Sequence[Patterns]) -> Array:
+    """Parts (rows, columns, r) of several depths in `_order`."""
+    if len(parts) == 1:
+        return parts[0]
+    xp = arrays.namespace(parts[0])
+    order = xp.asarray(_order(points), device=arrays.device(parts[0]))
+    return xp.take(xp.concat(list(parts), axis=-1), order, axis=-1)
