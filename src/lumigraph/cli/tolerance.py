@@ -63,14 +63,15 @@ def tolerance(
         A key of the camera file and how far it may be off, such as "separation=±0.05 mm" or
         "lenslets.focal_length=±1 % uniform"; +- will do. Normal errors keep to it in 95 % of all cameras,
         uniform ones in all. Lenslets that differ from each other: "lenslets.each.focal_length=±1 %",
-        "lenslets.each.decentre=±2 um", "lenslets.each.missing=0.2 %". What leans: "array_tilt_y=±1 mrad",
+        "lenslets.each.decentre=±2 um", "lenslets.each.tilt=±1 mrad" (with their index in the camera file),
+        "lenslets.each.form=±20 nm" (rms path), "lenslets.each.missing=0.2 %". What leans: "array_tilt_y=±1 mrad",
         array_tilt_x, array_bow (a length, at the corners), sensor_tilt_y, sensor_tilt_x. May be repeated.
     draws
         Cameras drawn.
     measure
         Names of quantities, separated by commas: those that 'lumigraph design' prints, focused distance,
         focus shift, depth error, blur at the object, blur behind a lenslet, lenslets that see a point,
-        micro-image fill, corner shift y, corner shift x, corner focus shift, corner depth error, lenslet focus shift, light of a point,
+        micro-image fill, corner shift y, corner shift x, corner focus shift, corner depth error, lenslet focus shift, light of a point, lenslet Strehl ratio,
         and the simulated ones of 'lumigraph sweep'.
     seed
         Of all that is drawn.

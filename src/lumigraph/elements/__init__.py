@@ -5,7 +5,7 @@
 - `apertures`: `CircularAperture`, `RectangularAperture`
 - `lens`: `ThinLens`
 - `lenslets`: `LensletArray`, square or hexagonal, of one or three focal lengths
-- `scatter`: `Scatter`, how lenslets of an array differ from each other
+- `scatter`: `Scatter`, how lenslets of an array differ from each other; `form`, terms of their form
 - `lean`: `Lean`, by how much arrays and sensors lean
 - `zernike`: Zernike polynomials in Noll's order and `ZernikePlate`
 - `field_plate`: Zernike terms that change over the field, and their plate

@@ -12,6 +12,7 @@ from lumigraph.core.arrays import Array
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice, Vector
+from lumigraph.elements.form import along, matrices
 from lumigraph.elements.lens import lens_phase
 from lumigraph.elements.scatter import Scatter
 from lumigraph.elements.transmission import Edge, check_edge, transmit, warn_if_coarse
@@ -177,8 +178,25 @@ class LensletArray:
                 focal_length = focal_length * factor
                 dy, dx = dy - (down * cos + across * sin), dx - (across * cos - down * sin)
             block = np.exp(-1j * np.pi * (dy**2 + dx**2) / (wavelength * focal_length))
+            if self.scatter is not None and self.scatter.warps:
+                block = block * np.exp(2j * np.pi / wavelength * self._warped(i, j, y, grid.x))
             result[first : first + rows] = block * opening
         return result
+
+    def _warped(self, i: np.ndarray, j: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Path [m] of each sample besides those of focus and vertex, in its lenslet (i, j)."""
+        assert self.scatter is not None
+        (y0, x0), (sin, cos) = self._position(i, j), coverage.sides(self.lattice.rotation)
+        down, across = (y - y0) * cos - (x - x0) * sin, (y - y0) * sin + (x - x0) * cos
+        low = int(i.min()), int(j.min())
+        all_i, all_j = np.ogrid[low[0] : int(i.max()) + 1, low[1] : int(j.max()) + 1]
+        warp, here = self.scatter.warp(all_i, all_j), (i - low[0], j - low[1])
+        total = warp.down[here] * down + warp.across[here] * across
+        half = self.fill_factor * self.lattice.pitch / 2
+        v, u, each = along(down / half), along(across / half), matrices(warp.terms)
+        for m, n in zip(*np.nonzero(np.any(each, axis=(0, 1))), strict=True):
+            total = total + each[..., m, n][here] * v[..., m] * u[..., n]
+        return total
 
     @property
     def _focal(self) -> tuple[Any, ...]:

@@ -1,17 +1,35 @@
 """`Scatter`: how lenslets of an array differ from each other, each by numbers of its own index."""
 
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtri
 
 from lumigraph.core import checks
+from lumigraph.elements.form import TERMS
 from lumigraph.errors import GeometryError
 
 _MULTIPLIERS = (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)  # splitmix64's
 
 MOST_MISSING = 0.99
 """Part of the lenslets."""
+
+MOST = {"focal_length": 0.2, "decentre": 1.0, "missing": MOST_MISSING, "turn": 0.05, "form": 10e-6}
+"""By name, in SI."""
+
+
+class Warp(NamedTuple):
+    """What paths through lenslets have besides focus and vertex: angles [rad] and terms [m].
+
+    `down` and `across` (...) turn light towards later columns and rows; `terms` (..., k) are those of
+    `lumigraph.elements.form`.
+    """
+
+    down: np.ndarray
+    across: np.ndarray
+    terms: np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +47,12 @@ class Scatter:
         Part of the lenslets that are opaque.
     seed
         Of all that is drawn.
+    turn
+        Standard deviation of the angles by which tilted lenslets turn light, along each axis of the array
+        [rad]: of a spherical surface tilted by θ, (n - 1) θ.
+    form
+        Of the path through a lenslet, what neither focus nor tilt describes: rms over the square around it
+        and over the lenslets [m]. Each of the terms of `form.TERMS` has the same part.
 
     Raises
     ------
@@ -40,10 +64,12 @@ class Scatter:
     decentre: float = 0.0
     missing: float = 0.0
     seed: int = 0
+    turn: float = 0.0
+    form: float = 0.0
 
     def __post_init__(self) -> None:
         checks.whole("seed", self.seed, 0)
-        for name, most in (("focal_length", 0.2), ("decentre", 1.0), ("missing", MOST_MISSING)):
+        for name, most in MOST.items():
             if not 0 <= checks.finite(name, getattr(self, name)) <= most:
                 raise GeometryError(
                     f"the scatter's {name} is {getattr(self, name):g} but must be from 0 to {most:g}."
@@ -54,6 +80,20 @@ class Scatter:
         bend, down, across, there = (_uniform(i, j, self.seed, channel) for channel in range(4))
         factor = 1 + self.focal_length * np.clip(ndtri(bend), -4, 4)
         return factor, self.decentre * ndtri(down), self.decentre * ndtri(across), there >= self.missing
+
+    @property
+    def warps(self) -> bool:
+        """Whether lenslets are tilted or have a form of their own."""
+        return bool(self.turn or self.form)
+
+    def warp(self, i: np.ndarray, j: np.ndarray) -> Warp:
+        """What paths through lenslets (i, j) have besides."""
+        down, across, *terms = (
+            np.clip(ndtri(_uniform(i, j, self.seed, channel)), -4, 4) for channel in range(4, 6 + len(TERMS))
+        )
+        return Warp(
+            self.turn * down, self.turn * across, self.form / math.sqrt(len(TERMS)) * np.stack(terms, -1)
+        )
 
 
 def _uniform(i: np.ndarray, j: np.ndarray, seed: int, channel: int) -> np.ndarray:

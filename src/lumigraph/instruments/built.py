@@ -5,8 +5,9 @@ import math
 from pydantic import model_validator
 
 from lumigraph.elements import Lean, Scatter
+from lumigraph.errors import GeometryError
 from lumigraph.instruments.part import Part
-from lumigraph.instruments.quantities import Displacement, Length, NotNegative, Seed, Tilt
+from lumigraph.instruments.quantities import Angle, Displacement, Length, NotNegative, Seed, Tilt
 
 
 class Built(Part):
@@ -32,6 +33,11 @@ class Built(Part):
         Standard deviation of their vertices from the middle of their apertures, along each axis.
     missing
         Part of the lenslets that are opaque.
+    tilt_scatter
+        Standard deviation of the angles by which their surfaces are tilted about their vertices, along each
+        axis. A sphere that is tilted by θ turns light by (n - 1) θ; n is the `index` of the lenslets.
+    form_scatter
+        Of the path through them, what neither focus nor tilt describes: its rms.
     seed
         Of which lenslet is how.
 
@@ -49,18 +55,27 @@ class Built(Part):
     focal_length_scatter: NotNegative = 0.0
     decentre_scatter: Displacement = 0.0
     missing: NotNegative = 0.0
+    tilt_scatter: Angle = 0.0
+    form_scatter: Displacement = 0.0
     seed: Seed = 0
 
-    @property
-    def scatter(self) -> Scatter | None:
-        """How single lenslets differ; None where they are alike.
+    def scatter(self, index: float | None = None) -> Scatter | None:
+        """How single lenslets of a refractive index differ; None where they are alike.
 
         Raises
         ------
         GeometryError
-            A negative scatter, or more than lenslets have.
+            A negative scatter, more than lenslets have, or tilts of lenslets whose index is not known.
         """
-        found = Scatter(self.focal_length_scatter, self.decentre_scatter, self.missing, self.seed)
+        if self.tilt_scatter and index is None:
+            raise GeometryError(
+                "tilted lenslets turn light by (n - 1) times their tilt, but their index n is not known. Add "
+                "it under [lenslets], such as index = 1.46 of fused silica."
+            )
+        turn = self.tilt_scatter * ((index or 1.0) - 1)
+        found = Scatter(
+            self.focal_length_scatter, self.decentre_scatter, self.missing, self.seed, turn, self.form_scatter
+        )
         return None if found == Scatter(seed=self.seed) else found
 
     def lean(self, corner: float) -> Lean | None:
@@ -79,7 +94,7 @@ class Built(Part):
 
     @model_validator(mode="after")
     def _is_possible(self) -> "Built":
-        _ = self.scatter, self.lean(1.0)  # they refuse what cannot be
+        _ = self.scatter(index=2.0), self.lean(1.0)  # they refuse what cannot be
         return self
 
     def __bool__(self) -> bool:

@@ -187,9 +187,11 @@ def _lenslets(camera: "LensletCamera") -> Iterator[Row]:
     for number, focal_length in enumerate(parts.focal_length):
         kind = "" if len(parts.focal_length) == 1 else f" {number + 1}"
         yield Row(f"lenslet focal length{kind}", focal_length, "m", "f_µ, given")
-    if camera.built.scatter is not None:
+    if camera.scatter is not None:
         yield Row("focal length scatter", camera.built.focal_length_scatter, "", "rms part, as built")
         yield Row("decentre scatter", camera.built.decentre_scatter, "m", "rms along each axis, as built")
+        yield Row("tilt scatter", camera.built.tilt_scatter, "rad", "rms about each axis, as built")
+        yield Row("form scatter", camera.built.form_scatter, "m", "rms path but for focus and tilt, as built")
         yield Row("missing", camera.built.missing, "", "part of the lenslets, as built")
     yield Row("lenslet f-number", f_number, "", "b/p")
     yield Row(

@@ -115,8 +115,11 @@ def write(table: Mapping[str, Any]) -> str:
 _LENGTHS = (
     "wavelength", "object_distance", "focal_length", "diameter", "pitch", "pixel_pitch", "offset",
     "bandwidth", "tube_lens", "focus_depth", "lenslet_offset", "sensor_distance", "fourier_lens",
-    "offset_y", "offset_x", "separation", "lenslet_distance", "decentre_scatter", "wavelengths", "array_bow",
+    "offset_y", "offset_x", "separation", "lenslet_distance", "decentre_scatter", "form_scatter",
+    "wavelengths", "array_bow",
 )  # fmt: skip
+
+_ANGLES = ("rotation", "field", "y", "x", "array_tilt", "sensor_tilt", "tilt_scatter")
 
 
 def _table(name: str, values: Mapping[str, Any]) -> list[str]:
@@ -137,7 +140,7 @@ def _text(key: str, value: Any) -> str:
         return "[" + ", ".join(_text(key, each) for each in value) + "]"
     if isinstance(value, float) and key in _LENGTHS:
         return f'"{_metres(value)}"'
-    if isinstance(value, float) and key in ("rotation", "field", "y", "x", "array_tilt", "sensor_tilt"):
+    if isinstance(value, float) and key in _ANGLES:
         return f'"{value!r} rad"'
     if isinstance(value, float) and key == "exposure_time":
         return f'"{value!r} s"'

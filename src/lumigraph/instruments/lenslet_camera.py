@@ -16,7 +16,7 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.core.linear import Linear
 from lumigraph.design import plenoptic1, plenoptic2, resolution
 from lumigraph.design.layout import LensletLayout
-from lumigraph.elements import Lean, LensletArray, Train
+from lumigraph.elements import Lean, LensletArray, Scatter, Train
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import grids, point_view
 from lumigraph.instruments.built import Built
@@ -74,6 +74,16 @@ class LensletCamera(Camera):
     def lean(self) -> Lean | None:
         """Of array and sensor as built; None where they are square to the axis."""
         return self.built.lean(math.hypot(*self.lenslets.reach))
+
+    @model_validator(mode="after")
+    def _lenslets_can_differ(self) -> Self:
+        _ = self.scatter  # it refuses tilts without an index
+        return self
+
+    @property
+    def scatter(self) -> Scatter | None:
+        """How single lenslets differ as built; None where they are alike."""
+        return self.built.scatter(self.lenslets.index)
 
     @property
     def matched_diameter(self) -> float:
@@ -252,7 +262,7 @@ class LensletCamera(Camera):
             shape=parts.shape,
             fill_factor=parts.fill_factor,
             extent=parts.extent,
-            scatter=self.built.scatter,
+            scatter=self.scatter,
         )
 
     def image_train(self) -> Train:

@@ -39,6 +39,8 @@ MOST_LENSLETS = 2**20
 """Largest array: 1024 x 1024."""
 MOST_CHANGE = 0.5
 """Of a single lenslet's focal length."""
+MOST_INDEX = 4.0
+"""Of lenslets: germanium's."""
 
 
 class MainLens(Part):
@@ -153,6 +155,8 @@ class Lenslets(Part):
         From +x towards +y [rad], or text such as "2 mrad".
     offset
         Of the lenslets from the axis (y, x), less than half a pitch.
+    index
+        Refractive index of the lenslets; what tilts them needs it, nothing else.
     single
         Lenslets that differ from the others, in the pupil of a Fourier microscope: `OneLenslet` by number,
         from 1 on row by row as `indices` has them.
@@ -167,7 +171,15 @@ class Lenslets(Part):
     fill_factor: Fraction = 1.0
     rotation: Angle = 0.0
     offset: Offset = (0.0, 0.0)
+    index: Number | None = None
     single: Singles = Field(default_factory=dict)
+
+    @field_validator("index")
+    @classmethod
+    def _is_an_index(cls, index: float | None) -> float | None:
+        if index is not None and not 1 < index <= MOST_INDEX:
+            raise GeometryError(f"index is {index:g} but must be above 1 and at most {MOST_INDEX:g}.")
+        return index
 
     @field_validator("count")
     @classmethod

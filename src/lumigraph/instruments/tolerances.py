@@ -23,20 +23,21 @@ NAMES = {
     "sensor.pixel_pitch": "length", "array_tilt_y": "angle", "array_tilt_x": "angle",
     "array_bow": "length", "sensor_tilt_y": "angle", "sensor_tilt_x": "angle",
     "lenslets.each.focal_length": "length", "lenslets.each.decentre": "length",
-    "lenslets.each.missing": "part",
+    "lenslets.each.tilt": "angle", "lenslets.each.form": "length", "lenslets.each.missing": "part",
 }  # fmt: skip
 """What may be off, as keys of a camera file, and ``main_lens.aberrations.N`` [waves rms] of Noll index N.
 
 Distances without a table are main lens to lenslets, lenslets to sensor and object to main lens; tilts and bow
 are those of ``[built]``. Below
 ``lenslets.each`` stands what each lenslet has of its own: focal length, decentre of its vertex along either
-axis, and the part of the lenslets that is missing.
+axis, tilt of its surface about either, form (rms path through it, but for focus and tilt), and the part of
+the lenslets that is missing.
 """
 
 EACH = "lenslets.each."
 """Begins the names of what lenslets have of their own."""
 
-MISSING = f"{EACH}missing"
+FORM, MISSING, TILT = (f"{EACH}{name}" for name in ("form", "missing", "tilt"))
 
 _UNITS = {"length": "m", "angle": "rad", "number": "", "part": ""}
 _NOLL = re.compile(r"main_lens\.aberrations\.[1-9]\d{0,3}")

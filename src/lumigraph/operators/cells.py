@@ -164,7 +164,7 @@ def check_alike(camera: CameraOptics) -> None:
         raise GeometryError(
             "lenslets that differ from each other have no operator, which repeats from lenslet to lenslet. "
             "Simulate points, or slices in Coherent() light, or leave focal_length_scatter, "
-            "decentre_scatter and missing out of [built]."
+            "decentre_scatter, tilt_scatter, form_scatter and missing out of [built]."
         )
 
 

@@ -11,6 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
+from lumigraph.elements import form
 from lumigraph.errors import GeometryError
 from lumigraph.operators.cell_response import (
     INFINITE,
@@ -238,8 +239,8 @@ class Each:
         if not self.optics.straight or self.optics.camera.model == "exact":
             raise GeometryError(
                 "lenslets that differ from each other are simulated for square ones of one focal length and "
-                'model = "paraxial". Use those, or leave focal_length_scatter, decentre_scatter and missing '
-                "out of [built]."
+                'model = "paraxial". Use those, or leave focal_length_scatter, decentre_scatter, '
+                "tilt_scatter, form_scatter and missing out of [built]."
             )
         self._lenslets = lenslets_of(self.optics)
 
@@ -265,12 +266,26 @@ class Each:
         scatter = self.optics.array.scatter
         assert scatter is not None  # `relay` has looked
         factor, dy, dx, there = scatter.of(i, j)
+        warp = scatter.warp(i, j) if scatter.warps else None
         total = np.zeros([axis.samples for axis in self.optics.axes], np.complex64)
         for k, n in zip(*np.nonzero(there), strict=True):
             bend = float(factor[k, n])
-            above = self._behind(0, ys[k], bend, float(dy[k, n]))
-            total += above @ light @ self._behind(1, xs[n], bend, float(dx[k, n])).T
+            above, seen = self._behind(0, ys[k], bend, float(dy[k, n]))
+            beside, across = self._behind(1, xs[n], bend, float(dx[k, n]))
+            if warp is None:  # few samples first: nodes are many
+                total += (above @ seen) @ light @ (beside @ across).T
+                continue
+            own = (float(warp.down[k, n]), float(warp.across[k, n]), warp.terms[k, n])
+            inside = seen @ light @ across.T * self._warped((ys[k], xs[n]), *own)
+            total += above @ inside @ beside.T
         return total
+
+    def _warped(self, middle: Pair, down: float, across: float, terms: np.ndarray) -> np.ndarray:
+        """Factor on the nodes (y, x) of the lenslet there, which is tilted and has a form of its own."""
+        y, x = (self._quadrature(which, middle[which])[1] - middle[which] for which in (0, 1))
+        half_y, half_x = (self._half(which) for which in (0, 1))
+        path = form.path(terms, y / half_y, x / half_x) + down * y[:, None] + across * x
+        return np.exp(2j * np.pi / self._lenslets.optics[0] * path).astype(np.complex64)
 
     def _around(self, mine: _Cells, cell: int) -> tuple[np.ndarray, list[float]]:
         """Numbers of the lenslets that light is followed to along an axis, and their places from the cell."""
@@ -281,22 +296,35 @@ class Each:
         numbers = np.arange(math.ceil(ends[0] - 1e-9), math.floor(ends[1] + 1e-9) + 1)
         return numbers, (origin + numbers * step).round(12).tolist()
 
-    def _behind(self, which: int, middle: float, factor: float, decentre: float) -> np.ndarray:
-        """Amplitude (samples, window) along one axis behind one lenslet."""
+    def _behind(
+        self, which: int, middle: float, factor: float, decentre: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Along one axis of one lenslet: from its nodes to the samples, and of the window's light to them."""
         wavelength, focal_length = self._lenslets.optics[0], focal_lengths(self.optics.array)[0] * factor
         spread, at, light = self._quadrature(which, middle)
         phase = np.exp(-1j * np.pi * (at - middle - decentre) ** 2 / (wavelength * focal_length))
-        return (spread * phase).astype(np.complex64) @ light
+        return (spread * phase).astype(np.complex64), light
 
     def _quadrature(self, which: int, middle: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of a lenslet's aperture: to the samples, its nodes from the cell, and of the window's light."""
         if (which, middle) not in self._known:
             axis, array, optics = self.optics.axes[which], self.optics.array, self._lenslets.optics
-            step = abs(array.lattice.basis[1 - which][which])
-            half = array.fill_factor * step / 2
-            count = nodes(half, _STRONGEST * focal_lengths(array)[0], axis, optics)
+            step, half = abs(array.lattice.basis[1 - which][which]), self._half(which)
+            count = nodes(half, _STRONGEST * focal_lengths(array)[0], axis, optics) + self._more(half)
             at, weight = legendre(middle - half, middle + half, count)
             spread = fresnel(axis.image, at, math.prod(optics)) * (weight * axis.fade(at, step))
             light = self._lenslets.values(which, at) @ self._lenslets.coefficients[which]
             self._known[which, middle] = spread, at, light.astype(np.complex64)
         return self._known[which, middle]
+
+    def _half(self, which: int) -> float:
+        """Of a lenslet's width along an axis [m]."""
+        lattice = self.optics.array.lattice
+        return self.optics.array.fill_factor * abs(lattice.basis[1 - which][which]) / 2
+
+    def _more(self, half: float) -> int:
+        """Nodes that tilts and forms ask for, as `nodes` counts."""
+        scatter = self.optics.array.scatter
+        assert scatter is not None
+        steepest = 4 * scatter.turn + form.STEEPEST * scatter.form / half
+        return math.ceil(4 * half * steepest / self._lenslets.optics[0])

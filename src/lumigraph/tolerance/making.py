@@ -11,7 +11,7 @@ from lumigraph.core import checks
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments import Instrument, LensletCamera, Tolerance
 from lumigraph.instruments.loading import AnyCamera
-from lumigraph.instruments.tolerances import EACH, MISSING, check_name
+from lumigraph.instruments.tolerances import EACH, MISSING, TILT, check_name
 
 SEED = "built.seed"
 """Error that says which lenslet is how."""
@@ -19,7 +19,10 @@ SEED = "built.seed"
 LEANS = ("array_tilt_y", "array_tilt_x", "sensor_tilt_y", "sensor_tilt_x")
 """Tilts, one along each axis."""
 
-_SCATTERS = {"focal_length": "focal_length_scatter", "decentre": "decentre_scatter", "missing": "missing"}
+_SCATTERS = {
+    "focal_length": "focal_length_scatter", "decentre": "decentre_scatter", "missing": "missing",
+    "tilt": "tilt_scatter", "form": "form_scatter",
+}  # fmt: skip
 """Keys of ``[built]`` by what each lenslet has of its own."""
 
 
@@ -154,12 +157,14 @@ def tolerances_of(
             "there are no tolerances. Add a table [tolerances] to the camera file, or give some, "
             "such as separation = '±0.05 mm'."
         )
+    if any(one.name == TILT for one in found):
+        built(camera, {TILT: 1e-6})  # their index must be known
     for one in found:
         one.deviation_of(value_of(camera, one.name))
-    if camera.built.scatter is not None and (each := [one.name for one in found if one.is_of_each]):
+    if camera.scatter is not None and (each := [one.name for one in found if one.is_of_each]):
         raise FormatError(
             f"{each[0]} would be drawn but the lenslets of [built] differ already. Leave out the tolerance, "
-            "or focal_length_scatter, decentre_scatter and missing."
+            "or focal_length_scatter, decentre_scatter, tilt_scatter, form_scatter and missing."
         )
     return found
 

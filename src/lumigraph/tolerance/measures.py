@@ -19,6 +19,8 @@ from lumigraph.instruments import LensletCamera, Row
 from lumigraph.instruments.capabilities import Rendered
 from lumigraph.tolerance.single import Differ, Sight, Single, last
 
+STREHL = "lenslet Strehl ratio"
+
 
 def measures(camera: LensletCamera, made: LensletCamera) -> tuple[Row, ...]:
     """What follows from a camera as built, lengths in metres.
@@ -40,7 +42,7 @@ def measures(camera: LensletCamera, made: LensletCamera) -> tuple[Row, ...]:
 
 def of_making(camera: LensletCamera, made: LensletCamera) -> Iterator[Row]:
     """Those that only a camera as built has."""
-    scatter = made.built.scatter
+    scatter = made.scatter
     single = Single() if scatter is None else Single.of(made, scatter)
     near = focused_distance(made)
     yield Row("focused distance", near, "m", "object that lenslets, or the sensor behind them, see sharp")
@@ -80,6 +82,7 @@ def _of_lenslets(camera: LensletCamera, made: LensletCamera, single: Single) -> 
     if isinstance(made, Rendered):
         shift = focused_distance(made, single.factor) - focused_distance(made)
         yield Row("lenslet focus shift", shift, "m", "of a lenslet near the axis, beyond the others' focus")
+    yield Row(STREHL, single.strehl, "", "of a lenslet near the axis, by its form alone")
     yield Row("light of a point", single.light, "", "on the axis, that lenslets do not lose by missing")
     for axis, shift in zip("yx", _corner_shift(camera, made, single), strict=True):
         yield Row(f"corner shift {axis}", shift, "px", "of the last micro-image from where it was meant")

@@ -1,30 +1,37 @@
 r"""What lenslets that differ from each other do to measures, by rays.
 
-A lenslet whose vertex is off by d moves all that is behind it by d b/f. Places of a point behind the lenslets
+A lenslet whose vertex is off by d moves all that is behind it by d b/f; one whose surface is tilted by θ by
+(n - 1) θ b, as if its vertex were off; one whose form is off by b times the mean slope of the path through
+it: so far the middle of light (its centroid) moves, by wave optics too. Places of a point behind the lenslets
 that see it, each with its share w of the point's light, then have a slope over the lenslets' places r of
 
-.. math:: \frac{\sum w (r - \bar r) \cdot d b/f}{\sum w |r - \bar r|^2}
+.. math:: \frac{\sum w (r - \bar r) \cdot s}{\sum w |r - \bar r|^2}
 
-beside the one that tells its depth. Independent errors of the lenslets add up by their squares, to first
-order: `changes` tries one lenslet after the other.
+where s are these shifts, beside the one that tells its depth. Independent errors of the lenslets add up by
+their squares, to first order: `changes` tries one lenslet after the other.
 """
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 
 from lumigraph.core import coverage
+from lumigraph.elements import form
+from lumigraph.elements.scatter import Warp
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import LensletCamera, Lenslets
 from lumigraph.instruments.capabilities import Rendered
-from lumigraph.instruments.tolerances import EACH, MISSING
+from lumigraph.instruments.tolerances import EACH, FORM, MISSING, TILT
 
 _ACROSS = 128
 """Rays across the stop."""
+
+_NODES = 24
+"""Of quadrature across a lenslet."""
 
 Errors = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """Of lenslets: factors of focal lengths, decentres along columns and rows [m], and presence."""
@@ -35,6 +42,10 @@ class Differ(Protocol):
 
     def of(self, i: np.ndarray, j: np.ndarray) -> Errors:
         """Errors of lenslets (i, j)."""
+        ...
+
+    def warp(self, i: np.ndarray, j: np.ndarray) -> Warp:
+        """What paths through lenslets (i, j) have besides."""
         ...
 
 
@@ -52,6 +63,10 @@ class One:
         Decentre of its vertex along columns and rows [m].
     there
         Whether it is.
+    turns
+        By how much it turns light along columns and rows [rad].
+    terms
+        Of the path through it, by number: those of `lumigraph.elements.form` [m].
     """
 
     index: tuple[int, int]
@@ -59,6 +74,8 @@ class One:
     down: float = 0.0
     across: float = 0.0
     there: bool = True
+    turns: tuple[float, float] = (0.0, 0.0)
+    terms: Mapping[int, float] = field(default_factory=dict)
 
     def of(self, i: np.ndarray, j: np.ndarray) -> Errors:
         """As `Differ.of`."""
@@ -67,6 +84,15 @@ class One:
             np.where(mine, self.factor, 1.0), np.where(mine, self.down, 0.0),
             np.where(mine, self.across, 0.0), np.where(mine, self.there, True),
         )  # fmt: skip
+
+    def warp(self, i: np.ndarray, j: np.ndarray) -> Warp:
+        """As `Differ.warp`."""
+        mine = (i == self.index[0]) & (j == self.index[1])
+        terms = np.zeros((*mine.shape, len(form.TERMS)))
+        for k, size in self.terms.items():
+            terms[mine, k] = size
+        down, across = (np.where(mine, turn, 0.0) for turn in self.turns)
+        return Warp(down, across, terms)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,6 +143,8 @@ class Single:
     ----------
     factor
         Of the focal length of the lenslet that gets most of the light of a point on the axis.
+    strehl
+        Of its form alone: brightness of a point amid the image over that without.
     slope
         Of that point's images behind its lenslets, over the lenslets' places.
     light
@@ -129,6 +157,7 @@ class Single:
     slope: float = 0.0
     light: float = 1.0
     corner: tuple[float, float] = (0.0, 0.0)
+    strehl: float = 1.0
 
     @classmethod
     def of(cls, camera: LensletCamera, differ: Differ, sight: Sight | None = None) -> "Single":
@@ -142,10 +171,12 @@ class Single:
         sight = Sight.of(camera) if sight is None else sight
         i, j = sight.indices.T
         factor, *_, there = differ.of(i, j)
+        terms = differ.warp(i, j).terms[sight.shares.argmax()]
         corner = _shifts(camera, differ, last(camera.lenslets))[0]
         return cls(
             float(factor[sight.shares.argmax()]), _slope(camera, differ, sight),
             float(sight.shares @ there), (float(corner[0]), float(corner[1])),
+            _strehl(terms / camera.wavelength),
         )  # fmt: skip
 
 
@@ -154,10 +185,22 @@ def _shifts(camera: LensletCamera, differ: Differ, indices: np.ndarray) -> np.nd
     i, j = indices.T
     factor, down, across, _ = differ.of(i, j)
     sin, cos = coverage.sides(camera.lattice.rotation)
-    shifts = np.stack([down * cos + across * sin, across * cos - down * sin], -1)
     focal = np.asarray(camera.lenslets.focal_length)
     focal = focal[camera.lattice.kind(i, j) % len(focal)] * factor
-    return shifts * (camera.lenslet_distance / focal)[:, None]
+    warp, half = differ.warp(i, j), camera.lenslets.pitch * camera.lenslets.fill_factor / 2
+    slopes = form.slopes(warp.terms / half)
+    down, across = down / focal + warp.down + slopes[0], across / focal + warp.across + slopes[1]
+    turns = np.stack([down * cos + across * sin, across * cos - down * sin], -1)
+    return turns * camera.lenslet_distance
+
+
+def _strehl(waves: np.ndarray) -> float:
+    """Of a lenslet whose form has these terms, in waves."""
+    if not waves.any():
+        return 1.0
+    at, weight = np.polynomial.legendre.leggauss(_NODES)
+    wave = np.exp(2j * np.pi * form.path(waves, at, at))
+    return float(abs(weight @ wave @ weight / 4) ** 2)
 
 
 def _slope(camera: LensletCamera, differ: Differ, sight: Sight) -> float:
@@ -217,6 +260,14 @@ def _pairs(camera: LensletCamera, name: str, size: float) -> Iterator[tuple[One,
         elif name == f"{EACH}focal_length":
             part = size / camera.lenslets.focal_length[0]
             yield One(index, factor=1 + part), One(index, factor=1 - part)
+        elif name == FORM:
+            part = size / math.sqrt(len(form.TERMS))
+            for k in range(len(form.TERMS)):
+                yield One(index, terms={k: part}), One(index, terms={k: -part})
+        elif name == TILT:
+            turn = size * ((camera.lenslets.index or 1.0) - 1)
+            for turns in ((turn, 0.0), (0.0, turn)):
+                yield One(index, turns=turns), One(index, turns=(-turns[0], -turns[1]))
         else:
             yield One(index, down=size), One(index, down=-size)
             yield One(index, across=size), One(index, across=-size)

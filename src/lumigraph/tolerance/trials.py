@@ -15,9 +15,10 @@ from lumigraph.core import checks
 from lumigraph.errors import FormatError, GeometryError, LumigraphError
 from lumigraph.instruments import LensletCamera, Tolerance
 from lumigraph.instruments.loading import camera_of
+from lumigraph.instruments.tolerances import FORM
 from lumigraph.metric.charts import check_camera as check_charts
 from lumigraph.tolerance.making import LEANS, SEED, built, check_camera, drawn, tolerances_of, value_of
-from lumigraph.tolerance.measures import is_finite, measures, of_differing, of_making
+from lumigraph.tolerance.measures import STREHL, is_finite, measures, of_differing, of_making
 from lumigraph.tolerance.single import changes
 
 MOST = 1_000_000
@@ -211,6 +212,7 @@ def _names(
     if asked is None:
         left = {"views per axis"} if VIEWS in known else set()
         usual = (*USUAL, *(OF_LENSLETS if each else ()), *(OF_LEANING if leans else ()))
+        usual = (*usual, *((STREHL,) if FORM in each else ()))
         return tuple(name for name in usual if name in known and name not in left)
     for name in asked:
         if name not in known and not metric.is_measure(name):
