@@ -10,6 +10,7 @@ import zarr
 import lumigraph as lg
 from cluster_jobs import Here, picture
 from lumigraph.cli import main
+from lumigraph.cli.batch import _failures
 from lumigraph.cli.standing import Standing
 
 
@@ -98,6 +99,11 @@ def test_a_frame_that_fails_ends_it_with_an_error(views, tmp_path, capsys):
     said = capsys.readouterr().err
     assert "1 of 2 frames failed. frame 1:" in said
     assert "without zarr.json" in said
+
+
+def test_frames_that_fail_alike_are_told_of_together():
+    found = lg.cluster.Report(9, {}, {4: "it is empty.", 1: "it is dark.", 2: "it is empty."})
+    assert _failures(found) == "3 of 9 frames failed. frame 1: it is dark; frames 2, 4: it is empty."
 
 
 def test_ctrl_c_says_what_is_done(views, tmp_path, capsys, monkeypatch):

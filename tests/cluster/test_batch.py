@@ -1,3 +1,4 @@
+import errno
 import json
 import os
 import random
@@ -15,6 +16,7 @@ import cluster_jobs as jobs
 import lumigraph as lg
 from lumigraph import cluster
 from lumigraph.cluster.ledger import Entry, Ledger
+from lumigraph.errors import FormatError, LumigraphError
 from lumigraph.io import series
 
 
@@ -129,6 +131,41 @@ def test_what_was_damaged_is_done_again(tmp_path, harm):
     run(output, log=str(log))
     assert log.read_text().split() == ["3"]
     assert contents(output) == before
+
+
+@pytest.mark.parametrize("of", [series, Ledger])
+def test_a_full_disk_ends_the_batch_and_no_frame_is_to_blame(of, tmp_path, monkeypatch):
+    name = "write" if of is series else "fail"
+    write = getattr(of, name)
+
+    def full(where, number, *rest):
+        if number == 3:
+            raise FormatError("it was not written") from OSError(errno.ENOSPC, "No space left on device")
+        return write(where, number, *rest)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(of, name, full)
+        whole = items(6)
+        whole[3]["bad"] = of is Ledger
+        with pytest.raises(LumigraphError, match=r"the disk of .*out.zarr is full"):
+            cluster.batch(jobs.picture, whole, tmp_path / "out.zarr", workers=jobs.Here())
+    found = cluster.status(tmp_path / "out.zarr")
+    assert not found.failures
+    assert 0 < found.done < 6
+    again = cluster.batch(jobs.picture, whole, tmp_path / "out.zarr", workers=jobs.Here())
+    assert again.done == (6 if of is series else 5)
+
+
+def test_what_differs_from_the_first_start_is_told_by_its_name(tmp_path):
+    film = {"file": "raws/film.tif", "size": 20, "modified": 1_700_000_000_123_000_000, "page": 0}
+    ledger, what = Ledger(tmp_path / "out.ledger"), {"options": ["--iterations", "3"]}
+    ledger.open(what, [film])
+    with pytest.raises(FormatError, match=r"another job: its --iterations is 3, now 4\."):
+        ledger.open({"options": ["--iterations", "4"]}, [film])
+    with pytest.raises(FormatError, match=r"film\.tif had 20 bytes, now 30\."):
+        ledger.open(what, [film | {"size": 30, "modified": 0}])
+    with pytest.raises(FormatError, match=r"film\.tif was modified at 2023-11-1\d .*\.123, now at .*\.125\."):
+        ledger.open(what, [film | {"modified": 1_700_000_000_125_000_000}])
 
 
 def test_a_frame_that_fails_is_left_out_and_tried_again(tmp_path):

@@ -142,7 +142,7 @@ def batch(
     from lumigraph import cluster
 
     if verb == _STATUS:
-        return _told(cluster.status(_only(words)), _only(words))
+        return _told(cluster.status(_only(words)), ())
     if verb not in KINDS:
         raise FormatError(f"batch takes {', '.join(KINDS)} or {_STATUS}, not {verb!r}.")
     if output is None:
@@ -173,7 +173,7 @@ def batch(
         save_table(output)
     if found.failures:
         raise LumigraphError(f"{_failures(found)} {found.done} of {found.count} are in {output}.")
-    return _told(found, output)
+    return _told(found, (output,))
 
 
 @contextmanager
@@ -235,14 +235,27 @@ def _only(words: Sequence[str]) -> Path:
 
 
 def _failures(found: "Report") -> str:
-    """How many frames failed, and why the first of them did."""
-    named = [f"frame {number}: {why}" for number, why in sorted(found.failures.items())[:_SHOWN]]
-    more = len(found.failures) - len(named)
-    tail = f" ... and {more} more" if more > 0 else ""
+    """How many frames failed, and why: the first reasons, each with its first frames."""
+    reasons: dict[str, list[int]] = {}
+    for number, why in sorted(found.failures.items()):
+        reasons.setdefault(why.rstrip("."), []).append(number)
+    named = [f"{_numbers(numbers)}: {why}" for why, numbers in list(reasons.items())[:_SHOWN]]
+    more = len(reasons) - len(named)
+    tail = f" ... and {more} more reasons" if more > 0 else ""
     return f"{len(found.failures)} of {found.stand.partition(' of ')[2]} failed. {'; '.join(named)}{tail}."
 
 
-def _told(found: "Report", output: Path) -> Result:
+def _numbers(numbers: list[int]) -> str:
+    """Of frames.
+
+    >>> _numbers([7]), _numbers([1, 2]), _numbers(list(range(10)))
+    ('frame 7', 'frames 1, 2', 'frames 0, 1, 2, 3, 4 and 5 more')
+    """
+    first, more = ", ".join(map(str, numbers[:_SHOWN])), len(numbers) - _SHOWN
+    return f"frame{'s' * (len(numbers) > 1)} {first}" + (f" and {more} more" if more > 0 else "")
+
+
+def _told(found: "Report", written: tuple[Path, ...]) -> Result:
     entries = list(found.entries.values())
     failed = len(found.failures)
     values = [Quantity("frames", found.count), Quantity("done", found.done), Quantity("failed", failed)]
@@ -264,5 +277,5 @@ def _told(found: "Report", output: Path) -> Result:
     extra = {"failures": {str(number): why for number, why in found.failures.items()}}
     return Result(
         "Batch", "Many frames, and what was made of each.", found, tuple(lines), tuple(values), notes=notes,
-        written=(output,), extra=extra,
+        written=written, extra=extra,
     )  # fmt: skip

@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -287,11 +288,25 @@ def _difference(begun: Any, asked: Any, name: str) -> str:
     if isinstance(begun, Mapping) and isinstance(asked, Mapping):
         for key in [*begun, *asked]:
             if begun.get(key) != asked.get(key):
-                return _difference(begun.get(key), asked.get(key), key)
+                found = _difference(begun.get(key), asked.get(key), key)
+                return _of_file(begun, asked) if key in ("size", "modified") and "file" in begun else found
     if isinstance(begun, list) and isinstance(asked, list):
         if len(begun) != len(asked):
             return f"it has {len(begun)} {name}, now {len(asked)}"
-        for one, other in zip(begun, asked, strict=True):
+        for k, (one, other) in enumerate(zip(begun, asked, strict=True)):
             if one != other:
-                return _difference(one, other, name)
+                before = str(begun[k - 1]) if k else ""
+                return _difference(one, other, before if before.startswith("-") else name)
     return f"its {name} is {str(begun)[:80]}, now {str(asked)[:80]}"
+
+
+def _of_file(begun: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
+    """How a file differs that has the same name."""
+    name = Path(str(begun["file"])).name
+    if begun.get("size") != asked.get("size"):
+        return f"{name} had {begun.get('size')} bytes, now {asked.get('size')}"
+    when = [
+        datetime.fromtimestamp(one.get("modified", 0) / 1e9).isoformat(" ", "milliseconds")
+        for one in (begun, asked)
+    ]
+    return f"{name} was modified at {when[0]}, now at {when[1]}"

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from lumigraph.cluster.estimate import Estimate, many
 from lumigraph.cluster.ledger import LINK, PAGE, Entry, Ledger
 from lumigraph.cluster.pool import Pool
-from lumigraph.cluster.task import BUSY, Outcome, Task, Work
+from lumigraph.cluster.task import BUSY, FULL, Outcome, Task, Work
 from lumigraph.core import arrays, checks
 from lumigraph.core.progress import Progress, Stage, silent
 from lumigraph.errors import LumigraphError
@@ -187,7 +187,7 @@ def batch(
         with cluster.group(task) as group:
             if left:
                 rest = _begin(task, (cluster, group), left, progress, estimated)
-                _do(group, rest, len(left) - len(rest), len(left), progress)
+                _do(task, group, rest, len(left) - len(rest), len(left), progress)
     found = status(output)
     mine = {number: why for number, why in found.failures.items() if first <= number < last}
     return replace(found, failures=mine, seconds=time.perf_counter() - began)
@@ -247,13 +247,13 @@ def _begin(
         The others cannot fit.
     """
     began, (_, group) = time.perf_counter(), who
-    done = _do(group, left[:1], 0, len(left), progress)
+    done = _do(task, group, left[:1], 0, len(left), progress)
     first, rest = _entries(task, done), left[1:]
     starting = max(time.perf_counter() - began - sum(one.seconds for one in first), 0.0)
     if first and rest:
         _need(task, who, len(rest), first, starting)  # refused before other workers take as much memory
     tried = _tried(rest, group.count, first[0].seconds if first else math.inf)
-    done += _do(group, tried, 1, len(left), progress)
+    done += _do(task, group, tried, 1, len(left), progress)
     rest = [number for number in rest if number not in set(tried)]
     known = _entries(task, done)
     if known and rest:
@@ -291,15 +291,24 @@ def _need(
     needed.require(group.count if cluster.is_here else 1, task.output)
 
 
-def _do(group: Group, numbers: list[int], done: int, total: int, progress: Progress) -> list[int]:
+def _do(task: Task, group: Group, numbers: list[int], done: int, total: int, progress: Progress) -> list[int]:
     """Do some frames; those that somebody else works on are asked for until they are done.
 
     Their numbers are given in the order in which they ended.
+
+    Raises
+    ------
+    LumigraphError
+        The disk is full, or others do not end.
     """
     ended, began, waiting = list[int](), time.perf_counter(), numbers
     for _ in range(_ROUNDS):
         busy = []
         for number, outcome in group.each(waiting):
+            if outcome == FULL:
+                raise LumigraphError(
+                    f"the disk of {task.output} is full. What is done is kept. Free some space, start again."
+                )
             if outcome == BUSY:
                 busy.append(number)
                 continue

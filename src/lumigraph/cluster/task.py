@@ -1,5 +1,6 @@
 """What a worker does for one frame, wherever it runs: claim it, compute it, write it, note it."""
 
+import errno
 import os
 import platform
 import sys
@@ -24,7 +25,7 @@ Work = Callable[[Any], Any]
 Outcome = tuple[int, str]
 """Number of a frame and how it ended."""
 
-DONE, FAILED, BUSY = "done", "failed", "busy"
+DONE, FAILED, BUSY, FULL = "done", "failed", "busy", "full"
 """How a frame ended: noted as done, noted as failed, claimed by somebody else."""
 
 _LONGEST = 400
@@ -106,7 +107,7 @@ class Task:
         return self.work.side_by_side if isinstance(self.work, SideBySide) else 1
 
     def do(self, numbers: Sequence[int]) -> Iterator[Outcome]:
-        """Compute frames unless they are done or somebody does so: `DONE`, `FAILED` or `BUSY` of each."""
+        """Compute frames unless they are done or somebody does so: `DONE`, `FAILED`, `BUSY`, `FULL`."""
         with ExitStack() as claims:
             mine = []
             for number in numbers:
@@ -143,8 +144,13 @@ class Task:
         noted = thing if isinstance(thing, BaseException) else _tried(self._record, number, thing, cost)
         if noted is None:
             return DONE
-        self.ledger.fail(number, _line(noted))
-        return FAILED
+        if noted is not thing and _is_full(noted):
+            return FULL
+        if (error := _tried(self.ledger.fail, number, _line(noted))) is None:
+            return FAILED
+        if _is_full(error):
+            return FULL
+        raise error
 
     def _record(self, number: int, thing: Any, made: "_Cost") -> None:
         with _measured() as cost:
@@ -211,6 +217,14 @@ def _tried(function: Callable[..., Any], *given: Any) -> Any:
         raise
     except BaseException as error:
         return error
+
+
+def _is_full(error: BaseException | None) -> bool:
+    """Whether an error is of a disk without room."""
+    if error is None:
+        return False
+    own = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+    return own or _is_full(error.__cause__)
 
 
 def peak() -> int:
