@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+import tomllib
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from lumigraph.core.warp import Warp
 from lumigraph.errors import FormatError
 from lumigraph.io import calibration
 from lumigraph.io.calibration import load_calibration, save_calibration
+from lumigraph.io.numerals import listed
 
 
 def full(rng):
@@ -61,6 +63,20 @@ def test_many_lenslets_are_read_by_numpy_as_tomllib_reads_them(
     assert set(calibration._taken(path.read_text())[1]) == names - left
     monkeypatch.setattr(calibration, "_taken", lambda text: (text, {}))
     same(found, load_calibration(path))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        [0.0, 1e-6, -1e-6, 999999999.999999, -10.0], [1 / 3, 2.0], [1e12, 1e-300], [3.0], [-12345.678901],
+        [[1, -20], [-300, 4]], [[0.5, -123.25], [1e-6, 99999.0]], [[1 / 3, 2.0]], [],
+    ],
+)  # fmt: skip
+def test_numbers_written_fast_are_read_as_they_were(values):
+    """Those of at most six decimals are written without Python, others by it."""
+    text = listed(np.array(values))
+    assert tomllib.loads(f"numbers = {text}")["numbers"] == values
+    assert text.count("\n") == (len(values) + 1 if np.ndim(values) == 2 else 0)
 
 
 @pytest.mark.parametrize("number", ["1..2", "1 2", "1, 2, 3", "one", "0_"])

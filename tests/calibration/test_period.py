@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from lumigraph.calibration import calibrate
 from lumigraph.calibration.period import Request, Vectors, _best, _Candidate
 from lumigraph.calibration.spectrum import Gaps
 from lumigraph.core.lattice import Lattice
@@ -20,6 +21,16 @@ def drawn(lattice, every_second):
     i, j = lattice.index(y, x)
     light = np.where((i + j) % 2 == 1, every_second, 1.0)
     return light * (np.hypot(*lattice.offset(y, x)) < 0.4 * lattice.pitch)
+
+
+@pytest.mark.parametrize(("size", "other"), [(500, 16.0), (800, 32.0)])
+def test_beats_of_sharp_edges_with_the_pixels_are_no_lattice(size, other):
+    """6.4 px repeat on whole pixels after 32 px: noiseless discs beat with them after 16 px, or 32."""
+    lattice = Lattice.square(6.4)
+    away = np.hypot(*lattice.offset(np.arange(float(size))[:, None], np.arange(float(size))))
+    noise = 0.01 * np.random.default_rng(0).standard_normal((size, size))
+    found = calibrate(1e4 * (np.clip(0.95 * 3.2 - away + 0.5, 0, 1) + noise) + 1500)
+    assert found.lattice.pitch == pytest.approx(6.4, rel=1e-3), f"not {other} px"
 
 
 TRUE = Lattice.square(12.3, 0.02, (5.0, 6.0))

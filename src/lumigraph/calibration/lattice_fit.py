@@ -18,6 +18,8 @@ from lumigraph.core.lattice import Layout
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 
+_DECIMALS = 6  # of a px, and of full light: what is beyond is a thousandth of what can be measured
+
 
 def calibrate(
     white: RawImage | Array | Sequence[RawImage | Array],
@@ -89,9 +91,10 @@ def calibrate(
     rms = float(np.sqrt(((spots.centers - model.position(spots.indices)) ** 2).sum(-1).mean()))
     bright = max(float(np.percentile(spots.light, 95)), 1e-30)
     return Calibration(
-        found.fitted.lattice, shape, spots.indices, spots.centers, rms if found.measured else math.nan,
+        found.fitted.lattice, shape, spots.indices, np.round(spots.centers, _DECIMALS),
+        rms if found.measured else math.nan,
         pixel_pitch if pixel_pitch is not None else first.pixel_pitch, separation, lenslet_distance,
-        warp=found.fitted.warp, light=spots.light / bright, fill=found.fill,
+        warp=found.fitted.warp, light=np.round(spots.light / bright, _DECIMALS), fill=found.fill,
         missing=unlit(original, model, spots.centers, white=found.white), sharpness=found.sharpness,
         notes=(*found.notes, *_overexposed(first, model, spots.indices)),
     )  # fmt: skip

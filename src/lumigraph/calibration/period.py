@@ -114,8 +114,8 @@ def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
     found = _distinct([v for v in found if v is not None and request.near(v)], _NEAR)
     if not found:
         raise CalibrationError(_nothing(pairs, repeats[int(np.argmax(tops))]))
-    ranked = _ranked(spectra, found)
     gaps, light = Gaps(middles[1]), Gaps(_middle(features[0], _FOLDED))
+    ranked = _ranked(spectra, _without_beats(found, (light, gaps)))
     chosen: list[Vectors] = []
     for candidate in ranked:
         if len(chosen) == _LOOKED_AT or candidate.score < 0.5 * ranked[0].score:
@@ -344,6 +344,24 @@ def _best(
             f"a {_told(best.vectors)} and a {_told(others[0].vectors)}. Pass pitch=, layout= or rotation=."
         )
     return best.vectors
+
+
+def _without_beats(found: list[Vectors], pictures: tuple[Gaps, ...]) -> list[Vectors]:
+    """Lattices but those that are beats of a finer one with the pixels: where edges are sharp, they have
+    many lines, but faint ones. Those that repeat after few of the finer one's cells are left to `_finest`.
+    """
+    fine = [one for one in found if _pitch(one) < _ALIASED]
+    return [v for v in found if not any(_beats(pictures, v, one) for one in fine)]
+
+
+def _beats(pictures: tuple[Gaps, ...], vectors: Vectors, finer: Vectors) -> bool:
+    """Whether a candidate is coarser than another, and faint beside it, and no few of its cells in one."""
+    if _area(vectors) < 1.05 * _area(finer) or not all(_faint(one, vectors, finer) for one in pictures):
+        return False
+    steps = np.linalg.solve(
+        np.stack([finer.row, finer.column], -1), np.stack([vectors.row, vectors.column], -1)
+    )
+    return bool(np.abs(steps - np.rint(steps)).max() > _AROUND or abs(np.linalg.det(steps)) > _COARSEST + 0.5)
 
 
 def _faint(picture: Gaps, vectors: Vectors, best: Vectors) -> bool:

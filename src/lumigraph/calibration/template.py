@@ -11,6 +11,7 @@ from lumigraph.core.calibration import Calibration
 _SAMPLES = 8  # pixels that fall into one cell of the mean micro-image at least
 _CHUNK = 1 << 18  # pixels at a time: as many as a processor's cache holds
 _RIDGE = 1e-4
+_PHASES = 64  # of a pixel: on whole ones stand many micro-images of a picture, before they are shifted
 _FINE = 768  # samples of the mean micro-image that the nearest is taken of
 
 
@@ -30,18 +31,13 @@ def sharpened(picture: np.ndarray, spots: Spots, model: Calibration) -> Spots:
     model
         Lattice through them.
     """
-    mean = mean_cell(picture, model, symmetric=True)
-    centers = spots.centers.copy()
-    pitch = model.lattice.pitch
-    reach = math.ceil(pitch * (0.5 if model.lattice.layout == "square" else 0.56))
-    step = max(1, _CHUNK // (2 * reach + 1) ** 2)
-    around, tables = windows(picture, (reach, reach)), _tables(mean, model)
-    for k in range(0, len(centers), step):
-        part = slice(k, k + step)
-        start = model.position(spots.indices[part])
-        most = max(0.5, 0.01 * pitch)
-        centers[part] = start + np.clip(_moves(around, tables, model, start), -most, most)
-    good = np.hypot(*(centers - spots.centers).T) < max(0.75, 0.05 * pitch)
+    tables = _tables(mean_cell(picture, model, symmetric=True), model)
+    start = model.position(spots.indices)
+    if len(start) > _PHASES**2:
+        start = np.rint(start * _PHASES) / _PHASES
+    most = max(0.5, 0.01 * model.lattice.pitch)
+    centers = start + np.clip(_moves(picture, tables, model, start), -most, most)
+    good = np.hypot(*(centers - spots.centers).T) < max(0.75, 0.05 * model.lattice.pitch)
     return spots._replace(centers=np.where(good[:, None], centers, spots.centers))
 
 
@@ -81,36 +77,74 @@ def _tables(mean: np.ndarray, model: Calibration) -> np.ndarray:
     return np.stack([*tables, np.zeros_like(tables[0])], -1)
 
 
-def _moves(around: np.ndarray, tables: np.ndarray, model: Calibration, centers: np.ndarray) -> np.ndarray:
-    """Shifts (k, 2) [px] of micro-images from where they are thought to be."""
-    inverse, shape = np.linalg.inv(model.lattice.matrix), np.array(around.shape[:2])
-    first, reach = np.rint(centers).astype(np.int64), around.shape[2] // 2
-    steps, fine = np.arange(-reach, reach + 1), math.isqrt(len(tables))
-    rows, columns = first[:, :1] + steps, first[:, 1:] + steps
-    values = around[tuple(np.clip(first, 0, shape - 1).T)]
-    dy = (rows - centers[:, :1])[:, :, None].astype(np.float32)
-    dx = (columns - centers[:, 1:])[:, None, :].astype(np.float32)
+def _moves(picture: np.ndarray, tables: np.ndarray, model: Calibration, centers: np.ndarray) -> np.ndarray:
+    """Shifts (k, 2) [px] of micro-images from where they are thought to be.
+
+    Those that lie alike between the pixels share the rows that make brightness and shifts of their pixels.
+    """
+    first, reach = np.rint(centers).astype(np.int64), _reach(model)
+    clear = np.clip(np.concatenate([first, np.array(picture.shape) - 1 - first], -1), 0, reach)
+    one, order, ends = _alike(np.concatenate([centers - first, clear], -1))
+    around, found = windows(picture, (reach, reach)), np.zeros((len(centers), 3))
+    step, begin = max(1, _CHUNK // (2 * reach + 1) ** 2), 0
+    for k in range(0, len(one), step):
+        these = one[k : k + step]
+        rows = _rows(tables, model, (centers - first)[these], clear[these])
+        for row, end in zip(rows, ends[k : k + step], strict=True):
+            group = order[begin:end]
+            found[group] = around[tuple(first[group].T)].reshape(len(group), -1) @ row.T
+            begin = end
+    bright = found[:, :1]
+    return np.where(bright > 0, found[:, 1:] / np.maximum(bright, 1e-9), 0)
+
+
+def _alike(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """One of each group of like rows (k, n), the rows by groups, and where each group ends."""
+    order = np.lexsort(rows.T)
+    starts = np.flatnonzero((np.diff(rows[order], axis=0, prepend=np.nan) != 0).any(-1))
+    return order[starts], order, np.append(starts[1:], len(rows))
+
+
+def _reach(model: Calibration) -> int:
+    """Pixels around a centre that hold its micro-image."""
+    return math.ceil(model.lattice.pitch * (0.5 if model.lattice.layout == "square" else 0.56))
+
+
+def _rows(tables: np.ndarray, model: Calibration, away: np.ndarray, clear: np.ndarray) -> np.ndarray:
+    """Rows (k, 3, n) that make brightness and brightness times shift (y, x) of the n pixels around a centre.
+
+    Parameters
+    ----------
+    tables
+        Of the mean micro-image.
+    model
+        Lattice.
+    away
+        Centres (k, 2) from the middle pixel [px].
+    clear
+        How many pixels there are above, left, below and right (k, 4).
+    """
+    inverse, reach, fine = np.linalg.inv(model.lattice.matrix), _reach(model), math.isqrt(len(tables))
+    steps = np.arange(-reach, reach + 1)
+    dy = (steps - away[:, :1])[:, :, None].astype(np.float32)
+    dx = (steps - away[:, 1:])[:, None, :].astype(np.float32)
     u, v = (np.float32(inverse[k, 0]) * dy + np.float32(inverse[k, 1]) * dx for k in (0, 1))
-    inside = (np.abs(u) < 0.62) & (np.abs(v) < 0.62)
-    if ((first < reach) | (first >= shape - reach)).any():
-        inside &= ((rows >= 0) & (rows < shape[0]))[:, :, None]
-        inside &= ((columns >= 0) & (columns < shape[1]))[:, None, :]
+    there = [(steps >= -clear[:, k : k + 1]) & (steps <= clear[:, k + 2 : k + 3]) for k in (0, 1)]
+    inside = (np.abs(u) < 0.62) & (np.abs(v) < 0.62) & there[0][:, :, None] & there[1][:, None, :]
     at = [np.rint(w * np.float32(fine)).astype(np.int32) % fine for w in (u, v)]
     place = at[0] * fine + at[1]
     looked = tables.view(np.complex128).ravel().take(place.ravel()).view(np.float32).reshape(*u.shape, 4)
-    terms = np.empty((len(centers), 5, *u.shape[1:]), np.float32)
+    terms = np.empty((len(away), 5, *u.shape[1:]), np.float32)
     for column, k in enumerate((0, 3, 4)):
         np.multiply(looked[..., column], inside, out=terms[:, k])
     np.multiply(terms[:, 0], dy / np.float32(reach), out=terms[:, 1])
     np.multiply(terms[:, 0], dx / np.float32(reach), out=terms[:, 2])
-    flat = terms.reshape(len(centers), 5, -1)
+    flat = terms.reshape(len(away), 5, -1)
     normal = (flat @ flat.transpose(0, 2, 1)).astype(float)
     scale = np.sqrt(np.maximum(np.einsum("kii->ki", normal), 1e-12))
     normal = normal / (scale[:, :, None] * scale[:, None, :]) + _RIDGE * np.eye(5)
-    right = (flat @ (values * inside).reshape(len(centers), -1, 1))[..., 0] / scale
-    weights = np.linalg.solve(normal, right[..., None])[..., 0] / scale
-    bright = weights[:, 0]
-    return np.where(bright[:, None] > 0, weights[:, 3:] / np.maximum(bright, 1e-9)[:, None], 0)
+    wanted = np.linalg.inv(normal)[:, [0, 3, 4]] / (scale[:, [0, 3, 4], None] * scale[:, None])
+    return wanted.astype(np.float32) @ flat
 
 
 def _refined(table: np.ndarray, fine: int) -> np.ndarray:

@@ -16,6 +16,7 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.core.warp import Warp
 from lumigraph.errors import FormatError, LumigraphError
 from lumigraph.io import source, target
+from lumigraph.io.numerals import listed
 from lumigraph.units import parse
 
 KIND = "calibration"
@@ -54,12 +55,12 @@ def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> 
         f"basis = [{_row(lattice.basis[0])}, {_row(lattice.basis[1])}]",
         "",
         "[lenslets]  # one row each: the index (i, j) and the measured centre (y, x)",
-        f"indices = [{_rows(to_numpy(calibration.indices))}]",
-        f"centers = [{_rows(to_numpy(calibration.centers))}]",
+        f"indices = {listed(to_numpy(calibration.indices))}",
+        f"centers = {listed(to_numpy(calibration.centers))}",
         f"missing = {to_numpy(calibration.missing).tolist()}  # indices of those not found",
     ]
     if calibration.light is not None:
-        lines.append(f"light = {_row(calibration.light)}")
+        lines.append(f"light = {listed(to_numpy(calibration.light))}")
     if calibration.warp is not None:
         lines += ["", *_warp_lines(calibration.warp)]
     target.write_bytes(path, ("\n".join(lines) + "\n").encode())
@@ -256,7 +257,3 @@ def _numbers(found: dict[str, Any], name: str, shape: tuple[int, ...]) -> np.nda
 
 def _row(values: Any) -> str:
     return f"[{', '.join(repr(value) for value in np.asarray(values).tolist())}]"
-
-
-def _rows(values: np.ndarray) -> str:
-    return "".join(f"\n  {_row(row)}," for row in values) + ("\n" if len(values) else "")
