@@ -100,5 +100,6 @@ def parse(text: str | float, dimension: str = "length") -> float:
         raise FormatError(f"{text!r} has an unknown unit {unit!r}. {hint}")
     known, size = _UNITS[unit]
     if known != dimension:
-        raise FormatError(f"{text!r} is not a {dimension}. {hint}")
+        article = "an" if dimension[0] in "aeiou" else "a"
+        raise FormatError(f"{text!r} is not {article} {dimension}. {hint}")
     return float(Decimal(match[1]) * Decimal(repr(size)))  # 200 * 1e-6 is not 2e-4

@@ -228,6 +228,9 @@ def test_a_camera_whose_point_is_seen_by_one_lenslet_alone_cannot_be_read(camera
         ({"lenslets.each.decentre": "±1 %"}, "is 0, and ±1 % of it is nothing"),
         ({"lenslets.each.decentre": "±1 um uniform"}, "lenslets differ normally"),
         ({"lenslets.each.decenter": "±1 um"}, "Did you mean 'lenslets.each.decentre'"),
+        ({"lenslets.each.tilt": "±1 mm"}, "tolerance of lenslets.each.tilt: '1 mm' is not an angle"),
+        ({"lenslets.each.form": "±1 %"}, "is 0, and ±1 % of it is nothing"),
+        ({"lenslets.each.form": "±1 mm"}, "form is 0.0005 m but must be from 0 to 1e-05 m"),
         ({"lenslets.each.focal_length": "±50 %"}, "must be from 0 to 0.2"),
     ],
 )

@@ -19,6 +19,8 @@ MOST_MISSING = 0.99
 MOST = {"focal_length": 0.2, "decentre": 1.0, "missing": MOST_MISSING, "turn": 0.05, "form": 10e-6}
 """By name, in SI."""
 
+UNITS = {"decentre": " m", "turn": " rad (of light, n - 1 times the tilt)", "form": " m"}
+
 
 class Warp(NamedTuple):
     """What paths through lenslets have besides focus and vertex: angles [rad] and terms [m].
@@ -71,8 +73,10 @@ class Scatter:
         checks.whole("seed", self.seed, 0)
         for name, most in MOST.items():
             if not 0 <= checks.finite(name, getattr(self, name)) <= most:
+                unit = UNITS.get(name, "")
                 raise GeometryError(
-                    f"the scatter's {name} is {getattr(self, name):g} but must be from 0 to {most:g}."
+                    f"the scatter's {name} is {getattr(self, name):g}{unit} but must be from 0 to "
+                    f"{most:g}{unit}. Check the unit, or give less."
                 )
 
     def of(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -123,7 +123,10 @@ class Tolerance:
             return cls(name, _number(name, half[:-1]) / 100, True, shape)
         if dimension == "number":
             return cls(name, _number(name, half), False, shape)
-        return cls(name, units.parse(half, dimension), False, shape)
+        try:
+            return cls(name, units.parse(half, dimension), False, shape)
+        except FormatError as error:
+            raise FormatError(f"the tolerance of {name}: {error}") from None
 
     @property
     def unit(self) -> str:
