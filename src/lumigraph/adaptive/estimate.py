@@ -32,6 +32,9 @@ TERMS = tuple(range(5, 16))
 ACCURACY = 3e-2
 """Of points' images: their errors are not alike from bead to bead, and less than noise."""
 
+COARSE = 0.1
+"""Accuracy of their derivatives."""
+
 SAMPLES = 3
 """Of the volume in which beads are looked for, along a lenslet."""
 
@@ -147,7 +150,7 @@ def estimate(
     covariance = covariance_of(model, around)[-fit.coefficients.size :, -fit.coefficients.size :]
     free = worth(covariance, fit.coefficients, model.counted)
     if not free.all():
-        fit = model.improved(replace(fit, coefficients=fit.coefficients * free), free, STEPS["all"])
+        fit = model.improved(fit.changed(coefficients=fit.coefficients * free), free, STEPS["all"])
         around = model.around(fit)
     warn_of_misfit(around.pearson, f"{len(fit.points.intensities)} beads leave")
     shape = (len(model.nodes.y), len(model.nodes.x), len(given.terms))
@@ -217,7 +220,8 @@ class _Given:
             for end, side in ((np.min, -1), (np.max, 1))
         )
         nodes = Nodes.of(grid, regions, len(self.terms))
-        return Model(images, self.problem, nodes, (low, high), progress)
+        coarse = replace(images, accuracy=COARSE)
+        return Model(images, self.problem, nodes, (low, high), progress, coarse=coarse)
 
     def beads(self, shown: np.ndarray | None = None) -> Points:
         """Beads by Richardson-Lucy; of what is brighter than `shown` where that is given."""
@@ -255,7 +259,7 @@ def _fitted(given: _Given, model: Model, fit: Fit, free: np.ndarray) -> tuple[Fi
         if more is None:
             return fit, done
         both = Points(*(np.concatenate(two) for two in zip(_parts(fit.points), _parts(more), strict=True)))
-        longer = _without_faint(model, model.improved(replace(fit, points=both), free, STEPS["all"]), free)
+        longer = _without_faint(model, model.improved(fit.changed(points=both), free, STEPS["all"]), free)
         unknowns = OWN * (len(longer.points.intensities) - len(fit.points.intensities))
         if fit.objective - longer.objective < max(unknowns, 1) * math.log(model.counted):
             return fit, done
@@ -277,7 +281,7 @@ def _without_faint(model: Model, fit: Fit, free: np.ndarray) -> Fit:
     if not kept.any():
         raise GeometryError("no bead stands out of the noise. Give a raw image with more light, or of beads.")
     points = Points(fit.points.positions[kept], fit.points.intensities[kept])
-    return model.improved(replace(fit, points=points), free, STEPS["all"])
+    return model.improved(fit.changed(points=points), free, STEPS["all"])
 
 
 def covariance_of(model: Model, around: Around) -> np.ndarray:

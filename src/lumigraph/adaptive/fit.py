@@ -8,7 +8,7 @@ and the logarithm of its light, then the coefficients at each node of the field.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -31,6 +31,9 @@ TRIES = 5
 
 GAIN = 0.5
 """Log-likelihood that a step must gain for another one to follow."""
+
+SHORT = 1.2
+"""Gain over the promised one above which a step was too short, as along a curved valley."""
 
 USUAL = 10
 """Steps after which progress is said to be half: how many there will be is not known."""
@@ -75,12 +78,22 @@ class Fit:
         What is minimised: deviance of all pixels [electrons] and the prior's.
     steps
         Taken so far.
+    light
+        On the pixels (ny, nx); None before the fit is judged.
+    around
+        The model around it, where it is known.
     """
 
     points: Points
     coefficients: np.ndarray
     objective: float = np.inf
     steps: int = 0
+    light: np.ndarray | None = None
+    around: "Around | None" = None
+
+    def changed(self, **changes: Any) -> "Fit":
+        """With other points or coefficients, not judged yet."""
+        return replace(self, objective=np.inf, light=None, around=None, **changes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,6 +133,9 @@ class Model:
         Of the fit's steps.
     longest
         Steps: see `LONGEST`.
+    coarse
+        Images whose derivatives show the way; None for `images`. What they get wrong meets only noise at the
+        end, so that it costs no more of a fit's precision than its own square.
     """
 
     images: Images
@@ -128,6 +144,7 @@ class Model:
     limits: tuple[np.ndarray, np.ndarray]
     progress: Progress = silent
     longest: tuple[float, ...] = LONGEST
+    coarse: Images | None = None
 
     @property
     def weights(self) -> np.ndarray:
@@ -158,8 +175,9 @@ class Model:
 
     def judged(self, fit: Fit) -> Fit:
         """The fit with its objective."""
-        deviance = self.problem.deviance(self.expected(self.light(fit))) * self.counted
-        return replace(fit, objective=deviance + self._prior(fit))
+        light = self.light(fit) if fit.light is None else fit.light
+        deviance = self.problem.deviance(self.expected(light)) * self.counted
+        return replace(fit, objective=deviance + self._prior(fit), light=light)
 
     def deviance(self, fit: Fit) -> float:
         """Poisson deviance per pixel that counts of a fit that was judged."""
@@ -171,6 +189,8 @@ class Model:
 
     def around(self, fit: Fit) -> Around:
         """Information and slope at a fit."""
+        if fit.around is not None:
+            return fit.around
         points = fit.points
         basis = self.nodes.at(points)
         c, count = basis @ fit.coefficients, len(points.intensities) * OWN
@@ -181,7 +201,7 @@ class Model:
             columns[p * OWN :][:OWN] = placed[:OWN]
             for node in np.flatnonzero(basis[p]):
                 by_node[node] += basis[p, node] * placed[OWN:]
-        shown = self.expected(columns[PLACES:count:OWN].sum(0, dtype=np.float64))
+        shown = self.expected(self.light(fit) if fit.light is None else fit.light)
         if self.problem.scale.response is not None:
             columns *= arrays.to_numpy(self.problem.scale.response).astype(np.float32)
         data, weights = arrays.to_numpy(self.problem.data), self.weights
@@ -193,10 +213,10 @@ class Model:
 
     def _columns(self, point: Points, c: np.ndarray) -> np.ndarray:
         """Changes (OWN + terms, ny, nx) by a bead's place and light, and by its coefficients."""
-        lit = next(iter(self.images.lit(point, c)))
-        n = len(c)
+        images = self.images if self.coarse is None else self.coarse
+        lit, n = next(iter(images.lit(point, c))), len(c)
         own = np.concatenate([lit.changes[n:], lit.image[None], lit.changes[:n]]) * point.intensities[0]
-        return np.stack([self.images.placed(self.images.whole(one, lit.cell)) for one in own])
+        return np.stack([images.placed(images.whole(one, lit.cell)) for one in own])
 
     def improved(self, fit: Fit, free: np.ndarray, steps: int) -> Fit:
         """The fit after at most some steps, with those coefficients free that are marked (terms,)."""
@@ -204,18 +224,31 @@ class Model:
         for _ in range(steps):
             around, found = self.around(fit), None
             for _ in range(TRIES):
-                tried = self.judged(self._moved(fit, self._step(around, fit, free, damping)))
+                step = self._step(around, fit, free, damping)
+                tried = self.judged(self._moved(fit, step))
                 if tried.objective < fit.objective:
-                    found, damping = replace(tried, steps=fit.steps + 1), max(damping / 10, 1e-7)
+                    found = tried
+                    if fit.objective - tried.objective > SHORT * 2 * _promised(around, step):
+                        found = self._farther(fit, step, tried)
+                    damping = max(damping / 10, 1e-7)
                     break
                 damping *= 10
             if found is None:
-                return fit
-            gained, fit = (fit.objective - found.objective) / 2, found
+                return replace(fit, around=around)
+            gained, fit = (fit.objective - found.objective) / 2, replace(found, steps=fit.steps + 1)
             stepped(self.progress, fit.steps)
             if gained < GAIN:
                 return fit
         return fit
+
+    def _farther(self, fit: Fit, step: np.ndarray, found: Fit) -> Fit:
+        """The best along a step that is doubled as long as the fit gets likelier."""
+        while True:
+            step = 2 * step
+            tried = self.judged(self._moved(fit, step))
+            if not tried.objective < found.objective:
+                return found
+            found = tried
 
     def _step(self, around: Around, fit: Fit, free: np.ndarray, damping: float) -> np.ndarray:
         c = fit.coefficients
@@ -226,8 +259,11 @@ class Model:
         used = np.append(np.ones(first, bool), np.tile(free, len(c)))
         step = np.zeros(n)
         step[used] = solved((around.information + prior)[np.ix_(used, used)], slope[used], damping)
-        longest = np.append(np.tile(self.longest[:OWN], first // OWN), np.full(c.size, self.longest[OWN]))
-        return step / max(1.0, float(np.max(np.abs(step) / longest)))
+        own = step[:first].reshape(-1, OWN)  # a view, as the next
+        own /= np.maximum(1, np.max(np.abs(own) / self.longest[:OWN], axis=1, keepdims=True))
+        shared = step[first:]
+        shared /= max(1.0, float(np.max(np.abs(shared), initial=0)) / self.longest[OWN])
+        return step
 
     def _moved(self, fit: Fit, step: np.ndarray) -> Fit:
         count = len(fit.points.intensities)
@@ -235,7 +271,7 @@ class Model:
         places = np.clip(fit.points.positions + own[:, :PLACES], *self.limits)
         points = Points(places, fit.points.intensities * np.exp(own[:, PLACES]))
         change = step[OWN * count :].reshape(fit.coefficients.shape)
-        return replace(fit, points=points, coefficients=fit.coefficients + change)
+        return fit.changed(points=points, coefficients=fit.coefficients + change)
 
 
 def solved(matrix: np.ndarray, right: np.ndarray, damping: float = 0.0) -> np.ndarray:
@@ -245,6 +281,11 @@ def solved(matrix: np.ndarray, right: np.ndarray, damping: float = 0.0) -> np.nd
     right = right / (scale if right.ndim == 1 else scale[:, None])
     found = np.linalg.solve(whole, right)
     return found / (scale if right.ndim == 1 else scale[:, None])
+
+
+def _promised(around: Around, step: np.ndarray) -> float:
+    """Log-likelihood that a step gains if derivatives stay as they are."""
+    return float(around.slope @ step - step @ around.information @ step / 2)
 
 
 def _one(points: Points, p: int) -> Points:

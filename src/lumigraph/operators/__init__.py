@@ -17,8 +17,8 @@
   `microscope_kernels`, images of its points; `microscope_rays`, the same by rays; `microscope_spectrum`, the
   lenslets' frequencies; `microscope_transforms`, to those and back; `microscope_patterns`, what they follow
   of a cell's points; `microscope_sensor`, from those to pixels;
-  `microscope_pupil`, points by the pupil's phase; `microscope_pixels`, real pixels; `microscope_samples`, how
-  many samples they need; `fourier_microscope`;
+  `microscope_pupil`, points by the pupil's phase; `microscope_pupil_waves`, its waves behind lenslets;
+  `microscope_pixels`, real pixels; `microscope_samples`, how many samples they need; `fourier_microscope`;
   `fourier_points`, its points with derivatives
 - `exact`: lenslets and distances beyond the paraxial; `paraxial`, how far off that is
 - `varying`: main lenses whose aberrations change over the field; `let`, the share of each sample; `mirrors`,

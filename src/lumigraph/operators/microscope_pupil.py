@@ -13,7 +13,6 @@ d|U|² = 2 Re(U* dU). Moving a point changes the phase as well, so that its plac
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
@@ -23,100 +22,18 @@ from lumigraph.elements.disc import disc, nodes_for
 from lumigraph.elements.objective import Objective
 from lumigraph.elements.zernike import noll_to_nm, zernike
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators.microscope_bench import fineness, guard, responses
+from lumigraph.operators.microscope_bench import fineness, guard
 from lumigraph.operators.microscope_building import Layout
-from lumigraph.operators.microscope_cell import CellSampling, Lenslet
+from lumigraph.operators.microscope_cell import Lenslet
 from lumigraph.operators.microscope_kernels import Demand, margin_of, reach_of
-from lumigraph.operators.microscope_waves import bloch, centred, over_cells
+from lumigraph.operators.microscope_pupil_waves import Waves, waves_of
 from lumigraph.scene import Points
 
-BLOCK = 2**22
+BLOCK = 2**21
 """Numbers of fields that are held at a time."""
 
 PLACES = 3
 """Derivatives by a point's place: y, x, dz."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Waves:
-    """What the plane waves of a pupil become behind the lenslets of a window, and how it is sampled.
-
-    Parameters
-    ----------
-    q
-        Of the nodes (rows, nodes), along y and x.
-    area
-        (rows, nodes).
-    down, across
-        Bloch waves (samples, rows) and (rows, nodes, samples).
-    sampled
-        From the fine grid to samples of the image (count, samples), along an axis.
-    """
-
-    q: tuple[np.ndarray, np.ndarray]
-    area: np.ndarray
-    down: np.ndarray
-    across: np.ndarray
-    sampled: np.ndarray
-
-    @property
-    def nbytes(self) -> int:
-        """Of all arrays."""
-        return self.down.nbytes + self.across.nbytes + self.sampled.nbytes + 3 * self.area.nbytes
-
-    def fields(self, pupils: np.ndarray) -> np.ndarray:
-        """On the fine grid (k, n, n), of pupils (k, rows, nodes)."""
-        rows = pupils.transpose(1, 0, 2) @ self.across
-        return self.down @ rows.transpose(1, 0, 2)
-
-    def back(self, fields: np.ndarray) -> np.ndarray:
-        """Conjugate transpose of `fields`."""
-        rows = self.down.T @ fields.conj()  # the waves are large: not they are conjugated
-        return (rows.transpose(1, 0, 2) @ self.across.transpose(0, 2, 1)).transpose(1, 0, 2).conj()
-
-    def samples(self, light: np.ndarray) -> np.ndarray:
-        """Of intensities (..., n, n) on the fine grid: (..., count, count)."""
-        return self.sampled @ light @ self.sampled.T
-
-    def spread(self, samples: np.ndarray) -> np.ndarray:
-        """Transpose of `samples`."""
-        return self.sampled.T @ samples @ self.sampled
-
-
-@remembered
-def _waves(
-    objective: Objective, lenslet: Lenslet, sampling: CellSampling, told: tuple[int, int, int, str]
-) -> Waves:
-    """For (cells, samples of the light along a lenslet, nodes along a diameter, precision) of a window."""
-    cells, fine, count, dtype = told
-    qy, qx, area = disc(count, count)
-    steepest = objective.numerical_aperture / lenslet.magnification / objective.wavelength * lenslet.pitch
-    finest = math.floor(fine / 2 - steepest)
-
-    def waves(q: np.ndarray) -> np.ndarray:
-        turns = q * (lenslet.pitch / (objective.wavelength * lenslet.magnification))
-        behind = bloch(lenslet, objective.wavelength, turns, finest, centred(fine))
-        return over_cells(behind.astype(dtype), turns, cells)
-
-    a = objective.aperture
-    across = np.stack([waves(row) for row in a * qx])
-    places = np.broadcast_to(a * qy, qx.shape), a * qx
-    return Waves(
-        (places[0], places[1]), area * a**2, np.ascontiguousarray(waves(a * qy[:, 0]).T), across,
-        _sampling(cells, fine, sampling).astype(np.real(across).dtype),
-    )  # fmt: skip
-
-
-@lru_cache(maxsize=8)
-def _sampling(cells: int, fine: int, sampling: CellSampling) -> np.ndarray:
-    """Matrix (cells N, cells fine) of what samples make of light; dark beyond the window."""
-    wide = cells + 2
-    n, count = wide * fine, wide * sampling.pixels
-    spectrum = responses(n, fine, sampling)[0][:, None] * np.fft.fft(np.eye(n), axis=0)
-    folded = np.zeros((count, n), np.complex128)
-    np.add.at(folded, np.rint(np.fft.fftfreq(n) * n).astype(int) % count, spectrum)
-    whole = np.fft.ifft(folded, axis=0).real * (count / n)
-    return whole[sampling.pixels : -sampling.pixels, fine:-fine]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -260,7 +177,8 @@ class PupilImages:
     ) -> Iterator[tuple[float, Lit]]:
         found: list[Lit | None] = [None] * len(points.intensities)
         for waves, pupil, phases, numbers in self._groups(points, coefficients):
-            combined = np.tensordot(directions, phases, 1) if directions.size else phases[:0]
+            along = directions.astype(phases.dtype)
+            combined = np.tensordot(along, phases, 1) if directions.size else phases[:0]
             for p in numbers:
                 place, cell = self._place(points.positions[p])
                 one = self._one(waves, _moved(pupil, phases, place), combined)
@@ -274,14 +192,14 @@ class PupilImages:
     def _one(self, waves: Waves, pupil: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Image of a pupil (modes, rows, nodes) and its derivatives by phases (k, rows, nodes)."""
         fields = waves.fields(pupil)
-        image = waves.samples(np.square(np.abs(fields)).sum(0))
+        image = waves.samples(np.sum([_crossed(field.copy(), field) for field in fields], axis=0))
         changes = np.zeros((len(phases), *image.shape), image.dtype)
         step = max(1, BLOCK // fields.size)
         for first in range(0, len(phases), step):
-            some = (1j * phases[first : first + step]).astype(pupil.dtype)
+            some = phases[first : first + step]
             for field, mode in zip(fields, pupil, strict=True):
-                moved = waves.fields(some * mode)
-                changes[first : first + step] += waves.samples(2 * (field.conj() * moved).real)
+                moved = waves.fields(some * (2j * mode).astype(mode.dtype))
+                changes[first : first + step] += waves.samples(_crossed(moved, field))
         return image, changes
 
     def _groups(
@@ -300,7 +218,7 @@ class PupilImages:
             for size, numbers in alike.items():
                 waves = self._waves(objective, *size)
                 pupil = bent.pupil(*waves.q, 0.0) * waves.area
-                yield waves, pupil.astype(waves.across.dtype), self._phases(objective, waves), numbers
+                yield waves, pupil.astype(waves.across.dtype), self._phases(objective, size), numbers
 
     def _size(self, objective: Objective, dz: float) -> tuple[int, int, int]:
         """Cells along a window, samples of the light along a lenslet, nodes along the pupil's diameter."""
@@ -313,23 +231,17 @@ class PupilImages:
 
     def _waves(self, objective: Objective, cells: int, fine: int, nodes: int) -> Waves:
         dtype = "complex128" if self.double else "complex64"
-        needed = (
-            np.dtype(dtype).itemsize
-            * 3.0
-            * (nodes**2 * cells * fine + 4 * objective.modes * (cells * fine) ** 2)
-        )
+        terms, fields = len(self.terms) + PLACES, objective.modes * (cells * fine) ** 2
+        needed = np.dtype(dtype).itemsize * ((12.0 + terms) * nodes**2 + 4.0 * (fields + BLOCK))
         what = f"the pupil's waves behind {cells} x {cells} lenslets"
         memory.require(needed, what, "Use points nearer to the focused plane.", SamplingError)
         plain = replace(objective, aberrations=())
-        return _waves(plain, self.lenslet, self.layout.sampling, (cells, fine, nodes, dtype))
+        return waves_of(plain, self.lenslet, self.layout.sampling, (cells, fine, nodes, dtype))
 
-    def _phases(self, objective: Objective, waves: Waves) -> np.ndarray:
+    def _phases(self, objective: Objective, size: tuple[int, int, int]) -> np.ndarray:
         """Phase [rad] per unit of each term, of y, x and dz (k, rows, nodes)."""
-        qy, qx = waves.q
-        rho, angle = np.hypot(qy, qx) / objective.numerical_aperture, np.arctan2(qy, qx)
-        k = 2 * np.pi / objective.wavelength
-        terms = [2 * np.pi * zernike(j, rho, angle) for j in self.terms]
-        return np.stack([*terms, -k * qy, -k * qx, k * objective.depth_path(qy, qx)])
+        plain = replace(objective, aberrations=())
+        return _phases(plain, size[2], self.terms, "float64" if self.double else "float32")
 
     @property
     def _unit(self) -> float:
@@ -370,6 +282,24 @@ class PupilImages:
             raise GeometryError(f"{name} have shape {found.shape} but there are {len(self.terms)} terms.")
         checks.finite_array(name, found, GeometryError)
         return found
+
+
+@remembered
+def _phases(objective: Objective, count: int, terms: tuple[int, ...], dtype: str) -> np.ndarray:
+    """Phase [rad] per unit of each term, of y, x and dz (k, rows, nodes)."""
+    y, x, _ = disc(count, count)
+    qy, qx = np.broadcast_to(objective.aperture * y, x.shape), objective.aperture * x
+    rho, angle = np.hypot(qy, qx) / objective.numerical_aperture, np.arctan2(qy, qx)
+    k = 2 * np.pi / objective.wavelength
+    own = [2 * np.pi * zernike(j, rho, angle) for j in terms]
+    return np.stack([*own, -k * qy, -k * qx, k * objective.depth_path(qy, qx)]).astype(dtype)
+
+
+def _crossed(fields: np.ndarray, field: np.ndarray) -> np.ndarray:
+    """Re(a* b) of fields a (..., y, x), which are used up, and a field b."""
+    numbers = fields.view(np.real(field).dtype)
+    numbers *= field.view(numbers.dtype)
+    return numbers[..., 0::2] + numbers[..., 1::2]
 
 
 def _moved(pupil: np.ndarray, phases: np.ndarray, place: np.ndarray) -> np.ndarray:
