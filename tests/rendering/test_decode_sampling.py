@@ -11,7 +11,7 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.core.raw import RawImage
 from lumigraph.core.warp import Warp
 from lumigraph.errors import CalibrationError, GeometryError, SamplingWarning
-from lumigraph.rendering import decode, hot_pixels, refocus
+from lumigraph.rendering import decode, hot_pixels, interpolate, refocus
 from lumigraph.rendering.kind_check import focused_shift
 
 NONE = np.zeros((0, 2))
@@ -200,3 +200,15 @@ def test_masks_and_images_of_other_sizes_are_refused():
         hot_pixels(raw, dark=np.ones((3, 3)))
     with pytest.raises(CalibrationError, match="sigmas is 0 but must be above 0"):
         hot_pixels(raw, sigmas=0)
+
+
+@pytest.mark.parametrize("tail", [(), (3,)])
+def test_many_positions_take_the_values_of_single_ones(rng, tail):
+    """They are taken in blocks, which is no business of theirs."""
+    image = rng.random((40, 50, *tail)).astype(np.float32)
+    y, x = rng.uniform(0, 39, (90, 1)), rng.uniform(0, 49, (1, 101))
+    together = interpolate.sample(image, y, x)
+    assert y.size * x.size > interpolate._BLOCK
+    one_by_one = np.stack([interpolate.sample(image, row, x[0]) for row in y])
+    np.testing.assert_array_equal(together, one_by_one)
+    assert together.dtype == np.float32

@@ -13,6 +13,7 @@ Interpolation = Literal["cubic", "linear", "band_limited"]
 INTERPOLATIONS = ("linear", "cubic", "band_limited")
 
 _LOBES = 3  # of the sinc, on either side
+_BLOCK = 1 << 13  # positions at a time: as many as a processor's cache holds
 
 Tap = tuple[int, np.ndarray]
 """Steps from the sample below a position, and the weight of the sample there."""
@@ -104,9 +105,22 @@ def sample(image: Array, y: np.ndarray, x: np.ndarray, interpolation: Interpolat
     """
     y, x = np.broadcast_arrays(y, x)
     xp, tail = namespace(image), tuple(image.shape[2:])
-    flat = xp.reshape(image, (image.shape[0] * image.shape[1], *tail))
+    flat, size = xp.reshape(image, (image.shape[0] * image.shape[1], *tail)), tuple(image.shape[:2])
+    if not isinstance(image, np.ndarray) or y.size <= _BLOCK:
+        return xp.reshape(_summed(flat, size, y, x, interpolation), (*y.shape, *tail))
+    y, x, shape = y.ravel(), x.ravel(), y.shape
+    result = np.empty((y.size, *tail), _summed(flat, size, y[:1], x[:1], interpolation).dtype)
+    for part in (slice(k, k + _BLOCK) for k in range(0, y.size, _BLOCK)):
+        result[part] = _summed(flat, size, y[part], x[part], interpolation)
+    return result.reshape(*shape, *tail)
+
+
+def _summed(
+    flat: Array, size: tuple[int, ...], y: np.ndarray, x: np.ndarray, interpolation: Interpolation
+) -> Array:
+    """Values (k[, c]) of a picture of a size, its pixels in one row, at k positions."""
     total = None
-    for index, weight in _combined(tuple(image.shape), y, x, interpolation):
-        term = weighted(take(flat, index, 0), weight, len(tail))
+    for index, weight in _combined(size, y, x, interpolation):
+        term = weighted(take(flat, index, 0), weight, len(flat.shape) - 1)
         total = term if total is None else total + term
-    return xp.reshape(total, (*y.shape, *tail))
+    return total
