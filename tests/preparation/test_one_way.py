@@ -172,3 +172,11 @@ def test_how_many_lenslets_are_left_out_is_always_said(bench):
     ready = lg.prepare(lg.open(bench / "raw.tiff"), replace(whole, missing=np.array([[0, 0], [2, 1]])))
     assert f"left out: 2 of {len(ready.lenslets.reasons)} lenslets" in ready.notes
     assert ready.calibration.misses(np.array([[0, 0], [1, 2], [2, 1]])).tolist() == [True, False, True]
+
+
+def test_a_raw_image_of_true_and_false_is_one_of_1_and_0(bench):
+    """Its range was the difference of two truths, which NumPy refuses."""
+    white = lg.open(bench / "white.tiff")
+    bright = lg.open(bench / "raw.tiff").data > white.data.mean()
+    views = [lg.decode(lg.prepare(one, calibrate(white))).data for one in (bright, bright.astype(np.uint8))]
+    np.testing.assert_array_equal(*views)

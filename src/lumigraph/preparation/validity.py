@@ -93,7 +93,7 @@ def _unread(values: np.ndarray, least: int) -> np.ndarray:
     picture = values if values.ndim == 2 else values.max(-1)
     dead = np.zeros(picture.shape, bool)
     for axis in (0, 1):
-        flat = np.ptp(picture, axis=1 - axis) == 0
+        flat = picture.max(1 - axis) == picture.min(1 - axis)
         if flat.all():
             continue
         rows = np.moveaxis(dead, axis, 0)
