@@ -126,6 +126,14 @@ def test_the_way_is_chosen_by_time_memory_and_symmetry(monkeypatch):
     assert not suits_frequencies(deep.kernels, cells, 0)
 
 
+def test_too_little_memory_is_no_reason_for_products_that_take_more(monkeypatch):
+    layout = Layout((15, 15), CellSampling(9, 8, 1 / 8))
+    deep = microscope_operator([SCOPE], LENSLET, layout, (-50e-6, 0.0, 40e-6), accuracy=2e-2)
+    monkeypatch.setattr("lumigraph.core.memory.available", lambda: 14 * 10**5)
+    assert suits_frequencies(deep.kernels, (15, 15), 0, deep.left_out)
+    assert deep.memory_bytes < dataclasses.replace(deep, by_frequency=False, _spectra={}).memory_bytes
+
+
 @pytest.mark.parametrize("depths", [DEPTHS, None])
 def test_objects_side_by_side_give_what_each_gives_and_no_bit_depends_on_the_others(depths, xp, rng):
     layout = Layout((6, 7), CellSampling(3, 8, 1 / 8))

@@ -324,14 +324,18 @@ def _norms(kernel: SliceKernel) -> tuple[float, float]:
 def suits_frequencies(
     kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int, left_out: float = 0.0
 ) -> bool:
-    """Whether the way through the lenslets' frequencies is faster, and its matrices leave memory free."""
+    """Whether the way through the lenslets' frequencies is faster, and its matrices leave memory free.
+
+    Or take less than those of all offsets, which then would only be worse.
+    """
     if not all(kernel.symmetric for kernel in kernels):
         return False
     points = patterns(kernels, left_out)
     counts = _counts(points, pixel_patterns(kernels, left_out, points))
     told, free = microscope_spectrum.tiling(kernels, cells, margin, counts), memory.available()
     needed = 4.0 * microscope_spectrum.matrix_numbers(told, *counts)
-    fits = free is None or needed < free * SHARE
+    offsets = 4.0 * sum(len(one.offsets) * one.sampling.classes * one.sampling.pixels**2 for one in kernels)
+    fits = free is None or needed < max(free * SHARE, offsets)
     return fits and microscope_spectrum.is_faster(kernels, told, counts)
 
 
