@@ -51,7 +51,7 @@ def of_quadrature(path: str, accuracy: float) -> Reached:
     return Reached(accuracy * math.exp(share), f"{path} at accuracy {accuracy:g}")
 
 
-SINGLE = 1.6
+SINGLE = 1.3
 """How much farther off the image of one sample of a slice is than that of many."""
 
 
