@@ -3,7 +3,6 @@
 import warnings
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import like, to_numpy
@@ -101,9 +100,8 @@ def lines_of(
         low, high = _range(disparities, pictures.reach)
     moves = labels(low, high)
     share = len(moves) / (len(moves) + 20)
-    first, rivals = swept(pictures, moves, shading, within(progress, 0, share))
-    first = np.clip(median_filter(first, 5), moves[0], moves[-1])
-    return refined(pictures, (first, rivals), shading, within(progress, share, 1))
+    first = swept(pictures, moves, shading, within(progress, 0, share))
+    return refined(pictures, first, shading, within(progress, share, 1))
 
 
 def _known(views: LightField) -> np.ndarray:

@@ -3,19 +3,23 @@
 Only the cross of views through the middle one is used: each is moved along one axis only. What stands before
 a place hides it from the views of one side; so the better of the left and the right half counts, and the
 better of the upper and the lower.
+
+Near views move little between labels, and may mislead, as on glass and polished steel. So the outermost
+views are also swept alone, and each place takes the map that the views agree with better.
 """
 
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import gaussian_filter, map_coordinates, median_filter
 
 from lumigraph.core import memory
-from lumigraph.core.progress import Progress, silent
+from lumigraph.core.progress import Progress, silent, within
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import WINDOW, Fit, Shading
 from lumigraph.depth.volume import box, cheapest, guided, rivals, semi_global
+from lumigraph.depth.vote import agreed
 from lumigraph.errors import GeometryError
 
 _STEP = 0.4  # between labels: how far a point moves in the outermost view [px]
@@ -56,13 +60,42 @@ def swept(
         f"the cost of {len(moves)} disparities for {shape[0]} x {shape[1]} places",
         "Give a range of disparities {factor:.1f}x narrower.",
     )
-    most = max(_MOST_DIFFERENCE, 3 * pictures.noise)
-    cost = costs(pictures, moves, most, progress, shading)
+    most, step = max(_MOST_DIFFERENCE, 3 * pictures.noise), moves[1] - moves[0]
+    ends = outermost(pictures)
+    share = 1.0 if ends is None else 0.7
+    total = _matched(pictures, moves, most, shading, within(progress, 0, share))
+    found, others = _cheapest(total, moves), rivals(total, most) * step
+    if ends is not None:
+        del total
+        second = _matched(ends, moves, most, shading, within(progress, share, 1))
+        found = agreed(pictures, (found, _cheapest(second, moves)), shading)
+    return found, others
+
+
+def _matched(
+    pictures: Pictures, moves: np.ndarray, most: float, shading: Shading, progress: Progress
+) -> np.ndarray:
+    """Costs (n, y, x) of the movements, smoothed along the picture's edges and by semi-global matching."""
     guide = pictures.center.mean(0)
-    cost = guided(cost, guide, 3)
-    cost = semi_global(cost, guide, 0.2 * most, most)
-    step = moves[1] - moves[0]
-    return moves[0] + cheapest(cost)[0] * step, rivals(cost, most) * step
+    cost = guided(costs(pictures, moves, most, progress, shading), guide, 3)
+    return semi_global(cost, guide, 0.2 * most, most)
+
+
+def _cheapest(total: np.ndarray, moves: np.ndarray) -> np.ndarray:
+    """Movements (y, x) of the least cost, less those of single places."""
+    found = median_filter(moves[0] + cheapest(total)[0] * (moves[1] - moves[0]), 5)
+    return np.clip(found, moves[0], moves[-1]).astype(np.float32)
+
+
+def outermost(pictures: Pictures) -> Pictures | None:
+    """The same with only the outermost lit views of the cross's arms; None where there are no others."""
+    v, u = pictures.middle
+    lit, cross = np.zeros_like(pictures.lit), np.zeros_like(pictures.lit)
+    cross[v], cross[:, u] = pictures.lit[v], pictures.lit[:, u]
+    for row, column in (np.nonzero(cross[:, u])[0][[0, -1]], u), (v, np.nonzero(cross[v])[0][[0, -1]]):
+        lit[row, column] = True
+    lit[v, u] = True
+    return replace(pictures, lit=lit) if cross.sum() > lit.sum() else None
 
 
 def costs(
