@@ -13,8 +13,14 @@ NOMINAL = Nominal(50e-3, 5.5e-6, (3068, 4080))
 PITCH, STEP = 23.3, 46.6  # px; every second lenslet
 
 
-def corners(rng: np.random.Generator, *, frames: int = 6, noise: float = 0.3, shared: float = 0.0) -> Corners:
-    """Of boards at 0.22 to 0.33 m that lean, through every lenslet that shows them."""
+def corners(
+    rng: np.random.Generator, *, frames: int = 6, noise: float = 0.3, shared: float = 0.0,
+    board: Board = BOARD, trend: float = 0.0,
+) -> Corners:  # fmt: skip
+    """Of boards at 0.22 to 0.33 m that lean, through every lenslet that shows them.
+
+    `noise` is that at a magnification of 0.1; its square changes as a power `trend` of it.
+    """
     y, x = np.mgrid[60:3000:STEP, 60:4000:STEP]
     centers, kinds = np.stack([y.ravel(), x.ravel()], 1), (np.indices(y.shape).sum(0) % 2).ravel()
     rows = []
@@ -22,11 +28,12 @@ def corners(rng: np.random.Generator, *, frames: int = 6, noise: float = 0.3, sh
         turn = rng.uniform(-0.7, 0.7, 3) * (1, 1, 0) if frame else np.zeros(3)
         turn = np.array([rng.uniform(-0.1, 0.1), *turn[:2]])
         shift = np.array([rng.uniform(0.22, 0.33), -0.02, -0.03]) + rng.uniform(-0.01, 0.01, 3)
-        points = geometry.moved(BOARD.points(), np.concatenate([turn, shift]))
+        points = geometry.moved(board.points(), np.concatenate([turn, shift]))
         for corner, point in enumerate(points):
             places = CAMERA.project(point, centers, kinds)
             lit = np.hypot(*(places - centers).T) < 0.42 * PITCH
-            off = rng.normal(0, noise, (lit.sum(), 2)) + rng.normal(0, shared, 2)
+            own = noise * (abs(CAMERA.magnification(point[0])) / 0.1) ** (trend / 2)
+            off = rng.normal(0, own, (lit.sum(), 2)) + rng.normal(0, shared, 2)
             rows.append(
                 np.column_stack(
                     [np.full((lit.sum(), 2), (frame, corner)), places[lit] + off, centers[lit], kinds[lit]]

@@ -1,6 +1,7 @@
 """Boards of dots, and with markers."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -96,7 +97,9 @@ def test_outlines_of_leaning_dots_are_ellipses_about_what_the_adjustment_expects
     corners = Corners(np.zeros(20, int), np.arange(20), places, centers, np.zeros(20, int), in_views=in_views)
 
     def misfit(board):
-        problem = Problem(corners, board, corners.frame, camera, [], Noise(np.ones(1), 0.0), corners.sights())
+        problem = Problem(
+            corners, board, corners.frame, camera, [], Noise(np.ones(1), 0.0), corners.sights(), np.ones(20)
+        )
         return np.abs(problem.misfit(np.concatenate([np.zeros(problem.free.shape[1]), pose]))).max()
 
     assert misfit(board) < 1e-5
@@ -212,7 +215,8 @@ def test_a_camera_measured_by_dots_survives_its_file_and_says_how_wide_they_were
     found = metric.board(seen, board, scenes.NOMINAL)
     assert "dots are taken as 5 mm wide, half of their spacing" in " ".join(found.notes)
     metric.save(found, tmp_path / "camera.json")
-    assert metric.load(tmp_path / "camera.json").board == board
+    assert metric.load(tmp_path / "camera.json").board == found.board
+    assert replace(found.board, heights=None) == board
     old = json.loads((tmp_path / "camera.json").read_text())
     old["board"] = {"shape": [5, 7], "spacing": 0.01}  # before there were dots
     (tmp_path / "camera.json").write_text(json.dumps(old))

@@ -63,7 +63,7 @@ def test_white_noise_comes_out_of_noise_that_corners_share() -> None:
     kind = rng.integers(0, 2, len(sight))
     noise = Noise(np.array([0.3, 0.9]), 0.5)
     values = rng.normal(size=(len(sight), 2)) * noise.own[kind][:, None] + rng.normal(0, 0.5, (400, 2))[sight]
-    white = noise.whitened(values, sight, kind)
+    white = noise.whitened(values, sight, noise.each(kind))
     means = np.stack([np.bincount(sight, w) for w in white.T], 1) / np.sqrt(np.bincount(sight))[:, None]
     assert white.std() == pytest.approx(1, abs=0.02)
     assert means.std() == pytest.approx(1, abs=0.1)  # shared noise alone would make it above 2
@@ -77,6 +77,7 @@ def test_a_drawn_camera_comes_back_within_its_intervals(measured: lg.metric.Meas
     assert np.abs(off[:8]).max() < 4
     assert measured.residual_px == pytest.approx(0.3, rel=0.05)
     assert measured.camera.lenslet_distance == pytest.approx(CAMERA.lenslet_distance, rel=0.01)
+    assert not any("not flat" in note for note in measured.notes)
     names = {(one, other) for one, other, _ in measured.tied()}
     assert ("f", "L") in names
     assert any("f and L change the pictures alike" in note for note in measured.notes)
@@ -108,6 +109,46 @@ def test_a_point_is_triangulated_within_its_error(measured: lg.metric.Measured) 
     assert abs(found.position[0] / point[0] - 1) < 0.02
     alone = triangulate(dataclasses.replace(measured, covariance=0 * measured.covariance), place, center)
     assert np.all(alone.errors < found.errors)
+
+
+def test_places_that_share_an_error_leave_a_point_less_sure(measured: lg.metric.Measured) -> None:
+    point, center = np.array([0.28, 0.012, -0.02]), np.array([1540.0, 2060.0]) + 23.3 * np.mgrid[
+        -3:4, -3:4
+    ].reshape(2, -1).T  # fmt: skip
+    place = CAMERA.project(point, center)
+    known = dataclasses.replace(measured, covariance=0 * measured.covariance)
+    shared = dataclasses.replace(known, noise=Noise(measured.noise.own, 0.5))
+    found = [triangulate(one, place, center) for one in (known, shared)]
+    # A shift of all places by 0.5 px moves the point sideways by that over what a metre moves them.
+    metre = np.diff(CAMERA.project(point + np.outer([0, 1e-4], [0, 1, 0]), center[:1].repeat(2, 0)), axis=0)
+    extra = np.sqrt(found[1].covariance[1, 1] - found[0].covariance[1, 1])
+    assert extra == pytest.approx(0.5 / abs(metre[0, 0] / 1e-4), rel=0.02)
+
+
+def test_a_board_that_is_not_flat_is_measured_with_its_heights() -> None:
+    y, x = np.mgrid[:5, :7].reshape(2, -1)
+    true = 0.2e-3 * np.sin(1.5 * x) * (1 + 0.2 * y)
+    bent = dataclasses.replace(BOARD, heights=tuple(true.tolist()))
+    seen = corners(np.random.default_rng(4), noise=0.2, board=bent)
+    found = board(seen, BOARD, NOMINAL)
+    flat = np.column_stack([np.ones(35), y, x])
+    off = np.array(found.board.heights) - true
+    off -= flat @ np.linalg.lstsq(flat, off, rcond=None)[0]  # a plane is the pose's
+    assert off.std() < 0.15 * true.std()
+    assert found.residual_px == pytest.approx(0.2, rel=0.05)
+    assert found.noise.shared < 0.1  # 0.4 px if the board is taken to be flat
+    assert any("the board is not flat: its corners stand" in note for note in found.notes)
+
+
+def test_noise_that_grows_with_blur_is_predicted_for_boards_elsewhere() -> None:
+    found = board(corners(np.random.default_rng(2), trend=-1.5), BOARD, NOMINAL)
+    assert found.noise.trend == pytest.approx([-1.5, -1.5], abs=0.2)
+    other, far = corners(np.random.default_rng(8), frames=4, trend=-1.5), []
+    for pose in found.locate(other):
+        chance = 3 / np.sqrt(4 * np.sum(other.frame == pose.frame))
+        assert pose.residual_px == pytest.approx(pose.expected_px, rel=chance)
+        far.append(pose.expected_px)
+    assert max(far) > 1.15 * min(far)  # so that one noise for all would not pass
 
 
 def test_a_wild_corner_is_left_out_and_counted(seen: Corners, measured: lg.metric.Measured) -> None:
@@ -149,10 +190,24 @@ def test_boards_that_tell_nothing_are_refused(seen: Corners) -> None:
         Nominal(0.0, 5e-6, (10, 10))
 
 
+def test_one_picture_given_three_times_is_no_camera(seen: Corners) -> None:
+    """b came out as 0, f to 12 µm, without a word."""
+    one = seen[seen.frame == 0]
+    same = Corners(
+        np.repeat([0, 1, 2], len(one)), np.tile(one.corner, 3),
+        np.tile(one.place, (3, 1)), np.tile(one.center, (3, 1)), np.tile(one.kind, 3),
+    )  # fmt: skip
+    with pytest.raises(lg.CalibrationError, match="stands the same on all 3 pictures"):
+        board(same, BOARD, NOMINAL)
+
+
 def test_a_measured_camera_survives_its_file(measured: lg.metric.Measured, tmp_path) -> None:
     lg.metric.save(measured, tmp_path / "camera.json")
     again = lg.metric.load(tmp_path / "camera.json")
     assert again.camera == measured.camera
+    assert again.board == measured.board
+    assert again.noise.seen == measured.noise.seen
+    np.testing.assert_array_equal(again.noise.trend, measured.noise.trend)
     np.testing.assert_array_equal(again.covariance, measured.covariance)
     np.testing.assert_array_equal(again.poses[1].shift, measured.poses[1].shift)
     (tmp_path / "camera.json").write_text('{"kind": "lumigraph metric camera", "camera": {}}')

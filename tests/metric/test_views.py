@@ -115,15 +115,16 @@ def test_what_views_of_a_corner_share_by_their_way_is_found_and_taken_out() -> N
     off += rng.normal(0, 0.2, (300, 2))[sight]
     found = Noise.of(off, sight, kind, way)
     assert (found.shared, found.sway) == (pytest.approx(0.2, rel=0.1), pytest.approx(0.05, rel=0.12))
-    plain, white = (one.whitened(off, sight, kind, way) for one in (replace(found, sway=0.0), found))
+    own = found.each(kind)
+    plain, white = (one.whitened(off, sight, own, way) for one in (replace(found, sway=0.0), found))
     slopes = [
         np.add.reduceat((way * one).sum(1), np.arange(0, 2700, 9)) / np.sqrt(192) for one in (plain, white)
     ]
     assert np.std(slopes[1]) == pytest.approx(1, abs=0.15)
     assert np.std(slopes[0]) > 5
     derivatives = rng.normal(0, 1, (2700, 2, 4))
-    alone = found.whitened(derivatives[..., 2], sight, kind, way)
-    np.testing.assert_allclose(found.whitened(derivatives, sight, kind, way)[..., 2], alone)
+    alone = found.whitened(derivatives[..., 2], sight, own, way)
+    np.testing.assert_allclose(found.whitened(derivatives, sight, own, way)[..., 2], alone)
 
 
 def test_corners_in_views_survive_their_table(tmp_path) -> None:

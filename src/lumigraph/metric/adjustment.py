@@ -20,6 +20,10 @@ _WILD = 6.0
 """Standard deviations beyond which a place is another corner's."""
 
 
+_FLAT = 1e-3
+"""To which a board is taken to be flat at first, over its diagonal: paper on a plate."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Adjusted:
     """A camera and poses, with their covariance.
@@ -38,6 +42,10 @@ class Adjusted:
         (n, 2) Computed minus measured [px], of all corners that were given.
     kept
         (n,) Whether they took part.
+    board
+        With the heights of its corners.
+    own
+        (n,) Noise of each place [px].
     """
 
     camera: MetricCamera
@@ -46,6 +54,8 @@ class Adjusted:
     noise: Noise
     residual: np.ndarray
     kept: np.ndarray
+    board: Board
+    own: np.ndarray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,6 +76,11 @@ class Problem:
         Of the corners.
     sight
         (n,) Which places are of one corner on one picture.
+    own
+        (n,) Noise of each place, as `Noise.each` gives it [px].
+    bow
+        Standard deviation of the heights of the board's corners, which are looked for [m]; 0 for a board
+        that is known.
     """
 
     corners: Corners
@@ -75,6 +90,8 @@ class Problem:
     priors: list[tuple[int, float, float]]
     noise: Noise
     sight: np.ndarray
+    own: np.ndarray
+    bow: float = 0.0
 
     @property
     def frames(self) -> int:
@@ -86,16 +103,22 @@ class Problem:
         """See `freedom`."""
         return freedom(self.camera)
 
-    def split(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers of the camera, and poses (frames, 6)."""
+    @property
+    def heights(self) -> int:
+        """Unknowns that are heights of the board's corners."""
+        return self.board.shape[0] * self.board.shape[1] if self.bow else 0
+
+    def split(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Numbers of the camera, heights of the corners (none if they are known), and poses (frames, 6)."""
         free = self.free
         numbers = self.camera.numbers + free @ unknowns[: free.shape[1]]
-        return numbers, unknowns[free.shape[1] :].reshape(self.frames, 6)
+        heights, poses = np.split(unknowns[free.shape[1] :], [self.heights])
+        return numbers, heights, poses.reshape(self.frames, 6)
 
     def misfit(self, unknowns: np.ndarray) -> np.ndarray:
         """(n, 2) Computed minus measured [px]: places, or centres of corners in views."""
-        numbers, poses = self.split(unknowns)
-        flat, pitch, seen = self.board.points()[self.corners.corner], self.camera.pixel_pitch, self.corners
+        numbers, _, poses = self.split(unknowns)
+        pitch, seen, flat = self.camera.pixel_pitch, self.corners, self._flat(unknowns)
         if radius := self.board.radius:
             points = geometry.dots(numbers, flat, poses[self.frame], radius, in_views=seen.in_views)
         else:
@@ -106,23 +129,42 @@ class Problem:
             )
         return geometry.project(numbers, points, seen.center, seen.kind, pitch) - seen.place
 
+    def _flat(self, unknowns: np.ndarray) -> np.ndarray:
+        """(n, 3) Corners of the board in its own frame."""
+        flat, (_, heights, _) = self.board.points()[self.corners.corner], self.split(unknowns)
+        if not self.heights:
+            return flat
+        return np.column_stack([heights[self.corners.corner], flat[:, 1:]])
+
+    def magnification(self, unknowns: np.ndarray) -> np.ndarray | None:
+        """(n,) Of the lenslets for what they show; None in views."""
+        if self.corners.in_views:
+            return None
+        numbers, _, poses = self.split(unknowns)
+        points = geometry.moved(self._flat(unknowns), poses[self.frame])
+        return geometry.magnification(numbers, points[:, 0])
+
     def slopes(self, unknowns: np.ndarray) -> np.ndarray:
         """(n, 2, unknowns) Derivatives of `misfit`."""
         camera = self.free.shape[1]
         result = np.zeros((len(self.corners), 2, len(unknowns)))
         for k in range(camera):
             result[..., k] = geometry.slope(self.misfit, unknowns, np.s_[k])
-        rows = np.arange(len(self.corners))
-        for k in range(6):  # those of all poses at once: each place depends on one
-            column = camera + 6 * self.frame + k
-            result[rows, :, column] = geometry.slope(self.misfit, unknowns, np.s_[camera + k :: 6])
+        rows, poses = np.arange(len(self.corners)), camera + self.heights
+        if self.heights:  # all at once: each place depends on one
+            column = camera + self.corners.corner
+            result[rows, :, column] = geometry.slope(self.misfit, unknowns, np.s_[camera:poses])
+        for k in range(6):  # so do poses
+            column = poses + 6 * self.frame + k
+            result[rows, :, column] = geometry.slope(self.misfit, unknowns, np.s_[poses + k :: 6])
         return result
 
     def residual(self, unknowns: np.ndarray) -> np.ndarray:
         """Of the corners, in standard deviations, and of what is known beforehand."""
-        numbers, _ = self.split(unknowns)
+        numbers, heights, _ = self.split(unknowns)
         known = [(numbers[k] - value) / error for k, value, error in self.priors]
-        return np.concatenate([self._white(self.misfit(unknowns)).ravel(), known])
+        even = heights / self.bow if self.bow else heights
+        return np.concatenate([self._white(self.misfit(unknowns)).ravel(), known, even])
 
     def jacobian(self, unknowns: np.ndarray) -> np.ndarray:
         """Derivatives of `residual`."""
@@ -130,10 +172,11 @@ class Problem:
         known = np.zeros((len(self.priors), len(unknowns)))
         for row, (k, _, error) in zip(known, self.priors, strict=True):
             row[: self.free.shape[1]] = self.free[k] / error
-        return np.concatenate([slopes, known])
+        even = np.eye(self.heights, len(unknowns), self.free.shape[1]) / (self.bow or 1.0)
+        return np.concatenate([slopes, known, even])
 
     def _white(self, values: np.ndarray) -> np.ndarray:
-        return self.noise.whitened(values, self.sight, self.corners.kind, self.corners.way)
+        return self.noise.whitened(values, self.sight, self.own, self.corners.way)
 
 
 def freedom(camera: MetricCamera) -> np.ndarray:
@@ -169,26 +212,52 @@ def adjust(
     frame = np.searchsorted(corners.frames, corners.frame)
     kinds = len(camera.gains)
     even = Noise(np.ones(kinds), 0.0)
-    first = Problem(corners, board, frame, camera, nominal.priors(kinds), even, corners.sights())
+    one = np.ones(len(corners))
+    first = Problem(corners, board, frame, camera, nominal.priors(kinds), even, corners.sights(), one)
     unknowns = np.concatenate([np.zeros(first.free.shape[1]), poses.ravel()])
     needed = 6.0 * 8 * 2 * len(corners) * len(unknowns)
     remedy = "Use fewer pictures, or every second corner."
     memory.require(needed, "the adjustment", remedy, CalibrationError)
-    problem, kept, misfit = first, np.ones(len(corners), bool), first.misfit(unknowns)
-    for number in range(_ROUNDS):
-        loss = "linear" if number else "soft_l1"  # until wild corners are known
-        jacobian: Any = problem.jacobian  # SciPy's types know names of methods only
-        found = least_squares(problem.residual, unknowns, jacobian, x_scale="jac", loss=loss, max_nfev=200)
-        if found.status <= 0:
-            raise CalibrationError(
-                f"the camera did not settle in {found.nfev} steps. Check the board and the nominal lengths."
-            )
-        unknowns = found.x
-        misfit = first.misfit(unknowns)
-        problem, kept = _again(first, misfit)
-    covariance = _covariance(problem, unknowns)
-    numbers, poses = problem.split(unknowns)
-    return Adjusted(camera.with_numbers(numbers), poses, covariance, problem.noise, misfit, kept)
+    kept = np.ones(len(corners), bool)
+    problem, found = _settled(first, unknowns, "soft_l1")  # until wild corners are known
+    for _ in range(_ROUNDS):
+        problem, unknowns = _bent(problem, found)
+        problem, kept = _again(replace(first, bow=problem.bow), unknowns)
+        problem, found = _settled(problem, unknowns)
+    numbers, heights, poses = problem.split(found)
+    whole = replace(first, bow=problem.bow)
+    misfit, own = whole.misfit(found), problem.noise.each(corners.kind, whole.magnification(found))
+    covariance = _covariance(problem, found)
+    known = replace(board, heights=tuple(heights.tolist())) if len(heights) else board
+    return Adjusted(camera.with_numbers(numbers), poses, covariance, problem.noise, misfit, kept, known, own)
+
+
+def _settled(problem: Problem, unknowns: np.ndarray, loss: str = "linear") -> tuple[Problem, np.ndarray]:
+    """A problem and the unknowns that solve it."""
+    jacobian: Any = problem.jacobian  # SciPy's types know names of methods only
+    found = least_squares(problem.residual, unknowns, jacobian, x_scale="jac", loss=loss, max_nfev=200)
+    if found.status <= 0:
+        raise CalibrationError(
+            f"the camera did not settle in {found.nfev} steps. Check the board and the nominal lengths."
+        )
+    return problem, found.x
+
+
+def _bent(problem: Problem, unknowns: np.ndarray) -> tuple[Problem, np.ndarray]:
+    """The problem of a board whose corners may stand out of its plane, as far as they were found to.
+
+    The spread of the heights is their mean square and variance together (expectation-maximisation).
+    """
+    camera = problem.free.shape[1]
+    if problem.heights:
+        jacobian = problem.jacobian(unknowns)
+        mine = slice(camera, camera + problem.heights)
+        variance = np.diag(np.linalg.inv(jacobian.T @ jacobian))[mine]
+        return replace(problem, bow=float(np.sqrt(np.mean(unknowns[mine] ** 2 + variance)))), unknowns
+    if problem.board.heights is not None:
+        return problem, unknowns
+    flat = np.zeros(len(problem.board.points()))
+    return replace(problem, bow=_FLAT * problem.board.diagonal), np.insert(unknowns, camera, flat)
 
 
 def placed(
@@ -206,8 +275,10 @@ def placed(
         A first pose (6,).
     """
     frame = np.zeros(len(corners), int)
-    problem = Problem(corners, board, frame, camera, [], noise, corners.sights())
+    problem = Problem(corners, board, frame, camera, [], noise, corners.sights(), noise.each(corners.kind))
     fixed = np.zeros(problem.free.shape[1])
+    blur = problem.magnification(np.concatenate([fixed, start]))
+    problem = replace(problem, own=noise.each(corners.kind, blur))
 
     def unknowns(pose: np.ndarray) -> np.ndarray:
         return np.concatenate([fixed, pose])
@@ -220,9 +291,9 @@ def placed(
     return problem, unknowns(found.x)
 
 
-def _again(first: Problem, misfit: np.ndarray) -> tuple[Problem, np.ndarray]:
-    """The problem with the noise of a misfit (n, 2), without its wild corners."""
-    kind = first.corners.kind
+def _again(first: Problem, unknowns: np.ndarray) -> tuple[Problem, np.ndarray]:
+    """The problem with the noise of what is left over, without its wild corners."""
+    kind, misfit, blur = first.corners.kind, first.misfit(unknowns), first.magnification(unknowns)
     typical = np.array([
         np.median(np.abs(misfit[kind == k])) if np.any(kind == k) else 1.0 for k in range(int(kind.max()) + 1)
     ])  # fmt: skip
@@ -232,14 +303,16 @@ def _again(first: Problem, misfit: np.ndarray) -> tuple[Problem, np.ndarray]:
         raise CalibrationError(
             "the corners of a picture fit no position of the board. Leave it out, or number them again."
         )
-    sight = corners.sights()
-    noise = Noise.of(misfit[kept], sight, corners.kind, corners.way)
-    return replace(first, corners=corners, frame=first.frame[kept], noise=noise, sight=sight), kept
+    sight, blur = corners.sights(), None if blur is None else blur[kept]
+    noise = Noise.of(misfit[kept], sight, corners.kind, corners.way, blur)
+    own = noise.each(corners.kind, blur)
+    frame = first.frame[kept]
+    return replace(first, corners=corners, frame=frame, noise=noise, sight=sight, own=own), kept
 
 
 def _covariance(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
     """Of the camera's numbers and the poses."""
-    camera = problem.free.shape[1]
+    camera, poses = problem.free.shape[1], problem.free.shape[1] + problem.heights
     jacobian = problem.jacobian(unknowns)
     scale = np.linalg.norm(jacobian, axis=0)
     if not scale.all():
@@ -248,7 +321,7 @@ def _covariance(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
         )
     inner = np.linalg.inv((jacobian / scale).T @ (jacobian / scale))
     inner /= np.outer(scale, scale)
-    out = np.zeros((len(problem.camera.numbers) + len(unknowns) - camera, len(unknowns)))
+    out = np.zeros((len(problem.camera.numbers) + len(unknowns) - poses, len(unknowns)))
     out[: len(problem.camera.numbers), :camera] = problem.free
-    out[len(problem.camera.numbers) :, camera:] = np.eye(len(unknowns) - camera)
+    out[len(problem.camera.numbers) :, poses:] = np.eye(len(unknowns) - poses)
     return out @ inner @ out.T

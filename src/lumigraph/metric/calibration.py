@@ -24,6 +24,12 @@ LEAST_FRAMES = 3
 _TIED = 0.95
 """Correlation of two numbers that are named as hard to tell apart."""
 
+_BENT = 5e-4
+"""Rms height of a board's corners over its diagonal from which on a note says so."""
+
+_SAME_TURN, _SAME_DISTANCE = 0.05, 0.02
+"""Turns [rad] and distances, over themselves, within which boards stand the same."""
+
 _LENGTHS = ("f", "L", "b")
 
 
@@ -104,6 +110,11 @@ class Measured:
         spread = np.where(self.errors > 0, self.errors, 1.0)
         return self.covariance / np.outer(spread, spread)
 
+    @property
+    def bow(self) -> float:
+        """Root mean square by which the board's corners stand out of their plane [m]."""
+        return float(np.sqrt(np.mean(np.square(self.board.heights or 0.0))))
+
     def tied(self) -> Iterator[tuple[str, str, float]]:
         """Pairs of numbers that the pictures hardly tell apart, with their correlation."""
         table = self.correlation
@@ -135,6 +146,7 @@ class Measured:
             Quantity("residual_px", self.residual_px, "px"),
             Quantity("noise_px", tuple(map(float, self.noise.own)), "px"),
             Quantity("shared_noise_px", self.noise.shared, "px"),
+            Quantity("board_bow", self.bow, "m"),
             Quantity("pictures", len(self.poses)),
             Quantity("left_out", self.left_out),
         )
@@ -159,7 +171,7 @@ class Measured:
 
     def _predicted(self, problem: Problem, unknowns: np.ndarray) -> tuple[np.ndarray, float]:
         """Covariance (6, 6) of a pose by a camera that is uncertain, and the rms that is expected [px]."""
-        fixed, corners = problem.free.shape[1], problem.corners
+        fixed = problem.free.shape[1]
         white = problem.jacobian(unknowns)
         mine = white[:, fixed:]
         back = np.linalg.pinv(problem.free)
@@ -169,7 +181,7 @@ class Measured:
         seen = slopes[:, :fixed] + slopes[:, fixed:] @ sway
         free = 1 - min(1.0, 6 / (2 * int(problem.sight.max() + 1)))
         variance = (
-            np.mean(self.noise.own[corners.kind] ** 2)
+            np.mean(problem.own**2)
             + self.noise.shared**2 * free
             + np.mean(np.sum((seen @ camera) * seen, axis=1))
         )
@@ -195,7 +207,8 @@ def board(corners: Corners, board: Board, nominal: Nominal) -> Measured:
     Raises
     ------
     CalibrationError
-        Fewer than three pictures, corners that the board does not have, or corners that fit no camera.
+        Fewer than three pictures, a board that stands the same on all, corners that the board does not have,
+        or corners that fit no camera.
 
     Notes
     -----
@@ -218,7 +231,20 @@ def board(corners: Corners, board: Board, nominal: Nominal) -> Measured:
     usable = np.isin(corners.frame, known)
     found = adjust(corners[usable], board, nominal, camera, np.array([poses[f] for f in known.tolist()]))
     found = turned_over(found, corners[usable], board, nominal)
-    return _measured(found, corners[usable], board, nominal, len(corners.frames) - len(known))
+    _check_poses(found.poses)
+    return _measured(found, corners[usable], found.board, nominal, len(corners.frames) - len(known))
+
+
+def _check_poses(poses: np.ndarray) -> None:
+    """Whether boards (frames, 6) stood differently: otherwise lengths follow from noise alone."""
+    turn = float(np.linalg.norm(np.ptp(poses[:, :3], axis=0)))
+    away = float(np.ptp(poses[:, 3]) / abs(np.median(poses[:, 3])))
+    if turn < _SAME_TURN and away < _SAME_DISTANCE:
+        raise CalibrationError(
+            f"the board stands the same on all {len(poses)} pictures, to {math.degrees(turn):.2g}° and "
+            f"{away:.2%} of its distance, which does not tell the camera. Take it at different distances and "
+            "angles, 10° and 10 % apart or more."
+        )
 
 
 def _measured(found: Adjusted, corners: Corners, board: Board, nominal: Nominal, unused: int) -> Measured:
@@ -232,7 +258,7 @@ def _measured(found: Adjusted, corners: Corners, board: Board, nominal: Nominal,
         mine = corners.frame == frame
         rows = slice(numbers + 6 * k, numbers + 6 * k + 6)
         off = math.sqrt(float(np.mean(found.residual[mine] ** 2)))
-        expected = math.sqrt(float(np.mean(found.noise.own[corners.kind[mine]] ** 2)) + found.noise.shared**2)
+        expected = math.sqrt(float(np.mean(found.own[mine] ** 2)) + found.noise.shared**2)
         pose = found.poses[k]
         poses.append(Pose(frame, pose[:3], pose[3:], found.covariance[rows, rows], off, expected))
     return replace(result, poses=tuple(poses), notes=tuple(_notes(result, nominal, unused)))
@@ -257,6 +283,11 @@ def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
         yield (
             f"dots are taken as {2e3 * result.board.radius:.4g} mm wide, half of their spacing, to find "
             "their middles from their outlines' on boards that lean. Give their width if it is another"
+        )
+    if (bow := result.bow) > _BENT * result.board.diagonal:
+        yield (
+            f"the board is not flat: its corners stand {bow * 1e3:.2g} mm rms out of their plane, which is "
+            "measured and allowed for"
         )
     if result.left_out:
         yield f"{result.left_out} places fit no corner and were left out"

@@ -54,6 +54,9 @@ class Board:
         Diameter of the dots, or width of the markers [m]; None for dots half as wide as their spacing.
     dictionary
         Of the markers, by OpenCV's name, such as DICT_4X4_50.
+    heights
+        Of all corners over the plane, away from the camera [m], of a board that is not flat: `board`
+        measures them. None for a flat one.
 
     Raises
     ------
@@ -77,6 +80,7 @@ class Board:
     pattern: str = "corners"
     size: float | None = None
     dictionary: str | None = None
+    heights: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", checks.shape("shape", self.shape))
@@ -90,6 +94,11 @@ class Board:
                 f"the pattern is {self.pattern!r} but must be one of {', '.join(PATTERNS)}."
             )
         self._check_size()
+        count = self.shape[0] * self.shape[1]
+        if self.heights is not None and len(self.heights) != count:
+            raise CalibrationError(f"the board has {len(self.heights)} heights but {count} corners.")
+        for height in self.heights or ():
+            checks.finite("heights", height, "m")
 
     def _check_size(self) -> None:
         charuco = self.pattern == "charuco"
@@ -164,11 +173,17 @@ class Board:
         }.get(self.pattern, f"board of {across} x {down} {self.pattern}")
 
     def points(self) -> np.ndarray:
-        """Corners or dots (n, 3) as (z, y, x) [m], row by row, in the board's own frame: z = 0."""
+        """Corners or dots (n, 3) as (z, y, x) [m], row by row, in the board's own frame: z = 0 if flat."""
         y, x = np.mgrid[: self.shape[0], : self.shape[1]].reshape(2, -1)
         if self.pattern == "asymmetric dots":
             x = 2 * x + y % 2
-        return np.stack([np.zeros(y.size), y * self.spacing, x * self.spacing], axis=1)
+        z = np.zeros(y.size) if self.heights is None else np.array(self.heights)
+        return np.stack([z, y * self.spacing, x * self.spacing], axis=1)
+
+    @property
+    def diagonal(self) -> float:
+        """From the first point to the last [m]."""
+        return float(np.hypot(*np.ptp(self.points()[:, 1:], axis=0)))
 
     @property
     def middle(self) -> np.ndarray:

@@ -129,6 +129,8 @@ def save(measured: Measured, path: str | os.PathLike[str]) -> None:
             "own": measured.noise.own.tolist(),
             "shared": measured.noise.shared,
             "sway": measured.noise.sway,
+            "trend": None if measured.noise.trend is None else measured.noise.trend.tolist(),
+            "seen": list(measured.noise.seen),
         },
         "board": asdict(measured.board),
         "residual_px": measured.residual_px,
@@ -162,16 +164,25 @@ def load(path: str | os.PathLike[str]) -> Measured:
             name: tuple(v) if isinstance(v, list) else v for name, v in found["camera"].items()
         }
         plain: dict[str, Any] = found["board"] | {"shape": tuple(found["board"]["shape"])}
+        if plain.get("heights") is not None:
+            plain["heights"] = tuple(_numbers(plain, "heights", len(plain["heights"])).tolist())
         board = Board(**plain)
         camera = MetricCamera(**lists)
-        own, shared = _numbers(found["noise"], "own", len(camera.gains)), _number(found["noise"], "shared")
-        sway = _number(found["noise"], "sway") if "sway" in found["noise"] else 0.0
-        numbers = len(camera.numbers)
+        numbers, noise = len(camera.numbers), _noise(found["noise"], len(camera.gains))
         return Measured(
-            camera, _numbers(found, "covariance", numbers, numbers), Noise(own, shared, sway), board,
+            camera, _numbers(found, "covariance", numbers, numbers), noise, board,
             tuple(_pose(one) for one in found["poses"]), _number(found, "residual_px"),
             int(found["left_out"]), tuple(map(str, found["notes"])),
         )  # fmt: skip
+
+
+def _noise(found: dict[str, Any], kinds: int) -> Noise:
+    own, shared = _numbers(found, "own", kinds), _number(found, "shared")
+    sway = _number(found, "sway") if "sway" in found else 0.0
+    if found.get("trend") is None:
+        return Noise(own, shared, sway)
+    low, middle, high = _numbers(found, "seen", 3).tolist()
+    return Noise(own, shared, sway, _numbers(found, "trend", kinds), (low, middle, high))
 
 
 def _pose(found: dict[str, Any]) -> Pose:

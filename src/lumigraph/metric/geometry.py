@@ -53,6 +53,12 @@ def project(
     return (seen + gains[kind][:, None] * (place - seen)) / pixel_pitch + axis
 
 
+def magnification(numbers: np.ndarray, distance: np.ndarray) -> np.ndarray:
+    """Of the lenslets, b/a, for what is so far from the main lens (n,) [m]; negative if Galilean."""
+    f, L, b = numbers[:3]
+    return b / (L - f * distance / (distance - f))
+
+
 def centers(
     numbers: np.ndarray, points: np.ndarray, seen_at: tuple[np.ndarray, np.ndarray], kind: np.ndarray,
     pixel_pitch: float,

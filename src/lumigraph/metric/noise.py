@@ -4,15 +4,23 @@ What they share (blur, print, a board that is not flat) does not average out ove
 of one place and τ² of what n places share, residuals r become independent, of variance 1, as
 
 .. math:: (r - \bar r \, (1 - \sigma / \sqrt{\sigma^2 + n \tau^2})) / \sigma
+
+Blur makes places less exact, and grows with the distance from what lenslets see in focus: σ² of each kind
+changes with the lenslets' magnification m = b/a as a power of it, (m/m_0)^k. (By k = -0.75, -0.2 and -0.4 the
+three kinds of a Raytrix R12 do, within 15 % from m = 0.06 to 0.35.)
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize
 from scipy.sparse import csr_array
 
 LEAST_NOISE = 1e-3
 """[px]; places that fit better are too good to be true."""
+
+_TREND = 1.0
+"""Power of m by which σ² may be expected to change."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,25 +36,47 @@ class Noise:
     sway
         Of how far a corner in views moves with the view [px/px]: samples of views pull corners towards them,
         and a corner passes slowly from one sample to the next.
+    trend
+        (kinds,) Power of the lenslets' magnification m by which σ² grows. None for not at all.
+    seen
+        Least, middle and greatest |m| that `own` and `trend` were found at.
     """
 
     own: np.ndarray
     shared: float
     sway: float = 0.0
+    trend: np.ndarray | None = None
+    seen: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def each(self, kind: np.ndarray, magnification: np.ndarray | None = None) -> np.ndarray:
+        """(n,) Standard deviations of places behind lenslets of a kind (n,), at their magnification (n,)."""
+        own = self.own[kind]
+        if self.trend is None or magnification is None:
+            return own
+        low, middle, high = self.seen
+        return own * (np.clip(np.abs(magnification), low, high) / middle) ** (self.trend[kind] / 2)
 
     @classmethod
     def of(
-        cls, residual: np.ndarray, sight: np.ndarray, kind: np.ndarray, way: np.ndarray | None = None
-    ) -> "Noise":
+        cls, residual: np.ndarray, sight: np.ndarray, kind: np.ndarray, way: np.ndarray | None = None,
+        magnification: np.ndarray | None = None,
+    ) -> "Noise":  # fmt: skip
         """Estimated from residuals (n, 2) [px], by the moments of corners with two places or more.
 
-        `way` (n, 2) [px], from centres to places, are given for corners in views.
+        `way` (n, 2) [px], from centres to places, are given for corners in views; the lenslets'
+        `magnification` (n,) for others, if noise may change with it.
         """
         count, kinds = np.bincount(sight), int(kind.max()) + 1
         mean, many, rest = _means(residual, sight), count > 1, 0.0
+        trend, seen, part = None, (0.0, 0.0, 0.0), np.ones(len(kind))
         if way is None:
             inner = np.mean((residual - mean[sight]) ** 2, axis=1)
-            own = _own(inner, sight, kind, kinds)
+            if magnification is not None:
+                low, middle, high = np.quantile(np.abs(magnification), (0, 0.5, 1)).tolist()
+                seen, away = (low, middle, high), np.log(np.abs(magnification) / middle)
+                trend = _trend(inner, sight, kind, away)
+                part = np.exp(trend[kind] * away)
+            own = _own(inner, sight, kind, part)
         else:
             ways, spread = _centred(way, sight)
             sway = np.bincount(sight, np.sum(ways * residual, axis=1)) / spread
@@ -55,15 +85,18 @@ class Noise:
             own = np.full(kinds, 2 * inner[many[sight]].sum() / max(np.sum(2 * count[many] - 3), 1))
             rest = np.mean(sway[many] ** 2 - own[0] / spread[many]) if many.any() else 0.0
         own = np.sqrt(np.maximum(own, LEAST_NOISE**2))
-        expected = np.bincount(sight, own[kind] ** 2) / count**2
+        expected = np.bincount(sight, own[kind] ** 2 * part) / count**2
         shared = np.mean(mean[many] ** 2) - np.mean(expected[many]) if many.any() else 0.0
-        return cls(own, float(np.sqrt(max(shared, 0.0))), float(np.sqrt(max(rest, 0.0))))
+        return cls(own, float(np.sqrt(max(shared, 0.0))), float(np.sqrt(max(rest, 0.0))), trend, seen)
 
     def whitened(
-        self, values: np.ndarray, sight: np.ndarray, kind: np.ndarray, way: np.ndarray | None = None
+        self, values: np.ndarray, sight: np.ndarray, own: np.ndarray, way: np.ndarray | None = None
     ) -> np.ndarray:
-        """Residuals or their derivatives (n, 2, ...), as independent ones of variance 1; `way` as of `of`."""
-        inverse = 1 / self.own[kind]
+        """Residuals or their derivatives (n, 2, ...), as independent ones of variance 1.
+
+        `own` (n,) is as `each` gives it, `way` as `of` takes it.
+        """
+        inverse = 1 / own
         scaled = values.reshape(len(values), -1) * inverse[:, None]
         together = csr_array((inverse, (sight, np.arange(len(sight)))))
         weight = together.power(2).sum(axis=1)
@@ -81,22 +114,42 @@ class Noise:
         return white - np.einsum("na,n...->na...", inner, taken)
 
 
-def _own(inner: np.ndarray, sight: np.ndarray, kind: np.ndarray, kinds: int) -> np.ndarray:
+def _own(inner: np.ndarray, sight: np.ndarray, kind: np.ndarray, part: np.ndarray) -> np.ndarray:
     """(kinds,) Variances, of squared distances (n,) from the means of the n places of a corner.
 
-    They are expected to be σ² (1 - 2/n) + Σ σ²/n² over the corner's places.
+    They are expected to be σ² (1 - 2/n) + Σ σ²/n² over the corner's places; each σ² is that of its kind
+    times `part` (n,).
     """
+    kinds = int(kind.max()) + 1
     each = np.zeros((int(sight.max()) + 1, kinds))
-    np.add.at(each, (sight, kind), 1)
-    count = each.sum(1)[sight]
+    np.add.at(each, (sight, kind), part)
+    count = np.bincount(sight)[sight]
     several = count > 1
     table, found = np.zeros((kinds, kinds)), np.zeros(kinds)
     for k in range(kinds):
         mine = several & (kind == k)
         table[k] = (each[sight[mine]] / count[mine, None] ** 2).sum(0)
-        table[k, k] += np.sum(1 - 2 / count[mine])
+        table[k, k] += np.sum(part[mine] * (1 - 2 / count[mine]))
         found[k] = inner[mine].sum()
     return np.linalg.lstsq(table, found, rcond=None)[0]
+
+
+def _trend(inner: np.ndarray, sight: np.ndarray, kind: np.ndarray, away: np.ndarray) -> np.ndarray:
+    """(kinds,) By how much the logarithm of variances grows with `away` (n,): the likeliest, near 0."""
+    count, trends = np.bincount(sight)[sight], np.zeros(int(kind.max()) + 1)
+    for k in range(len(trends)):
+        mine = (kind == k) & (count > 1)
+        if not mine.any():
+            continue
+        variance, at = np.maximum((inner * count)[mine] / (count[mine] - 1), LEAST_NOISE**2), away[mine]
+
+        def unlikely(trend: np.ndarray, variance: np.ndarray = variance, at: np.ndarray = at) -> float:
+            level = np.mean(variance * np.exp(-trend[0] * at))
+            rest = len(at) * (np.log(level) + trend[0] * np.mean(at))
+            return float(rest + (trend[0] / _TREND) ** 2 / 2)
+
+        trends[k] = minimize(unlikely, np.zeros(1), bounds=[(-5 * _TREND, 5 * _TREND)]).x[0]
+    return trends
 
 
 def _sums(values: np.ndarray, sight: np.ndarray) -> np.ndarray:

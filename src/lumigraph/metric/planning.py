@@ -225,7 +225,8 @@ class _Before:
         if seen is None:
             return None
         frame, sights = np.zeros(len(seen), int), seen.sights()
-        problem = Problem(seen, self.board, frame, self.camera, [], self.noise, sights)
+        own_noise = self.noise.each(seen.kind)
+        problem = Problem(seen, self.board, frame, self.camera, [], self.noise, sights, own_noise)
         own = problem.free.shape[1]
         slopes = problem.jacobian(np.concatenate([np.zeros(own), pose]))
         of_camera, of_pose = slopes[:, :own], slopes[:, own:]

@@ -73,7 +73,9 @@ def triangulate(
     checks.finite_array("center", center, CalibrationError)
     kinds = np.broadcast_to(np.asarray(kind), len(place))
     camera, noise = measured.camera, measured.noise
-    own, start = noise.own[kinds][:, None], _first(measured, place, center, in_views)
+    start = _first(measured, place, center, in_views)
+    blur = None if in_views else geometry.magnification(camera.numbers, np.full(len(place), start[0]))
+    own = noise.each(kinds, blur)[:, None]
 
     def misfit(numbers: np.ndarray, point: np.ndarray) -> np.ndarray:
         if in_views:
@@ -98,7 +100,9 @@ def triangulate(
     sway = inverse @ np.stack(
         [geometry.slope(lambda n: white(n, found.x), camera.numbers, k) for k in numbers], axis=1
     )
-    covariance = inverse @ inverse.T + sway @ measured.covariance @ sway.T
+    # What all places of a point share moves them together, along either axis.
+    together = noise.shared * inverse @ np.kron(1 / own, np.eye(2))
+    covariance = inverse @ inverse.T + together @ together.T + sway @ measured.covariance @ sway.T
     return Triangulated(found.x, covariance, float(np.sqrt(np.mean(misfit(camera.numbers, found.x) ** 2))))
 
 
