@@ -261,10 +261,35 @@ def missed(known: dict[str, dict[str, str]]) -> list[str]:
 
 
 def write(text: str, document: Path = DOCUMENT) -> None:
-    """Put the table between its marks."""
+    """Put the table between its marks; cells that were not run keep what the document says."""
     before, rest = document.read_text().split(MARKS[0])
-    after = rest.split(MARKS[1])[1]
-    document.write_text(f"{before}{MARKS[0]}\n\n{text}\n\n{MARKS[1]}{after}")
+    there, after = rest.split(MARKS[1])
+    document.write_text(f"{before}{MARKS[0]}\n\n{merged(text, there.strip())}\n\n{MARKS[1]}{after}")
+
+
+def merged(table: str, older: str) -> str:
+    """A table whose rows and cells that are missing, or are "–", are those of an older one."""
+    (head, rule, *lines), known = table.splitlines(), dict(map(_row, older.splitlines()[2:]))
+    found = dict(map(_row, lines))
+    rows = [name for name in dict.fromkeys((c.camera, c.path) for c in cells()) if name in known | found]
+    filled = (
+        [
+            new if new != "–" else old
+            for new, old in zip(found.get(name, _NONE), known.get(name, _NONE), strict=True)
+        ]
+        for name in rows
+    )
+    return "\n".join(
+        [head, rule, *("| " + " | ".join((*n, *c)) + " |" for n, c in zip(rows, filled, strict=True))]
+    )
+
+
+_NONE = ("–",) * len(ACCURACIES)
+
+
+def _row(line: str) -> tuple[tuple[str, str], tuple[str, ...]]:
+    camera, path, *values = (cell.strip() for cell in line.strip("|").split("|"))
+    return (camera, path), tuple(values)
 
 
 def main() -> None:
