@@ -10,7 +10,7 @@ from scipy.sparse import eye_array
 
 import lumigraph as lg
 from deconvolution.models import Matrix, blur, blurred, disc, placed
-from lumigraph.core.linear import Joint
+from lumigraph.core.joint import Joint
 from lumigraph.deconvolution import (
     Exposure,
     Interrupted,

@@ -14,7 +14,8 @@
 - `picture`: thumbnails and tables for notebooks
 - `volume`: `Volume`, reconstructed intensities (z, y, x)
 - `stack`: `Stack`, pictures in an order; `cloud`: `PointCloud`, points in space
-- `linear`: `Linear`, maps from objects to raw images and back; `matrix`: `Matrix`, one of given numbers
+- `linear`: `Linear`, maps from objects to raw images and back; `joint`: `Joint`, several of one object;
+  `matrix`: `Matrix`, one of given numbers
 - `arrays`: the only file that knows array libraries
 - `brief`: what a large object shows of itself in a few lines
 - `checks`: one-line refusals of bad numbers

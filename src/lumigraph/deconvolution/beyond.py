@@ -7,7 +7,8 @@ import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
-from lumigraph.core.linear import Joint, Linear, Shape
+from lumigraph.core.joint import Joint
+from lumigraph.core.linear import Linear, Shape
 from lumigraph.deconvolution.problem import UNSEEN
 
 BARELY = 0.1

@@ -8,7 +8,8 @@ from typing import Any, overload
 
 from lumigraph.core import arrays, checks, memory
 from lumigraph.core.arrays import A, Array
-from lumigraph.core.linear import Joint, Linear
+from lumigraph.core.joint import Joint
+from lumigraph.core.linear import Linear
 from lumigraph.core.raw import RawImage
 from lumigraph.core.threads import single_products
 from lumigraph.core.volume import Volume

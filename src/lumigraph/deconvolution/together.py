@@ -15,7 +15,8 @@ from dataclasses import replace
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
-from lumigraph.core.linear import Joint, Linear
+from lumigraph.core.joint import Joint
+from lumigraph.core.linear import Linear
 from lumigraph.core.raw import RawImage
 from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.problem import Problem, pixels, values

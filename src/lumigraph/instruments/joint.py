@@ -9,7 +9,8 @@ import numpy as np
 from lumigraph.core import checks
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
-from lumigraph.core.linear import Joint, Linear
+from lumigraph.core.joint import Joint
+from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress, part
 from lumigraph.errors import GeometryError
 from lumigraph.instruments.camera import Camera
