@@ -126,7 +126,7 @@ def waves(length: int, first: int, count: int, odd: int, of_image: bool) -> np.n
 def back(length: int, first: int, count: int, odd: int, of_image: bool) -> np.ndarray:
     """From those sums to the lenslets (count, 2 f), as the frequencies below 0 have the same.
 
-    >>> (back(5, 1, 3, 1, True) @ waves(5, 1, 3, 1, True)).round(6).tolist()
+    >>> ((back(5, 1, 3, 1, True) @ waves(5, 1, 3, 1, True)).round(6) + 0.0).tolist()  # no -0.0
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
     frequencies = np.arange(length // 2 + 1)
