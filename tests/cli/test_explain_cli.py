@@ -96,7 +96,7 @@ def numbers(text, pattern):
 @pytest.mark.parametrize(
     ("f_number", "asked", "warns"),
     [
-        (32, (), False),
+        (8, (), False),
         (32, ("--accuracy", "1e-4"), True),
         (4, (), True),
     ],

@@ -355,7 +355,7 @@ def _without_beats(found: list[Vectors], pictures: tuple[Gaps, ...]) -> list[Vec
 
 
 def _beats(pictures: tuple[Gaps, ...], vectors: Vectors, finer: Vectors) -> bool:
-    """Whether a candidate is coarser than another, and faint beside it, and no few of its cells in one."""
+    """Whether a candidate is coarser than another, faint beside it, and more than a few of its cells."""
     if _area(vectors) < 1.05 * _area(finer) or not all(_faint(one, vectors, finer) for one in pictures):
         return False
     steps = np.linalg.solve(
