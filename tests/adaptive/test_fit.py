@@ -1,0 +1,89 @@
+"""Steps of a fit whose images are Gaussian spots, moved along x by the one coefficient."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from lumigraph.adaptive.field import Nodes
+from lumigraph.adaptive.fit import Fit, Model
+from lumigraph.adaptive.star import Alone
+from lumigraph.core.grid import Grid
+from lumigraph.deconvolution import Exposure
+from lumigraph.deconvolution.problem import Problem, Scale
+from lumigraph.operators.microscope_pupil import Lit
+from lumigraph.scene import Points
+
+Y, X = np.mgrid[-10.0:11, -10.0:11]
+LIGHT, MOVED = 500.0, 0.7
+"""Of the bead that is seen, and where the coefficient puts it."""
+
+
+@dataclass
+class Spots:
+    """Images of which derivatives may be off by a factor; how often either is asked for is counted."""
+
+    off: float = 1.0
+    calls: dict[str, int] = field(default_factory=lambda: {"forward": 0, "lit": 0})
+    shape = X.shape
+
+    def forward(self, points: Points, coefficients: np.ndarray) -> np.ndarray:
+        self.calls["forward"] += 1
+        y, x, _ = points.positions[0]
+        return points.intensities[0] * np.exp(-((Y - y) ** 2 + (X - x - coefficients[0]) ** 2) / 8)
+
+    def lit(self, points: Points, coefficients: np.ndarray) -> Iterator[Lit]:
+        self.calls["lit"] += 1
+        image = self.forward(Points(points.positions, np.ones(1)), coefficients)
+        changes = np.zeros((4, *self.shape))  # the bead's place is known
+        changes[0] = self.off * image * (X - points.positions[0, 1] - coefficients[0]) / 4
+        yield Lit(image, changes, (0, 0))
+
+    def whole(self, image: np.ndarray, cell: tuple[int, int]) -> np.ndarray:
+        return image
+
+    def placed(self, samples: np.ndarray) -> np.ndarray:
+        return samples
+
+
+def bead(light: float) -> Points:
+    return Points(np.zeros((1, 3)), np.array([light]))
+
+
+@pytest.fixture
+def model():
+    spots = Spots()
+    data = np.random.default_rng(5).poisson(spots.forward(bead(LIGHT), np.array([MOVED])) + 1.0) * 1.0
+    exposure = Exposure(background=1.0, gain=1.0)
+    scale = Scale.of(Alone(spots.forward(bead(1.0), np.zeros(1))), exposure, data)
+    nodes, held = Nodes.of(Grid.square(21, 1.0), (1, 1), 1), np.zeros(3)
+    return Model(spots, Problem.of(data, exposure, scale), nodes, (held, held))
+
+
+def test_a_step_that_gains_more_than_promised_is_doubled(model):
+    first, fixed = Fit(bead(30 * LIGHT), np.array([[MOVED]])), np.zeros(1, bool)
+    found = model.improved(first, fixed, 1)
+    taken = np.log(found.points.intensities[0] / first.points.intensities[0])
+    assert taken < -1.5  # one step is 1 at most
+    e_fold = replace(first, points=bead(30 * LIGHT / np.e))
+    assert found.objective < model.judged(e_fold).objective
+
+
+@pytest.mark.parametrize("off", [0.8, 1.3])
+def test_coarse_derivatives_show_the_way_to_the_same_place(model, off):
+    start, free = Fit(bead(LIGHT / 2), np.zeros((1, 1))), np.ones(1, bool)
+    exact = model.improved(start, free, 40)
+    coarse = Spots(off)
+    found = replace(model, coarse=coarse).improved(start, free, 40)
+    assert coarse.calls["lit"] > 1
+    deviation = 1 / np.sqrt(model.around(exact).information[-1, -1])
+    assert abs(found.coefficients[0, 0] - exact.coefficients[0, 0]) < 0.3 * deviation
+    assert abs(exact.coefficients[0, 0] - MOVED) < 3 * deviation
+    assert found.points.intensities[0] == pytest.approx(exact.points.intensities[0], rel=5e-3)
+
+
+def test_pictures_that_are_judged_are_not_coarse(model):
+    coarse = Spots()
+    replace(model, coarse=coarse).improved(Fit(bead(LIGHT), np.zeros((1, 1))), np.ones(1, bool), 3)
+    assert coarse.calls["forward"] == coarse.calls["lit"]  # each derivative makes its own
