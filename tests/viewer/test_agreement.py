@@ -98,6 +98,27 @@ def test_depths_of_a_camera_2_agree_in_metres(tmp_path, monkeypatch):
         np.testing.assert_allclose(np.asarray(other), found.values, atol=1e-6)
 
 
+def test_pictures_of_three_kinds_of_lenslets_agree_to_a_grey_level(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    camera = lg.FocusedPlenopticCamera.from_catalogue("multi-focus-hex")
+    lenslets = {**camera.lenslets.model_dump(exclude_unset=True), "count": (6, 6)}
+    camera = camera.replace(lenslets=lenslets, sensor={"pixel_pitch": 10e-6})
+    (tmp_path / "camera.toml").write_text(camera.to_toml())
+    y, x = np.indices(camera.sensor.shape)
+    raw = lg.RawImage((2 + np.sin(0.4 * y) * np.cos(0.5 * x)).astype(np.float32))
+    lg.save(raw, "raw.tiff")
+    shown = viewer.open_exhibit(
+        tmp_path / "raw.tiff", viewer.Origin(camera=lg.load_camera("camera.toml"), patch=camera.patch)
+    )
+    sizes, seen = shown.planes.positions, np.asarray(shown.planes.data)
+    patches = f"--patches={sizes[0]}:{sizes[-1]}:{len(sizes)}"
+    assert main(["render", "raw.tiff", "--camera", "camera.toml", patches, "-o", "stack.tiff"]) == 0
+    python = lg.render_stack(raw, camera.calibration, sizes, focus=camera.patches_on_raw())
+    level = float(np.max(python)) / 255
+    assert np.abs(np.asarray(lg.open("stack.tiff").data) - python).max() < level
+    assert np.abs(seen - python).max() < level
+
+
 def test_depths_of_a_camera_1_are_shown_in_metres_from_the_focused_plane(open_page):
     camera = lg.load_camera("thesis-plenoptic-1")
     focal_length = camera.main_lens.focal_length

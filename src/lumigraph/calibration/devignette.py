@@ -123,7 +123,7 @@ def _phases(bayer: str | None) -> list[tuple[slice, slice]]:
 
 
 def check_alike(name: str, picture: RawImage, raw: RawImage) -> None:
-    """Refuse a white or dark image of another size than the raw image's, complex, or not finite."""
+    """Refuse a white or dark image of another size than the raw image, complex, or with unusable values."""
     shape, expected = tuple(picture.data.shape), tuple(raw.data.shape)
     if shape not in (expected, expected[:2]):
         raise CalibrationError(
@@ -132,7 +132,7 @@ def check_alike(name: str, picture: RawImage, raw: RawImage) -> None:
         )
     if is_complex(picture.data):
         raise CalibrationError(f"the {name} image is complex. Give its intensity.")
-    checks.finite_array(f"the {name} image", picture.data, CalibrationError)
+    checks.brightness(f"the {name} image", picture.data, CalibrationError)
 
 
 def _aligned(values: np.ndarray, picture: RawImage) -> np.ndarray:

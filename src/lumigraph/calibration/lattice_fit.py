@@ -121,7 +121,7 @@ def _light(white: RawImage | Array | Sequence[RawImage | Array]) -> tuple[RawIma
                 f"the white images have {images[0].shape} and {image.shape} pixels. "
                 "Give images of one camera at one setting."
             )
-        checks.finite_array("the white image", image.data, CalibrationError)
+        checks.brightness("the white image", image.data, CalibrationError)
     if len(images) == 1:
         return images[0], _picture(images[0])
     total = np.zeros(images[0].shape, np.float32)

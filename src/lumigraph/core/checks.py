@@ -13,6 +13,7 @@ from lumigraph.errors import GeometryError, LumigraphError
 
 Pair = tuple[float, float]
 
+_BRIGHTEST = 1e15  # its square, summed over 100 million pixels, still fits into float32
 _MOST = 2**31 - 1  # along one axis: more would overflow the index types of array libraries
 
 
@@ -125,3 +126,21 @@ def finite_array(name: str, array: Any, error: type[LumigraphError] = LumigraphE
             f"{name} has {count} NaN or infinite values of {values.size}, the first at index {where}. "
             "Replace them by a measured or interpolated value."
         )
+
+
+def brightness(name: str, array: Any, error: type[LumigraphError] = LumigraphError) -> None:
+    """Refuse a picture with NaN, infinite values, or some whose squares no float32 could sum."""
+    finite_array(name, array, error)
+    values = to_numpy(array)
+    if not values.size or values.dtype.kind not in "iuf":
+        return
+    ends = [(float(values.flat[k]), k) for k in (values.argmin(), values.argmax())]
+    worst, place = max(ends, key=lambda end: abs(end[0]))
+    if abs(worst) <= _BRIGHTEST:
+        return
+    count = int(np.count_nonzero((values > _BRIGHTEST) | (values < -_BRIGHTEST)))
+    where = tuple(int(i) for i in np.unravel_index(place, values.shape))
+    raise error(
+        f"{name} has {count} of {values.size} values beyond ±{_BRIGHTEST:g}, such as {worst:g} at index "
+        f"{where}. Replace them if they were not measured; else divide all values by one number."
+    )

@@ -1,5 +1,6 @@
 """The pictures that come with a raw image: `Beside`."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,9 @@ from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.sensor import demosaic, levels
 
+_BELOW = 0.1  # of the spread of a raw image's values: noise about 0 has a mean within
+_LOOKED_AT = 4e6  # values; of larger pictures some rows are
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Beside:
@@ -20,13 +24,25 @@ class Beside:
     dark: RawImage | None = None
 
     def check(self, raw: RawImage) -> None:
-        """Refuse pictures of other sizes, and what is not finite."""
+        """Refuse pictures of other sizes, and values that are not finite or too large to compute with."""
         if is_complex(raw.data):
             raise CalibrationError("the raw image is complex. Give its intensity.")
-        checks.finite_array("the raw image", raw.data, CalibrationError)
+        checks.brightness("the raw image", raw.data, CalibrationError)
         for name, picture in (("white", self.white), ("dark", self.dark)):
             if picture is not None:
                 check_alike(name, picture, raw)
+
+    def doubt(self, raw: RawImage) -> str | None:
+        """What to say of a raw image that is darker than its dark level on average, as no light makes it."""
+        some = slice(None, None, math.ceil(math.prod(raw.data.shape) / _LOOKED_AT))
+        values, dark = to_numpy(raw.data)[some], self.dark or black_plane(raw)
+        black = 0.0 if dark is None else float(to_numpy(dark.data)[some].mean(dtype=float))
+        mean, spread = float(values.mean(dtype=float)), float(values.std(dtype=float))
+        if mean - black >= -_BELOW * spread:
+            return None
+        below = "below 0" if dark is None else f"less than its dark level, {black:g}"
+        remedy = "Invert it back, or subtract less" if dark is None else "Give the dark image of its exposure"
+        return f"the raw image is {mean:g} on average, {below}, which light never is. {remedy}."
 
     def light(self, raw: RawImage) -> np.ndarray | None:
         """White image above the dark (y, x), the brightest colour of it, 1 at full light."""

@@ -91,6 +91,9 @@ def prepare(
     raw = as_raw(raw)
     beside.check(raw)
     found, notes = _placed(raw, calibration, beside.white, camera)
+    notes += _flat(raw)
+    if doubt := beside.doubt(raw):
+        _warn(notes, doubt)
     reasons = pixel_reasons(raw, beside, found, _mask(mask, raw))
     lenslets = None if found is None else verdicts(reasons, found)
     notes = (*notes, *beside.notes(raw, divide=divide), *_counted(reasons, lenslets))
@@ -132,6 +135,14 @@ def _placed(
     line, agree = implied(found.lattice, described)
     notes.append(line) if agree else _warn(notes, line)
     return _with_lengths(found, told), notes
+
+
+def _flat(raw: RawImage) -> list[str]:
+    """A note on a raw image of one value, on which no verb can find anything."""
+    values = to_numpy(raw.data)
+    if (low := values.min()) != values.max():
+        return []
+    return [f"all pixels of the raw image are {low:g}: there is nothing to see on it"]
 
 
 def _warn(notes: list[str], line: str) -> None:

@@ -79,7 +79,9 @@ def _pairs(picture: np.ndarray, calibration: Calibration) -> tuple[np.ndarray, n
         y, x = calibration.position(indices + np.array((0, step))).T[:, :, None, None]
         piece = sample(picture, y + offsets[:, None], x + offsets, "linear")
         shading = piece.mean(0)
-        piece = piece / np.maximum(shading, 0.1 * max(float(shading.max()), 1e-300))
+        if (most := float(shading.max())) <= 0:
+            return None
+        piece = piece / np.maximum(shading, 0.1 * most)
         pieces.append(piece - piece.mean((1, 2), keepdims=True))
     return pieces[0], pieces[1]
 

@@ -205,10 +205,11 @@ def of_raw(
         return Exhibit(name, raw=raw, facts=facts)
     patch = patch if patch is not None else _own_patch(raw, calibration)
     if patch is not None:
-        planes, camera = rendered(raw, calibration, patch), origin.camera
+        camera = origin.camera
         camera = camera if isinstance(camera, Rendered) and isinstance(camera, WithMainLens) else None
         sizes = () if camera is None else camera.patches_on_raw()
         focus = sharp_kinds(calibration, sizes, origin.calibration)
+        planes = rendered(raw, calibration, patch, focus)
         return Exhibit(
             name, raw=raw, calibration=calibration, planes=planes, facts=facts,
             depth=lambda: depth_of_pixels(raw, calibration, focus, camera),
@@ -255,12 +256,17 @@ def _metres(camera: Described | None, views: LightField) -> Callable[[np.ndarray
     return lambda values: to_numpy(metric(disparities(values), views, focal_length=lens).values)
 
 
-def rendered(raw: RawImage, calibration: Calibration, patch: float | PatchRange) -> Planes:
-    """Pictures of a camera 2.0 with patches about one, or as given, by `lumigraph.rendering.render_stack`."""
+def rendered(
+    raw: RawImage, calibration: Calibration, patch: float | PatchRange, focus: list[float] | None = None
+) -> Planes:
+    """Pictures of a camera 2.0 with patches about one, or as given, as `lumigraph render --patches` has them.
+
+    `focus`: patches [px] at which each of three kinds of lenslets is sharp, where they are known.
+    """
     from lumigraph.rendering import render_stack
 
     range_ = patch if isinstance(patch, PatchRange) else PatchRange.about(patch, calibration)
-    pictures = to_numpy(render_stack(raw, calibration, range_.sizes, samples=range_.samples))
+    pictures = to_numpy(render_stack(raw, calibration, range_.sizes, samples=range_.samples, focus=focus))
     return Planes(pictures.astype(np.float32, copy=False), range_.sizes, "Patch", "px")
 
 
