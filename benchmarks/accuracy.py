@@ -226,11 +226,15 @@ def _known(rows: Path) -> dict[str, dict[str, str]]:
 
 
 def table(known: dict[str, dict[str, str]]) -> str:
-    """Markdown: a line for each path and camera, worst of all depths; for each accuracy, all places."""
+    """Markdown: a line for each path and camera, worst of all depths; for each accuracy, all places.
+
+    What was not run at all of its depths is left out: the worst may be missing.
+    """
     worst: dict[tuple[str, str], dict[str, list[str]]] = {}
-    for cell in cells():
+    partly = {cell._replace(dz=0.0) for cell in cells() if cell.key not in known}
+    for cell in (cell for cell in cells() if cell._replace(dz=0.0) not in partly):
         mine = worst.setdefault((cell.camera, cell.path), {})
-        for place, value in known.get(cell.key, {}).items():
+        for place, value in known[cell.key].items():
             mine.setdefault(f"{place} {cell.asked:g}", []).append(value)
     head = ["camera", "path", *(f"{a:g}" for a in ACCURACIES)]
     lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]

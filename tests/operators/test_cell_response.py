@@ -10,8 +10,9 @@ from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.elements import LensletArray
-from lumigraph.operators.cell_response import INFINITE, Axis, Lenslets, legendre, nodes
-from lumigraph.operators.lenslet_light import LensletLight
+from lumigraph.operators.cell_response import INFINITE, SLACK, Axis, Lenslets, legendre, nodes
+from lumigraph.operators.cells import OVERSAMPLING
+from lumigraph.operators.lenslet_light import LensletLight, windows
 from lumigraph.propagation import propagate
 from lumigraph.units import mm, nm, um
 
@@ -34,6 +35,23 @@ def test_samples_of_light_tell_what_is_between_them():
     for frequency in (0.0, 0.3 * BAND, -0.95 * BAND):
         found = values(at) @ (coefficients @ np.exp(2j * np.pi * frequency * here.window))
         np.testing.assert_allclose(found, np.exp(2j * np.pi * frequency * at), atol=1e-5)
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5])
+def test_light_around_a_lenslet_tells_what_is_in_it(accuracy):
+    """Waves up to the edge of the main lens, from points that stand as far apart as they may.
+
+    Their images are off by less: most of it is at the lenslet's edge, and of waves from the stop's edge.
+    """
+    band = 6 / (4 * PITCH) * SLACK / OVERSAMPLING
+    plain = Axis(PITCH, 6, 10, 0.0, band)
+    _, here = windows(Lenslets((plain, plain), ARRAYS["hexagonal"], WAVELENGTH, DISTANCE), accuracy)
+    coefficients, values = here.basis()
+    at, edge = np.linspace(-PITCH / 2, PITCH / 2, 201), band / SLACK
+    frequencies = np.linspace(-edge, edge, 25)
+    waves = np.exp(2j * np.pi * frequencies * here.window[:, None])
+    off = values(at) @ (coefficients @ waves) - np.exp(2j * np.pi * frequencies * at[:, None])
+    assert np.sqrt(np.mean(np.abs(off) ** 2)) < 3 * accuracy
 
 
 def test_the_window_and_the_image_are_centred_on_the_cell():

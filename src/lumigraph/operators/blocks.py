@@ -152,12 +152,12 @@ class Builder:
         self.optics, self.axes, self.progress, self.workers = optics, optics.axes, progress, workers
         self.lenslets = lenslets_of(optics)
         axes, cells = self.axes, optics.margin(optics.reach)
+        accuracy = optics.fineness.accuracy
         if not optics.straight:
-            axes = windows(self.lenslets)
+            axes = windows(self.lenslets, accuracy)
             cells = [math.ceil(optics.lit / axis.size) for axis in axes]
         light = wave(optics.camera, optics.distance, axes, cells, optics.place)
         self.light = light.dimmed(optics.image_scale)
-        accuracy = optics.fineness.accuracy
         self.apart = None
         if not optics.straight:
             self.apart = LensletLight(self.lenslets, self.light, optics.lit, accuracy)
