@@ -1,5 +1,7 @@
 """White images drawn from their definition: micro-images with the area of each pixel that they cover."""
 
+import math
+
 import numpy as np
 
 from lumigraph.core.lattice import Lattice
@@ -82,3 +84,22 @@ def random_case(rng, smallest=5.0, largest=200.0):
         "noise": float(rng.choice([0, 0.03, 0.1])), "dead": float(rng.choice([0, 0.01, 0.03])),
     }  # fmt: skip
     return lattice, shape, options
+
+
+def sampled(lattice, shape, form="round", fill=0.9, over=4):
+    """White image: area fraction of each pixel inside micro-images, from over² points a pixel."""
+    inside = np.zeros(shape)
+    cos, sin = math.cos(lattice.rotation), math.sin(lattice.rotation)
+    steps = (np.arange(over) - (over - 1) / 2) / over
+    radius = fill * lattice.pitch / 2
+    for a in steps:
+        for b in steps:
+            dy, dx = lattice.offset(np.arange(shape[0])[:, None] + a, np.arange(shape[1])[None, :] + b)
+            if form == "round":
+                inside += np.hypot(dy, dx) < radius
+            elif form == "square":
+                inside += np.maximum(np.abs(dy * cos - dx * sin), np.abs(dx * cos + dy * sin)) < radius
+            else:
+                r = np.hypot(dy, dx) / lattice.pitch
+                inside += (1 + np.cos(2 * np.pi * r * 5)) * (r < fill / 2)  # bright ring at the edge
+    return inside / over**2

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from lumigraph.calibration import calibrate
-from lumigraph.calibration.period import Request, Vectors, _best, _Candidate
+from lumigraph.calibration.period import Request, _best, _Candidate
 from lumigraph.calibration.spectrum import Gaps
+from lumigraph.calibration.vectors import Vectors
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import CalibrationError
 

@@ -5,6 +5,7 @@
 - `tiles`: the same for large pictures, by their middle and tiles
 - `unlit`: which lenslets are dark or saturated
 - `period`: the lattice vectors, by autocorrelation, before any spot is known
+- `vectors`, `multiples`: a candidate, and which of them hold several cells of the true lattice
 - `centres`: sub-pixel centre of every micro-image
 - `diagnosis`: `diagnose`, what a white image says about how a camera is put together
 - `aligned`: a maker's lattice moved to the borders of micro-images on a raw image

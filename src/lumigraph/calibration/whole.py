@@ -11,10 +11,11 @@ from lumigraph.calibration.centres import Spots, followed, measure
 from lumigraph.calibration.fitting import Fitted, fit, recentred
 from lumigraph.calibration.following import followed as light_followed
 from lumigraph.calibration.overlap import Discs, overlapping, separated
-from lumigraph.calibration.period import Request, Vectors, lattice_vectors
+from lumigraph.calibration.period import Request, lattice_vectors
 from lumigraph.calibration.quality import fill_of, sharpness_of
 from lumigraph.calibration.surface import Surface, flattened
 from lumigraph.calibration.template import mean_cell, sharpened
+from lumigraph.calibration.vectors import Vectors
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.gaps import logarithm, valleys
 from lumigraph.core.lattice import Lattice, Vector
