@@ -8,6 +8,7 @@ import pytest
 
 import cameras
 from lumigraph.core.cache import Budget, ByteCache
+from lumigraph.errors import SamplingError
 from lumigraph.instruments import PlenopticCamera
 from lumigraph.operators import blocks, factors, few_points, kernels, places, point_images
 from lumigraph.operators.fineness import Fineness
@@ -16,6 +17,7 @@ from lumigraph.operators.missing import Missing
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.places import State
 from lumigraph.operators.sizes import build_bytes
+from lumigraph.operators.streamed import stream_bytes
 from lumigraph.units import mm, nm, um
 
 focused = partial(cameras.focused, pixel_pitch=9 * um, pitch=80 * um)
@@ -293,3 +295,15 @@ def test_lenslets_between_limits_are_sums_from_one_side_less_others(layout):
         rows = list(builder.lenslets.rows(middle, (state.y, state.x)))
         field = builder.apart.amplitudes(missing._numbers((0, 1)), rows)
         np.testing.assert_allclose(found[state], np.abs(field) ** 2, atol=1e-5 * np.abs(field).max() ** 2)
+
+
+def test_the_memory_that_is_free_does_not_choose_between_held_and_streamed(optics, monkeypatch):
+    """Images differ by a sixth of what is asked: a worker must not stream what the first one held."""
+    assert stream_bytes(optics) < build_bytes(optics)
+    monkeypatch.setattr("lumigraph.core.memory.available", lambda: build_bytes(optics) - 1)
+    monkeypatch.setattr(kernels, "_MATRICES", ByteCache())
+    monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
+    with pytest.raises(
+        SamplingError, match=r"the periodic operator needs \S+ GiB but \S+ GiB are free\. Use"
+    ):
+        matrix(optics)

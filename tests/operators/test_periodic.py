@@ -413,5 +413,5 @@ def test_an_operator_that_cannot_fit_is_refused(monkeypatch):
     optics = [Optics.of(camera, camera.object_distance + 1.234 * mm, accuracy) for accuracy in (1e-4, 1e-5)]
     between = np.mean([stream_bytes(o) for o in optics])
     monkeypatch.setattr(memory, "available", lambda: between)
-    with pytest.raises(SamplingError, match=r"An accuracy of 0\.0001 fits \(\S+ GiB\): ask for that"):
+    with pytest.raises(SamplingError, match=r"An accuracy of 0\.001 fits \(\S+ GiB\): ask for that"):
         periodic_operator(camera, grid, 1.234 * mm, accuracy=1e-5)

@@ -283,8 +283,8 @@ class Deconvolver:
     ) -> list[Result | Exception]:
         """The results of at most `side_by_side` raw images, or the error of each that has none.
 
-        They share the products of the operator. Which others there are does not change a bit of a result;
-        beside that of a call for it alone, it may be off by rounding.
+        They go through the operator together. Which others there are does not change a bit of a result: it
+        is that of a call for it alone.
         """
         found: list[Result | Exception] = []
         begun: list[tuple[int, Callable[[Linear], Result]]] = []

@@ -89,6 +89,7 @@ def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None
         return streamed(optics, progress)
 
     def built() -> dict[str, np.ndarray]:
+        _require(optics)
         said(operations(optics), "the periodic operator takes once")
         return _build(optics, progress)
 
@@ -113,26 +114,33 @@ def said(operations: float, what: str) -> None:
 
 
 def _held(optics: Optics) -> bool:
-    limit = HELD if optics.straight else math.inf  # what cannot be streamed is held where it fits at all
+    """Whether it is kept, whatever memory is free: streamed images differ, and should not tell the machine.
+
+    What cannot be streamed is held where it fits at all.
+    """
     if build_operations(optics) > LONGEST:
         return False
-    return build_bytes(optics) <= min(limit, memory.available() or math.inf)
+    return not optics.straight or build_bytes(optics) <= HELD
 
 
-def _streams(optics: Optics) -> bool:
-    """Whether blocks are computed fast enough to be let go: those of lenslets whose axes are apart."""
-    if not optics.straight or stream_operations(optics) > LONGEST:
-        return False
-    return stream_bytes(optics) <= (memory.available() or math.inf)
+def _needed(optics: Optics) -> float:
+    """Memory that it takes, kept or streamed [bytes]."""
+    return build_bytes(optics) if _held(optics) or not optics.straight else stream_bytes(optics)
+
+
+def _can(optics: Optics) -> bool:
+    """Whether it fits in memory and is fast enough; only lenslets whose axes are apart are streamed."""
+    fast = _held(optics) or (optics.straight and stream_operations(optics) <= LONGEST)
+    return fast and _needed(optics) <= (memory.available() or math.inf)
 
 
 def _require(optics: Optics) -> None:
     """Refuse what can neither be held nor streamed, and name the finest accuracy that can."""
-    if _streams(optics):
+    if _can(optics):
         return
     coarser = (a for a in (1e-4, 1e-3, 1e-2) if a > optics.fineness.accuracy)
     others = (Optics.of(optics.camera, optics.distance, a, optics.blurred).bricks for a in coarser)
-    fits = next((o for o in others if _held(o) or _streams(o)), None)
+    fits = next(filter(_can, others), None)
     remedy = "Use slower lenslets" if fits is None else f"{_price(fits)}: ask for that"
     if (needed := operations(optics)) > LONGEST:
         what = "for each image" if optics.straight else "to build"
@@ -141,13 +149,12 @@ def _require(optics: Optics) -> None:
             f"min of a processor that does 1e11 a second; {LONGEST:.0e} are allowed. "
             f"{remedy}, or use Snapshots."
         )
-    needed = stream_bytes(optics) if optics.straight else build_bytes(optics)
-    memory.require(needed, "the periodic operator", f"{remedy}, or use Snapshots.", SamplingError)
+    memory.require(_needed(optics), "the periodic operator", f"{remedy}, or use Snapshots.", SamplingError)
 
 
 def _price(fits: Optics) -> str:
     """What an operator that can be had takes."""
-    needed = build_bytes(fits) if _held(fits) else stream_bytes(fits)
+    needed = _needed(fits)
     minutes, each = operations(fits) / A_MINUTE, "" if _held(fits) else " for each image"
     time = f", some {minutes:.2g} min of a processor{each}" if minutes > 1 else ""
     return f"An accuracy of {fits.fineness.accuracy:g} fits ({needed / 2**30:.2g} GiB{time})"

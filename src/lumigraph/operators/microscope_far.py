@@ -6,6 +6,8 @@ depths share the patterns, so that one transform back is enough for each.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 import scipy.fft
@@ -26,11 +28,26 @@ class Far:
         (n, k): what each has of each pattern.
     images
         (k, N²): the patterns.
+    parts
+        (k, r): how much of each of r patterns, which depths share, is in them: `images` are those then. None
+        where they are its own.
     """
 
     offsets: np.ndarray
     weights: np.ndarray
     images: np.ndarray
+    parts: np.ndarray | None = None
+
+    def spectrum(self, cells: tuple[int, int], margin: int) -> np.ndarray:
+        """Transforms (patterns, L, L/2 + 1) of the weights; cells and margin are those of `FarLight`."""
+        seen, lengths = _seen(cells, margin), _lengths(cells, margin)
+        steps = self.offsets - margin  # from the object's first lenslet, to the image's first
+        inside = np.asarray((steps > -np.asarray(seen)).all(1) & (steps < cells).all(1))
+        wide = np.zeros((*lengths, self.weights.shape[1]))
+        row, column = (steps[inside] % lengths).T
+        wide[row, column] = self.weights[inside]
+        own = np.fft.rfft2(wide, axes=(0, 1)).transpose(2, 0, 1)
+        return own if self.parts is None else np.tensordot(self.parts.T.astype(float), own, 1)
 
 
 def shared(
@@ -60,7 +77,7 @@ def shared(
     lost = np.sqrt([np.cumsum(np.square(own @ vectors.T).sum(0)[::-1])[::-1] for own in rows]).max(0)
     kept = max(int((lost > allowed).sum()), 1)
     images = vectors[:kept].astype(np.float32)
-    found = [Far(far.offsets, far.weights @ (far.images @ images.T), images) for far in fars]
+    found = [Far(far.offsets, far.weights, images, far.images @ images.T) for far in fars]
     return found, float(lost[kept]) if kept < len(lost) else 0.0
 
 
@@ -95,31 +112,22 @@ class FarLight:
 
         `basis` (N², r) are the patterns of a cell's image; None for its samples themselves.
         """
-        seen = cells[0] + 2 * margin, cells[1] + 2 * margin
-        y, x = (
-            int(scipy.fft.next_fast_len(n + m - 1, real=True) or n + m)
-            for n, m in zip(cells, seen, strict=True)
-        )
-        spectra = []
-        for far in fars:
-            steps = far.offsets - margin  # from the object's first lenslet, to the image's first
-            inside = (steps > -np.asarray(seen)).all(1) & (steps < cells).all(1)
-            wide = np.zeros((y, x, len(far.images)))
-            row, column = (steps[inside] % (y, x)).T
-            wide[row, column] = far.weights[inside]
-            spectra.append(np.fft.rfft2(wide, axes=(0, 1)).transpose(2, 0, 1))
+        y, x = _lengths(cells, margin)
+        kind = np.complex64 if arrays.is_single(like) else np.complex128
+        spectra = np.empty((len(fars), len(fars[0].images), y, x // 2 + 1), kind)
+        for k, far in enumerate(fars):
+            spectra[k] = far.spectrum(cells, margin)
         alike = all(far.images is fars[0].images for far in fars)
         images = np.stack([far.images for far in (fars[:1] if alike else fars)])
         images = images if basis is None else images @ basis
-        return cls(arrays.like(np.stack(spectra), like), arrays.like(images, like), (y, x), cells, seen)
+        return cls(arrays.like(spectra, like), arrays.like(images, like), (y, x), cells, _seen(cells, margin))
 
     def forward(self, volume: Array, points: int) -> Array:
         """Light (rows, columns, r) from a volume (z, rows s, columns s)."""
         xp, (rows, columns) = arrays.namespace(volume), self.cells
-        cells = _summed(volume, points)
-        spectrum = arrays.rfft2(cells, self.lengths, axes=(1, 2))[:, None, ...] * self.spectra
-        if self.images.shape[0] == 1:
-            spectrum = xp.sum(spectrum, axis=0, keepdims=True)
+        cells, depths = arrays.rfft2(_summed(volume, points), self.lengths, axes=(1, 2)), volume.shape[0]
+        lit = (cells[k, None, ...] * self.spectra[k, ...] for k in range(depths))
+        spectrum = reduce(add, lit)[None, ...] if self.images.shape[0] == 1 else xp.stack(list(lit))
         light = arrays.irfft2(spectrum, self.lengths, axes=(2, 3))[..., :rows, :columns]
         light = xp.reshape(light, (-1, rows * columns))
         return xp.reshape(xp.matrix_transpose(light) @ self._patterns, (rows, columns, -1))
@@ -136,9 +144,30 @@ class FarLight:
         parts = xp.reshape(
             self._patterns @ xp.matrix_transpose(flat), (*self.images.shape[:2], rows, columns)
         )
-        spectrum = arrays.rfft2(parts, self.lengths, axes=(2, 3)) * xp.conj(self.spectra)
-        cells = arrays.irfft2(xp.sum(spectrum, axis=1), self.lengths, axes=(1, 2))
+        spectrum = arrays.rfft2(parts, self.lengths, axes=(2, 3))
+        found, depths = spectrum.shape[0], self.spectra.shape[0]
+        pairs = ((spectrum[k % found, ...], self.spectra[k, ...]) for k in range(depths))
+        seen = xp.stack([xp.sum(light * xp.conj(own), axis=0) for light, own in pairs])
+        cells = arrays.irfft2(seen, self.lengths, axes=(1, 2))
         return cells[:, : self.seen[0], : self.seen[1]]
+
+
+def far_numbers(fars: Sequence[Far], cells: tuple[int, int], margin: int, patterns: int) -> int:
+    """How many a `FarLight` of shared patterns holds, with what `forward` or `adjoint` takes."""
+    (y, x), k = _lengths(cells, margin), len(fars[0].images)
+    spectrum = 2 * y * (x // 2 + 1)
+    return spectrum * (len(fars) * (k + 2) + 3 * k) + k * (patterns + 2 * y * x)
+
+
+def _seen(cells: tuple[int, int], margin: int) -> tuple[int, int]:
+    """Lenslets (rows, columns) before which the object stands."""
+    return cells[0] + 2 * margin, cells[1] + 2 * margin
+
+
+def _lengths(cells: tuple[int, int], margin: int) -> tuple[int, int]:
+    """Of the transforms (y, x), in which no light falls round their ends."""
+    y, x = (n + m - 1 for n, m in zip(cells, _seen(cells, margin), strict=True))
+    return int(scipy.fft.next_fast_len(y, real=True) or y), int(scipy.fft.next_fast_len(x, real=True) or x)
 
 
 def _summed(volume: Array, s: int) -> Array:

@@ -14,13 +14,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from lumigraph.core import arrays, memory
+from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear, Shape
 from lumigraph.operators import microscope_spectrum
-from lumigraph.operators.microscope_far import Far, FarLight, shared
+from lumigraph.operators.microscope_far import Far, FarLight, far_numbers, shared
 from lumigraph.operators.microscope_kernels import SHARES, SliceKernel
 from lumigraph.operators.microscope_patterns import Patterns, patterns, pixel_patterns
 from lumigraph.operators.microscope_tiles import Tiling
@@ -30,9 +30,6 @@ GATHERED = 2**27
 
 FINEST = 1e-6
 """Relative rms that far light loses where nothing else may."""
-
-SHARE = 0.3
-"""Part of the free memory that matrices of the lenslets' frequencies may take."""
 
 _MATRICES = ByteCache()
 
@@ -115,7 +112,7 @@ class MicroscopeOperator(Linear):
         N, given = self.kernels[0].sampling.pixels, sum(math.prod(shape) for shape in self.shape)
         if self.by_frequency:
             held = microscope_spectrum.held_numbers(self._tiling, self._points, self._pixels)
-            return self.nbytes + 4.0 * (self._matrix_numbers + given + held)
+            return self.nbytes + 4.0 * (self._matrix_numbers + self._far_numbers + given + held)
         most = max(len(kernel.offsets) * kernel.sampling.classes for kernel in self.kernels)
         gathered = min(2 * most * math.prod(self.cells), 2 * GATHERED)
         matrices = sum(len(kernel.offsets) * kernel.sampling.classes for kernel in self.kernels) * N * N
@@ -186,22 +183,25 @@ class MicroscopeOperator(Linear):
         return microscope_spectrum.matrix_numbers(self._tiling, *_counts(self._points, self._pixels))
 
     @property
+    def _far_numbers(self) -> int:
+        """Of far light, and of what it holds while it is followed."""
+        fars = self._shared[0]
+        return far_numbers(fars, self.cells, self.margin, self._pixels.count) if fars else 0
+
+    @property
     def side_by_side(self) -> int:
-        """Objects that share a product by frequencies in less time than one after the other."""
+        """Objects that go through each frequency's matrix in less time than through all one by one."""
         if not self.by_frequency:
             return 1
         return microscope_spectrum.sharing(self._tiling)
 
     def _forward(self, intensity: Array) -> Array:
-        return self._lit([intensity], 1)[0]
+        return self._forwards([intensity])[0]
 
     def _forwards(self, intensities: Sequence[Array]) -> list[Array]:
-        return self._lit(intensities, self.side_by_side)
-
-    def _lit(self, intensities: Sequence[Array], side: int) -> list[Array]:
         volumes = intensities if self.depths is not None else [one[None, ...] for one in intensities]
         if self.by_frequency:
-            return self._by_frequencies(volumes[0]).forward(volumes, side)
+            return self._by_frequencies(volumes[0]).forward(volumes)
         planes = [self._by_offsets(volume) + self._far_plane(volume) for volume in volumes]
         placement = self.placement
         return planes if placement is None else [placement._forward(plane) for plane in planes]
@@ -229,7 +229,7 @@ class MicroscopeOperator(Linear):
         """Far light of each depth by patterns that they share, and the relative rms that those lose."""
         if "shared" not in self._spectra:
             accuracy, spent = self.left_out / SHARES["patterns"], max(one.error for one in self.kernels)
-            left = 0.5 * math.sqrt(max(accuracy**2 - spent**2, 0.0))
+            left = 0.5 * math.sqrt(accuracy**2 - spent**2) if spent < accuracy else accuracy  # missed anyway
             allowed = max(min(SHARES["rank"] * accuracy, left), FINEST)
             light = [_norms(kernel) for kernel in self.kernels]
             self._spectra["shared"] = shared(self._own_fars, light, allowed) if self._own_fars else ([], 0.0)
@@ -264,14 +264,11 @@ class MicroscopeOperator(Linear):
         return _plane(xp.reshape(image, (N * N, *self.cells)), N)
 
     def _adjoint(self, raw: Array) -> Array:
-        return self._seen_by([raw], 1)[0]
+        return self._adjoints([raw])[0]
 
     def _adjoints(self, raws: Sequence[Array]) -> list[Array]:
-        return self._seen_by(raws, self.side_by_side)
-
-    def _seen_by(self, raws: Sequence[Array], side: int) -> list[Array]:
         if self.by_frequency:
-            volumes = self._by_frequencies(raws[0]).adjoint(raws, side)
+            volumes = self._by_frequencies(raws[0]).adjoint(raws)
         else:
             placed = self.placement
             planes = raws if placed is None else [placed._adjoint(raw) for raw in raws]
@@ -324,18 +321,19 @@ def _norms(kernel: SliceKernel) -> tuple[float, float]:
 def suits_frequencies(
     kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int, left_out: float = 0.0
 ) -> bool:
-    """Whether the way through the lenslets' frequencies is faster, and its matrices leave memory free.
+    """Whether the way through the lenslets' frequencies is faster, and its matrices take no more than `MOST`.
 
-    Or take less than those of all offsets, which then would only be worse.
+    Or less than those of all offsets, which then would only be worse. It does not depend on the memory that
+    is free: the two ways differ by rounding, and a result's bits should not tell the machine.
     """
     if not all(kernel.symmetric for kernel in kernels):
         return False
     points = patterns(kernels, left_out)
     counts = _counts(points, pixel_patterns(kernels, left_out, points))
-    told, free = microscope_spectrum.tiling(kernels, cells, margin, counts), memory.available()
+    told = microscope_spectrum.tiling(kernels, cells, margin, counts)
     needed = 4.0 * microscope_spectrum.matrix_numbers(told, *counts)
     offsets = 4.0 * sum(len(one.offsets) * one.sampling.classes * one.sampling.pixels**2 for one in kernels)
-    fits = free is None or needed < max(free * SHARE, offsets)
+    fits = needed <= max(microscope_spectrum.MOST, offsets)
     return fits and microscope_spectrum.is_faster(kernels, told, counts)
 
 

@@ -41,7 +41,7 @@ READ, PASSED = 24, 150
 to one number of a tile (transforms, parts and copies). The former was measured, the latter is a guess."""
 
 SIDE = 4
-"""Objects that share a product, at most: with more of them their columns leave the cache."""
+"""Objects that go through a matrix one after the other, at most: with more, their columns leave the cache."""
 
 GROUP = 2**22
 """Numbers of the transforms of all tiles that are treated at a time, at most, if one depth has fewer: they
@@ -104,7 +104,7 @@ def is_faster(kernels: Sequence[SliceKernel], told: Tiling, counts: tuple[int, i
 
 
 def sharing(told: Tiling) -> int:
-    """Objects whose tiles fill a product, so that reading `R` counts for little: at most `SIDE`.
+    """Objects by whose products reading `R` counts for little: at most `SIDE`.
 
     >>> from lumigraph.operators.microscope_tiles import Row
     >>> [sharing(Tiling(*[Row(29, 0, 4, n)] * 2)) for n in (1, 2, 3)]
@@ -165,13 +165,9 @@ class Spectra:
         matrices = list(each(found, groups(points, told)))
         return cls(told, points, pixels, matrices, sensor(pixels, placement, like), far)
 
-    def forward(self, volumes: Sequence[Array], side: int = 1) -> list[Array]:
-        """Images (ny, nx) of volumes (z, rows s, columns s), at most `side` of them.
-
-        They share each product. It has rows for `side` volumes, be they there or not: the bits of a sum may
-        depend on how many there are.
-        """
-        told = self.told
+    def forward(self, volumes: Sequence[Array]) -> list[Array]:
+        """Images (ny, nx) of volumes (z, rows s, columns s), which are those of each alone bit for bit."""
+        told, side = self.told, len(volumes)
 
         def lit(group: tuple[slice, Array]) -> Array:
             depths, matrix = group
@@ -181,14 +177,14 @@ class Spectra:
                 found = [parted(volume[k + depths.start, ...], one) for k, one in enumerate(chosen)]
                 return _ordered(found, chosen)
 
-            return columns(map(cells, volumes), side, told, _odd(chosen), of_image=False) @ matrix
+            return _times(columns(map(cells, volumes), side, told, _odd(chosen), of_image=False), matrix)
 
         found = each(lit, zip(groups(self.points, told), self.matrices, strict=True))
         sums = next(found)
         for part in found:
             sums += part
         images = [self._far_image(volume) for volume in volumes]
-        add_cells(images, sums, side, told, self.pixels.odd, of_image=True)
+        add_cells(images, sums, told, self.pixels.odd, of_image=True)
         return [self.sensor.whole(image) for image in images]
 
     def _far_image(self, volume: Array) -> Array:
@@ -203,7 +199,7 @@ class Spectra:
         """Along a side of a cell."""
         return math.isqrt(len(self.points[0].basis))
 
-    def adjoint(self, images: Sequence[Array], side: int = 1) -> list[Array]:
+    def adjoint(self, images: Sequence[Array]) -> list[Array]:
         """Transpose of `forward`: volumes (z, rows s, columns s)."""
         xp, told, n, evens = arrays.namespace(images[0]), self.told, len(images), []
 
@@ -212,7 +208,7 @@ class Spectra:
                 yield (part := self.sensor.parted(image))
                 evens.append(None if self.far is None else self.far.adjoint(part))
 
-        sums = columns(parts(), side, told, self.pixels.odd, of_image=True)
+        sums = columns(parts(), n, told, self.pixels.odd, of_image=True)
         shape, s = tuple(row.cells + 2 * row.margin for row in (told.rows, told.columns)), self._points
         like = {"dtype": images[0].dtype, "device": arrays.device(images[0])}
         volumes = [xp.empty((len(self.points), shape[0] * s, shape[1] * s), **like) for _ in images]
@@ -221,14 +217,27 @@ class Spectra:
             depths, matrix = group
             chosen = self.points[depths]
             cells = [xp.zeros((*shape, matrix.shape[1]), **like) for _ in range(n)]
-            product = sums @ xp.matrix_transpose(matrix)
-            add_cells(cells, product, side, told, _odd(chosen), of_image=False)
+            product = _times(sums, xp.matrix_transpose(matrix))
+            add_cells(cells, product, told, _odd(chosen), of_image=False)
             for volume, own, even in zip(volumes, cells, evens, strict=True):
                 _put_planes(volume, own, even, chosen, depths.start)
 
         for _ in each(seen, zip(groups(self.points, told), self.matrices, strict=True)):
             pass
         return volumes
+
+
+def _times(sums: Array, matrix: Array) -> Array:
+    """Sums (frequencies, objects, 4 tiles, channels) times matrices (frequencies, channels, others).
+
+    Each object has a product of its own: the bits of one row may depend on the others of a product, and on
+    its place among them (OpenBLAS, processors without AVX-512). NumPy does all of a frequency before the
+    next, while its matrix is in the processor's cache.
+    """
+    if arrays.is_numpy(sums):
+        return sums @ matrix[:, None]
+    each_one = [sums[:, k, ...] @ matrix for k in range(sums.shape[1])]
+    return arrays.namespace(sums).stack(each_one, axis=1)
 
 
 def _put_planes(

@@ -20,12 +20,12 @@ from lumigraph.operators.microscope_tiles import Span, Tiling
 
 
 def columns(parts: Iterable[Array], side: int, told: Tiling, odd: np.ndarray, *, of_image: bool) -> Array:
-    """Four sums (frequencies, side · 4 tiles, channels) of cells' parts (rows, columns, channels).
+    """Four sums (frequencies, side, 4 tiles, channels) of cells' parts (rows, columns, channels).
 
     Parameters
     ----------
     parts
-        Of objects or images, at most `side`; the others are 0.
+        Of `side` objects or images.
     odd
         (2, channels): whether they are odd along y and x, in the order of `PARITIES`.
     of_image
@@ -33,7 +33,7 @@ def columns(parts: Iterable[Array], side: int, told: Tiling, odd: np.ndarray, *,
     """
     parts = iter(parts)
     first = next(parts)
-    (hy, hx), n = _halves(told), 0
+    hy, hx = _halves(told)
     shape = hy, hx, side, told.count, 2, 2, first.shape[-1]
     xp = arrays.namespace(first)
     found = xp.empty(shape, dtype=first.dtype, device=arrays.device(first))
@@ -45,16 +45,13 @@ def columns(parts: Iterable[Array], side: int, told: Tiling, odd: np.ndarray, *,
             down = xp.reshape(y @ xp.reshape(tile, (tile.shape[0], -1)), (2 * hy, *tile.shape[1:]))
             four = xp.reshape(x @ down, (hy, 2, hx, 2, -1))
             found[:, :, n, k, :, :, own] = xp.permute_dims(four, (0, 2, 1, 3, 4))
-    found[:, :, n + 1 :, ...] = 0
-    return xp.reshape(found, (told.frequencies, side * 4 * told.count, first.shape[-1]))
+    return xp.reshape(found, (told.frequencies, side, 4 * told.count, first.shape[-1]))
 
 
-def add_cells(
-    parts: Sequence[Array], sums: Array, side: int, told: Tiling, odd: np.ndarray, *, of_image: bool
-) -> None:
+def add_cells(parts: Sequence[Array], sums: Array, told: Tiling, odd: np.ndarray, *, of_image: bool) -> None:
     """Add to cells' parts (rows, columns, channels) those whose `columns` these are."""
     xp, (hy, hx) = arrays.namespace(sums), _halves(told)
-    sums = xp.reshape(sums, (hy, hx, side, told.count, 2, 2, -1))
+    sums = xp.reshape(sums, (hy, hx, len(parts), told.count, 2, 2, -1))
     for (n, cells), (k, (spans, parity, own)) in itertools.product(
         enumerate(parts), list(_pieces(told, odd))
     ):
