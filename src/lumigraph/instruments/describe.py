@@ -226,6 +226,12 @@ def _sensor(camera: "Camera") -> Iterator[Row]:
 def readout(sensor: Sensor) -> Iterator[Row]:
     """What the sensor makes of photons, by EMVA 1288's model."""
     noise = 3 * sensor.dark_noise / sensor.gain
+    if sensor.fill_factor < 1:
+        yield Row("pixel fill factor", sensor.fill_factor, "", "active width / pitch, given")
+        zero = 1 / (sensor.fill_factor * sensor.pixel_pitch)
+        yield Row("pixels' first zero", zero, "1/m", "1 / (fill factor x pitch), on the sensor")
+    if (response := sensor.angular_response) is not None:
+        yield Row("response at 10°", float(response.of(math.radians(10))), "", "of one axis, given")
     yield Row("full well", sensor.full_well, "electrons", "given")
     yield Row("gain", sensor.gain, "electrons per count", "full well / (highest count - black level)")
     yield Row("read noise", sensor.read_noise, "electrons", "given")

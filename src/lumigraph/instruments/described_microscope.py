@@ -16,6 +16,7 @@ from lumigraph.design.layout import LensletLayout, MicroscopeLayout
 from lumigraph.elements.mismatch import Mismatch
 from lumigraph.elements.objective import Model, Objective
 from lumigraph.errors import GeometryError
+from lumigraph.instruments.angular import refuse_angles, refuse_gaps
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.microscope_objective import MicroscopeObjective
 from lumigraph.instruments.parts import Lenslets, Pixels
@@ -52,6 +53,8 @@ class DescribedMicroscope(Instrument):
             if given != (self.configuration == configuration):
                 verb = "needs" if self.configuration == configuration else "has no use for"
                 raise GeometryError(f"configuration {self.configuration!r} {verb} {key}. Change one of them.")
+        refuse_angles(self.pixels.angular_response, "microscopes")
+        refuse_gaps(self.pixels.fill_factor, "microscopes")
         if self.lenslets.single and self.configuration != "fourier":
             raise GeometryError(
                 f"single lenslets differ in configuration 'fourier', not {self.configuration!r}. "

@@ -119,7 +119,7 @@ _LENGTHS = (
     "wavelengths", "array_bow",
 )  # fmt: skip
 
-_ANGLES = ("rotation", "field", "y", "x", "array_tilt", "sensor_tilt", "tilt_scatter")
+_ANGLES = ("rotation", "angles", "field", "y", "x", "array_tilt", "sensor_tilt", "tilt_scatter")
 
 
 def _table(name: str, values: Mapping[str, Any]) -> list[str]:

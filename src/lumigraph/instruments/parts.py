@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import FormatError, GeometryError
+from lumigraph.instruments.angular import Angles
 from lumigraph.instruments.over_field import OverField, given
 from lumigraph.instruments.part import Part
 from lumigraph.instruments.quantities import (
@@ -324,6 +325,10 @@ class Pixels(Part):
         Of the readout.
     quantum_efficiency, dark_current, exposure_time, black_level, prnu, dsnu, pattern_seed
         As for `Sensor`; left out, an ideal one. The time is text such as "10 ms", or [s].
+    fill_factor
+        Width of a pixel's active square over the pitch.
+    angular_response
+        By the angle from the chief ray: `Angles`, behind lenslets of cameras only.
     """
 
     pixel_pitch: Length
@@ -338,6 +343,8 @@ class Pixels(Part):
     prnu: NotNegative = 0.0
     dsnu: NotNegative = 0.0
     pattern_seed: Seed = 0
+    fill_factor: Fraction = 1.0
+    angular_response: Angles | None = None
 
     @field_validator("shape")
     @classmethod
@@ -354,9 +361,12 @@ class Pixels(Part):
     def sensor(self, shape: tuple[int, int]) -> Sensor:
         """These pixels, so many of them."""
         check_pixels(shape)
-        return Sensor(
-            shape, **{name: getattr(self, name) for name in type(self).model_fields if name != "shape"}
-        )
+        given: dict[str, Any] = {
+            name: getattr(self, name) for name in type(self).model_fields if name != "shape"
+        }
+        angles = self.angular_response
+        given["angular_response"] = None if angles is None else angles.response()
+        return Sensor(shape, **given)
 
 
 def check_pixels(shape: tuple[int, int]) -> None:

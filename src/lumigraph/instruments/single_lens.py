@@ -14,6 +14,7 @@ from lumigraph.design import resolution
 from lumigraph.elements import Train
 from lumigraph.errors import FormatError, GeometryError, SamplingError
 from lumigraph.instruments import describe, grids, trade_offs
+from lumigraph.instruments.angular import refuse_angles
 from lumigraph.instruments.camera import Camera, Making
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.row import Row
@@ -62,6 +63,7 @@ class SingleLensCamera(Camera):
             )
         if self.pixels.shape is None:
             raise FormatError("sensor.shape is missing. A camera without lenslets needs it: write [ny, nx].")
+        refuse_angles(self.pixels.angular_response, "cameras without lenslets")
         self._check_beyond_focus()
         return self
 

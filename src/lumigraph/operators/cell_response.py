@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from lumigraph.elements import LensletArray
+from lumigraph.sensor import AngularResponse
 
 SLACK = 1.04
 """How much wider than D/(λL) the band is taken: grey pixels at the stop's edge reach beyond it."""
@@ -36,6 +37,9 @@ Box = tuple[Pair, Pair]
 MIDDLE: Box = ((0.0, 0.0), (0.0, 0.0))
 
 INFINITE: Limits = (-math.inf, math.inf)
+
+Accepted = tuple[AngularResponse, float]
+"""How pixels respond to angles, and the distance from the lenslets that these are seen over [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,12 +126,15 @@ class Lenslets:
         [m]
     distance
         To the image [m].
+    pixels
+        Their angular response and the true distance b that gives the angles [m]; None where it is flat.
     """
 
     def __init__(
-        self, axes: tuple[Axis, Axis], array: LensletArray, wavelength: float, distance: float
-    ) -> None:
-        self.axes, self.array = axes, array
+        self, axes: tuple[Axis, Axis], array: LensletArray, wavelength: float, distance: float,
+        pixels: Accepted | None = None,
+    ) -> None:  # fmt: skip
+        self.axes, self.array, self.pixels = axes, array, pixels
         self.optics = wavelength, distance
         self._bases = axes[0].basis(), axes[1].basis()
         self._members: dict[tuple[float, float], np.ndarray] = {}
@@ -164,7 +171,7 @@ class Lenslets:
         """
         axis, (coefficients, light) = self.axes[which], self._bases[which]
         step = abs(self.array.lattice.basis[1 - which][which])
-        (focal_length,), squared = focal_lengths(self.array), self.optics[0] * self.optics[1]
+        (focal_length,) = focal_lengths(self.array)
         half, total = self.array.fill_factor * step / 2, np.zeros((axis.samples, len(coefficients)))
         count = nodes(half, focal_length, axis, self.optics)
         reach = axis.size / 2 + axis.neighbourhood
@@ -172,8 +179,23 @@ class Lenslets:
             at, weight = legendre(middle - half, middle + half, count)
             phase = np.exp(-1j * np.pi * (at - middle) ** 2 / (self.optics[0] * focal_length))
             weight = weight * axis.fade(at, step)
-            total = total + (fresnel(axis.image, at, squared) * (weight * phase)) @ light(at)
+            total = total + (self.spread(axis.image, at) * (weight * phase)) @ light(at)
         return (total @ coefficients)[None]
+
+    def spread(self, image: np.ndarray, light: np.ndarray, tilt: float = 0.0) -> np.ndarray:
+        """`fresnel` along an axis, as the pixels count it: whose angles are `tilt` less (tangent).
+
+        Of telecentric places, (s - w)/b is the tangent from the chief ray of the main lens' middle.
+        """
+        found = fresnel(image, light, math.prod(self.optics))
+        return found if self.pixels is None else found * self.accepted(image[:, None] - light, tilt)
+
+    def accepted(self, aside: np.ndarray, tilt: float = 0.0) -> np.ndarray:
+        """What the pixels' angular response does to amplitudes that come from so far aside [m]."""
+        if self.pixels is None:
+            return np.ones_like(aside)
+        response, distance = self.pixels
+        return response.amplitude(aside / distance - tilt)
 
     def rows(self, center: Pair, limits: tuple[Limits, Limits]) -> Iterator[tuple[float, list[Pair]]]:
         """Rows of lenslets: their y, and (x, focal length) of their members."""
@@ -208,7 +230,7 @@ class Lenslets:
             )
             phase = np.exp(-1j * np.pi * (at - middle) ** 2 / (wavelength * focal_length))
             weight = weight * axis.fade(at, self.array.lattice.pitch)
-            spread = fresnel(axis.image, at, wavelength * self.optics[1])
+            spread = self.spread(axis.image, at)
             result.append(((spread * (weight * phase)) @ light(at)).astype(np.complex64).ravel())
         bend = np.exp(-1j * np.pi * lines**2 / (wavelength * focal_length)).astype(np.complex64)
         return self._members.setdefault((middle, focal_length), np.array(result)[like] * bend[:, None])

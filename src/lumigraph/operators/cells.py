@@ -18,6 +18,7 @@ from lumigraph.elements.transmission import Thin, transmit
 from lumigraph.errors import GeometryError
 from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics
+from lumigraph.operators.cell_response import Accepted
 from lumigraph.operators.fineness import Edges, Fineness
 
 OVERSAMPLING = 1.2
@@ -138,6 +139,12 @@ def telecentric_distance(camera: CameraOptics) -> float:
     """Lenslets to sensor of the telecentric camera with the same image, b L/(L + b) [m]."""
     b, L = lenslet_distance(camera), camera.separation
     return b * L / (b + L)
+
+
+def accepted(camera: CameraOptics) -> Accepted | None:
+    """How its pixels respond to angles behind its lenslets; None where they do alike to all."""
+    response = camera.sensor.angular_response
+    return None if response is None or response.is_flat else (response, lenslet_distance(camera))
 
 
 def lenslet_array(camera: CameraOptics) -> LensletArray:

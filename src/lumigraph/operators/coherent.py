@@ -88,7 +88,7 @@ def _on_sensor(camera: CameraOptics, modes: np.ndarray, grid: Grid, distance: fl
         mine = slice(first, first + step)
         for light in stop.behind(lights, plane.y[mine], plane.x):
             image[mine] += np.abs(light) ** 2
-    return averaged(plane, pixels).forward(image)
+    return averaged(plane, pixels, camera.sensor.fill_factor).forward(image)
 
 
 def _farthest(y: np.ndarray, x: np.ndarray) -> float:

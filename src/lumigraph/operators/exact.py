@@ -27,6 +27,7 @@ from lumigraph.elements import LensletArray
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.cell_response import (
     MIDDLE,
+    Accepted,
     Axis,
     Box,
     Lenslets,
@@ -111,10 +112,10 @@ class ExactLenslets(Lenslets):
 
     def __init__(
         self, axes: tuple[Axis, Axis], array: LensletArray, wavelength: float, distance: float,
-        separation: float, accuracy: float,
+        separation: float, accuracy: float, pixels: Accepted | None = None,
     ) -> None:  # fmt: skip
         scale = 1 + distance / separation
-        super().__init__(axes, array, wavelength, distance / scale)
+        super().__init__(axes, array, wavelength, distance / scale, pixels)
         self.b, self.L, self.scale, self.k = distance, separation, scale, 2 * np.pi / wavelength
         self.least = KEPT * accuracy
         (self.focal_length,) = focal_lengths(array)
@@ -204,6 +205,9 @@ class ExactLenslets(Lenslets):
                 weight * axis.fade(at, step) * np.exp(1j * self.k * path) / math.sqrt(math.prod(self.optics))
             )
             spread, bright = np.exp(1j * self.k * sphere(apart**2, self.b)), light(at)
+            if self.pixels is not None:
+                chief = np.arctan((axis.image + place) / self.L)[:, None]
+                spread = spread * np.sqrt(self.pixels[0].of(np.arctan(apart / self.b) - chief))
             way, lenslet, curved = (
                 part.along(which, places) for part, places in zip(parts, (apart, off, there), strict=True)
             )
@@ -225,9 +229,12 @@ def lenslets_of(optics: Optics) -> Lenslets:
     """What a camera's lenslets do to light, by its model."""
     camera, (axes, array) = optics.camera, (optics.axes, optics.array)
     if camera.model == "paraxial":
-        return Lenslets(axes, array, camera.wavelength, _cells.telecentric_distance(camera))
+        telecentric = _cells.telecentric_distance(camera)
+        return Lenslets(axes, array, camera.wavelength, telecentric, _cells.accepted(camera))
     distance, accuracy = _cells.lenslet_distance(camera), optics.fineness.accuracy
-    return ExactLenslets(axes, array, camera.wavelength, distance, camera.separation, accuracy)
+    return ExactLenslets(
+        axes, array, camera.wavelength, distance, camera.separation, accuracy, _cells.accepted(camera)
+    )
 
 
 def terms_of(optics: Optics) -> int:

@@ -57,7 +57,8 @@ class LensletLight:
         self.bases = [axis.basis() for axis in self.window]
         self.faintest = FAINTEST * accuracy
         halves = zip(self.axes, _half(lenslets), strict=True)
-        self.modes = [_modes(a, h, self.squared, self.faintest) for a, h in halves]
+        bent = lenslets.pixels is not None
+        self.modes = [_modes(a, h, self.squared, self.faintest, bent=bent) for a, h in halves]
         self._known: dict[tuple[float, float, float], np.ndarray] = {}
         self._carriers: dict[tuple[int, float], np.ndarray] = {}
         self.light, self.widest = light, widest
@@ -142,7 +143,7 @@ class LensletLight:
         pitch, (lines, weight, chords) = self.lenslets.array.lattice.pitch, self.lenslets.lines
         bend = -1 / (wavelength * focal_length) + 1 / self.squared
         turn = np.exp(1j * np.pi * (bend * lines**2 + (2 * lines * y + y**2) / self.squared))
-        seen = self._seen(0, lines) * (turn * weight * self.axes[0].fade(y + lines, pitch))
+        seen = self._seen(0, lines, y) * (turn * weight * self.axes[0].fade(y + lines, pitch))
         along_y = (seen[:, None, :] * down(lines).T).reshape(-1, len(lines))
         chords, like = np.unique(chords.round(12), return_inverse=True)
         along_x = []
@@ -151,7 +152,7 @@ class LensletLight:
                 -chord, chord, nodes(chord, focal_length, self.axes[1], self.lenslets.optics)
             )
             turn = np.exp(1j * np.pi * (bend * at**2 + (2 * at * x + x**2) / self.squared))
-            seen = self._seen(1, at) * (turn * share * self.axes[1].fade(x + at, pitch))
+            seen = self._seen(1, at, x) * (turn * share * self.axes[1].fade(x + at, pitch))
             along_x.append((seen @ across(at)).ravel())
         both = along_y.astype(np.complex64) @ np.array(along_x, np.complex64)[like]
         (n, a), (m, b) = (
@@ -160,9 +161,11 @@ class LensletLight:
         both = both.reshape(n, a, m, b).transpose(0, 2, 1, 3).reshape(n * m, a * b)
         return np.ascontiguousarray((both @ self.kept).T)
 
-    def _seen(self, which: int, at: np.ndarray) -> np.ndarray:
+    def _seen(self, which: int, at: np.ndarray, place: float) -> np.ndarray:
         """Few numbers (modes, nodes) of what nodes of a lenslet, counted from its middle, bring to a cell."""
         turn = np.exp(-2j * np.pi / self.squared * self.axes[which].image[:, None] * at)
+        if self.lenslets.pixels is not None:
+            turn *= self.lenslets.accepted(self.axes[which].image[:, None] - (place + at))
         return self.modes[which].conj().T @ turn / math.sqrt(self.squared)
 
 
@@ -188,9 +191,15 @@ def _gram(light: Callable[[np.ndarray], np.ndarray], chord: float) -> np.ndarray
     return (light(at).T * weight) @ light(at)
 
 
-def _modes(axis: Axis, half: float, squared: float, faintest: float) -> np.ndarray:
-    """Orthonormal (samples, modes): all that a lenslet brings to a cell, but for where the lenslet is."""
+def _modes(axis: Axis, half: float, squared: float, faintest: float, *, bent: bool) -> np.ndarray:
+    """Orthonormal (samples, modes): all that a lenslet brings to a cell, but for where the lenslet is.
+
+    Where pixels respond to angles, what it brings is `bent`: times parabolas over the cell, too.
+    """
     at = np.linspace(-half, half, 4 * math.ceil(2 * half * axis.size / squared) + 40)
     turn = np.exp(-2j * np.pi / squared * axis.image[:, None] * at)
+    if bent:
+        across = 2 * axis.image[:, None] / axis.size
+        turn = np.hstack([turn, turn * across, turn * across**2])
     vectors, strength, _ = np.linalg.svd(turn, full_matrices=False)
     return vectors[:, strength > faintest * strength[0]]

@@ -71,6 +71,8 @@ class Optics:
                 _cells.lens(camera), self.array, self.cells, self.fineness, self.distance, camera.model,
                 self.place,
             ))  # fmt: skip
+            if (pixels := _cells.accepted(camera)) is not None:
+                known += repr(pixels)
         return hashlib.sha256(known.encode()).hexdigest()[:32]
 
     @property

@@ -22,7 +22,6 @@ from lumigraph.operators.cell_response import (
     Lenslets,
     Limits,
     focal_lengths,
-    fresnel,
     legendre,
     nodes,
 )
@@ -221,7 +220,7 @@ class Lines:
         """Amplitude (samples, lines) along y of a row of lenslets there from the cell's centre [m]."""
         if place not in self._spreads:
             axis, (lines, weight, _) = self.optics.axes[0], self._lenslets.lines
-            spread = fresnel(axis.image, place + lines, math.prod(self._lenslets.optics))
+            spread = self._lenslets.spread(axis.image, place + lines)
             spread *= weight * axis.fade(place + lines, self.optics.array.lattice.pitch)
             self._spreads[place] = spread.astype(np.complex64)
         return self._spreads[place]
@@ -312,7 +311,7 @@ class Each:
             step, half = abs(array.lattice.basis[1 - which][which]), self._half(which)
             count = nodes(half, _STRONGEST * focal_lengths(array)[0], axis, optics) + self._more(half)
             at, weight = legendre(middle - half, middle + half, count)
-            spread = fresnel(axis.image, at, math.prod(optics)) * (weight * axis.fade(at, step))
+            spread = self._lenslets.spread(axis.image, at) * (weight * axis.fade(at, step))
             light = self._lenslets.values(which, at) @ self._lenslets.coefficients[which]
             self._known[which, middle] = spread, at, light.astype(np.complex64)
         return self._known[which, middle]

@@ -124,14 +124,18 @@ def represented(source: Grid, points: Grid, half_width: float = HALF_WIDTH) -> R
     return _on_both_axes(matrix, source, points)
 
 
-def averaged(plane: Grid, pixels: Grid) -> Resampling:
-    """Means over the areas of pixels of a band-limited plane, the pixels turned by 180°."""
+def averaged(plane: Grid, pixels: Grid, fill: float = 1.0) -> Resampling:
+    """Means over the areas of pixels of a band-limited plane, the pixels turned by 180°.
+
+    What falls beside a pixel's active square, `fill` times as wide as the pixel, counts as nothing.
+    """
 
     def matrix(axis: int) -> Banded:
         pitch, width = plane.pitch[axis], pixels.pitch[axis] / plane.pitch[axis]
 
         def mean(d: np.ndarray) -> np.ndarray:
-            return (integral(d + width / 2) - integral(d - width / 2)) / width
+            half = fill * width / 2
+            return (integral(d + half) - integral(d - half)) / width
 
         at = -(pixels.y, pixels.x)[axis] / pitch
         return banded(at, (plane.y, plane.x)[axis] / pitch, mean, HALF_WIDTH + width / 2)

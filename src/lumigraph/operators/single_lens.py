@@ -235,7 +235,8 @@ def _imaging(camera: CameraOptics, here: tuple[Span, Span], dz: float) -> tuple[
         key, lambda: arrays.rfft2(_point_image(camera, distance, offsets, light), window)
     )
     samples, seen = ((y.count, x.count) for y, x in (here, there))
-    return Convolution(transfer, window, samples, seen), averaged(_grid(list(there)), pixels)
+    mean = averaged(_grid(list(there)), pixels, camera.sensor.fill_factor)
+    return Convolution(transfer, window, samples, seen), mean
 
 
 def image_pitch(camera: CameraOptics) -> float:

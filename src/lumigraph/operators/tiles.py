@@ -26,12 +26,14 @@ def spread(optics: Optics, grid: Grid, points: Offset, ring: Offset) -> Linear:
 
 def readout(optics: Optics) -> Linear:
     """Means over the pixels of the image's samples, turned back."""
-    cells, pixels = optics.cells, optics.camera.sensor.grid
+    cells, sensor = optics.cells, optics.camera.sensor
     if not optics.rotation:
-        return averaged(cells.grid(cells.samples, optics.image_scale, cells.ring), pixels)
+        return averaged(
+            cells.grid(cells.samples, optics.image_scale, cells.ring), sensor.grid, sensor.fill_factor
+        )
     wide = _widened(cells.grid(cells.samples, 1.0, cells.ring), optics)
     turn = Turn(cells.grid(cells.samples, 1.0, wide), -optics.rotation)
-    mean = averaged(cells.grid(cells.samples, optics.image_scale, wide), pixels)
+    mean = averaged(cells.grid(cells.samples, optics.image_scale, wide), sensor.grid, sensor.fill_factor)
     return mean @ turn @ _cropped(turn.grid, wide, cells.ring, cells.samples).T
 
 

@@ -12,7 +12,7 @@ from scipy import fft
 
 from lumigraph.core import arrays
 from lumigraph.operators import cells as _cells
-from lumigraph.operators.cell_response import Axis, Lenslets, focal_lengths, fresnel, legendre, nodes
+from lumigraph.operators.cell_response import Axis, Lenslets, focal_lengths, legendre, nodes
 from lumigraph.operators.optics import Optics
 
 KEPT = 5.0
@@ -96,14 +96,14 @@ class Side:
         place = (self.origin - self.first) / self.step - 0.5
         return (np.arange(-self.reach, self.reach + 1) - (place - math.floor(place + 1e-4))) * self.step
 
-    def spread(self, light: np.ndarray, squared: float) -> np.ndarray:
-        """Amplitude (samples, light) of light at distances from a lenslet's centre [m]; λb is `squared`.
+    def spread(self, light: np.ndarray, lenslets: Lenslets, tilt: float) -> np.ndarray:
+        """Amplitude (samples, light) of light at distances from a lenslet's centre [m].
 
         It fades out where it ends: edges of lenslets that abut cancel.
         """
         places, reach = self.offsets(), self.axis.neighbourhood
         left = np.clip(np.abs(places[:, None] - light) / reach, 1 - FADING, 1) - (1 - FADING)
-        return fresnel(places, light, squared) * np.cos(np.pi / 2 / FADING * left) ** 2
+        return lenslets.spread(places, light, tilt) * np.cos(np.pi / 2 / FADING * left) ** 2
 
 
 def _fast(count: int) -> int:
@@ -122,10 +122,11 @@ def _samples(optics: Optics, which: int, farthest: float) -> int:
 
 @dataclass(frozen=True)
 class WaveImage:
-    """Of a wave of amplitude 1."""
+    """Of a wave of amplitude 1; what pixels make of its angles is theirs of light that leans by `tilt`."""
 
     optics: Optics
     sides: tuple[Side, Side]
+    tilt: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
     def of(cls, optics: Optics, pitches: float) -> "WaveImage":
@@ -146,7 +147,10 @@ class WaveImage:
         return image.reshape(y.cells, y.axis.samples, x.cells, x.axis.samples)
 
     def aside(self) -> float:
-        """Part of the light on an endless array that goes farther than it is followed."""
+        """Part of the light on an endless array that goes farther than it is followed, as pixels count it."""
+        if (pixels := self._lenslets.pixels) is not None:
+            sent = replace(self, optics=without_angles(self.optics)).aside()
+            return sent * float(pixels[0].amplitude(self.farthest / pixels[1])) ** 2
         (y, x), lattice, total = self.sides, self.optics.array.lattice, 0.0
         shape = y.axis.samples, x.axis.samples
         ends = [(s.first, s.first + s.axis.size * (1 - 1e-6)) for s in self.sides]
@@ -196,25 +200,34 @@ class WaveImage:
     @cached_property
     def _lenslets(self) -> Lenslets:
         distance, axes = _cells.telecentric_distance(self.optics.camera), [side.axis for side in self.sides]
-        return Lenslets((axes[0], axes[1]), self.optics.array, self.optics.camera.wavelength, distance)
+        return Lenslets(
+            (axes[0], axes[1]), self.optics.array, self.optics.camera.wavelength, distance,
+            _cells.accepted(self.optics.camera),
+        )  # fmt: skip
 
     def _one(self, focal_length: float) -> np.ndarray:
         array = self.optics.array
         if array.shape == "square":
             halves = [array.fill_factor * pitch / 2 for pitch in array.lattice.pitches]
             return np.outer(*(self._along(k, half, focal_length) for k, half in enumerate(halves)))
-        (lines, weight, chords), (wavelength, distance) = self._lenslets.lines, self._lenslets.optics
+        (lines, weight, chords), wavelength = self._lenslets.lines, self._lenslets.optics[0]
         different, like = np.unique(chords.round(12), return_inverse=True)
         behind = np.array([self._along(1, chord, focal_length) for chord in different.tolist()])[like]
         bend = weight * np.exp(-1j * np.pi * lines**2 / (wavelength * focal_length))
-        return (self.sides[0].spread(lines, wavelength * distance) * bend) @ behind
+        return (self.sides[0].spread(lines, self._lenslets, self.tilt[0]) * bend) @ behind
 
     def _along(self, which: int, half: float, focal_length: float) -> np.ndarray:
         """Amplitude (samples,) along an axis behind a line of a lenslet."""
-        side, (wavelength, distance) = self.sides[which], self._lenslets.optics
+        side, wavelength = self.sides[which], self._lenslets.optics[0]
         at, weight = legendre(-half, half, nodes(half, focal_length, side.axis, self._lenslets.optics))
         weight = weight * np.exp(-1j * np.pi * at**2 / (wavelength * focal_length))
-        return side.spread(at, wavelength * distance) @ weight
+        return side.spread(at, self._lenslets, self.tilt[which]) @ weight
+
+
+def without_angles(optics: Optics) -> Optics:
+    """The same before pixels that respond alike to all angles."""
+    sensor = replace(optics.camera.sensor, angular_response=None)
+    return replace(optics, camera=replace(optics.camera, sensor=sensor))
 
 
 def _around(image: np.ndarray, shape: tuple[int, int], reach: tuple[int, int]) -> np.ndarray:

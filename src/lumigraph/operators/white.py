@@ -11,7 +11,9 @@ cells around; its faint fringes are left out.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy import fft
@@ -21,6 +23,7 @@ from lumigraph.core import arrays
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import HasOptics
 from lumigraph.operators.cells import check_alike
+from lumigraph.operators.coherent import disc
 from lumigraph.operators.glare import fallen
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.tiles import readout
@@ -52,6 +55,9 @@ SAMPLED, LEAST = 0.015, 1.2e-5
 """What is left where light is followed across the whole image: of the accuracy, and in any case, as sums
 of three by three lenslets say (1e-5 to 1.7e-5)."""
 
+LEANS = (3, 4, 5, 7)
+"""Places along each axis of the stop that waves come from before pixels that respond to angles: tried."""
+
 LARGEST = 2.0**25
 """Samples of a wave's image."""
 
@@ -72,7 +78,7 @@ def image_and_error(camera: HasOptics, accuracy: float) -> tuple[np.ndarray, flo
     pitches = _pitches(optics)
     raw, fringes = _followed(optics, pitches)
     beyond = max(0.0, 1 - pitches / _across(optics))
-    off = math.hypot(fringes, max(SAMPLED * accuracy, LEAST))
+    off = math.hypot(fringes, max(SAMPLED * accuracy, LEAST), leans(optics)[1])
     if beyond:
         nearer, _ = _followed(optics, NEARER * pitches)
         missed = float(np.linalg.norm(raw - nearer)) / (float(np.linalg.norm(raw)) or 1.0)
@@ -90,7 +96,7 @@ def _of(camera: HasOptics, accuracy: float) -> Optics:
 def _followed(optics: Optics, pitches: float) -> tuple[np.ndarray, float]:
     """Raw image of light that is followed so far, and the relative rms of the fringes that it lacks."""
     cells, wave = optics.cells, WaveImage.of(optics, pitches)
-    short = _averaged(np.abs(wave.amplitude()) ** 2, optics)
+    short = _through_stop(wave, optics)
     image = short[wave.sides[0].like][:, :, wave.sides[1].like]
     far = _far(wave)[:, None, :, None]
     image += wave.aside() * wave.through * far
@@ -114,7 +120,7 @@ def endless(optics: Optics) -> tuple[np.ndarray, float]:
     optics = replace(optics, array=replace(optics.array, extent=None), cells=period)
     wave = WaveImage.of(optics, _pitches(optics))
     aside = wave.aside() * wave.through / optics.image_scale**2
-    image = _averaged(np.abs(wave.amplitude()) ** 2, optics)[0, :, 0] / optics.image_scale**2 + aside
+    image = _through_stop(wave, optics)[0, :, 0] / optics.image_scale**2 + aside
     tiles = image[: cells.samples[0]].reshape(cells.samples[0], columns, cells.samples[1])
     first = [cells.columns(cells.ring[1], cells.ring[1] + columns, 0, k)[0] for k in range(cells.kinds)]
     pictures = np.array([tiles[:, k - cells.ring[1]].ravel() for k in first])
@@ -170,19 +176,84 @@ def _far(wave: WaveImage) -> np.ndarray:
     return fftconvolve(there, law, mode="same")
 
 
-def _averaged(image: np.ndarray, optics: Optics) -> np.ndarray:
-    """Mean of an image (cells, samples, cells, samples) over the stop's image, on the samples of `optics`."""
+def _through_stop(wave: WaveImage, optics: Optics) -> np.ndarray:
+    """Mean intensity (cells, samples, cells, samples) of waves from all over the stop.
+
+    All have the same image but for its place, unless pixels respond to angles: then what waves from some
+    places along each axis of the stop bring is interpolated between them (Lagrange).
+    """
+    if _cells.accepted(optics.camera) is None:
+        return _averaged(np.abs(wave.amplitude()) ** 2, optics)
+    total, edge = np.zeros(()), _stop_radius(optics) / _cells.lenslet_distance(optics.camera)
+    places = leans(optics)[0]
+    for down, across in product(range(len(places)), repeat=2):
+        tilted = replace(wave, tilt=(edge * places[down], edge * places[across]))
+        image = np.abs(tilted.amplitude()) ** 2
+        total = total + _averaged(image, optics, (_lagrange(places, down), _lagrange(places, across)))
+    return total
+
+
+def leans(optics: Optics) -> tuple[np.ndarray, float]:
+    """Places in the stop (n,), of its half, and what pixels' response is off between them, of it.
+
+    As few as leave the accuracy, all over the light that a lenslet sends to its own image; what most of it
+    leaves is a third of that.
+    """
+    if (pixels := _cells.accepted(optics.camera)) is None:
+        return np.zeros(1), 0.0
+    response, distance = pixels
+    stop, lenslet = _stop_radius(optics) / distance, optics.array.lattice.pitch / 2 / distance
+    at, aside = np.linspace(-1, 1, 101), np.linspace(0, lenslet, 51)[:, None]
+    true, places, left = response.amplitude(aside - stop * at) ** 2, np.zeros(1), 0.0
+    for count in LEANS:
+        places = np.cos(np.pi * (np.arange(count) + 0.5) / count)
+        known = response.amplitude(aside - stop * places) ** 2
+        found = known @ np.array([_lagrange(places, k)(at) for k in range(count)])
+        left = math.sqrt(2 * float(np.mean((found - true) ** 2) / np.mean(true**2)))
+        if left < optics.fineness.accuracy:
+            break
+    return places, left
+
+
+Weight = Callable[[np.ndarray], np.ndarray]
+"""By the place in the stop along an axis, of its half."""
+
+
+def _averaged(image: np.ndarray, optics: Optics, lean: tuple[Weight, Weight] | None = None) -> np.ndarray:
+    """Mean of an image (cells, samples, cells, samples) over the stop's image, on the samples of `optics`.
+
+    With weights along y and x where they are given.
+    """
     y, x = (_Frequencies(optics, k, *image.shape[2 * k : 2 * k + 2]) for k in (0, 1))
     spectrum = arrays.rfft2(image.reshape(y.given, x.given), (y.fine, x.fine))
     spectrum = spectrum[y.number][:, : x.coarse // 2 + 1]
     across = slice(x.coarse // 2 + 1)
     turns = np.pi * np.hypot((y.number / y.length)[:, None], (x.number / x.length)[across])
     turns *= 2 * _stop_radius(optics)
-    spectrum *= np.where(turns == 0, 1, 2 * j1(turns) / np.where(turns == 0, 1, turns))
+    if lean is None:
+        spectrum *= np.where(turns == 0, 1, 2 * j1(turns) / np.where(turns == 0, 1, turns))
+    else:
+        spectrum *= _weighed(y.number / y.length, (x.number / x.length)[across], _stop_radius(optics), lean)
     spectrum *= np.outer(y.moved(), x.moved()[across])
     found = arrays.irfft2(spectrum, (y.coarse, x.coarse))
     tiles = found.reshape(-1, y.samples, x.coarse // x.samples, x.samples)
     return tiles[: y.cells, :, : x.cells]
+
+
+def _weighed(y: np.ndarray, x: np.ndarray, radius: float, lean: tuple[Weight, Weight]) -> np.ndarray:
+    """Transform at frequencies (y, x) [1/m] of weights along both axes, over a disc."""
+    turns = 2 * math.pi * radius * max(np.abs(y).max(), np.abs(x).max())
+    angles, place, shares = disc(48 + math.ceil(1.2 * turns))
+    down, across = np.sin(angles), place
+    weights = shares * lean[0](down)[:, None] * lean[1](across)
+    left, right = (np.exp(2j * np.pi * radius * np.outer(f, at)) for f, at in ((y, down), (x, across)))
+    return left @ weights @ right.T
+
+
+def _lagrange(places: np.ndarray, number: int) -> Weight:
+    """Polynomial that is 1 at one of some places and 0 at the others."""
+    others = np.delete(places, number)
+    return lambda at: np.prod((at[:, None] - others) / (places[number] - others), axis=1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,9 @@
 - `colour`: `mosaic`, a Bayer filter; `demosaic`, the colour picture behind one
 """
 
+from lumigraph.sensor.angular import AngularResponse
 from lumigraph.sensor.colour import demosaic, levels, mosaic
 from lumigraph.sensor.pixels import integrate, integrate_adjoint
 from lumigraph.sensor.sensor import Sensor
 
-__all__ = ["Sensor", "demosaic", "integrate", "integrate_adjoint", "levels", "mosaic"]
+__all__ = ["AngularResponse", "Sensor", "demosaic", "integrate", "integrate_adjoint", "levels", "mosaic"]

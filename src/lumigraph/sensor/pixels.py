@@ -16,6 +16,8 @@ _MATRICES = ByteCache()
 def integrate(intensity: Array, grid: Grid, sensor: Sensor | Grid, *, turned: bool = True) -> Array:
     r"""Mean intensity over the area of each pixel; an even intensity of 1 gives 1.
 
+    Where a sensor's `fill_factor` is below 1, what falls on the dark part of a pixel counts as nothing.
+
     Exact for an intensity that is band-limited on its grid (1/(2dx) ≥ 1/(λ F#), PSF of f-number F#) and
     dark at its border: along each axis the samples' Fourier series is integrated in closed form over each
     pixel, as a matrix product,
@@ -60,7 +62,7 @@ def integrate(intensity: Array, grid: Grid, sensor: Sensor | Grid, *, turned: bo
             f"intensity has shape {tuple(intensity.shape)} but the grid has {grid.shape}: "
             "the last two axes must be (y, x) of the grid."
         )
-    along_y, along_x = _matrices(grid, _pixels(sensor), intensity, turned)
+    along_y, along_x = _matrices(grid, _pixels(sensor), _fill(sensor), intensity, turned)
     xp = namespace(intensity)
     return xp.matmul(xp.matmul(along_y, intensity), xp.matrix_transpose(along_x))
 
@@ -93,7 +95,7 @@ def integrate_adjoint(values: Array, grid: Grid, sensor: Sensor | Grid, *, turne
             f"values have shape {tuple(values.shape)} but the sensor has {pixels.shape} pixels: "
             "the last two axes must be (y, x) of the pixels."
         )
-    along_y, along_x = _matrices(grid, pixels, values, turned)
+    along_y, along_x = _matrices(grid, pixels, _fill(sensor), values, turned)
     xp = namespace(values)
     return xp.matmul(xp.matmul(xp.matrix_transpose(along_y), values), along_x)
 
@@ -105,17 +107,23 @@ def _pixels(sensor: Sensor | Grid) -> Grid:
     return sensor
 
 
-def _matrices(grid: Grid, pixels: Grid, array: Array, turned: bool) -> tuple[Array, Array]:
+def _fill(sensor: Sensor | Grid) -> float:
+    return sensor.fill_factor if isinstance(sensor, Sensor) else 1.0
+
+
+def _matrices(grid: Grid, pixels: Grid, fill: float, array: Array, turned: bool) -> tuple[Array, Array]:
     matrices = []
     for axis in (0, 1):
         centers = (pixels.y, pixels.x)[axis]
         samples = grid.shape[axis], grid.pitch[axis], grid.center[axis]
-        key = samples, pixels.shape[axis], pixels.pitch[axis], pixels.center[axis], turned, placement(array)
+        seen = pixels.shape[axis], pixels.pitch[axis], pixels.center[axis], fill
+        key = samples, seen, turned, placement(array)
         matrices.append(
             _MATRICES.get(
                 key,
                 lambda centers=centers, samples=samples, axis=axis: like(
-                    averages(-centers if turned else centers, pixels.pitch[axis], *samples), array
+                    averages(-centers if turned else centers, fill * pixels.pitch[axis], *samples) * fill,
+                    array,
                 ),
             )
         )

@@ -10,6 +10,7 @@ from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import GeometryError, LumigraphError
+from lumigraph.sensor.angular import AngularResponse
 
 _NOT_NEGATIVE = {
     "read_noise": "electrons", "dark_current": "electrons per second", "exposure_time": "s",
@@ -59,6 +60,11 @@ class Sensor:
         Dark signal non-uniformity: standard deviation of the pixels' dark signal [electrons].
     pattern_seed
         Of both fixed patterns: sensors of one seed are the same piece of silicon.
+    fill_factor
+        Width of a pixel's active square over the pitch: the rest of its area is dark, so that even light of
+        1 reads fill_factor², and the pixel's transfer function is sinc(fill_factor · pitch · f).
+    angular_response
+        By the angle of incidence; None where it does not matter.
 
     Raises
     ------
@@ -92,6 +98,8 @@ class Sensor:
     prnu: float = 0.0
     dsnu: float = 0.0
     pattern_seed: int = 0
+    fill_factor: float = 1.0
+    angular_response: AngularResponse | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", checks.shape("shape", self.shape))
@@ -100,10 +108,9 @@ class Sensor:
         for name, unit in _NOT_NEGATIVE.items():
             if checks.finite(name, getattr(self, name), unit) < 0:
                 raise GeometryError(f"{name} is {getattr(self, name):g} {unit} but must be at least 0.")
-        if not 0 < checks.finite("quantum_efficiency", self.quantum_efficiency, "1") <= 1:
-            raise GeometryError(
-                f"quantum_efficiency is {self.quantum_efficiency:g} but must be above 0 and at most 1."
-            )
+        for name in ("quantum_efficiency", "fill_factor"):
+            if not 0 < (part := checks.finite(name, getattr(self, name), "1")) <= 1:
+                raise GeometryError(f"{name} is {part:g} but must be above 0 and at most 1.")
         checks.whole("pattern_seed", self.pattern_seed, 0)
         if isinstance(self.bits, bool) or not isinstance(self.bits, int) or not 1 <= self.bits <= 16:
             raise GeometryError(f"bits is {self.bits!r} but must be a whole number from 1 to 16.")

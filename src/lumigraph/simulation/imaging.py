@@ -185,6 +185,11 @@ def _check(camera: Camera, scene: Scene, coherence: Coherence | Incoherent | Par
             "coherence is PartiallyCoherent, whose modes are followed by lenses and plates to lenslets that "
             "are not turned: this camera has others. Set rotation to 0, or use TiltedWaves(count, na=...)."
         )
+    if isinstance(coherence, Snapshots | TiltedWaves) and camera.sensor.angular_response is not None:
+        raise GeometryError(
+            f"coherence is {type(coherence).__name__}, which counts light alike at all angles, "
+            "but sensor.angular_response is given. Use Incoherent() or Coherent(), or leave it out."
+        )
     if not scene.parts:
         raise GeometryError("the scene is empty. Add targets, points or a diffuser.")
     for part in scene.parts:
