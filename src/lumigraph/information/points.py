@@ -149,7 +149,7 @@ class CameraSource:
         """As `Source.image`."""
         points, optics = Points(place[None], np.ones(1)), resolved(self.camera.optics(), self.accuracy)
         if self.camera.lattice is None:
-            found = single_lens.points_image(optics, points)
+            found, _ = single_lens.points_image(optics, points)
         else:
             found = points_image(optics, points, self.accuracy, self._kept(float(place[2])))
         step = optics.object_pitch * optics.separation / (optics.object_distance + float(place[2]))

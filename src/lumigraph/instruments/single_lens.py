@@ -1,5 +1,6 @@
 """A camera without lenslets."""
 
+import warnings
 from collections.abc import Sequence
 from functools import cached_property
 from typing import ClassVar
@@ -12,14 +13,14 @@ from lumigraph.core.linear import Linear, stack
 from lumigraph.core.progress import part
 from lumigraph.design import resolution
 from lumigraph.elements import Train
-from lumigraph.errors import FormatError, GeometryError, SamplingError
+from lumigraph.errors import FormatError, GeometryError, SamplingError, SamplingWarning
 from lumigraph.instruments import describe, grids, trade_offs
 from lumigraph.instruments.angular import refuse_angles
 from lumigraph.instruments.camera import Camera, Making
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.row import Row
 from lumigraph.operators import CameraOptics, single_lens_operator
-from lumigraph.operators.single_lens import ERROR
+from lumigraph.operators.single_lens import FINEST
 from lumigraph.propagation import Propagate
 
 
@@ -116,14 +117,14 @@ class SingleLensCamera(Camera):
     def _planes(
         self, optics: CameraOptics, depths: Sequence[float] | None, grid: Grid, making: Making
     ) -> Linear:
-        if not 1e-2 >= checks.finite("accuracy", making.accuracy, "1", SamplingError) >= ERROR:
+        if not 1e-2 >= checks.finite("accuracy", making.accuracy, "1", SamplingError) >= FINEST:
             raise SamplingError(
-                f"accuracy is {making.accuracy:g} but a single lens is imaged to {ERROR:g}, relative rms. "
-                f"Ask for {ERROR:g} to 0.01."
+                f"accuracy is {making.accuracy:g} but a single lens is imaged to {FINEST:g}, relative rms. "
+                f"Ask for {FINEST:g} to 0.01."
             )
         maps, planes = [], (0.0,) if depths is None else depths
         for number, dz in enumerate(planes):
-            maps.append(single_lens_operator(optics, grid, dz, making.accuracy))
+            maps.append(_warned(single_lens_operator(optics, grid, dz, making.accuracy), dz, making.accuracy))
             part(making.progress, number, len(planes))(1.0)
         return maps[0] if depths is None else stack(maps, depths=depths)
 
@@ -134,3 +135,15 @@ class SingleLensCamera(Camera):
     def describe(self) -> Description:
         """Distances, f-numbers, cut-offs and sampling, each with its equation."""
         return describe.single_lens(self)
+
+
+def _warned(operator: Linear, dz: float, accuracy: float) -> Linear:
+    """The same, with a word where it is less exact than asked for."""
+    if operator.error > accuracy:
+        warnings.warn(
+            f"an accuracy of {accuracy:g} was asked for but images of the plane at {dz:g} m, far out of "
+            f"focus, are off by some {operator.error:.2g} rms. Ask for a coarser accuracy, or less blur.",
+            SamplingWarning,
+            stacklevel=2,
+        )
+    return operator

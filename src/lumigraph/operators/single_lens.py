@@ -14,9 +14,9 @@ D/(λL), so that samples λL/(2D) apart hold the image, whatever the object's ow
    nothing wraps round;
 3. the band-limited image is integrated over each pixel.
 
-Steps 1 and 3 are banded matrices along each axis (`resampling`). The whole is exact to 1e-4 of the image's
-rms, but for light farther from its point than some 600 λL/D, where a point has 3e-4 of its light: what is
-nearer is made brighter by as much.
+Steps 1 and 3 are banded matrices along each axis (`resampling`). The whole is off by 1e-5 to 1e-4 of the
+image's rms (`error`), but for light farther from its point than some 600 λL/D, where a point has 3e-4 of its
+light: what is nearer is made brighter by as much.
 
 Goodman, *Introduction to Fourier Optics*, sections 6.1 to 6.3.
 """
@@ -24,7 +24,7 @@ Goodman, *Introduction to Fourier Optics*, sections 6.1 to 6.3.
 import math
 import warnings
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -33,7 +33,6 @@ from lumigraph.core.arrays import Array
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Chain, Linear, Shape
-from lumigraph.elements import ThinLens
 from lumigraph.errors import SamplingError, SamplingWarning
 from lumigraph.operators import band, varying
 from lumigraph.operators import cells as _cells
@@ -43,13 +42,16 @@ from lumigraph.operators.resampling import Resampling, averaged, represented
 from lumigraph.operators.varying import FieldOperator
 from lumigraph.propagation import propagate
 from lumigraph.propagation.window import smooth_size
-from lumigraph.scene import Points, Slice, sources
+from lumigraph.scene import Points, sources
 
 COARSEST_PUPIL = 512
 """Samples across the pupil, at least."""
 
 FINEST_PUPIL = 1500
 """Samples across the pupil, at most, unless a blur is wider than that resolves."""
+
+BLURRED, FINEST_BLURRED = 150.0, 3000
+"""Samples across the pupil for each λL/D of a blur's radius, and at most."""
 
 PERIOD = 3.0
 """The pupil's samples make h repeat itself after this many times its largest offset from the axis."""
@@ -59,8 +61,15 @@ _TRANSFERS = ByteCache()
 TOLD = 40.0
 """How far around a point [λL/D] its images are set beside each other."""
 
-ERROR = 1e-4
-"""Relative rms error of an image: kernels and pupil, against twice as much of each."""
+FINEST = 1e-4
+"""Accuracy that operators may be asked for: they are better up to blurs of 26 λL/D."""
+
+KERNELS, EDGE = 6e-6, 1.3
+"""Relative rms error that kernels leave, and that a pupil's grey edge does, whose samples have the phase of
+their middles: so many times the square of a blur's radius [λL/D] over the samples across the pupil.
+
+Against `benchmarks.references`, f/10 to f/30, blurs to 40 λL/D.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -75,12 +84,15 @@ class Convolution(Linear):
         Samples (ny, nx) of those DFTs.
     samples, seen
         Of the image that the object covers, and that the sensor does (y, x).
+    left
+        Relative rms error that the pupil's samples leave.
     """
 
     transfer: np.ndarray
     window: tuple[int, int]
     samples: tuple[int, int]
     seen: tuple[int, int]
+    left: float
 
     title: ClassVar[str] = "Convolution with a point's image"
 
@@ -102,6 +114,11 @@ class Convolution(Linear):
         return arrays.irfft2(spectrum, self.window)[:rows, :columns]
 
     @property
+    def error(self) -> float:
+        """With what kernels leave."""
+        return math.hypot(KERNELS, self.left)
+
+    @property
     def memory_bytes(self) -> float:
         """Of the transfer, and of two spectra and two windows on the way [bytes]."""
         return self.transfer.nbytes + 4.0 * 4 * math.prod(self.window)
@@ -114,11 +131,6 @@ class SingleLensOperator(Chain):
     """
 
     title: ClassVar[str] = "Operator of a single lens"
-
-    @property
-    def error(self) -> float:
-        """What kernels and pupil leave, of the image's rms."""
-        return ERROR
 
 
 def single_lens_operator(
@@ -169,35 +181,32 @@ def _seen(camera: CameraOptics, distance: float) -> varying.Image:
     pitch, spot = image_pitch(camera), camera.wavelength * camera.separation / camera.pupil_diameter
     reach = max(1.2 * _cells.blur(one, distance) for one in varying.some(camera)) + TOLD * spot
     span = Span.around(-reach, reach, pitch)
-    return lambda one: _point_image(one, distance, [span, span], 1.0).ravel()
+    # Coarse pupils do to set lenses beside each other.
+    return lambda one: _point_image(one, distance, [span, span], 1.0, 0.0).ravel()
 
 
-def slice_image(camera: HasOptics, part: Slice, accuracy: float = 1e-3) -> tuple[np.ndarray, float]:
-    """Raw image (ny, nx) of a slice, and what fields between those of chosen lenses are off by."""
-    operator = single_lens_operator(camera, part.grid, part.dz, accuracy)
-    image = operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
-    return image, operator.left if isinstance(operator, FieldOperator) else 0.0
-
-
-def points_image(instrument: HasOptics, points: Points) -> np.ndarray:
-    """Raw image (ny, nx) of points, wherever they are.
+def points_image(instrument: HasOptics, points: Points) -> tuple[np.ndarray, float]:
+    """Raw image (ny, nx) of points, wherever they are, and its relative rms error.
 
     One convolution for each depth or, where the lens changes over the field, for each point.
     """
     camera = instrument.optics()
     if varying.plate_of(camera) is None:
         return _points_image(camera, points.positions, points.intensities)
-    total = np.zeros(camera.sensor.shape, np.float32)
+    total, off = np.zeros(camera.sensor.shape, np.float32), 0.0
     for position, intensity in zip(points.positions, points.intensities, strict=True):
         distance = camera.object_distance + float(position[2])
         one = varying.at(camera, position[0] / distance, position[1] / distance)
-        total += _points_image(one, position[None], np.array([intensity]))
-    return total
+        image, error = _points_image(one, position[None], np.array([intensity]))
+        total, off = total + image, max(off, error)
+    return total, off
 
 
-def _points_image(camera: CameraOptics, positions: np.ndarray, intensities: np.ndarray) -> np.ndarray:
+def _points_image(
+    camera: CameraOptics, positions: np.ndarray, intensities: np.ndarray
+) -> tuple[np.ndarray, float]:
     """By one lens for all."""
-    total = np.zeros(camera.sensor.shape, np.float32)
+    total, off = np.zeros(camera.sensor.shape, np.float32), 0.0
     for dz in np.unique(positions[:, 2]):
         chosen = positions[:, 2] == dz
         scale, pitch = -camera.separation / (camera.object_distance + dz), image_pitch(camera)
@@ -207,8 +216,9 @@ def _points_image(camera: CameraOptics, positions: np.ndarray, intensities: np.n
         # A point of intensity 1 counts as one sample of the camera's own object grid.
         light = intensities[chosen] * camera.object_pitch**2 * (scale / pitch) ** 2
         samples = ((along_y * light) @ along_x.T).toarray().astype(np.float32)
-        total += Chain(_imaging(camera, here, float(dz))).forward(samples)
-    return total
+        imaging = Chain(_imaging(camera, here, float(dz)))
+        total, off = total + imaging.forward(samples), max(off, imaging.error)
+    return total, off
 
 
 def _covering(places: tuple[np.ndarray, np.ndarray], pitch: float) -> tuple[Span, Span]:
@@ -228,15 +238,21 @@ def _imaging(camera: CameraOptics, here: tuple[Span, Span], dz: float) -> tuple[
         for own, out in zip(here, there, strict=True)
     ]
     window = smooth_size(offsets[0].count), smooth_size(offsets[1].count)
-    _check_memory(window, camera)
+    followed = _followed(camera, distance, offsets, BLURRED)
+    _check_memory(window, followed.across, camera)
     light = (pitch * distance) ** 2 / (math.pi * camera.pupil_diameter**2 / 4)
     key = repr((offsets, distance, camera.wavelength, camera.separation, camera.lens))
     transfer = _TRANSFERS.get(
         key, lambda: arrays.rfft2(_point_image(camera, distance, offsets, light), window)
     )
     samples, seen = ((y.count, x.count) for y, x in (here, there))
+<<<<<<< HEAD
     mean = averaged(_grid(list(there)), pixels, camera.sensor.fill_factor)
     return Convolution(transfer, window, samples, seen), mean
+=======
+    convolution = Convolution(transfer, window, samples, seen, followed.left)
+    return convolution, averaged(_grid(list(there)), pixels)
+>>>>>>> 0e6d0d8 (Cameras without lenslets sample the pupil as finely as the blur asks for and state what they are off by: far out of focus images were off by 2e-3 and said 1.3e-5. ADR 0016: images by pairs of lenslets were made, and why they are not taken)
 
 
 def image_pitch(camera: CameraOptics) -> float:
@@ -245,14 +261,30 @@ def image_pitch(camera: CameraOptics) -> float:
     return finest / band.OVERSAMPLING
 
 
-def _point_image(camera: CameraOptics, distance: float, offsets: list[Span], light: float) -> np.ndarray:
-    """Image (ny, nx) of a point on the axis at the given offsets, times `light`, float32."""
-    spot = camera.wavelength * camera.separation / camera.pupil_diameter
-    blur = _blur(camera, distance)
+class _Followed(NamedTuple):
+    """How far from the axis light is wanted and followed [m], samples across the pupil, what these leave."""
+
+    wanted: float
+    reach: float
+    across: int
+    left: float
+
+
+def _followed(camera: CameraOptics, distance: float, offsets: list[Span], finely: float) -> _Followed:
+    spot, blur = _cells.airy(camera), _cells.blur(camera, distance)
     wanted = max(max(abs(span.first), abs(span.last)) * span.pitch for span in offsets)
     reach = min(wanted, max(FINEST_PUPIL * spot / PERIOD, 1.5 * blur + 50 * spot))
+    blurred = min(finely * blur / spot, FINEST_BLURRED)
+    across = math.ceil(max(COARSEST_PUPIL, PERIOD * reach / spot, blurred))
+    return _Followed(wanted, reach, across, EDGE * (blur / spot / across) ** 2)
+
+
+def _point_image(
+    camera: CameraOptics, distance: float, offsets: list[Span], light: float, finely: float = BLURRED
+) -> np.ndarray:
+    """Image (ny, nx) of a point on the axis at the given offsets, times `light`, float32."""
+    wanted, reach, across, _ = _followed(camera, distance, offsets, finely)
     near = [_cropped(span, reach) for span in offsets]
-    across = max(COARSEST_PUPIL, math.ceil(PERIOD * reach / spot))
     wide = math.ceil(across * _cells.stop_reach(camera.lens))
     pupil = Grid.square(wide + 3, camera.pupil_diameter / across)
     with warnings.catch_warnings():  # a smooth converging wave: its samples do not stand for points
@@ -274,13 +306,6 @@ def _point_image(camera: CameraOptics, distance: float, offsets: list[Span], lig
     return result
 
 
-def _blur(camera: CameraOptics, distance: float) -> float:
-    """Radius of a point's geometric image [m]."""
-    lenses = [part for part in camera.lens.elements if isinstance(part, ThinLens)]
-    vergence = sum(1 / lens.focal_length for lens in lenses) - 1 / distance
-    return camera.pupil_diameter / 2 * abs(1 - camera.separation * vergence)
-
-
 def _cropped(span: Span, reach: float) -> Span:
     most = math.ceil(reach / span.pitch - 1e-9)
     first, last = max(span.first, -most), min(span.last, most)
@@ -295,9 +320,9 @@ def _grid(spans: list[Span]) -> Grid:
     return Grid((shape[0], shape[1]), (spans[0].pitch, spans[1].pitch), (center[0], center[1]))
 
 
-def _check_memory(window: tuple[int, int], camera: CameraOptics) -> None:
+def _check_memory(window: tuple[int, int], across: int, camera: CameraOptics) -> None:
     memory.require(
-        20.0 * math.prod(window) + 8 * math.prod(camera.sensor.shape),
+        20.0 * math.prod(window) + 40.0 * across**2 + 8 * math.prod(camera.sensor.shape),
         f"the image's {window[0]} x {window[1]} samples",
         "Use fewer pixels, a smaller object, or a larger f-number.",
         SamplingError,

@@ -81,8 +81,9 @@ def of_white(difference: float, accuracy: float) -> Reached:
     )
 
 
-SINGLE_LENS = Reached(1.3e-5, "convolution with a point's image")
-"""Of a camera without lenslets: 7e-6 to 2.5e-5, by what is drawn and how far it is from focus."""
+def of_convolution(operator_error: float, source: str = "") -> Reached:
+    """Of a camera without lenslets, by what its operator states."""
+    return Reached(max(operator_error, ROUNDING), f"convolution with a point's image{source}")
 
 
 def of_grids(camera: Camera) -> Reached:

@@ -8,7 +8,7 @@ import numpy as np
 from lumigraph.core import arrays
 from lumigraph.core.progress import Progress
 from lumigraph.core.progress import part as share
-from lumigraph.operators import CameraOptics, points, single_lens, white
+from lumigraph.operators import CameraOptics, points, single_lens, single_lens_operator, white
 from lumigraph.operators.coherent import coherent_image
 from lumigraph.operators.leaning import flat
 from lumigraph.operators.paraxial import left_by_field, resolved
@@ -80,8 +80,7 @@ def _image_of(
     if light is not None and isinstance(part, Slice):
         return _lit(replace(plain, model="paraxial"), part, accuracy, light)
     if plain.lattice is None and not isinstance(camera, CameraOptics):
-        image, left = _without_lenslets(camera, part, accuracy)
-        return image, error.SINGLE_LENS.and_also(left, ", lenses over the field" if left else "")
+        return _without_lenslets(camera, part, accuracy)
     if isinstance(part, Diffuser):
         image, off = white.image_and_error(plain, accuracy)
         return part.intensity * image, error.of_white(off, accuracy).through(plain)
@@ -115,9 +114,14 @@ def _lit(
     return coherent_image(camera, amplitude, part.grid, part.dz, accuracy), reached
 
 
-def _without_lenslets(camera: Camera, part: Part, accuracy: float) -> tuple[np.ndarray, float]:
+def _without_lenslets(camera: Camera, part: Part, accuracy: float) -> tuple[np.ndarray, error.Reached]:
     if isinstance(part, Points):
-        return single_lens.points_image(camera, part), 0.0
+        image, off = single_lens.points_image(camera, part)
+        return image, error.of_convolution(off)
     if isinstance(part, Diffuser):  # a sharp image of nothing: even light
-        return np.full(camera.sensor.shape, part.intensity), 0.0
-    return single_lens.slice_image(camera, part.trimmed(), accuracy)
+        return np.full(camera.sensor.shape, part.intensity), error.of_convolution(0.0)
+    part = part.trimmed()
+    operator = single_lens_operator(camera, part.grid, part.dz, accuracy)
+    several = ", lenses over the field" if isinstance(operator, FieldOperator) else ""
+    image = operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
+    return image, error.of_convolution(operator.error, several)
