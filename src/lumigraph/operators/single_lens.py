@@ -246,13 +246,8 @@ def _imaging(camera: CameraOptics, here: tuple[Span, Span], dz: float) -> tuple[
         key, lambda: arrays.rfft2(_point_image(camera, distance, offsets, light), window)
     )
     samples, seen = ((y.count, x.count) for y, x in (here, there))
-<<<<<<< HEAD
     mean = averaged(_grid(list(there)), pixels, camera.sensor.fill_factor)
-    return Convolution(transfer, window, samples, seen), mean
-=======
-    convolution = Convolution(transfer, window, samples, seen, followed.left)
-    return convolution, averaged(_grid(list(there)), pixels)
->>>>>>> 0e6d0d8 (Cameras without lenslets sample the pupil as finely as the blur asks for and state what they are off by: far out of focus images were off by 2e-3 and said 1.3e-5. ADR 0016: images by pairs of lenslets were made, and why they are not taken)
+    return Convolution(transfer, window, samples, seen, followed.left), mean
 
 
 def image_pitch(camera: CameraOptics) -> float:
