@@ -279,3 +279,14 @@ def test_an_object_that_cannot_fit_is_refused_before_it_is_made():
 
     with pytest.raises(lg.SamplingError, match="1000000 x 1000000 samples needs"):
         lg.deconvolve(np.ones((2, 3)), Huge())
+
+
+@pytest.mark.parametrize("accelerated", [False, True])
+def test_a_filter_that_would_make_the_fit_far_worse_is_left_out_of_the_step(rng, accelerated):
+    """One that moves the factor aside: voxels grow that their own light speaks against, without end."""
+    operator = blurred((14, 13), 1.2)
+    raw = rng.poisson(operator.forward(disc((14, 13)))).astype(np.float32)
+    method = RichardsonLucy(filter=lambda factor: np.roll(factor, 3, -1), accelerated=accelerated)
+    found = np.array(deviances(raw, operator, 60, method=method))
+    assert (found[1:] <= 1.02 * found[:-1]).all()
+    assert found[-1] < found[0]

@@ -13,6 +13,8 @@ from lumigraph.core.arrays import Array
 from lumigraph.deconvolution.methods import Filter, Prior, State, check_offers, check_start
 from lumigraph.deconvolution.problem import Problem
 
+_RISE = 1.02  # of the deviance: priors and filters may raise it a little
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RichardsonLucy:
@@ -27,7 +29,8 @@ class RichardsonLucy:
         `TotalVariation` or `Wavelets`; None for the most likely object.
     filter
         Applied to the factor of each step, such as `LowPass`: an even start never takes up what it removes,
-        and light is not drawn from one plane to another. What it leaves below 0 becomes 0.
+        and light is not drawn from one plane to another. What it leaves below 0 becomes 0. A step that would
+        fit the raw image worse by 2 % is taken without it.
     accelerated
         Extrapolates each step by the last one (Biggs & Andrews), with as much likelihood in a third to a
         tenth of the steps; where a plain step would be likelier it is taken instead.
@@ -58,27 +61,32 @@ class RichardsonLucy:
             check_offers("filter", self.filter, ("__call__",), "Give LowPass(...).")
 
     def step(self, problem: Problem, state: State) -> State:
-        """The next state: one application of Aᵀ and one of A."""
-        estimate, memory = self._improved(problem, state)
-        if not self.accelerated:
-            return State.at(problem, estimate, memory, state.done + 1)
-        change = estimate - state.estimate
-        ahead = _ahead(estimate, change, state)
-        memory |= {"last": estimate, "change": change}
-        found = State.at(problem, ahead, memory, state.done + 1)
-        if self.prior is None and self.filter is None and found.deviance > state.deviance:
-            return State.at(problem, estimate, memory, state.done + 1)
-        return found
-
-    def _improved(self, problem: Problem, state: State) -> tuple[Array, dict[str, Array]]:
+        """The next state: one application of Aᵀ and one of A, or up to three where it would fit far worse."""
         factor = problem.scale.over_sensitivity(problem.scale.back(problem.data / state.model))
-        if self.filter is not None:
-            factor = self.filter(arrays.by_plane(_where_seen, factor, problem.scale.seen))
+        most = state.deviance * (1.0 if self.prior is None and self.filter is None else _RISE)
+        estimate, memory = self._improved(problem, state, self._filtered(problem, factor))
+        if self.accelerated:
+            change = estimate - state.estimate
+            ahead = _ahead(estimate, change, state)
+            memory |= {"last": estimate, "change": change}
+            found = State.at(problem, ahead, memory, state.done + 1)
+            if found.deviance <= most:
+                return found
+        found = State.at(problem, estimate, memory, state.done + 1)
+        if self.filter is None or found.deviance <= most:
+            return found
+        return State.at(problem, *self._improved(problem, state, factor), state.done + 1)
+
+    def _filtered(self, problem: Problem, factor: Array) -> Array:
+        if self.filter is None:
+            return factor
+        return self.filter(arrays.by_plane(_where_seen, factor, problem.scale.seen))
+
+    def _improved(self, problem: Problem, state: State, factor: Array) -> tuple[Array, dict[str, Array]]:
         estimate = arrays.by_plane(lambda before, times: _positive(before * times), state.estimate, factor)
-        memory: dict[str, Array] = {}
-        if self.prior is not None:
-            estimate, memory = self.prior.shrink(problem, estimate, state)
-        return estimate, memory
+        if self.prior is None:
+            return estimate, {}
+        return self.prior.shrink(problem, estimate, state)
 
 
 def _ahead(estimate: Array, change: Array, state: State) -> Array:
