@@ -178,7 +178,7 @@ def single_lens_operator(
 
 def _seen(camera: CameraOptics, distance: float) -> varying.Image:
     """Images of a point by lenses of a camera; see `varying`."""
-    pitch, spot = image_pitch(camera), camera.wavelength * camera.separation / camera.pupil_diameter
+    pitch, spot = image_pitch(camera), _cells.airy(camera)
     reach = max(1.2 * _cells.blur(one, distance) for one in varying.some(camera)) + TOLD * spot
     span = Span.around(-reach, reach, pitch)
     # Coarse pupils do to set lenses beside each other.
@@ -252,8 +252,7 @@ def _imaging(camera: CameraOptics, here: tuple[Span, Span], dz: float) -> tuple[
 
 def image_pitch(camera: CameraOptics) -> float:
     """Distance of the samples that hold the image [m]: λL/(2D) and some closer."""
-    finest = camera.wavelength * camera.separation / (2 * camera.pupil_diameter)
-    return finest / band.OVERSAMPLING
+    return _cells.airy(camera) / 2 / band.OVERSAMPLING
 
 
 class _Followed(NamedTuple):
@@ -317,7 +316,7 @@ def _grid(spans: list[Span]) -> Grid:
 
 def _check_memory(window: tuple[int, int], across: int, camera: CameraOptics) -> None:
     memory.require(
-        20.0 * math.prod(window) + 40.0 * across**2 + 8 * math.prod(camera.sensor.shape),
+        20.0 * math.prod(window) + 56.0 * across**2 + 8 * math.prod(camera.sensor.shape),
         f"the image's {window[0]} x {window[1]} samples",
         "Use fewer pixels, a smaller object, or a larger f-number.",
         SamplingError,
