@@ -83,6 +83,7 @@ from .rendering import (
 from .scene import (
     ExtendedSource as ExtendedSource,
     GaussianSchell as GaussianSchell,
+    Medium as Medium,
     Points as Points,
     Scene as Scene,
     Slice as Slice,

@@ -11,7 +11,7 @@ d|U|² = 2 Re(U* dU). Moving a point changes the phase as well, so that its plac
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +31,9 @@ from lumigraph.scene import Points
 
 BLOCK = 2**21
 """Numbers of fields that are held at a time."""
+
+Factor = Callable[[Objective, np.ndarray, np.ndarray], np.ndarray]
+"""Of the amplitudes (rows, nodes) of an objective's pupil at n sin θ along y and x."""
 
 PLACES = 3
 """Derivatives by a point's place: y, x, dz."""
@@ -157,6 +160,20 @@ class PupilImages:
         """
         along = np.eye(len(self.terms) + PLACES) if directions is None else directions
         return (lit for _, lit in self._each(points, coefficients, along))
+
+    def through(self, position: np.ndarray, factor: Factor, away: float) -> np.ndarray:
+        """Samples of the layout, of a point of 1 whose pupil's amplitudes are multiplied by a factor.
+
+        Its image's window, and its pupil's nodes, are those of a point `away` [m] from the focused plane.
+        """
+        whole, (place, cell) = np.zeros(self._samples), self._place(position)
+        for objective in self.objectives:
+            size = self._size(objective, away)
+            waves, phases = self._waves(objective, *size), self._phases(objective, size)
+            pupil = objective.pupil(*waves.q, 0.0) * waves.area * factor(objective, *waves.q)
+            own = _moved(pupil.astype(waves.across.dtype), phases, place)
+            self._add(whole, self._one(waves, own, phases[:0])[0] * self._unit, cell)
+        return whole
 
     def cells_at(self, dz: float) -> int:
         """Along the window that holds the image of a point at a depth [m], without coefficients."""

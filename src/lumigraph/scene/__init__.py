@@ -6,12 +6,14 @@
 - `sources`: waves: `plane_wave`, `point_source`, `gaussian_beam`
 - `schell`, `extended`: partially coherent light as modes: `GaussianSchell`, `ExtendedSource`
 - `lamps`: shapes of extended sources
+- `medium`: `Medium`, what refracts in a sample before microscopes
 - `line`: `SpectralLine`, light of a finite bandwidth
 """
 
 from lumigraph.scene import sources, targets
 from lumigraph.scene.extended import ExtendedSource
 from lumigraph.scene.line import SpectralLine
+from lumigraph.scene.medium import Medium
 from lumigraph.scene.rgbd import Seeing
 from lumigraph.scene.schell import GaussianSchell
 from lumigraph.scene.volumes import Diffuser, Part, Points, Scene, Slice
@@ -20,6 +22,7 @@ __all__ = [
     "Diffuser",
     "ExtendedSource",
     "GaussianSchell",
+    "Medium",
     "Part",
     "Points",
     "Scene",

@@ -14,7 +14,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators.coherent import is_followed
-from lumigraph.scene import Points, Scene, Slice
+from lumigraph.scene import Medium, Points, Scene, Slice
 from lumigraph.simulation import error
 from lumigraph.simulation.camera import Camera, Imaging
 from lumigraph.simulation.coherence import (
@@ -55,6 +55,7 @@ def simulate(
     spectrum: Spectrum | None = None,
     progress: Progress | None = None,
     map: Callable[..., Iterable[Any]] = serial_map,  # noqa: A002 - what it is
+    medium: Medium | None = None,
 ) -> RawImage:
     """Raw image (ny, nx) of a scene, float32, turned by 180° so that pictures stand upright.
 
@@ -85,6 +86,9 @@ def simulate(
     map
         Runs the propagations, such as a pool's ``imap``; results are added in order, so that every map
         gives the same raw image.
+    medium
+        What refracts before the scene, of light-field microscopes ("1.0" and "2.0"): slices that delay light,
+        by multislice; at most some thousand points and lit samples.
 
     Raises
     ------
@@ -100,10 +104,16 @@ def simulate(
         planes = zip(scene.data, scene.depths, strict=True)
         scene = Scene(Slice(plane, scene.grid, dz) for plane, dz in planes)
     if spectrum is not None:
+        if medium is not None:
+            raise GeometryError(
+                "medium and spectrum are both given: one sample's indices have one wavelength."
+            )
         return _coloured(camera, scene, coherence, spectrum, progress, map)
     if isinstance(camera, Microscope):
         checks.instance("scene", scene, Scene)
-        return microscope_image(camera, scene, coherence, progress)
+        return microscope_image(camera, scene, coherence, progress, medium)
+    if medium is not None:
+        raise GeometryError("medium is of light-field microscopes: before a camera leave it out.")
     _check(camera, scene, coherence)
     return _imaged(camera, scene, coherence, progress, map)
 

@@ -20,10 +20,12 @@ from lumigraph.operators.microscope_building import Layout
 from lumigraph.operators.microscope_cell import Lenslet
 from lumigraph.operators.microscope_kernels import Demand, point_cells, require_window
 from lumigraph.operators.microscope_operator import MicroscopeOperator
-from lumigraph.scene import Diffuser, Points, Scene, Slice
+from lumigraph.operators.microscope_pupil import PupilImages
+from lumigraph.scene import Diffuser, Medium, Points, Scene, Slice
 from lumigraph.sensor import Sensor
 from lumigraph.simulation import error
 from lumigraph.simulation.coherence import Incoherent
+from lumigraph.simulation.through_medium import lit_points, medium_image
 
 SAMPLES = 5
 """Samples along a lenslet of a scene's slice, at least: those of the microscope's ``object_grid``."""
@@ -66,15 +68,28 @@ class Microscope(Protocol):
         """How it sees slices."""
         ...
 
+    @property
+    def object_grid(self) -> Grid:
+        """Samples of the focused plane."""
+        ...
+
+    def pupil_images(self, terms: Sequence[int], *, farthest: float, accuracy: float) -> PupilImages:
+        """Images of points as functions of its pupil."""
+        ...
+
     def imaged_point(self, y: float, x: float, dz: float, accuracy: float) -> tuple[np.ndarray, float]:
         """Raw image of a point, and its estimated relative rms error."""
         ...
 
 
 def microscope_image(
-    scope: Microscope, scene: Scene, coherence: Any, progress: Progress | None = None
+    scope: Microscope,
+    scene: Scene,
+    coherence: Any,
+    progress: Progress | None = None,
+    medium: Medium | None = None,
 ) -> RawImage:
-    """Raw image (ny, nx) float32 of a scene.
+    """Raw image (ny, nx) float32 of a scene, seen through a medium or none.
 
     Raises
     ------
@@ -94,8 +109,13 @@ def microscope_image(
             "nothing hides. Leave the opacity out."
         )
     pixels, reached = np.zeros(scope.sensor.shape), []
+    if medium is not None:
+        scene = Scene([lit_points(scope, scene)])
     for done, part in enumerate(scene.parts):
-        image, rms = _image(scope, part, coherence.accuracy)
+        if medium is not None and isinstance(part, Points):
+            image, rms = medium_image(scope, part, medium, coherence.accuracy, progress)
+        else:
+            image, rms = _image(scope, part, coherence.accuracy)
         pixels += image
         reached.append((error.norm(image), error.Reached(rms, _SOURCE)))
         if progress is not None:
