@@ -4,7 +4,9 @@
 each run draws a camera (focal length, distances, exit pupil, axis, tilt, distortion, gains of the kinds). It
 gives a white image and pictures of a board at drawn poses, by rays and with 1 % of noise. The array is
 calibrated on the white image, corners are found, and `lg.metric.board` measures the camera, told a focal
-length that is off by chance, as a data sheet's is, by ``--known`` (one standard deviation). A point that took
+length that is off by chance, as a data sheet's is, by ``--known`` (one standard deviation); with ``--pitch
+1e-4`` the lenslets' pitch, too, off by that part. ``--planned 8`` takes eight pictures at the poses of
+`lg.metric.plan`, instead of five (of a camera 1.0 six) drawn ones near the plane in focus. A point that took
 no part is triangulated with the result, from places as exact as corners are.
 """
 
@@ -17,6 +19,9 @@ from dataclasses import replace
 import numpy as np
 
 import lumigraph as lg
+
+TRIES = 10
+"""Until a pose where no board is found is left out."""
 
 NAMES = ("focal_length", "separation", "lenslet_distance", "distance of a point")
 
@@ -63,15 +68,35 @@ def pose(rng, distance, board):
     return drawn.pose(turn, float(distance + rng.uniform(-3e-3, 3e-3)), board)
 
 
-def pictures(rng, true, white, found, kinds):
-    """Corners on 5 pictures, 6 of a camera 1.0 (kinds 0), and how many were taken again."""
+def drawn_poses(rng, board, views):
+    """Functions that draw the pose of each picture: near the plane in focus."""
+    distances = rng.permutation(np.linspace(0.36, 0.46, 6) if views else np.linspace(0.43, 0.47, 5))
+    return [lambda distance=one: pose(rng, distance, board) for one in distances]
+
+
+def planned_poses(rng, camera, board, nominal, count):
+    """The same, as `lg.metric.plan` asks for by what data sheets say, to 3 degrees and 1 %."""
     from metric import drawn, drawn_views
 
+    views = board == drawn_views.BOARD
+    plan = lg.metric.plan(*camera, board, nominal, pictures=count, in_views=views)
+
+    def draw(step):
+        turn = np.array(step.turn) + rng.normal(0, 0.05, 3)
+        return drawn.pose(tuple(turn), float(step.distance * (1 + rng.normal(0, 0.01))), board)
+
+    return [lambda step=one: draw(step) for one in plan.steps]
+
+
+def pictures(rng, true, white, found, poses):
+    """Corners on pictures, and how many were taken again."""
+    from metric import drawn, drawn_views
+
+    kinds, board, draws = poses
     views, again, frames = not kinds, 0, []
-    board = drawn_views.BOARD if views else drawn.BOARD
-    for distance in rng.permutation(np.linspace(0.36, 0.46, 6) if views else np.linspace(0.43, 0.47, 5)):
-        while True:
-            where = pose(rng, distance, board)
+    for draw in draws:
+        for _ in range(TRIES):
+            where = draw()
             raw = (
                 drawn_views.raw(where, rng, seen_by=true) if views else drawn.raw(true, where, kinds, rng=rng)
             )
@@ -81,13 +106,15 @@ def pictures(rng, true, white, found, kinds):
                 break
             except lg.LumigraphError:
                 again += 1
+        else:
+            continue
         frames.append(replace(one, frame=0 * one.frame + len(frames)))
     columns = ("frame", "corner", "place", "center", "kind")
     whole = (np.concatenate([getattr(one, name) for one in frames]) for name in columns)
-    return lg.metric.Corners(*whole, in_views=views), board, again
+    return lg.metric.Corners(*whole, in_views=views), again
 
 
-def run(rng, what, known):
+def run(rng, what, known, pitch=None, planned=None):
     """Deviations of `NAMES` over the truth, and over what is said; residual [px]; pictures taken again."""
     from metric import drawn, drawn_views
 
@@ -98,9 +125,17 @@ def run(rng, what, known):
     found = lg.calibrate(white)
     if kinds == 3:  # which lenslets are of which kind no white image tells
         found = drawing.calibration(kinds)
-    corners, board, again = pictures(rng, true, white, found, kinds)
     told = true.focal_length * (1 + rng.normal(0, known))
     nominal = lg.metric.Nominal(told, true.pixel_pitch, drawing.SHAPE, focal_length_error=known)
+    if pitch:
+        lenslets = drawing.PITCH / (1 + true.lenslet_distance / true.exit_pupil) * (1 + rng.normal(0, pitch))
+        nominal = replace(nominal, pitch_ratio=found.lattice.pitch / lenslets, pitch_ratio_error=pitch)
+    board = drawing.BOARD
+    if planned:
+        draws = planned_poses(rng, (true, found), board, nominal, planned)
+    else:
+        draws = drawn_poses(rng, board, not kinds)
+    corners, again = pictures(rng, true, white, found, (kinds, board, draws))
     measured = lg.metric.board(corners, board, nominal)
     off = measured.camera.numbers[:3] - true.numbers[:3]
     point = np.array([rng.uniform(0.43, 0.47), *rng.uniform(-3e-3, 3e-3, 2)])
@@ -138,13 +173,17 @@ def main():
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--known", type=float, default=0.02)
+    parser.add_argument("--pitch", type=float)
+    parser.add_argument("--planned", type=int)
     given = parser.parse_args()
     sys.path.insert(0, "tests")
     warnings.simplefilter("ignore")
     part, sure, px, again, refused, started = [], [], [], 0, 0, time.process_time()
     for k in range(given.first, given.first + given.runs):
         try:
-            one = run(np.random.default_rng([given.seed, k]), given.what, given.known)
+            one = run(
+                np.random.default_rng([given.seed, k]), given.what, given.known, given.pitch, given.planned
+            )
         except lg.LumigraphError as error:
             print(f"run {k}: {error}", flush=True)
             refused += 1

@@ -78,3 +78,25 @@ def test_a_plan_says_which_pictures_to_take(capsys) -> None:
     assert printed[4].startswith("note: f, and with it L")
     assert main([*words[:2], *words[4:]]) == 1
     assert "a plan needs --camera" in capsys.readouterr().err
+
+
+def test_squares_that_are_not_as_wide_as_said_are_refused_by_what_is_known_of_b(table, capsys) -> None:
+    words = ["board", str(table), *KNOWN, "--board", "7 x 5 corners, 12 mm", "--lenslet-distance", "0.42 mm"]
+    assert main([*words, "--lenslet-distance-error", "0.008 mm"]) == 1
+    assert "mm, 12 mm given. Measure the board and give its spacing" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--lenslet-distance-error", "0.01 mm"], "needs --lenslet-distance, or --camera"),
+        (
+            ["--lenslet-pitch", "127 um"],
+            "give --micro-image-pitch, in pixels: the lenslets' pitch is compared",
+        ),
+        (["--lenslet-pitch-error", "0.01 um"], "give --lenslet-pitch, or --camera: the lenslets' pitch"),
+    ],
+)
+def test_half_of_what_is_known_of_the_array_is_refused(table, capsys, words, said) -> None:
+    assert main(["board", str(table), *KNOWN, "--board", "7 x 5 corners, 10 mm", *words]) == 1
+    assert said in capsys.readouterr().err

@@ -11,7 +11,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import CalibrationError
 from lumigraph.metric import geometry, planning
-from metric import drawn, scenes
+from metric import drawn, drawn_views, scenes
 
 NOMINAL = metric.Nominal(50e-3, drawn.PIXEL, drawn.SHAPE)
 
@@ -69,6 +69,39 @@ def test_a_board_that_cannot_be_used_is_refused() -> None:
         metric.plan(drawn.camera(1.0), drawn.calibration(), drawn.BOARD, NOMINAL, pictures=2)
 
 
+def test_boards_are_in_the_picture_with_their_outer_squares_where_a_plan_puts_them(plan) -> None:
+    """And half a square of the white margin, without which none is found; corners alone do not ask for it."""
+    outer = np.array([(0.0, y, x) for y in (-1.5, 4.5) for x in (-1.5, 5.5)]) * drawn.BOARD.spacing
+    centers = drawn.calibration().position(drawn.calibration().indices_within((0, 419), (0, 499)))
+    for step in plan.steps:
+        for point in geometry.moved(outer, drawn.pose(step.turn, step.distance)):
+            way = np.hypot(*(plan.camera.project(point[None].repeat(len(centers), 0), centers) - centers).T)
+            assert way.min() < 0.3 * drawn.PITCH  # the lenslet that shows it in its middle is there
+
+
+def test_a_plan_takes_the_views_that_boards_are_looked_for_in() -> None:
+    """Also behind lenslets 11 pixels wide, where one of 13 was left."""
+    nominal = metric.Nominal(50e-3, drawn_views.PIXEL, drawn_views.SHAPE)
+    camera, calibration, board = drawn_views.CAMERA, drawn_views.calibration(), drawn_views.BOARD
+    found = metric.plan(camera, calibration, board, nominal, pictures=3, in_views=True)
+    raw = drawn_views.raw(drawn.pose((0.05, 0.3, -0.2), 0.4, board), np.random.default_rng(0))
+    seen = metric.find_corners([lg.RawImage(raw)], board, calibration, in_views=True)
+    assert found.steps[0].places == 12 * np.bincount(seen.corner).max()
+
+
+def test_a_pitch_that_is_known_makes_a_plan_tell_f() -> None:
+    camera, exact = drawn.camera(1.0), (0.03, 0.03)
+    ratio = 1 + camera.lenslet_distance / camera.exit_pupil
+    known = dataclasses.replace(NOMINAL, pitch_ratio=ratio, pitch_ratio_error=1e-4)
+    free, tied = (
+        metric.plan(camera, drawn.calibration(), drawn.BOARD, one, pictures=6, noise_px=exact)
+        .steps[-1]
+        .errors[0]
+        for one in (NOMINAL, known)
+    )
+    assert tied < 0.5 * free
+
+
 def test_a_plan_for_views_says_what_boards_in_views_will_tell() -> None:
     """Of a camera 1.0: b well, f and L no better than what is known of f, as the exit pupil is free."""
     camera = dataclasses.replace(scenes.VIEWS_CAMERA, tilt=(0.0, 0.0))
@@ -79,7 +112,7 @@ def test_a_plan_for_views_says_what_boards_in_views_will_tell() -> None:
     found = metric.plan(camera, calibration, scenes.BOARD, scenes.NOMINAL, pictures=6, in_views=True)
     errors = np.array([step.errors for step in found.steps]) / camera.numbers[:3]
     assert errors[-1, :2] == pytest.approx(0.02, rel=0.1)
-    assert errors[-1, 2] < 0.012 < 0.5 * errors[0, 2]
+    assert errors[-1, 2] < min(0.0055, 0.5 * errors[0, 2])
     assert any(max(np.abs(step.turn)) > 0.6 for step in found.steps)
     own, shared = 0.02 * scenes.PITCH, 0.01 * scenes.PITCH
     before = planning._Before(camera, calibration, scenes.BOARD, metric.noise.Noise(np.ones(1), 0.0), True)

@@ -13,11 +13,15 @@ from lumigraph.cli.files import check_output
 from lumigraph.cli.options import Output, length
 from lumigraph.cli.origin import NO_ORIGIN, Origin
 from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.core.checks import Pair
 from lumigraph.core.result import Figure, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
     from lumigraph.metric import Board, Corners, Measured, Nominal, Plan
+
+
+_ARRAY = ("lenslet_pitch", "micro_images")
 
 
 @Parameter(name="*")
@@ -35,20 +39,39 @@ class Known:
         Pixel pitch of the sensor, such as '5.5 um'; that of the raw images or of --camera if left out.
     shape
         Rows and columns of the raw images, for a table of corners.
+    lenslet_distance
+        From lenslets to sensor, such as '0.42 mm', of a camera 1.0 their focal length; that of --camera if
+        left out. It checks the board's spacing, which nothing else does.
+    lenslet_distance_error
+        How well that is known, such as '0.02 mm'; 5 % if left out.
+    lenslet_pitch
+        Between lenslets, if it is known well, such as '125.02 um': with the pitch of the micro-images it
+        tells f and distances.
+    lenslet_pitch_error
+        How well that is known, such as '0.01 um'; 0.03 % if left out. With it, the pitch of --camera is used.
+    micro_image_pitch
+        Pixels between micro-images, for a table of corners; of raw images it is measured.
     """
 
     focal_length: str | None = None
     focal_length_error: str | None = None
     pixel_pitch: str | None = None
     shape: tuple[int, int] | None = None
+    lenslet_distance: str | None = None
+    lenslet_distance_error: str | None = None
+    lenslet_pitch: str | None = None
+    lenslet_pitch_error: str | None = None
+    micro_image_pitch: float | None = None
 
     def nominal(self, given: dict[str, Any]) -> "Nominal":
         """Of the options, which come before what files say."""
         from lumigraph.metric import Nominal
 
         f, pitch = length("--focal-length", self.focal_length), length("--pixel-pitch", self.pixel_pitch)
-        known = {"focal_length": f, "pixel_pitch": pitch, "shape": self.shape}
+        b, apart = length("--lenslet-distance", self.lenslet_distance), self._apart(given)
+        known = {"focal_length": f, "pixel_pitch": pitch, "shape": self.shape, "lenslet_distance": b}
         known = given | {name: value for name, value in known.items() if value is not None}
+        known = {name: value for name, value in known.items() if name not in _ARRAY}
         lacking = [
             f"--{name.replace('_', '-')}"
             for name in ("focal_length", "pixel_pitch", "shape")
@@ -56,9 +79,39 @@ class Known:
         ]
         if lacking:
             raise FormatError(f"give {', '.join(lacking)} of the camera.")
-        nominal = Nominal(**known)
-        error = length("--focal-length-error", self.focal_length_error)
-        return nominal if error is None else replace(nominal, focal_length_error=error / nominal.focal_length)
+        nominal = self._sure(Nominal(**known))
+        if apart is None:
+            return nominal
+        lenslets, seen = apart
+        nominal = replace(nominal, pitch_ratio=seen * nominal.pixel_pitch / lenslets)
+        error = length("--lenslet-pitch-error", self.lenslet_pitch_error)
+        return nominal if error is None else replace(nominal, pitch_ratio_error=error / lenslets)
+
+    def _sure(self, nominal: "Nominal") -> "Nominal":
+        """With errors that are given as lengths."""
+        f = length("--focal-length-error", self.focal_length_error)
+        b = length("--lenslet-distance-error", self.lenslet_distance_error)
+        if f is not None:
+            nominal = replace(nominal, focal_length_error=f / nominal.focal_length)
+        if b is None:
+            return nominal
+        if nominal.lenslet_distance is None:
+            raise FormatError("--lenslet-distance-error needs --lenslet-distance, or --camera.")
+        return replace(nominal, lenslet_distance_error=b / nominal.lenslet_distance)
+
+    def _apart(self, given: dict[str, Any]) -> Pair | None:
+        """Pitch of the lenslets [m], and that of their micro-images [px]."""
+        pitch = length("--lenslet-pitch", self.lenslet_pitch)
+        if pitch is None and self.lenslet_pitch_error is None:
+            return None
+        lenslets, seen = (
+            pitch or given.get("lenslet_pitch"),
+            self.micro_image_pitch or given.get("micro_images"),
+        )
+        if lenslets is None or seen is None:
+            lacking = "--lenslet-pitch, or --camera" if lenslets is None else "--micro-image-pitch, in pixels"
+            raise FormatError(f"give {lacking}: the lenslets' pitch is compared with the micro-images'.")
+        return lenslets, seen
 
 
 def board(
@@ -165,6 +218,7 @@ def _found(
 ) -> "tuple[Corners, Board, dict[str, Any], tuple[str, ...]]":
     """Of raw images."""
     from lumigraph import metric
+    from lumigraph.instruments import LensletCamera
     from lumigraph.instruments.capabilities import Rendered, WithMainLens
 
     camera = origin.described("decode" if views else None)
@@ -173,8 +227,12 @@ def _found(
     with progress("board") as tell:
         seen = metric.find_corners(ready, board, in_views=in_views, progress=tell)
     told = {"shape": ready[0].shape, "pixel_pitch": ready[0].pixel_pitch}
+    if ready[0].calibration is not None and (origin.white or origin.calibration):
+        told["micro_images"] = ready[0].calibration.lattice.pitch
     if isinstance(camera, WithMainLens):
         told |= {"focal_length": camera.main_lens.focal_length, "pixel_pitch": camera.sensor.pixel_pitch}
+    if isinstance(camera, LensletCamera):
+        told |= {"lenslet_distance": camera.lenslet_distance, "lenslet_pitch": camera.lenslets.pitch}
     known = {name: value for name, value in told.items() if value is not None}
     return seen, board, known, ready[0].notes
 
@@ -190,6 +248,8 @@ def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int)
         raise FormatError("a plan needs --camera, a file of a plenoptic camera, and --board.")
     ideal = metric.MetricCamera.of(camera)
     told = {name: getattr(ideal, name) for name in ("focal_length", "pixel_pitch")}
+    lattice = camera.calibration.lattice
+    told |= {"lenslet_pitch": camera.lenslets.pitch, "micro_images": lattice.pitch}
     nominal = known.nominal(told | {"shape": camera.sensor.shape})
     in_views = not isinstance(camera, Rendered)
     found = metric.plan(ideal, camera.calibration, board, nominal, pictures=pictures, in_views=in_views)
@@ -208,7 +268,8 @@ def _hardly_told(found: "Plan", nominal: "Nominal") -> tuple[str, ...]:
         return ()
     return (
         f"f, and with it L and distances, stays as well known as it is beforehand "
-        f"(± {1.96 * nominal.focal_length_error:.2g} of it): measure it, and give --focal-length-error",
+        f"(± {1.96 * nominal.focal_length_error:.2g} of it): measure it, and give --focal-length-error, "
+        "or the lenslets' pitch, and give --lenslet-pitch-error",
     )
 
 

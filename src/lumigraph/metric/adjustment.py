@@ -7,6 +7,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from lumigraph.core import memory
+from lumigraph.core.checks import Pair
 from lumigraph.errors import CalibrationError
 from lumigraph.metric import geometry
 from lumigraph.metric.camera import MetricCamera, Nominal
@@ -81,6 +82,8 @@ class Problem:
     bow
         Standard deviation of the heights of the board's corners, which are looked for [m]; 0 for a board
         that is known.
+    apart
+        Pitch of the micro-images over the lenslets', and its standard deviation, if it is known.
     """
 
     corners: Corners
@@ -92,6 +95,7 @@ class Problem:
     sight: np.ndarray
     own: np.ndarray
     bow: float = 0.0
+    apart: Pair | None = None
 
     @property
     def frames(self) -> int:
@@ -164,7 +168,8 @@ class Problem:
         numbers, heights, _ = self.split(unknowns)
         known = [(numbers[k] - value) / error for k, value, error in self.priors]
         even = heights / self.bow if self.bow else heights
-        return np.concatenate([self._white(self.misfit(unknowns)).ravel(), known, even])
+        apart = [] if self.apart is None else (geometry.pitch_ratio(numbers) - self.apart[0]) / self.apart[1]
+        return np.concatenate([self._white(self.misfit(unknowns)).ravel(), known, apart, even])
 
     def jacobian(self, unknowns: np.ndarray) -> np.ndarray:
         """Derivatives of `residual`."""
@@ -173,7 +178,11 @@ class Problem:
         for row, (k, _, error) in zip(known, self.priors, strict=True):
             row[: self.free.shape[1]] = self.free[k] / error
         even = np.eye(self.heights, len(unknowns), self.free.shape[1]) / (self.bow or 1.0)
-        return np.concatenate([slopes, known, even])
+        apart = np.zeros((int(self.apart is not None), len(unknowns)))
+        if self.apart is not None:
+            of_camera = geometry.slopes_of_pitch_ratio(self.split(unknowns)[0]) @ self.free
+            apart[0, : self.free.shape[1]] = of_camera / self.apart[1]
+        return np.concatenate([slopes, known, apart, even])
 
     def _white(self, values: np.ndarray) -> np.ndarray:
         return self.noise.whitened(values, self.sight, self.own, self.corners.way)
@@ -212,8 +221,8 @@ def adjust(
     frame = np.searchsorted(corners.frames, corners.frame)
     kinds = len(camera.gains)
     even = Noise(np.ones(kinds), 0.0)
-    one = np.ones(len(corners))
-    first = Problem(corners, board, frame, camera, nominal.priors(kinds), even, corners.sights(), one)
+    priors, one = nominal.priors(kinds), np.ones(len(corners))
+    first = Problem(corners, board, frame, camera, priors, even, corners.sights(), one, apart=nominal.apart)
     unknowns = np.concatenate([np.zeros(first.free.shape[1]), poses.ravel()])
     needed = 6.0 * 8 * 2 * len(corners) * len(unknowns)
     remedy = "Use fewer pictures, or every second corner."

@@ -14,6 +14,7 @@ from lumigraph.metric import geometry
 from lumigraph.metric.adjustment import Adjusted, Problem, adjust, placed
 from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
+from lumigraph.metric.known import disagreement
 from lumigraph.metric.noise import Noise
 from lumigraph.metric.start import LEAST_CORNERS, search
 from lumigraph.metric.twofold import turned_over
@@ -208,7 +209,8 @@ def board(corners: Corners, board: Board, nominal: Nominal) -> Measured:
     ------
     CalibrationError
         Fewer than three pictures, a board that stands the same on all, corners that the board does not have,
-        or corners that fit no camera.
+        corners that fit no camera, or a board whose squares are, beyond doubt, not as wide as they are said
+        to be.
 
     Notes
     -----
@@ -266,6 +268,7 @@ def _measured(found: Adjusted, corners: Corners, board: Board, nominal: Nominal,
 
 def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
     """What to know before trusting a camera."""
+    yield from disagreement(result.camera, result.covariance, nominal, result.board)
     if unused:
         yield f"{unused} pictures show too few corners for a position and were not used"
     f, error = result.camera.focal_length, float(result.errors[0])

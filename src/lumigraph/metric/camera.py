@@ -150,6 +150,13 @@ class Nominal:
         Of p1 and p2: lenses are centred to some thousandths.
     gain_error
         Of the kinds' gains.
+    lenslet_distance, lenslet_distance_error
+        Lenslets to sensor, b [m], and how well it is known, over itself: of a camera 1.0 the lenslets' focal
+        length. None if it is not known; then nothing tells a board whose squares are not as wide as they are
+        said to be.
+    pitch_ratio, pitch_ratio_error
+        Of the micro-images' pitch on the sensor to the lenslets', 1 + b/E, and how well it is known. It gives
+        the exit pupil, and so f, L and distances. None if the lenslets' pitch is not known.
 
     Raises
     ------
@@ -167,12 +174,21 @@ class Nominal:
     distortion_error: float = 0.05
     decentring_error: float = 5e-3
     gain_error: float = 0.2
+    lenslet_distance: float | None = None
+    lenslet_distance_error: float = 0.05
+    pitch_ratio: float | None = None
+    pitch_ratio_error: float = 3e-4
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", checks.shape("shape", self.shape))
         for one in fields(self):
-            if one.name != "shape":
+            if one.name != "shape" and getattr(self, one.name) is not None:
                 checks.positive(one.name, getattr(self, one.name), "1")
+
+    @property
+    def apart(self) -> Pair | None:
+        """Pitch of micro-images over lenslets', and its standard deviation, if it is known."""
+        return None if self.pitch_ratio is None else (self.pitch_ratio, self.pitch_ratio_error)
 
     @property
     def middle(self) -> Pair:
@@ -198,5 +214,7 @@ class Nominal:
             "p1": (0.0, self.decentring_error),
             "p2": (0.0, self.decentring_error),
         }
+        if self.lenslet_distance is not None:
+            known["b"] = self.lenslet_distance, self.lenslet_distance_error * self.lenslet_distance
         gains = [(len(geometry.NAMES) + k, 1.0, self.gain_error) for k in range(kinds)]
         return [(geometry.NAMES.index(name), *values) for name, values in known.items()] + gains

@@ -59,6 +59,17 @@ def magnification(numbers: np.ndarray, distance: np.ndarray) -> np.ndarray:
     return b / (L - f * distance / (distance - f))
 
 
+def pitch_ratio(numbers: np.ndarray) -> np.ndarray:
+    """(1,) Pitch of micro-images over that of the lenslets, 1 + b/E."""
+    _, L, b, ratio = numbers[:4]
+    return np.array([1 + b * ratio / L])
+
+
+def slopes_of_pitch_ratio(numbers: np.ndarray) -> np.ndarray:
+    """(numbers,) Derivatives of `pitch_ratio`."""
+    return np.concatenate([slope(pitch_ratio, numbers, np.s_[k]) for k in range(len(numbers))])
+
+
 def centers(
     numbers: np.ndarray, points: np.ndarray, seen_at: tuple[np.ndarray, np.ndarray], kind: np.ndarray,
     pixel_pitch: float,

@@ -19,14 +19,15 @@ from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.metric.finding import LEAST_SEEN, lit_radius
 from lumigraph.metric.noise import Noise
-from lumigraph.metric.views import DIRECTIONS
+from lumigraph.metric.views import DIRECTIONS, reach
 from lumigraph.metric.windows import LEAST_SQUARE, nearest
 
 Turn = tuple[float, float, float]
 
 _TILTS = (0.0, 0.35, -0.35, 0.7, -0.7)  # rad: beyond, the squares are too narrow
+_STEEPEST = 0.8  # rad, about both axes together
 _RATIOS = (0.08, 0.6)  # how far a corner moves against a lenslet, as `depth.correlation` looks for it
-_DISTANCES = 6
+_DISTANCES, _DISTANCES_IN_VIEWS = 12, 6
 _FARTHEST = 200.0  # focal lengths
 
 _MOVED = 3.0
@@ -34,6 +35,9 @@ _MOVED = 3.0
 
 _MARGIN = 4.0
 """Lenslets around a corner that its saddle is looked for in."""
+
+_BESIDE = 1.5
+"""Squares beyond the outer corners that finding a board needs."""
 
 _SURE = (0.1, 0.3)
 """Of L and b: how well they are known without any picture, over themselves."""
@@ -147,7 +151,8 @@ def plan(
     own, shared = (checks.positive("noise_px", one, "px") for one in noise_px or usual)
     before = _Before(camera, calibration, board, Noise(np.full(len(camera.gains), own), shared), in_views)
     distances = _in_views(camera, pitch) if in_views else _distances(camera)
-    shots = [before.shot(*place) for place in product(distances, product((0.0,), _TILTS, _TILTS))]
+    turns = [(0.0, y, x) for y, x in product(_TILTS, _TILTS) if math.hypot(y, x) <= _STEEPEST]
+    shots = [before.shot(*place) for place in product(distances, turns)]
     useful = [shot for shot in shots if shot is not None]
     if not useful:
         seen = "in squares 6 samples of a view wide" if in_views else (
@@ -193,7 +198,7 @@ def _in_views(camera: MetricCamera, pitch: float) -> list[float]:
     points = np.stack([every, 0 * every, 0 * every], 1)
     moved = [_centers(camera, points, np.array([0.0, side * pitch / 2])) for side in (1, -1)]
     usable = every[np.abs(moved[0] - moved[1]).max(1) <= _MOVED * pitch]
-    return usable[np.linspace(0, len(usable) - 1, min(_DISTANCES, len(usable))).astype(int)].tolist()
+    return usable[np.linspace(0, len(usable) - 1, min(_DISTANCES_IN_VIEWS, len(usable))).astype(int)].tolist()
 
 
 def _centers(camera: MetricCamera, points: np.ndarray, way: np.ndarray) -> np.ndarray:
@@ -219,7 +224,7 @@ class _Before:
         middle = geometry.moved(self.board.middle, still)
         pose = np.concatenate([turn, np.array([distance, 0.0, 0.0]) - middle])
         points = geometry.moved(self.board.points(), pose)
-        if points[:, 0].min() <= 1.02 * self.camera.focal_length:
+        if points[:, 0].min() <= 1.02 * self.camera.focal_length or not self.whole(pose):
             return None
         seen = self.by_views(points) if self.in_views else self.by_lenslets(points)
         if seen is None:
@@ -233,6 +238,13 @@ class _Before:
         across = of_pose.T @ of_camera
         told = of_camera.T @ of_camera - across.T @ np.linalg.solve(of_pose.T @ of_pose, across)
         return _Shot(distance, turn, len(seen), told)
+
+    def whole(self, pose: np.ndarray) -> bool:
+        """Whether the board is in the picture with its outer squares and half a square of white margin."""
+        rim = [np.array([-_BESIDE, n - 1 + _BESIDE]) * self.board.spacing for n in self.board.shape]
+        y, x = (one.ravel() for one in np.meshgrid(*rim))
+        at = _centers(self.camera, geometry.moved(np.stack([0 * y, y, x], 1), pose), np.zeros(2))
+        return bool(((at > 0) & (at < np.array(self.calibration.shape) - 1)).all())
 
     def by_lenslets(self, points: np.ndarray) -> Corners | None:
         """Places of all corners behind lenslets; None where one cannot be found."""
@@ -253,10 +265,9 @@ class _Before:
     def by_views(self, points: np.ndarray) -> Corners | None:
         """Centres of micro-images showing the corners in each view; None where one is not in the picture."""
         pitch, size = self.calibration.lattice.pitch, np.array(self.calibration.shape)
-        reach = lit_radius(self.calibration) - pitch / DIRECTIONS / math.sqrt(2)
         at = (np.arange(DIRECTIONS) - DIRECTIONS // 2) * pitch / DIRECTIONS
         ways = np.stack(np.meshgrid(at, at, indexing="ij"), -1).reshape(-1, 2)
-        ways = ways[np.hypot(*ways.T) <= reach]
+        ways = ways[np.hypot(*ways.T) <= reach(self.calibration, DIRECTIONS)]
         corner, view = (each.ravel() for each in np.indices((len(points), len(ways))))
         center = _centers(self.camera, points[corner], ways[view])
         middle = center.reshape(len(points), len(ways), 2).mean(1)
@@ -276,7 +287,10 @@ def _chosen(shots: list[_Shot], camera: MetricCamera, nominal: Nominal, pictures
     free, lengths = freedom(camera), camera.numbers[:3]
     beforehand = [(k, error) for k, _, error in nominal.priors(len(camera.gains))]
     beforehand += [(k + 1, share * lengths[k + 1]) for k, share in enumerate(_SURE)]
-    known = np.array([free[k] / error for k, error in beforehand])
+    known = [free[k] / error for k, error in beforehand]
+    if nominal.apart is not None:
+        known.append(geometry.slopes_of_pitch_ratio(camera.numbers) @ free / nominal.apart[1])
+    known = np.array(known)
     told = known.T @ known
 
     def errors(told: np.ndarray) -> np.ndarray:

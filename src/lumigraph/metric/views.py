@@ -1,5 +1,6 @@
 """Corners or dots of a board in the views of raw images of a plenoptic 1.0 camera."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,8 +44,7 @@ def on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: int
     data = data.mean(4) if data.ndim == 5 else data
     which = np.argwhere(np.ones(data.shape[:2], bool))
     _, way = raw_places(views, calibration, np.zeros((len(which), 2)), which)
-    reach = (calibration.fill or 1.0) * pitch / 2 - _RIM - pitch / count / np.sqrt(2)
-    near = np.hypot(*way.T) <= reach
+    near = np.hypot(*way.T) <= reach(calibration, count)
     which, way = which[near], way[near]
     first = _board(data[count // 2, count // 2], board, f"the middle view of picture {frame}")
     known = np.flatnonzero(np.isfinite(first[:, 0]))
@@ -60,6 +60,12 @@ def on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: int
         )
     center, ways = raw_places(views, calibration, track.places[corner, view], which[view])
     return np.full(len(corner), frame), known[corner], center + ways, center, np.zeros(len(corner), int)
+
+
+def reach(calibration: Calibration, count: int) -> float:
+    """How far from a micro-image's centre the middles of `count` views may be: wholly inside the rim [px]."""
+    pitch = calibration.lattice.pitch
+    return (calibration.fill or 1.0) * pitch / 2 - _RIM - pitch / count / math.sqrt(2)
 
 
 def _board(middle: np.ndarray, board: Board, what: str) -> np.ndarray:
