@@ -4,6 +4,8 @@
     python -m benchmarks.many_frames growth [--frames 2000]    the peak of a worker's memory
     python -m benchmarks.many_frames ledger                    its part of a frame's processor time
     python -m benchmarks.many_frames kills [--frames 500]      a data set killed five times, and one not
+    python -m benchmarks.many_frames swept [--frames 200]      a sweep killed five times, and one not
+    python -m benchmarks.many_frames warm [--frames 8]         a film's likelihood by warm starts
     python -m benchmarks.many_frames standard [--frames 8]     25 planes as fine as 1463 x 1273 pixels
     python -m benchmarks.many_frames scaling [--frames 60]     two workers beside one
     python -m benchmarks.many_frames cost                      by planes, samples and lenslets
@@ -181,9 +183,9 @@ def of_ledger(frames: int, folder: Path) -> None:
     times = {
         place[2]: times[3]
         for place, times in found.items()
-        if "cluster" in place[0] or "cli/batch" in place[0]
+        if "cluster" in place[0] or "cli/frames" in place[0]
     }
-    outside = times["do"] - times["__call__"]
+    outside = times["do"] - times["several"]
     print(f"{outside / (frames - 2) * 1e3:.1f} ms of {times['do'] / (frames - 2) * 1e3:.0f} ms, "
           f"{100 * outside / times['do']:.2f} %")  # fmt: skip
 
@@ -191,31 +193,72 @@ def of_ledger(frames: int, folder: Path) -> None:
 def kills(frames: int, folder: Path) -> None:
     """Whether a data set that was killed five times has the bits of one that was not."""
     (folder / "focused.toml").write_text(camera(count=(4, 4)).to_toml())
-    words = [sys.executable, "-m", "lumigraph", "dataset", "focused.toml", "-n", str(frames)]
-    words += ["--z", "-6 mm:6 mm:6 mm", "--workers", "2", "-o"]
+    words = ["dataset", "focused.toml", "-n", str(frames), "--z", "-6 mm:6 mm:6 mm"]
+    _killed(words, frames, [folder / name for name in ("killed.zarr", "whole.zarr")])
+
+
+def swept(frames: int, folder: Path) -> None:
+    """Whether a sweep by closed forms that was killed five times has the table of one that was not."""
+    (folder / "focused.toml").write_text(camera().to_toml())
+    words = ["sweep", "focused.toml", "--measure", "lateral resolution"]
+    words += ["--vary", f"lenslets.focal_length=5 mm:5.4 mm:{frames}"]
+    _killed(words, frames, [folder / name for name in ("killed.csv", "whole.csv")])
+
+
+def _killed(words: list[str], frames: int, outputs: list[Path]) -> None:
+    """Run a command until it is done, killed five times on its way, and once undisturbed; compare."""
+    words, first = [sys.executable, "-m", "lumigraph", *words, "--workers", "2", "-o"], outputs[0]
     rng, killed = random.Random(4), 0
     while killed < 5:
-        started = subprocess.Popen([*words, "killed.zarr"], start_new_session=True, stderr=subprocess.DEVNULL)
+        started = subprocess.Popen([*words, first.name], start_new_session=True, stderr=subprocess.DEVNULL)
         time.sleep(1 if killed else 5)
-        while not list((folder / "killed.zarr.ledger/done").glob("*.json"))[killed * frames // 6 :]:
+        while not list((ledger(first) / "done").glob("*.json"))[killed * frames // 6 :]:
             time.sleep(0.1)
         time.sleep(rng.uniform(0, 2))
         if started.poll() is None:
             os.killpg(started.pid, signal.SIGKILL)
             killed += 1
-            print(f"killed at {len(cluster.status(folder / 'killed.zarr').entries)} of {frames}", flush=True)
+            print(f"killed at {len(cluster.status(first).entries)} of {frames}", flush=True)
         started.wait()
         time.sleep(1)
-    for name in ("killed.zarr", "whole.zarr"):
-        subprocess.run([*words, name], check=True, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-    sums = [contents(folder / name) for name in ("killed.zarr", "whole.zarr")]
+    for output in outputs:
+        subprocess.run(
+            [*words, output.name], check=True, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+        )
+    sums = [list(contents(output).values()) for output in outputs]
     same = "the same bits" if sums[0] == sums[1] else "OTHER BITS"
-    print(f"{len(sums[1])} files, {cluster.status(folder / 'killed.zarr').done} samples: {same}")
+    print(f"{len(sums[1])} files, {cluster.status(first).done} done: {same}")
+
+
+def warm(frames: int, folder: Path) -> None:
+    """Deviance a pixel of drifting beads, by cold starts, by half of the iterations, and by as many warm."""
+    scope, rng = lg.LightFieldMicroscope.from_catalogue("lfm-guv"), np.random.default_rng(0)
+    operator = scope.operator(tuple(np.arange(-10, 11, 5) * um), 3, accuracy=1e-2)
+    places = rng.uniform(15, 72, (60, 2))
+    film = []
+    for _ in range(frames):
+        volume = np.full(operator.shape[1], 0.02, np.float32)
+        places += rng.normal(0, 0.2, places.shape)
+        np.add.at(volume, (np.arange(60) % 5, *places.round().astype(int).T), 20.0)
+        film.append(rng.poisson(200 * operator.forward(volume)).astype(np.uint16))
+    (folder / "guv.toml").write_text(scope.to_toml())
+    tifffile.imwrite(folder / "guv.tif", np.stack(film), photometric="minisblack")
+    for iterations, more in (("8", []), ("4", []), ("4", ["--warm", "--run", str(frames)])):
+        output = folder / f"{iterations}{len(more)}.ome.zarr"
+        if lumigraph([*DEEP, iterations, *more, "-o", str(output), "--workers", "1"]):
+            raise SystemExit("it failed")
+        found = []
+        for page, raw in enumerate(film[1:], 1):
+            seen = operator.forward(np.asarray(lg.open(output, page=page).data, np.float32))
+            seen = np.maximum(seen * raw.sum() / seen.sum(), 1e-6).astype(float)
+            ratio = np.where(raw > 0, raw / seen, 1.0)
+            found.append(2 * np.mean(raw * np.log(ratio) - raw + seen))
+        print(f"{iterations} iterations{', warm' if more else ''}: {np.mean(found):.3f}", flush=True)
 
 
 def contents(store: Path) -> dict[str, int]:
-    """CRC-32 of each file."""
-    files = (path for path in sorted(store.rglob("*")) if path.is_file())
+    """CRC-32 of each file, or of the one that it is."""
+    files = (path for path in (store, *sorted(store.rglob("*"))) if path.is_file())
     return {str(path.relative_to(store)): zlib.crc32(path.read_bytes()) for path in files}
 
 
@@ -297,7 +340,8 @@ def cost(frames: int, folder: Path) -> None:
 
 WHAT: dict[str, tuple[Callable[[int, Path], None], int]] = {
     "estimates": (estimates, 24), "growth": (growth, 2000), "ledger": (of_ledger, 12),
-    "kills": (kills, 500), "standard": (standard, 8), "scaling": (scaling, 60), "cost": (cost, 3),
+    "kills": (kills, 500), "swept": (swept, 200), "warm": (warm, 8),
+    "standard": (standard, 8), "scaling": (scaling, 60), "cost": (cost, 3),
 }  # fmt: skip
 
 
