@@ -30,7 +30,7 @@ def parts_of(name: str) -> Parts:
     """Of a scene, where the truth is known."""
     views, truth = SCENES[name]()
     pictures = Pictures.of(views)
-    found, evidence = lines_of(pictures)
+    found, evidence, _ = lines_of(pictures)
     known = np.isfinite(truth)
     parts = terms(found, evidence)
     return np.stack([parts[name][known] for name in FACTORS]), np.abs(found - truth * pictures.reach)[known]

@@ -14,7 +14,7 @@
 - `pictures`, `sweep`, `lines`: the steps of `epi`: even views, a plane sweep, least squares on all views;
   `vote`: which of two sweeps the views agree with;
   `shading`: how a place's brightness changes from view to view
-- `expected`: the error to expect
+- `expected`: the error to expect; `chance`: matches no better than by chance; `repeats`: pictures that repeat
 - `volume`: costs of many labels: guided filter, semi-global matching, the best label
 - `smooth`: surfaces through uncertain values that may be slanted, bent and torn
 """

@@ -21,6 +21,7 @@ _RIVALS = 0.5  # of how far other values lie: so large are errors where they exp
 _CHANCE = 0.5  # px: what lies nearer is noise of the costs, as on slants
 _GAPS = 3  # samples across that an area of rivals closes over
 _AREA = 7  # samples across that it has: beside an edge of depth there are fewer
+_EVEN, _ABOUT = 1e-6, 33  # contrast of what is saturated or black; samples across whose values it may have
 _FAINT = 0.005  # contrast between neighbours by which an edge of depth shows
 
 
@@ -38,12 +39,15 @@ class Evidence:
         Between neighbours of the picture (y, x), of 0 to 1.
     rivals
         How far (y, x) other values lie that explain a place as well; see `lumigraph.depth.volume.rivals`.
+    chance
+        How likely (y, x) the match is one by chance; see `lumigraph.depth.chance.by_chance`.
     """
 
     deviation: np.ndarray
     disputed: np.ndarray
     contrast: np.ndarray
     rivals: np.ndarray
+    chance: np.ndarray | float = 0.0
 
 
 def contrast(picture: np.ndarray) -> np.ndarray:
@@ -61,6 +65,16 @@ def expected(values: np.ndarray, evidence: Evidence, *, slants: bool = True) -> 
     usual = sum((FACTORS[name] * part for name, part in parts.items()), np.zeros_like(values))
     rivals = np.where(evidence.rivals > _CHANCE, evidence.rivals, 0)
     return np.maximum(usual, _RIVALS * grey_opening(grey_closing(rivals, _GAPS), _AREA))
+
+
+def uniform(evidence: Evidence) -> np.ndarray:
+    """Whether a place (y, x) and all around it are as bright, as where the picture is saturated or black."""
+    return maximum_filter(evidence.contrast, 3) < _EVEN
+
+
+def about(values: np.ndarray) -> np.ndarray:
+    """Mean distance (y, x) to expect of what may have any of the values that are near to it."""
+    return 0.5 * _range(values, _ABOUT)
 
 
 def terms(values: np.ndarray, evidence: Evidence, *, slants: bool = True) -> dict[str, np.ndarray]:

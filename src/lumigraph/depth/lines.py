@@ -8,6 +8,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates, maximum_filter, spline_filter
 
 from lumigraph.core.progress import Progress
+from lumigraph.depth.chance import by_chance
 from lumigraph.depth.expected import Evidence, contrast
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import WINDOW, Fit, Shading
@@ -55,7 +56,8 @@ def refined(
         change = update(moves, asked.information, asked.pull, how, edges, tears(moves, _TEAR)) - moves
         moves = moves + np.clip(change, -_BEFORE, _BEFORE)
         progress((k + 1) / len(_JUMPS))
-    return moves, Evidence(_deviation(pictures, asked), box(asked.disputed, 1), edged, rivals)
+    deviation, chance = _deviation(pictures, asked), by_chance(pictures, asked.shown)
+    return moves, Evidence(deviation, box(asked.disputed, 1), edged, rivals, chance)
 
 
 def _deviation(pictures: Pictures, asked: "_Asked") -> np.ndarray:
@@ -87,7 +89,7 @@ class _Asked:
     """What the views pull at each place (y, x), their information about it, and the shading that is left.
 
     `residual` is how much the views that see a place differ from the middle one, `disputed` the part of them
-    that does by more than noise.
+    that does by more than noise, and `shown` the mean of what they show.
     """
 
     pull: np.ndarray
@@ -95,12 +97,13 @@ class _Asked:
     shading: Shading
     residual: np.ndarray
     disputed: np.ndarray
+    shown: np.ndarray
 
 
 def _asked(pictures: Pictures, lines: np.ndarray, moves: np.ndarray, shading: Shading) -> _Asked:
     center = pictures.center.mean(0)
     slope = np.gradient(center)
-    pull, information, down, right, agreed, off, count = (np.zeros_like(moves) for _ in range(7))
+    pull, information, down, right, agreed, off, count, shown = (np.zeros_like(moves) for _ in range(8))
     fit, usual = Fit(moves.shape, pictures.noise), 2.5 * pictures.noise
     for (y, x), seen, view in _warped(pictures, lines, moves):
         residual, along = view - center, np.gradient(view)
@@ -116,11 +119,13 @@ def _asked(pictures: Pictures, lines: np.ndarray, moves: np.ndarray, shading: Sh
         agreed += weight
         off += seen * np.minimum(left, _MOST_LEFT)
         count += seen
+        shown += np.where(seen, view, 0)
     shading = fit.solved(WINDOW)
     pull += shading.down * down + shading.right * right
     clear = maximum_filter(moves, 2 * _BESIDE + 1) - moves < _BEFORE
+    shown = np.where(count > 0, shown / np.maximum(count, 1), center)
     count = np.maximum(count, 1)
-    return _Asked(pull * clear, information * clear, shading, off / count, 1 - agreed / count)
+    return _Asked(pull * clear, information * clear, shading, off / count, 1 - agreed / count, shown)
 
 
 def _warped(

@@ -1,6 +1,7 @@
 """The views of a light field as depth estimation needs them: few, even, and on a common scale."""
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,7 +14,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.depth import vignetted
 from lumigraph.depth.quantities import disparity_per_alpha
 from lumigraph.depth.volume import box
-from lumigraph.errors import GeometryError
+from lumigraph.errors import GeometryError, SamplingWarning
 
 MOST_VIEWS = 9
 """Along one axis: views between these look much the same, and cost as much."""
@@ -27,6 +28,8 @@ FEWEST_VIEWS, LEAST_SIDE = 2, 8
 _WINDOW, _SMOOTH = 4, 0.1  # px; part of the windows that show nothing but noise
 _OF_NOISE = 0.81  # of its mean: how rough the smoothest tenth of the windows of noise alone is
 _LIT = 0.1  # of a picture from 0 to 1: what is darker may be cut off
+_BRIGHT, _GLARING = 0.999, 1e6  # part of the middle view; times as bright is no light
+_NEGATIVE, _USUAL = 0.05, 1e30  # of the light; what single precision holds
 _DARK = 0.05  # views darker than this part of the middle one lie outside the aperture
 
 
@@ -110,10 +113,11 @@ class Pictures:
             f"depth from {len(chosen[0])} x {len(chosen[1])} views",
             "Use {factor:.1f}x fewer pixels.",
         )
-        data = to_numpy(views.data)[np.ix_(*chosen)].astype(np.float32)
+        data = to_numpy(views.data)[np.ix_(*chosen)]
         checks.finite_array("the light field", data, GeometryError)
-        data = data[:, :, None] if data.ndim == 4 else np.moveaxis(data, 4, 2)
         center = len(chosen[0]) // 2, len(chosen[1]) // 2
+        data = _checked(data, center)
+        data = data[:, :, None] if data.ndim == 4 else np.moveaxis(data, 4, 2)
         data, lit = _even(data, center)
         seen = vignetted.even(data, lit, center)
         (per_t, per_s), middle = disparity_per_alpha(views), [n // 2 for n in views.aperture.shape]
@@ -122,6 +126,25 @@ class Pictures:
         reach = float(max(np.abs(down).max(), np.abs(right).max()))
         noise = noise_of(data[center].mean(0))
         return cls(data, down / reach, right / reach, lit, noise, reach, seen)
+
+
+def _checked(data: np.ndarray, middle: tuple[int, int]) -> np.ndarray:
+    """Views (v, u, t, s[, c]) as float32, none much brighter than the middle one, or less than nothing."""
+    bright, most = float(np.quantile(np.abs(data[middle]), _BRIGHT)), float(data.max())
+    if most > _GLARING * bright > 0:
+        broken = int((data > _GLARING * bright).sum())
+        raise GeometryError(
+            f"the light field holds {most:.3g} where {_BRIGHT:.1%} of the middle view are at most "
+            f"{bright:.3g}. Replace the {broken} broken values by what is around them."
+        )
+    lit, below = (abs(float(data.sum(where=part, dtype=float))) for part in (data > 0, data < 0))
+    if below > _NEGATIVE * lit:
+        told = f"{below / (below + lit):.0%} of the light field are negative light, down to {data.min():.3g}"
+        if below > lit:
+            raise GeometryError(f"{told}. Subtract it from its white level if it is inverted.")
+        warnings.warn(f"{told}, and count as 0. Subtract less from it.", SamplingWarning, stacklevel=4)
+    unit = bright if bright and not 1 / _USUAL < bright < _USUAL else 1
+    return data.astype(np.float32) if unit == 1 else (data / unit).astype(np.float32)
 
 
 def _chosen(count: int) -> np.ndarray:

@@ -219,6 +219,11 @@ def _outside(image: np.ndarray, distance: float, axis: int) -> np.ndarray:
     return image[places] if axis == 0 else image[:, places]
 
 
+def farthest(pictures: Pictures) -> float:
+    """Most movement in the outermost view [px] that a lens camera could show."""
+    return max(2.0, _FAR * max(pictures.center.shape[1:]))
+
+
 def span(pictures: Pictures) -> tuple[tuple[float, float], Shading]:
     """Least and most movement in the outermost view [px] that the picture shows, with some to spare; shading.
 
@@ -226,8 +231,7 @@ def span(pictures: Pictures) -> tuple[tuple[float, float], Shading]:
     which shading does not touch, then, with the shading so found, of all that they show.
     """
     size = _COARSE if min(pictures.center.shape[1:]) >= 16 * _COARSE else 1
-    small = _shrunk(pictures, size)
-    most = max(2.0, _FAR * max(pictures.center.shape[1:]))
+    small, most = _shrunk(pictures, size), farthest(pictures)
     moves = np.arange(-most, most + 0.5, 0.5).astype(np.float32) / np.float32(size)
     limit = 3 * max(_MOST_DIFFERENCE, 3 * pictures.noise / size)
     radius = max(1, WINDOW // size)
