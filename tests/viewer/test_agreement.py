@@ -119,6 +119,26 @@ def test_pictures_of_three_kinds_of_lenslets_agree_to_a_grey_level(tmp_path, mon
     assert np.abs(seen - python).max() < level
 
 
+def test_depths_of_a_microscope_agree_in_metres(tmp_path, monkeypatch):
+    """Lenslets show a texture that moves by 0.3 lenslets a view; the page counts in the same depths."""
+    monkeypatch.chdir(tmp_path)
+    camera = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
+        lenslets={"count": (17, 17)}, sensor={"shape": (260, 260)}
+    )
+    (tmp_path / "camera.toml").write_text(camera.to_toml())
+    y, x = np.meshgrid(*map(np.arange, camera.sensor.shape), indexing="ij")
+    (dy, dx), pitch = camera.calibration.offset(y, x), camera.calibration.lattice.pitch
+    y, x = (y - dy) / pitch - 0.3 * dy, (x - dx) / pitch - 0.3 * dx
+    raw = 5 + np.sin(0.9 * y + 0.4 * x) + np.cos(1.1 * x) + np.sin(0.7 * y - 0.8 * x) + np.cos(1.3 * y)
+    lg.save(lg.RawImage(raw.astype(np.float32)), "raw.tiff")
+    assert main(["depth", "raw.tiff", "--camera", "camera.toml", "-o", "map.tiff"]) == 0
+    written = np.asarray(lg.open("map.tiff").data)
+    shown = viewer.open_exhibit(tmp_path / "raw.tiff", viewer.Origin(camera=camera))
+    depths = shown.metres(np.asarray(lg.depth.disparity_of(shown.depth(), shown.views).values))
+    np.testing.assert_allclose(depths, written, rtol=1e-4, atol=1e-9)
+    assert 1e-6 < np.abs(np.median(written)) < 1e-3
+
+
 def test_depths_of_a_camera_1_are_shown_in_metres_from_the_focused_plane(open_page):
     camera = lg.load_camera("thesis-plenoptic-1")
     focal_length = camera.main_lens.focal_length
