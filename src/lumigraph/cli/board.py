@@ -13,11 +13,11 @@ from lumigraph.cli.files import check_output
 from lumigraph.cli.options import Output, length
 from lumigraph.cli.origin import NO_ORIGIN, Origin
 from lumigraph.cli.reporting import REPORTED, Reported
-from lumigraph.core.checks import Pair
 from lumigraph.core.result import Figure, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
+    from lumigraph.core.checks import Pair
     from lumigraph.metric import Board, Corners, Measured, Nominal, Plan
 
 
@@ -99,7 +99,7 @@ class Known:
             raise FormatError("--lenslet-distance-error needs --lenslet-distance, or --camera.")
         return replace(nominal, lenslet_distance_error=b / nominal.lenslet_distance)
 
-    def _apart(self, given: dict[str, Any]) -> Pair | None:
+    def _apart(self, given: dict[str, Any]) -> "Pair | None":
         """Pitch of the lenslets [m], and that of their micro-images [px]."""
         pitch = length("--lenslet-pitch", self.lenslet_pitch)
         if pitch is None and self.lenslet_pitch_error is None:
