@@ -1,11 +1,14 @@
 """Work on several threads: order, errors, and what becomes of BLAS' own threads."""
 
+import sys
 import threading
+import types
 
 import pytest
-from threadpoolctl import threadpool_info, threadpool_limits
+from threadpoolctl import ThreadpoolController, threadpool_info, threadpool_limits
 
-from lumigraph.core.threads import each
+from lumigraph.core import threads
+from lumigraph.core.threads import each, single_products
 
 
 def blas():
@@ -29,6 +32,18 @@ def test_products_take_one_thread_inside_and_as_many_as_before_afterwards():
         assert set(blas().values()) == {1}
         second.close()
         assert blas() == before
+
+
+def test_libraries_are_looked_for_again_when_modules_have_come(monkeypatch):
+    looked = []
+    monkeypatch.setattr(threads, "_LIMIT", threads._Limit())
+    monkeypatch.setattr(threads, "ThreadpoolController", lambda: looked.append(1) or ThreadpoolController())
+    for expected in (1, 1, 2):
+        if expected == 2:
+            monkeypatch.setitem(sys.modules, "with_a_library", types.ModuleType("with_a_library"))
+        with single_products():
+            assert set(blas().values()) == {1}
+        assert len(looked) == expected
 
 
 def test_an_error_drops_what_has_not_begun():

@@ -1,5 +1,6 @@
 """Independent pieces of work side by side, each on one thread."""
 
+import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -7,7 +8,7 @@ from contextlib import contextmanager
 from threading import Lock
 from typing import TypeVar
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from lumigraph.core import arrays
 
@@ -44,15 +45,21 @@ def each(
 
 
 class _Limit:
-    """The process' one limit of BLAS threads: set by the first who wants it, lifted by the last."""
+    """The process' one limit of BLAS threads: set by the first who wants it, lifted by the last.
+
+    The libraries are looked for again, in a millisecond, only when modules have come that may have loaded others.
+    """
 
     def __init__(self) -> None:
         self.lock, self.users, self.set = Lock(), 0, None
+        self.modules, self.libraries = 0, None
 
     def change(self, users: int) -> None:
         with self.lock:
             if self.users == 0:
-                self.set = threadpool_limits(1, "blas")
+                if self.libraries is None or self.modules != len(sys.modules):
+                    self.modules, self.libraries = len(sys.modules), ThreadpoolController()
+                self.set = self.libraries.limit(limits=1, user_api="blas")
             self.users += users
             if self.users == 0 and self.set is not None:
                 self.set.restore_original_limits()
