@@ -26,6 +26,7 @@ LARGE = [
     lg.CoherentModes(lg.Field(PICTURE + 0j, GRID, 5e-7)),
     lg.LightField(PICTURE.reshape(7, 10, 70, 100), lg.Grid((7, 10), 1e-3), lg.Grid((70, 100), 1e-4), 0.1),
     lg.Volume(np.broadcast_to(PICTURE, (90, N, N)), GRID, np.linspace(0, 1e-3, 90)),
+    lg.Medium(np.broadcast_to(PICTURE * 1e-9, (90, N, N)), GRID, np.linspace(0, 1e-3, 90)),
     lg.Stack(np.broadcast_to(PICTURE, (90, N, N)), np.linspace(0, 1, 90)),
     lg.depth.DepthMap(PICTURE, PICTURE, "depth"),
     lg.PointCloud(PICTURE[:, :3], PICTURE[:, :3]),
