@@ -47,7 +47,7 @@ def each(
 class _Limit:
     """The process' one limit of BLAS threads: set by the first who wants it, lifted by the last.
 
-    The libraries are looked for again, in a millisecond, only when modules have come that may have loaded others.
+    Libraries are looked for again, in a millisecond, only when modules have come that may have loaded some.
     """
 
     def __init__(self) -> None:
