@@ -2,9 +2,9 @@
 Through a sample that refracts
 ==============================
 
-Beads in a row, seen past a ball whose index is 0.02 higher than around it. Light of each bead goes through thin
-slices of the ball to the pupil, and from there through the lenslets: what the ball bends comes to other pixels, and
-the views of a bead no longer agree on where it is.
+Beads in a row, seen past a ball whose index is 0.02 higher than around it. Light of each bead goes through
+thin slices of the ball to the pupil, and from there through the lenslets: what the ball bends comes to
+other pixels, and the views of a bead no longer agree on where it is.
 """
 
 import numpy as np
