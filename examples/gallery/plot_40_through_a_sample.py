@@ -30,3 +30,8 @@ pictures = [
     for raw, name in ((plain, "without the ball"), (seen, "past the ball"))
 ]
 figure = lg.plots.images(pictures)
+
+# %%
+# Look at it closely:
+
+lg.view_inline(seen)
