@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 _ARRAY = ("lenslet_pitch", "micro_images")
+"""What is known of the array, which `Nominal` takes as their ratio."""
 
 
 @Parameter(name="*")
@@ -67,18 +68,7 @@ class Known:
         """Of the options, which come before what files say."""
         from lumigraph.metric import Nominal
 
-        f, pitch = length("--focal-length", self.focal_length), length("--pixel-pitch", self.pixel_pitch)
-        b, apart = length("--lenslet-distance", self.lenslet_distance), self._apart(given)
-        known = {"focal_length": f, "pixel_pitch": pitch, "shape": self.shape, "lenslet_distance": b}
-        known = given | {name: value for name, value in known.items() if value is not None}
-        known = {name: value for name, value in known.items() if name not in _ARRAY}
-        lacking = [
-            f"--{name.replace('_', '-')}"
-            for name in ("focal_length", "pixel_pitch", "shape")
-            if name not in known
-        ]
-        if lacking:
-            raise FormatError(f"give {', '.join(lacking)} of the camera.")
+        apart, known = self._apart(given), self._lengths(given)
         nominal = self._sure(Nominal(**known))
         if apart is None:
             return nominal
@@ -86,6 +76,23 @@ class Known:
         nominal = replace(nominal, pitch_ratio=seen * nominal.pixel_pitch / lenslets)
         error = length("--lenslet-pitch-error", self.lenslet_pitch_error)
         return nominal if error is None else replace(nominal, pitch_ratio_error=error / lenslets)
+
+    def _lengths(self, given: dict[str, Any]) -> dict[str, Any]:
+        """What options and files say of main lens, sensor and lenslets' distance, by its names in `Nominal`."""
+        own = {
+            name: length(f"--{name.replace('_', '-')}", getattr(self, name))
+            for name in ("focal_length", "pixel_pitch", "lenslet_distance")
+        } | {"shape": self.shape}
+        known = {name: value for name, value in given.items() if name not in _ARRAY}
+        known |= {name: value for name, value in own.items() if value is not None}
+        lacking = [
+            f"--{name.replace('_', '-')}"
+            for name in ("focal_length", "pixel_pitch", "shape")
+            if name not in known
+        ]
+        if lacking:
+            raise FormatError(f"give {', '.join(lacking)} of the camera.")
+        return known
 
     def _sure(self, nominal: "Nominal") -> "Nominal":
         """With errors that are given as lengths."""

@@ -20,7 +20,6 @@ from lumigraph.simulation import error
 MOST = 5000
 """Points that are followed: each takes some seconds."""
 
-
 PUPIL, FINEST = 0.7, 1e-5
 """Part of the accuracy that images without steps are made for: the distance of slices may take the rest."""
 
