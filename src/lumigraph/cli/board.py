@@ -78,7 +78,7 @@ class Known:
         return nominal if error is None else replace(nominal, pitch_ratio_error=error / lenslets)
 
     def _lengths(self, given: dict[str, Any]) -> dict[str, Any]:
-        """What options and files say of main lens, sensor and lenslets' distance, by its names in `Nominal`."""
+        """What options and files say of main lens, sensor and b, by its names in `Nominal`."""
         own = {
             name: length(f"--{name.replace('_', '-')}", getattr(self, name))
             for name in ("focal_length", "pixel_pitch", "lenslet_distance")
