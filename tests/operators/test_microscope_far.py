@@ -1,6 +1,7 @@
 """Far light of several depths by few patterns that they share."""
 
 import dataclasses
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from lumigraph.elements.objective import Objective
 from lumigraph.operators.microscope_building import Layout, microscope_operator
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_far import FarLight, shared
+from lumigraph.operators.microscope_far import Far, FarLight, far_numbers, shared
 from lumigraph.operators.microscope_kernels import SHARES
 from lumigraph.operators.microscope_operator import _norms
 
@@ -67,3 +68,33 @@ def test_far_light_by_shared_patterns_is_that_of_each_depths_own(operator, rng):
             raw = rng.random(expected.shape).astype(dtype)
             seen = np.repeat(np.repeat(one.adjoint(raw), 3, 1), 3, 2)
             assert np.vdot(one.forward(volume, 3), raw) == pytest.approx(np.vdot(volume, seen), rel=1e-4)
+
+
+def test_what_each_point_hardly_shows_counts_where_it_adds_up_in_even_planes(rng):
+    """A thousand cells that each send a thousandth: of a point 0.03 of what the plane has."""
+    first, second = np.linalg.qr(rng.standard_normal((40, 2)))[0].T
+    offsets = np.stack(np.divmod(np.arange(1000), 40), 1) - (12, 20)
+    weights = np.full((1000, 2), 1e-3, np.float32)
+    far = Far(offsets, weights, np.stack([first, first + 0.1 * second]).astype(np.float32))
+    found, lost = shared([far], [(1.0, 1.0)], 1e-2)
+    assert len(found[0].images) == 2
+    assert lost < 1e-12
+    weights[:, 1] *= 0.1
+    found, lost = shared([far], [(1.0, 1.0)], 1.5e-2)  # 0.1 of 0.1 of the plane, in one direction of two
+    off = weights.sum(0) @ (far.images - found[0].parts @ found[0].images)
+    assert np.linalg.norm(off) <= lost
+    assert lost == pytest.approx(np.sqrt(2) * 1e-2, rel=0.02)
+
+
+def test_numbers_that_far_light_takes(operator):
+    found, _ = shared(operator._own_fars, [_norms(one) for one in operator.kernels], 1e-4)
+    cells, margin, like = (40, 36), 2, np.zeros(1, np.float32)
+    volume, basis = np.ones((3, 3 * 44, 3 * 40), np.float32), np.eye(81, dtype=np.float32)
+    tracemalloc.start()
+    far = FarLight.of(found, cells, margin, basis, like)
+    tracemalloc.reset_peak()
+    far.adjoint(far.forward(volume, 3))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    light = 4 * 40 * 36 * 81  # of `forward`, which is the operator's
+    assert 4 * far_numbers(found, cells, margin, 81) == pytest.approx(peak - light, rel=0.25)

@@ -156,7 +156,7 @@ def far_numbers(fars: Sequence[Far], cells: tuple[int, int], margin: int, patter
     """How many a `FarLight` of shared patterns holds, with what `forward` or `adjoint` takes."""
     (y, x), k = _lengths(cells, margin), len(fars[0].images)
     spectrum = 2 * y * (x // 2 + 1)
-    return spectrum * (len(fars) * (k + 2) + 3 * k) + k * (patterns + 2 * y * x)
+    return spectrum * (len(fars) * (k + 1) + 3 * k) + k * patterns
 
 
 def _seen(cells: tuple[int, int], margin: int) -> tuple[int, int]:
