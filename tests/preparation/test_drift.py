@@ -193,6 +193,7 @@ def test_a_slip_is_told_with_its_error(rng):
     raw = raw_image(lattice, (400, 440), rng)
     slips = [drift(raw + 0.1 * rng.standard_normal(raw.shape), off(lattice)) for _ in range(4)]
     assert all(0 < found.slip < 4 * found.error < 0.1 for found in slips)
+    assert all(found.told().endswith("towards the border") for found in slips)
 
 
 def test_a_part_of_the_picture_that_is_out_of_step_makes_no_slip(rng):
@@ -203,6 +204,7 @@ def test_a_part_of_the_picture_that_is_out_of_step_makes_no_slip(rng):
     found = drift(half, off(lattice))
     assert found.slip > 0.1, "which was warned of"
     assert found.slip < 3 * found.error
+    assert f"tell to ±{3 * found.error:.2f} only" in found.told()
     decode(half, off(lattice))  # warnings are errors
 
 

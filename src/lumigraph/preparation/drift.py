@@ -80,7 +80,9 @@ class Drift:
 
     def told(self) -> str:
         """How well the lattices agree, in one line."""
-        return f"the raw image's own lattice slips by {self.slip:.2f} of a pitch towards the border"
+        unsure = self.slip >= _SLIGHT and self.slip < _SIGMAS * self.error
+        doubt = f", which its gaps tell to ±{_SIGMAS * self.error:.2f} only" if unsure else ""
+        return f"the raw image's own lattice slips by {self.slip:.2f} of a pitch towards the border{doubt}"
 
     def report(self) -> str:
         """Both lattices in one line."""
