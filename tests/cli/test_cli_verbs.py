@@ -44,6 +44,7 @@ VERBS = (
         "tolerance",
         "dataset",
         "board",
+        "convert",
         "chart",
         "datasheet",
         "twin",

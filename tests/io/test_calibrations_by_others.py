@@ -1,11 +1,15 @@
 """Raytrix XML and plenoptomos INI: the lattice where the maker says it is, and what is wrong with a file."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import lumigraph as lg
 import lumigraph.io as io
 from data_folder import real
 from fuzz import seeds
+from lumigraph.core.warp import Warp
 from lumigraph.errors import FormatError
 from lumigraph.io import raytrix
 
@@ -83,3 +87,40 @@ def test_damaged_geometries_are_named(tmp_path, old, new, message):
     (tmp_path / "a.ini").write_bytes(seeds.PLENOPTOMOS.replace(old, new))
     with pytest.raises(FormatError, match=message):
         io.open(tmp_path / "a.ini")
+
+
+@pytest.mark.parametrize("kinds", [1, 3])
+def test_a_lattice_comes_back_from_a_raytrix_file(tmp_path, kinds):
+    # Turned, with two pitches and some shear, its origin far from the middle.
+    lattice = lg.Lattice(((0.21, 9.5), (8.3, 4.6)), (3.25, -40.5), "hex", kinds)
+    indices = lattice.indices((0, 99), (0, 140))
+    given = lg.Calibration(lattice, (100, 141), indices, lattice.position(indices), 0.0)
+    io.save(given, tmp_path / "a.xml")
+    found = io.open(tmp_path / "a.xml", shape=(100, 141)).lattice
+    assert np.allclose(found.basis, lattice.basis, rtol=1e-13)
+    centers = lattice.centers((0, 99), (0, 140))
+    assert np.allclose(found.centers((0, 99), (0, 140)), centers, atol=1e-10)
+    assert np.array_equal(found.kind(*found.index(*centers.T)), lattice.kind(*lattice.index(*centers.T)))
+    twice = io.open(tmp_path / "a.xml", shape=(100, 141))
+    io.save(twice, tmp_path / "b.xml")
+    assert np.allclose(
+        io.open(tmp_path / "b.xml", shape=(100, 141)).lattice.origin, twice.lattice.origin, atol=1e-10
+    )
+
+
+def test_raytrix_files_keep_depths_of_lens_types_and_refuse_what_they_cannot_hold(tmp_path):
+    (tmp_path / "a.xml").write_bytes(seeds.RAYTRIX)
+    given = io.open(tmp_path / "a.xml", shape=(60, 71))
+    types = raytrix.lens_types(tmp_path / "a.xml")
+    raytrix.save(given, tmp_path / "b.xml", lens_types=types)
+    assert raytrix.lens_types(tmp_path / "b.xml") == types
+    with pytest.raises(FormatError, match="lens_types has 2 pairs but the array has 3 kinds"):
+        raytrix.save(given, tmp_path / "b.xml", lens_types=types[:2])
+    square = lg.Lattice.square(10.0)
+    flat = replace(given, lattice=square, centers=square.position(given.indices))
+    with pytest.raises(
+        FormatError, match=r"the lattice is square, which a Raytrix file cannot hold. Save it as .toml"
+    ):
+        io.save(flat, tmp_path / "b.xml")
+    with pytest.raises(FormatError, match="the lattice is warped"):
+        io.save(replace(given, warp=Warp((30.0, 30.0), (1e-6, 0.0), 0.0)), tmp_path / "b.xml")

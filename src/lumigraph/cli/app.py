@@ -20,6 +20,7 @@ from lumigraph.cli.board import board
 from lumigraph.cli.calibrate import calibrate
 from lumigraph.cli.catalogue import catalogue
 from lumigraph.cli.chart import chart
+from lumigraph.cli.convert import convert
 from lumigraph.cli.dataset import dataset
 from lumigraph.cli.datasheet import datasheet
 from lumigraph.cli.decode import decode
@@ -51,8 +52,8 @@ _LONGEST = 400  # characters of a line on standard error
 
 VERBS = (
     demo, design, information, simulate, calibrate, decode, render, refocus, depth, deconvolve, wavefront,
-    measure, batch, sweep, optimise, tolerance, dataset, board, chart, datasheet, twin, view, samples,
-    catalogue, reproduce,
+    measure, batch, sweep, optimise, tolerance, dataset, board, convert, chart, datasheet, twin, view,
+    samples, catalogue, reproduce,
 )  # fmt: skip
 """In the order of their use."""
 

@@ -88,7 +88,7 @@ FORMATS = (
     Format("Lytro", (".lfp", ".lfr", ".lfx", ".raw"), "lytro", (), _LYTRO, ("what",)),
     Format("GIF, MP4", (".gif", ".mp4"), "movie", ("Stack",), ()),
     Format("calibration", (".toml",), "calibration", ("Calibration",), ("Calibration",)),
-    Format("Raytrix calibration", (".xml",), "raytrix", (), ("Calibration",), ("shape",)),
+    Format("Raytrix calibration", (".xml",), "raytrix", ("Calibration",), ("Calibration",), ("shape",)),
     Format("plenoptomos geometry", (".ini",), "plenoptomos", (), ("Calibration",), ("shape",)),
     Format("Lytro metadata", (".json", ".txt"), "lytro_metadata", (), ("Calibration",)),
     Format("folder of views", (FOLDER,), "views", ("LightField",), ("LightField",)),

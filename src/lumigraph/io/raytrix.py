@@ -6,6 +6,8 @@ has another middle: its lattice is then off by the crop, by up to half a lenslet
 """
 
 import math
+import os
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,7 @@ from lumigraph.core import checks
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import FormatError
-from lumigraph.io import source
+from lumigraph.io import source, target
 
 _LONGEST = 1 << 20  # bytes
 _NOTE = "the lattice stands where the maker's file puts it; a cropped picture may be shifted against it"
@@ -58,6 +60,68 @@ def load(
         lattice = Lattice(_basis(path, root, diameter, rotation), origin, "hex", _kinds(root))
     indices = source.nominal_indices(path, lattice, shape)
     return Calibration(lattice, shape, indices, lattice.position(indices), 0.0, notes=(_NOTE,), by_maker=True)
+
+
+def save(
+    calibration: Calibration, path: str | os.PathLike[str], *, lens_types: Sequence[tuple[float, float]] = ()
+) -> None:
+    """Write the lattice as a Raytrix XML file, which `load` reads with ``shape=calibration.shape``.
+
+    The file has no place for measured centres, light, missing lenslets and lengths.
+
+    Parameters
+    ----------
+    calibration
+        Of a hexagonal array.
+    path
+        The file (.xml).
+    lens_types
+        Virtual depths (nearest, farthest) at which each kind is sharp, if they are known.
+
+    Raises
+    ------
+    FormatError
+        A square lattice, one with a warp, or other than one pair of depths for each kind.
+    """
+    lattice = calibration.lattice
+    if lattice.layout != "hex" or calibration.warp is not None:
+        what = "square" if lattice.layout != "hex" else "warped"
+        raise FormatError(f"the lattice is {what}, which a Raytrix file cannot hold. Save it as .toml.")
+    if lens_types and len(lens_types) != lattice.kinds:
+        raise FormatError(f"lens_types has {len(lens_types)} pairs but the array has {lattice.kinds} kinds.")
+    target.write_bytes(path, ("\n".join(_written(calibration, lens_types)) + "\n").encode())
+
+
+def _written(calibration: Calibration, lens_types: Sequence[tuple[float, float]]) -> Iterator[str]:
+    """Lines of the file; numbers in lens diameters are of a lattice that is turned back."""
+    lattice, middle = calibration.lattice, (np.array(calibration.shape) - 1) / 2
+    nearby = np.array(lattice.index(*middle)) + np.array([(0, dj) for dj in range(-1, 2)])
+    first = next(pair for pair in nearby if lattice.kind(*pair) == 0)
+    y, x = lattice.position(first) - middle
+    diameter, angle = math.hypot(*lattice.basis[0]), -lattice.rotation
+    sin, cos = math.sin(angle), math.cos(angle)
+    down, across = np.array([[cos, sin], [-sin, cos]]) @ lattice.basis[1] / diameter
+    yield '<RayCalibData version="1.0">'
+    yield from _vector("offset", "pix", x, -y)
+    yield f'  <diameter units="pix">{diameter!r}</diameter>'
+    yield f'  <rotation units="rad">{angle!r}</rotation>'
+    yield from _vector("lens_base_x", "lens", 1.0, 0.0)
+    yield from _vector("lens_base_y", "lens", across, -down)
+    if lattice.kinds == 3:
+        yield from _vector("sub_grid_base", "lens", 2 * (1 + across), -2 * down)
+    for kind, offset in enumerate((0.0, 1.0, -1.0)[: lattice.kinds]):
+        yield f'  <lens_type id="{kind}">'
+        yield from ("  " + line for line in _vector("offset", "lens", offset, 0.0))
+        if lens_types:
+            near, far = map(float, lens_types[kind])
+            ends = f"<min>{near!r}</min><max>{far!r}</max>"
+            yield f'    <depth_range units="virtual_depth">{ends}</depth_range>'
+        yield "  </lens_type>"
+    yield "</RayCalibData>"
+
+
+def _vector(name: str, units: str, x: float, y: float) -> Iterator[str]:
+    yield f'  <{name} units="{units}"><x>{float(x)!r}</x><y>{float(y)!r}</y></{name}>'
 
 
 def contents(path: Path) -> list[tuple[str, str, str]]:

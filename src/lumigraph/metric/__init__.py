@@ -7,6 +7,7 @@
   with the noise of corners that are seen many times (`noise`). `Measured` holds it, its errors, the poses.
 - `chart`: boards and other charts to print, in true size (`printed`).
 - `plan`: how to take pictures of the board, and how well they will tell the camera.
+- `load_camera`, `save_camera`: cameras in files of COMPOTE (`compote`) and LFToolbox (`lftoolbox`).
 - `triangulate`: positions of points from their micro-images.
 - `datasheet`: what a camera does, on `Charts` that `read_charts` finds in a folder or `simulate_charts` takes
   by wave optics (`planes`: a picture of the charts; `Sheet`: the lines).
@@ -24,7 +25,8 @@ from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.charts import Charts, Seen, read_charts, save_charts, simulate_charts
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.metric.datasheet import datasheet
-from lumigraph.metric.files import load, load_compote, load_corners, save, save_corners
+from lumigraph.metric.exchange import load_camera, save_camera
+from lumigraph.metric.files import is_measured, load, load_compote, load_corners, save, save_corners
 from lumigraph.metric.finding import find_corners
 from lumigraph.metric.planning import Plan, plan
 from lumigraph.metric.printed import chart
@@ -56,12 +58,15 @@ __all__ = [
     "datasheet",
     "find_corners",
     "is_measure",
+    "is_measured",
     "load",
+    "load_camera",
     "load_compote",
     "load_corners",
     "plan",
     "read_charts",
     "save",
+    "save_camera",
     "save_charts",
     "save_corners",
     "simulate_charts",

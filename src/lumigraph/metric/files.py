@@ -47,7 +47,7 @@ def load_corners(path: str | os.PathLike[str]) -> Corners:
     in_views = set(found.get(IN_VIEWS, np.zeros(1)).tolist())
     if in_views not in ({0.0}, {1.0}):
         raise FormatError(f"column {IN_VIEWS} of {file} must hold 0 in all rows, or 1 in all.")
-    with _checked(file):
+    with reading(file):
         place, center = (_pair(found, y, x) for y, x in (("y", "x"), ("center_y", "center_x")))
         found.setdefault("kind", np.zeros(len(place)))
         frame, corner, kind = (_whole(name, found) for name in ("frame", "corner", "kind"))
@@ -77,8 +77,8 @@ def load_compote(folder: str | os.PathLike[str]) -> tuple[Corners, Board, Nomina
     files = [source.regular_file(source.unlinked(place / name)) for name in _COMPOTE]
     corners = _table(files[0], ("k", "l", "u", "v", "cluster", "frame"))
     centers = _table(files[1], ("k", "l", "u", "v"))
-    camera, scene = (_json(file) for file in files[2:])
-    with _checked(place):
+    camera, scene = (read_json(file) for file in files[2:])
+    with reading(place):
         sensor, grid = camera["sensor"], scene["checkerboards"][0]
         nominal = Nominal(
             float(camera["main_lens"]["f"]) * _MM,
@@ -156,8 +156,8 @@ def load(path: str | os.PathLike[str]) -> Measured:
         Another file, or one that is damaged.
     """
     file = source.regular_file(path)
-    found = _json(file)
-    with _checked(file):
+    found = read_json(file)
+    with reading(file):
         if found.get("kind") != KIND:
             raise FormatError(f"its kind is {found.get('kind')!r} but must be {KIND!r}.")
         lists: dict[str, Any] = {
@@ -174,6 +174,11 @@ def load(path: str | os.PathLike[str]) -> Measured:
             tuple(_pose(one) for one in found["poses"]), _number(found, "residual_px"),
             int(found["left_out"]), tuple(map(str, found["notes"])),
         )  # fmt: skip
+
+
+def is_measured(path: str | os.PathLike[str]) -> bool:
+    """Whether a JSON file is a camera that `save` wrote."""
+    return read_json(source.regular_file(path)).get("kind") == KIND
 
 
 def _noise(found: dict[str, Any], kinds: int) -> Noise:
@@ -218,7 +223,8 @@ def _table(path: Path, needed: Sequence[str]) -> dict[str, np.ndarray]:
     return dict(zip(names, values.T, strict=True))
 
 
-def _json(path: Path) -> dict[str, Any]:
+def read_json(path: Path) -> dict[str, Any]:
+    """The JSON object in a file of at most 256 MiB."""
     _check_length(path)
     with source.decoding(path, "JSON"):
         found = json.loads(path.read_text(encoding="utf-8"))
@@ -247,8 +253,8 @@ def _whole(name: str, found: dict[str, np.ndarray]) -> np.ndarray:
 
 
 @contextmanager
-def _checked(path: Path) -> Iterator[None]:
-    """Whatever a file holds that a camera cannot have is its own fault, in one line."""
+def reading(path: Path) -> Iterator[None]:
+    """Context in which whatever a file holds that a camera cannot have is its own fault, in one line."""
     try:
         yield
     except LumigraphError as error:
