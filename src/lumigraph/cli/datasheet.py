@@ -16,9 +16,10 @@ from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
     from lumigraph.core.progress import Progress
-    from lumigraph.metric import Charts, Plane, Sheet
+    from lumigraph.metric import Charts, Entry, Plane, Sheet
 
 _MOST = 3  # cameras side by side
+_NONE = "not measured"
 
 
 def datasheet(
@@ -28,6 +29,7 @@ def datasheet(
     camera: str | None = None,
     depths: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
     seed: int = 1,
+    accuracy: float = 1e-2,
     charts: Path | None = None,
     output: Output | None = None,
     common: Common = COMMON,
@@ -55,6 +57,8 @@ def datasheet(
         distances over what the camera refocuses if left out.
     seed
         Of the simulated sensor's noise.
+    accuracy
+        Of simulated charts, relative rms, 1e-2 to 1e-5.
     charts
         Folder to write the simulated raw images into, as a laboratory would take them; for one camera file.
     output
@@ -73,7 +77,7 @@ def datasheet(
 
     for source in sources:
         with progress(f"data sheet of {source}") as tell:
-            found = _charts(source, camera, planes, seed, tell)
+            found = _charts(source, camera, (planes, accuracy), seed, tell)
             if charts is not None:
                 written += metric.save_charts(found, charts)
             sheets.append(metric.datasheet(found))
@@ -85,7 +89,7 @@ def datasheet(
 
 
 def _charts(
-    source: str, camera: str | None, depths: list[float] | None, seed: int, tell: "Progress"
+    source: str, camera: str | None, how: tuple[list[float] | None, float], seed: int, tell: "Progress"
 ) -> "Charts":
     import numpy as np
 
@@ -97,7 +101,8 @@ def _charts(
         return metric.read_charts(source, None if camera is None else check_camera(load_camera(camera)))
     rng, name = np.random.default_rng(seed), Path(source).stem
     one = check_camera(load_camera(source))
-    return metric.simulate_charts(one, depths, name=name, rng=rng, progress=tell)
+    depths, accuracy = how
+    return metric.simulate_charts(one, depths, name=name, rng=rng, accuracy=accuracy, progress=tell)
 
 
 def _distinct(sheets: "Sequence[Sheet]") -> "list[Sheet]":
@@ -163,10 +168,17 @@ def _table(sheets: "list[Sheet]", section: str) -> list[list[str]]:
     rows = [["quantity", *(sheet.name for sheet in sheets), "how"]]
     for name in names:
         found = [one.get(name) for one in entries]
-        told = list(dict.fromkeys(one.how for one in found if one is not None))
         label = next(one.quantity.label for one in found if one is not None)
-        rows.append([label, *("-" if one is None else one.text for one in found), " / ".join(told)])
+        rows.append([label, *(_NONE if one is None else one.text for one in found), _how(sheets, found)])
     return rows
+
+
+def _how(sheets: "list[Sheet]", found: "Sequence[Entry | None]") -> str:
+    """How a quantity was measured, camera by camera where that differs."""
+    told = {sheet.name: one.how for sheet, one in zip(sheets, found, strict=True) if one is not None}
+    if len(told) == 1 or len(set(told.values())) == 1:
+        return next(iter(told.values()))
+    return "; ".join(f"{name}: {how}" for name, how in told.items())
 
 
 _COLUMNS = (
@@ -181,7 +193,7 @@ def _planes(planes: "Sequence[Plane]") -> list[list[str]]:
     for name in _COLUMNS:
         found = [next((e for e in plane.entries if e.quantity.name == name), None) for plane in planes]
         if any(one is not None and one.value is not None for one in found):
-            rows.append([name.replace("_", " "), *("-" if one is None else one.text for one in found)])
+            rows.append([name.replace("_", " "), *(_NONE if one is None else one.text for one in found)])
     return rows
 
 

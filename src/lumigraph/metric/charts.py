@@ -26,7 +26,7 @@ from lumigraph.instruments.files import read as read_table
 from lumigraph.instruments.loading import AnyCamera, load_camera
 from lumigraph.preparation import read_raw
 from lumigraph.scene import Scene, targets
-from lumigraph.simulation import simulate
+from lumigraph.simulation import Incoherent, simulate
 from lumigraph.units import parse
 
 FILE = "charts.toml"
@@ -34,6 +34,9 @@ FILE = "charts.toml"
 
 FILL = 0.8
 """Part of a full well that white images and charts fill."""
+
+ACCURACY = 1e-2
+"""Of simulated charts, as good as their noise: at 1e-3 an image out of focus may take minutes."""
 
 _FLATS = (0.1, 0.25, 0.45, 0.65)  # the same of further white images, for photon transfer
 _CELL = 22.0  # samples of the picture to a square, of the farthest chart
@@ -271,6 +274,7 @@ def simulate_charts(
     name: str = "camera",
     rng: np.random.Generator | None = None,
     textured: bool = True,
+    accuracy: float = ACCURACY,
     progress: Progress = silent,
 ) -> Charts:
     """The pictures that a laboratory would take with a camera, by wave optics and with its sensor's noise.
@@ -287,6 +291,8 @@ def simulate_charts(
         Random numbers of the noise.
     textured
         Whether random patterns are taken, too, for depth.
+    accuracy
+        Of the charts' pictures, relative rms; the white image's is 1e-3.
     progress
         Called as ``progress(fraction)``.
 
@@ -296,7 +302,8 @@ def simulate_charts(
         Another kind of camera, or a depth inside the focal length.
     """
     rng = np.random.default_rng(0) if rng is None else rng
-    return Lights.of(camera, depths, textured=textured, progress=progress).exposed(rng, name)
+    lights = Lights.of(camera, depths, textured=textured, accuracy=accuracy, progress=progress)
+    return lights.exposed(rng, name)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -329,6 +336,7 @@ class Lights:
         depths: Sequence[float] | None = None,
         *,
         textured: bool = True,
+        accuracy: float = ACCURACY,
         progress: Progress = silent,
     ) -> "Lights":
         """By wave optics; parameters and errors as of `simulate_charts`."""
@@ -343,7 +351,10 @@ class Lights:
             scenes = [_board(canvas, spacing or 1.0)]
             if textured:
                 scenes.append(targets.texture(canvas, _GRAIN * _sample(camera, depth), seed=k))
-            seen = [np.asarray(to_numpy(simulate(camera, one.at(depth)).data)) for one in scenes]
+            seen = [
+                np.asarray(to_numpy(simulate(camera, one.at(depth), Incoherent(accuracy)).data))
+                for one in scenes
+            ]
             charts.append((depth, seen[0], seen[1] if textured else None))
             progress(k / (len(depths) + 1))
         return cls(camera, white, tuple(charts), spacing)

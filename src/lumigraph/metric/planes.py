@@ -41,6 +41,7 @@ _HIGH = 0.7
 """Over the length of an edge in samples, the part by which MTF50 and MTF10 may read high: the line spread's
 tails lie outside. `benchmarks.edges` finds 0.46 ± 0.24."""
 _WHOLE = 0.8  # of the corners of the picture that shows most
+_STRAY = 4.0  # standard deviations from which on a place does not count for noise
 _TO_SIGMA = 1.4826  # of a normal distribution, over the median distance from its middle
 
 
@@ -337,21 +338,38 @@ def _steady(found: DepthMap, name: str, unit: str) -> list[Entry]:
     known = values[np.isfinite(values)]
     if known.size < _BLOCKS**2:
         return [_not(name, f"{known.size} places with a confidence above {TRUSTED:g}")]
-    middles = [
-        float(np.median(part[np.isfinite(part)]))
+    value, interval = mean_within([float(np.median(part)) for part in _blocks(values)])
+    noise, ends = _scatter(values)
+    part = f"{known.size / values.size:.0%} of the places, those with a confidence above {TRUSTED:g}"
+    mean = f"mean of {len(_blocks(values))} parts of the field; {part}"
+    spread = f"standard deviation of the places, strays beyond {_STRAY:g} of them left out; {part}"
+    return [
+        Entry("", Quantity(name, value, unit, interval), mean),
+        Entry("", Quantity(f"{name}_noise", noise, unit, ends), spread),
+    ]
+
+
+def _blocks(values: np.ndarray) -> list[np.ndarray]:
+    """Known values of the pieces of the field that have three or more."""
+    pieces = [
+        part[np.isfinite(part)]
         for rows in np.array_split(values, _BLOCKS, axis=0)
         for part in np.array_split(rows, _BLOCKS, axis=1)
-        if np.isfinite(part).sum() >= 3
     ]
-    value, interval = mean_within(middles)
-    scatter = _TO_SIGMA * float(np.median(np.abs(known - np.median(known))))
-    part = f"{known.size / values.size:.0%} of the places, those with a confidence above {TRUSTED:g}"
-    return [
-        Entry(
-            "", Quantity(name, value, unit, interval), f"mean of {len(middles)} parts of the field; {part}"
-        ),
-        Entry("", Quantity(f"{name}_noise", scatter, unit), f"1.48 times the median deviation; {part}"),
-    ]
+    return [part for part in pieces if part.size >= 3]
+
+
+def _scatter(values: np.ndarray) -> tuple[float, tuple[float, float] | None]:
+    """Standard deviation of values without strays, and its interval by how pieces of the field differ."""
+    middle = np.nanmedian(values)
+    typical = _TO_SIGMA * np.nanmedian(np.abs(values - middle))
+    near = np.where(np.abs(values - middle) <= _STRAY * typical, values - middle, np.nan)
+    squares = [float(np.mean(part**2)) for part in _blocks(near)]
+    noise, (_, interval) = float(np.nanstd(near)), mean_within(squares)
+    if interval is None:
+        return noise, None
+    low, high = (math.sqrt(max(0.0, end)) for end in interval)
+    return noise, (min(low, noise), max(high, noise))
 
 
 def mean_within(values: Sequence[float]) -> tuple[float, tuple[float, float] | None]:

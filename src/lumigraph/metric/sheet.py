@@ -1,11 +1,14 @@
 """What a data sheet holds: entries with their intervals and how they were measured."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from lumigraph.core.brief import brief
 from lumigraph.core.result import Quantity
+
+_PREFIXES = ((1.0, "m"), (1e3, "mm"), (1e6, "µm"), (1e9, "nm"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +39,8 @@ class Entry:
         """The value as people read it."""
         if self.value is None:
             return "not measured"
-        q = self.quantity
-        if q.unit != "1/m":
-            return str(q)
-        ends = None if q.interval is None else (q.interval[0] / 1e3, q.interval[1] / 1e3)
-        return str(Quantity(q.name, q.value / 1e3, "lp/mm", ends))
+        q = _on_chart(self.quantity) if self.quantity.unit == "1/m" else self.quantity
+        return str(q) if q.interval is None else _to_interval(q)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,6 +118,31 @@ class Sheet:
                     "camera": self.name, "section": one.section or "Planes", "name": q.name, "value": q.value,
                     "unit": q.unit, "interval": q.interval, "chart_depth": depth, "how": one.how,
                 }  # fmt: skip
+
+
+def _on_chart(q: Quantity) -> Quantity:
+    """Of line pairs a metre, in line pairs a millimetre."""
+    ends = None if q.interval is None else (q.interval[0] / 1e3, q.interval[1] / 1e3)
+    return Quantity(q.name, q.value / 1e3, "lp/mm", ends)
+
+
+def _to_interval(q: Quantity) -> str:
+    """Value and ends of the interval with the decimals of half its width, two digits of that.
+
+    >>> _to_interval(Quantity("pitch", 48.231234, "px", (48.2196, 48.2428)))
+    '48.231 px (48.220 to 48.243)'
+    >>> _to_interval(Quantity("scale", 2.0412e-4, "m", (1.9912e-4, 2.0912e-4)))
+    '204.1 µm (199.1 to 209.1)'
+    """
+    values, unit = (q.value, *(q.interval or ())), q.unit
+    if unit == "m":
+        largest = max(map(abs, values))
+        factor, unit = next(one for one in _PREFIXES if largest * one[0] >= 1 or one == _PREFIXES[-1])
+        values = tuple(factor * one for one in values)
+    half = (values[2] - values[1]) / 2
+    decimals = 1 - math.floor(math.log10(half)) if 0 < half < math.inf else 6
+    value, low, high = (f"{round(one, decimals) + 0.0:.{max(0, decimals)}f}" for one in values)
+    return f"{value} {'' if unit == '1' else unit}".rstrip() + f" ({low} to {high})"
 
 
 def _named(entries: Sequence[Entry], name: str) -> Quantity:

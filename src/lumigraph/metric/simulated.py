@@ -20,6 +20,7 @@ from lumigraph.rendering import refocus
 MEASURES = ("mtf50_middle", "mtf50_border", "mtf10_middle", "mtf10_border", "sample_on_chart", "distortion")
 """What is measured, and the contrast ``mtf@F/mm`` of F cycles per millimetre of the object, in the middle."""
 
+_ACCURACY = 1e-3  # cameras that differ little are compared
 _CONTRAST = re.compile(r"mtf@(\d+\.?\d*)/mm")
 
 
@@ -59,7 +60,7 @@ def simulated(
     for name in names:
         if not is_measure(name):
             raise GeometryError(f"{name!r} is not measured. Give {', '.join(MEASURES)} or mtf@10/mm.")
-    charts = simulate_charts(check_camera(camera), (0.0,), rng=rng, textured=False)
+    charts = simulate_charts(check_camera(camera), (0.0,), rng=rng, textured=False, accuracy=_ACCURACY)
     assert charts.spacing is not None  # it is simulated
     white, dark = mean_image(charts.whites), mean_image(charts.darks)
     lattice = calibrate(white)
