@@ -134,6 +134,22 @@ def test_pages_of_a_series_share_one_sensitivity(focused, tmp_path, monkeypatch)
     np.testing.assert_allclose(pictures[1], 2 * pictures[0], rtol=0.02, atol=0.02 * pictures[1].max())
 
 
+def test_a_page_of_a_series_is_judged_by_its_own_pixels(focused, tmp_path):
+    """Those that are full on the first one counted on the second, and the other way round."""
+    frame = lg.open(tmp_path / "raw.tiff").data.astype(np.uint16)
+    film = np.stack([frame, frame, 0 * frame])
+    film[0, 5:9, 5:9] = film[1, 30:40, 20:30] = 65535
+    tifffile.imwrite(tmp_path / "film.tif", film, photometric="minisblack")
+    said = ("deconvolve", "film.tif", "--camera", "camera.toml", "--iterations", 2, "--page")
+    assert focused(*said, "0:1", "-o", "all.tiff").code == 0
+    for page in (0, 1):
+        assert focused(*said, page, "-o", "one.tiff").code == 0
+        alone, mine = (lg.open(tmp_path / name).data for name in ("one.tiff", f"all-page-{page}.tiff"))
+        np.testing.assert_array_equal(mine, alone)
+    dark = focused(*said, "all", "-o", "all.tiff")
+    assert (dark.code, "page 2: the raw image is dark" in dark.err) == (1, True), dark.err
+
+
 def test_a_microscope_gives_a_volume_with_its_places(lumigraph, tmp_path):
     """White and dark images, as a microscopist takes them; the bead comes back where it was."""
     (tmp_path / "scope.toml").write_text(SCOPE)

@@ -163,10 +163,6 @@ def test_where_pixels_angles_are_not_followed_they_are_refused():
     scope = lg.LightFieldMicroscope.from_catalogue("lfm-guv")
     with pytest.raises(lg.GeometryError, match="not in microscopes"):
         scope.replace(sensor={"angular_response": {"power": 4.0}})
-    with pytest.raises(
-        lg.GeometryError, match=r"fill_factor is 0.8 but pixels of microscopes are active all over"
-    ):
-        scope.replace(sensor={"fill_factor": 0.8})
     with pytest.raises(lg.GeometryError, match="1 angles and 1 values"):
         AngularResponse(0.0, (0.0,), (1.0,))
     with pytest.raises(lg.GeometryError, match="angles are 0, 10, 5 deg but must rise from 0"):

@@ -19,7 +19,7 @@ from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.cli.several import SEVERAL, Several, Shifts
 from lumigraph.core.progress import Progress, Stage, silent, within
 from lumigraph.core.result import Result
-from lumigraph.errors import FormatError
+from lumigraph.errors import FormatError, LumigraphError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from lumigraph.core.calibration import Calibration
     from lumigraph.core.linear import Linear
     from lumigraph.core.prepared import PreparedImage
+    from lumigraph.core.raw import RawImage
     from lumigraph.deconvolution import Deconvolver, Step
     from lumigraph.instruments import Instrument
 
@@ -94,18 +95,26 @@ def deconvolve(
         made(0.0)
         shifts = several.moved(described, 1 + len(more)) if more else None
         wavefront = bent.found(ready, described, wanted.depths(), within(shown, 0.0, 1.0, "wavefront"))
-        described = described if wavefront is None else wavefront.instrument
-        engine = _engine(_Asked.of(described, wanted, way, ready.calibration, made, shifts))
+        model = described if wavefront is None else wavefront.instrument
+        engine = _engine(_Asked.of(model, wanted, way, ready.calibration, made, shifts))
         _begin(engine)
         task = _Task(engine, way, output, None if several.light is None else several.lights())
-        pages: list[tuple[str, Any]] = [(name, replace(ready, data=frame.data)) for name, frame in frames]
-        if more:
-            pages = [("", [ready, *(seen.prepared(frame, described) for frame in more)])]
-        for name, found in task.run(pages, (steps, shown)):
+        first = [ready, *(seen.prepared(frame, described) for frame in more)] if more else ready
+        for name, page, found in task.run(_pages(frames, first, seen, described), (steps, shown)):
+            ready = ready if more else page
             written.append(_named(output, name))
             io.save(found, written[-1])
-    told = result(found, ready if more else pages[-1][1], steps, tuple(written))
+    told = result(found, ready, steps, tuple(written))
     return told if wavefront is None else with_wavefront(told, wavefront)
+
+
+def _pages(
+    frames: "list[tuple[str, RawImage]]", first: Any, seen: Seen, camera: "Instrument"
+) -> "Iterator[tuple[str, Any]]":
+    """Pages, each judged by its own pixels when its turn comes; the first one is."""
+    yield frames[0][0], first
+    for name, frame in frames[1:]:
+        yield name, seen.prepared(frame, camera)
 
 
 def _check(
@@ -241,13 +250,12 @@ class _Task:
         return found, found[0].gain
 
     def run(
-        self, pages: "list[tuple[str, Any]]", followed: "tuple[list[Step], Progress]"
-    ) -> "Iterator[tuple[str, Any]]":
-        """The name and the object of each page; the steps of one are kept, and shown."""
+        self, pages: "Iterator[tuple[str, Any]]", followed: "tuple[list[Step], Progress]"
+    ) -> "Iterator[tuple[str, Any, Any]]":
+        """Each page's name, the page and its object; the steps of one are kept, and shown."""
         from lumigraph import deconvolution, io
 
-        (exposure, gain), (steps, shown), name = self._known(pages[0][1]), followed, ""
-        _check_gain(self.way, gain)
+        (steps, shown), name, gain = followed, "", None
 
         def follow(step: "Step") -> None:
             steps.append(step)
@@ -257,7 +265,12 @@ class _Task:
         try:
             for name, ready in pages:
                 steps.clear()
-                yield name, self.engine(ready, exposure, progress=follow, checkpoint=self.way.checkpoint)
+                exposure, gain = self._known(ready)
+                _check_gain(self.way, gain)
+                found = self.engine(ready, exposure, progress=follow, checkpoint=self.way.checkpoint)
+                yield name, ready, found
+        except LumigraphError as error:
+            raise type(error)(f"{name[1:].replace('-', ' ')}: {error}" if name else str(error)) from error
         except deconvolution.Interrupted as stopped:
             kept = _named(self.output, f"{name}.partial")
             io.save(stopped.partial, kept)

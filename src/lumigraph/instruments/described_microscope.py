@@ -54,7 +54,8 @@ class DescribedMicroscope(Instrument):
                 verb = "needs" if self.configuration == configuration else "has no use for"
                 raise GeometryError(f"configuration {self.configuration!r} {verb} {key}. Change one of them.")
         refuse_angles(self.pixels.angular_response, "microscopes")
-        refuse_gaps(self.pixels.fill_factor, "microscopes")
+        if self.configuration == "fourier":
+            refuse_gaps(self.pixels.fill_factor, "Fourier microscopes")
         if self.lenslets.single and self.configuration != "fourier":
             raise GeometryError(
                 f"single lenslets differ in configuration 'fourier', not {self.configuration!r}. "

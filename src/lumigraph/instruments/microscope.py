@@ -32,6 +32,9 @@ from lumigraph.simulation.microscope_scene import SAMPLES, point_image
 MODELLED = 1e-2
 """Accuracy of the model of a real camera: that of the light of 10 000 photons in a pixel."""
 
+FINER = 1.5
+"""Samples of light that is traced by rays, over whole pixels: those between are interpolated."""
+
 PIXELS = 0.6
 """Of the accuracy, what the interpolation of pixels may take."""
 
@@ -248,7 +251,7 @@ class LightFieldMicroscope(DescribedMicroscope):
         if isinstance(pixels, int) and not isinstance(pixels, bool):
             if pixels < 2:
                 raise GeometryError(f"pixels is {pixels} but a lenslet needs at least 2 along each side.")
-            return Layout(self.lenslets.count, CellSampling(samples, pixels, 1 / pixels))
+            return Layout(self.lenslets.count, self._sampled(samples, pixels, 1 / pixels, 0))
         calibration = self.calibration if pixels is None else pixels
         if not isinstance(calibration, Calibration):
             raise GeometryError(f"pixels is {pixels!r} but must be a whole number, a Calibration or None.")
@@ -260,12 +263,19 @@ class LightFieldMicroscope(DescribedMicroscope):
 
     def _sampling(self, samples: int, pitch: float, dz: float, accuracy: float) -> CellSampling:
         """For pixels of which `pitch` make a lenslet's."""
+        fill = self.pixels.fill_factor
         if self.objective.model == "rays":
-            N = math.ceil(1.5 * pitch)
-            return CellSampling(samples, N, narrowed(1 / pitch, N), 1)
-        shortest = min(self.objectives, key=lambda one: one.wavelength)
-        N = samples_needed(shortest, self.lenslet, 1 / pitch, dz, PIXELS * require_accuracy(accuracy))
-        return CellSampling(samples, N, 1 / pitch, DEGREE)
+            N = math.ceil(max(FINER, math.sqrt(2) / fill) * pitch)
+            return self._sampled(samples, N, 1 / pitch, 1)
+        shortest, width = min(self.objectives, key=lambda one: one.wavelength), fill / pitch
+        N = samples_needed(shortest, self.lenslet, width, dz, PIXELS * require_accuracy(accuracy))
+        return self._sampled(samples, N, 1 / pitch, DEGREE)
+
+    def _sampled(self, samples: int, N: int, apart: float, degree: int) -> CellSampling:
+        """By N samples along a lenslet, for pixels that stand so far apart [lenslets]."""
+        fill = self.pixels.fill_factor
+        width = narrowed(fill * apart, N) if degree == 1 else fill * apart
+        return CellSampling(samples, N, width, degree, fill**2)
 
     def magnifications(self) -> trade_offs.Range:
         """Of the objective."""

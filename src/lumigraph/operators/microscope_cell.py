@@ -46,12 +46,15 @@ class CellSampling:
     degree
         0 where the samples are pixels; else that of the B-splines whose coefficients they are, from which
         pixels anywhere are interpolated (`microscope_pixels`).
+    light
+        What a pixel reads of even light of 1: the square of its fill factor.
     """
 
     points: int
     pixels: int
     width: float
     degree: int = 0
+    light: float = 1.0
 
     @property
     def classes(self) -> int:

@@ -256,7 +256,7 @@ def slice_kernel(
     off = np.stack([np.square(own - guessed).sum(1, dtype=np.float64) for own in cells])
     off /= np.square(cells).sum((1, 2), dtype=np.float64)[:, None]
     kept, cut = _near(counts @ off / s**2, T, SHARES["near"] * demand.accuracy, symmetric)
-    passed = float(lenslet.width / lenslet.pitch) ** 2 * (math.pi / 4 if lenslet.is_round else 1)
+    passed = sampling.light * (lenslet.width / lenslet.pitch) ** 2 * (math.pi / 4 if lenslet.is_round else 1)
     beyond = max(passed * sampling.pixels**2 / s**2 - float(average.sum(dtype=np.float64)), 0.0)
     places, light = _far(average.sum(1) * ~kept, beyond, (objectives[0], lenslet, dz), demand)
     return SliceKernel(
@@ -357,9 +357,8 @@ def _images(
     """Images (points, cells, N²) at (dz, demand), and the relative rms that their samples do not hold."""
     (dz, demand), N = told, sampling.pixels
     if objectives[0].model == "rays":  # which have no wavelength
-        cells, passed = ray_images(objectives[0], lenslet, sampling, points, dz)
-        cells *= (N * N / sampling.classes * passed / cells.sum((1, 2), dtype=np.float64))[:, None, None]
-        return cells, 0.0
+        cells = ray_images(objectives[0], lenslet, sampling, points, dz)
+        return cells * np.float32(sampling.light * N * N / sampling.classes), 0.0
     reach = max(reach_of(one, lenslet, dz, demand) for one in objectives)
     T, lost = 2 * reach + 1, 0.0
     cells = np.zeros((len(points), T * T, N * N), np.float32)
@@ -367,7 +366,7 @@ def _images(
         bench = _bench(objective, lenslet, sampling, reach, (dz, demand))
         for row, (image, missed) in enumerate(bench.images(dz, points)):
             parted = image.reshape(T, N, T, N).transpose(0, 2, 1, 3).reshape(T * T, N * N)
-            cells[row] += parted / len(objectives)
+            cells[row] += sampling.light / len(objectives) * parted
             lost = max(lost, missed)
     return cells, lost
 

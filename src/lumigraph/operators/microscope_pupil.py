@@ -262,9 +262,10 @@ class PupilImages:
 
     @property
     def _unit(self) -> float:
-        """Area of a sample of the object, shared among wavelengths [m²]."""
-        pitch = self.lenslet.pitch / self.lenslet.magnification / self.layout.sampling.points
-        return pitch**2 / len(self.objectives)
+        """Area of a sample of the object, shared among wavelengths, that pixels take light of [m²]."""
+        sampling = self.layout.sampling
+        pitch = self.lenslet.pitch / self.lenslet.magnification / sampling.points
+        return sampling.light * pitch**2 / len(self.objectives)
 
     def _place(self, position: np.ndarray) -> tuple[np.ndarray, tuple[int, int]]:
         """A point (y, x) from its cell's middle and dz [m], and that cell's (row, column)."""

@@ -8,6 +8,7 @@ M. Levoy et al., ACM Trans. Graph. 25, 924 (2006).
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,28 +28,28 @@ def ray_images(
     sampling: CellSampling,
     points: Sequence[tuple[float, float]],
     dz: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Images of points (ky, kx) of a cell at depth `dz`, and the part of their light that passes lenslets.
+) -> np.ndarray:
+    """Images of points (ky, kx) of a cell at depth `dz`, whose light behind open lenslets is 1.
 
     Returns
     -------
-    tuple
-        (points, T², N²) float32 over T × T cells around the points' own; (points,).
+    array
+        (points, T², N²) float32 over T × T cells around the points' own, of pixels that are active all over:
+        one that is active in part has as much as if all of it were like that part.
     """
     s, N = sampling.points, sampling.pixels
     rim = objective.numerical_aperture / lenslet.magnification * lenslet.distance / lenslet.pitch
     outer = max(0, math.ceil(rim - 0.5))  # micro-images that reach into their neighbours
+    whole = _weights(objective, rim, _rays(replace(sampling, width=1 / N), outer)[2])[2].sum()
     pixel, cell, at = _rays(sampling, outer)
-    sine = at / rim * objective.numerical_aperture / objective.medium
-    slant = sine[:, None] ** 2 + sine**2
-    inside = slant < (objective.aperture / objective.medium) ** 2
-    cosine = np.sqrt(1 - np.where(inside, slant, 0))
-    weight = (inside / cosine).ravel()
+    sine, cosine, weight = _weights(objective, rim, at)
+    inside = weight > 0
+    weight = weight.ravel() / (whole * PER_POINT**2)
     moves = dz * lenslet.magnification / lenslet.pitch / cosine
     reach = math.ceil(np.abs(moves * sine)[inside.any(0)].max() + 0.5) + outer if inside.any() else 1
     T = 2 * reach + 1
     own = (pixel[:, None] * N + pixel).ravel()
-    images, passed = np.zeros((len(points), T * T, N * N), np.float32), np.zeros(len(points))
+    images = np.zeros((len(points), T * T, N * N), np.float32)
     spread = ((np.arange(PER_POINT) + 0.5) / PER_POINT - 0.5) / s
     for row, (ky, kx) in enumerate(points):
         for ey, ex in np.stack(np.meshgrid(spread, spread), -1).reshape(-1, 2):
@@ -61,8 +62,16 @@ def ray_images(
             ).ravel()
             found = np.bincount(place * N * N + own, light, T * T * N * N)
             images[row] += found.reshape(T * T, N * N)
-            passed[row] += light.sum() / weight.sum() / PER_POINT**2
-    return images, passed
+    return images
+
+
+def _weights(objective: Objective, rim: float, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of rays at places from a lenslet's centre: sines along an axis, cosines, light (0 beyond the stop)."""
+    sine = at / rim * objective.numerical_aperture / objective.medium
+    slant = sine[:, None] ** 2 + sine**2
+    inside = slant < (objective.aperture / objective.medium) ** 2
+    cosine = np.sqrt(1 - np.where(inside, slant, 0))
+    return sine, cosine, inside / cosine
 
 
 def _rays(sampling: CellSampling, outer: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
