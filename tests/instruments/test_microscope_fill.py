@@ -27,7 +27,7 @@ def apart(found, expected):
     ids=["point", "white"],
 )
 def test_a_pixel_active_in_part_reads_a_ninth_of_what_a_third_of_it_does(scene):
-    # Pixels that are active all over read the point 25 % off, and nine times as much light.
+    # Pixels that are active all over read nine times as much light, and the point 9 % off beside it.
     seen, fine = (np.asarray(lg.simulate(LightFieldMicroscope(**one), scene).data) for one in (COARSE, FINE))
     assert apart(seen, fine[MIDDLE] / 9) < 2e-3
 
