@@ -183,6 +183,18 @@ def test_what_compote_cannot_hold_is_named(tmp_path):
         lg.metric.save_camera(near, calibration(HEX), tmp_path / "a.json", "compote")
 
 
+def test_cameras_that_compote_cannot_mean_are_refused(tmp_path):
+    path = tmp_path / "a.json"
+    with pytest.raises(FormatError, match="distance is 50 mm but must be beyond f, 50 mm"):
+        lg.metric.save_camera(CAMERA, calibration(HEX), path, "compote", distance=0.05)
+    lg.metric.save_camera(CAMERA, calibration(HEX), path, "compote", distance=0.4)
+    found = json.loads(path.read_text())
+    found["mla"]["mesh"]["pitch"] = [[p * CAMERA.pixel_pitch * 1e3 for p in found["mia"]["mesh"]["pitch"][0]]]
+    path.write_text(json.dumps(found))
+    with pytest.raises(FormatError, match=r"mia.mesh.pitch is 1 of mla.mesh.pitch but must be more"):
+        lg.metric.load_camera(path)
+
+
 FLAT = replace(CAMERA, tilt=(0.0, 0.0), radial=(0.0,) * 3, tangential=(0.0, 0.0), gains=(1.0,))
 
 

@@ -53,6 +53,10 @@ def camera_of(found: dict[str, Any]) -> tuple[MetricCamera, Calibration]:
     axis = (shape[0] - 1 + sensor[1] / pixel, shape[1] - 1 + sensor[0] / pixel)
     seen = _pitch(found, "mia") * pixel
     ratio = float(np.mean(seen / (_pitch(found, "mla") * _MM)))
+    if not ratio > 1:
+        raise FormatError(
+            f"mia.mesh.pitch is {ratio:.6g} of mla.mesh.pitch but must be more: an exit pupil has a place."
+        )
     tilt = -normal[:2] / normal[2]
     radial, tangential = _distortion(found, f)
     camera = MetricCamera(
@@ -97,13 +101,15 @@ def intrinsics_of(
                 "Give the distance of what was seen."
             )
         distance = f * L / (L - f)
+    if distance <= f:
+        raise FormatError(f"distance is {distance * 1e3:.4g} mm but must be beyond f, {f * 1e3:.4g} mm.")
     image = f * distance / (distance - f) / _MM
     rows, columns = calibration.shape
     back = [pixel * (a - n + 1) / _MM for a, n in zip(camera.axis[::-1], (columns, rows), strict=True)]
     mesh, ends = _mesh(calibration)
     node, turn = _array_pose(camera, ends, mesh)
     plain = {
-        "D": -node[2], "d": (L + camera.lenslet_distance) / _MM + node[2], "I": len(camera.gains), "mode": 2,
+        "D": -node[2], "d": (L + camera.lenslet_distance) / _MM + node[2], "I": len(camera.gains),
         "dist_focus": distance / _MM,
         "main_lens": {"f": f / _MM, "pose": _pose(np.eye(3), [0.0, 0.0, 0.0])},
         "distortions": {
