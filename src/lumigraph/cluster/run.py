@@ -17,9 +17,9 @@ from lumigraph.core import arrays, checks
 from lumigraph.core.progress import Progress, Stage, silent
 from lumigraph.errors import LumigraphError
 
-_TRIED, _TRIAL, _PART = 3, 20.0, 4
-"""Frames of each worker that are done before the others are estimated, while the first one shows that they
-take fewer seconds than this; and one of so many frames at most."""
+_TRIED, _TRIAL, _PART = 16, 5.0, 4
+"""Frames of each worker that are done before the others are estimated, at most, the seconds that they take,
+at most, if more than one; and one of so many frames at most."""
 
 _TOLD = 16
 """Of so many frames that are checked, one is told of."""
@@ -252,24 +252,35 @@ def _begin(
     starting = max(time.perf_counter() - began - sum(one.seconds for one in first), 0.0)
     if first and rest:
         _need(task, who, len(rest), first, starting)  # refused before other workers take as much memory
-    tried = _tried(rest, group.count, first[0].seconds if first else math.inf)
-    done += _do(task, group, tried, 1, len(left), progress)
-    rest = [number for number in rest if number not in set(tried)]
+    for _ in range(2):  # in the first round each worker makes what it keeps
+        tried = _tried(rest, len(done), group.count, _quickest(_entries(task, done)))
+        done += _do(task, group, tried, len(done), len(left), progress)
+        rest = [number for number in rest if number not in set(tried)]
     known = _entries(task, done)
     if known and rest:
         _need(task, who, len(rest), known, starting, estimated)
     return rest
 
 
-def _tried(numbers: list[int], workers: int, seconds: float) -> list[int]:
-    """Some of the frames, evenly spaced, by what the first one took: costs may change along a job.
+def _tried(rest: list[int], done: int, workers: int, seconds: float) -> list[int]:
+    """Some of the frames, evenly spaced as costs may change along a job.
 
-    >>> _tried(list(range(1, 24)), 2, 0.1), _tried(list(range(1, 24)), 2, 60.0), _tried([7, 8], 4, 60.0)
-    ([3, 7, 12, 17, 21], [6, 18], [8])
+    One for each worker at first; then as many as the quickest of those that are done lets them do in time.
+
+    >>> _tried(list(range(1, 24)), 1, 2, 9.0), _tried([7, 8], 1, 4, 60.0)
+    ([6, 18], [8])
+    >>> [len(_tried(list(range(n)), 3, 2, 0.5)) for n in (21, 397)], _tried(list(range(397)), 3, 2, 9.0)
+    ([3, 20], [])
     """
-    each = max(min(_TRIED, int(_TRIAL / max(seconds, 1e-3))), 1)
-    count = min(workers * each, max(len(numbers) // _PART, 1), len(numbers))
-    return [numbers[(2 * k + 1) * len(numbers) // (2 * count)] for k in range(count)]
+    each = 1 if done == 1 else min(_TRIED, int(_TRIAL / max(seconds, 1e-3)))
+    most = max((len(rest) + done - 1) // _PART, 1) - (done - 1)
+    count = max(min(workers * each, most, len(rest)), 0)
+    return [rest[(2 * k + 1) * len(rest) // (2 * count)] for k in range(count)]
+
+
+def _quickest(known: list[Entry]) -> float:
+    """Least time of a frame [s]: those that made what their worker keeps took more."""
+    return min((entry.seconds for entry in known), default=math.inf)
 
 
 def _entries(task: Task, numbers: list[int]) -> list[Entry]:
