@@ -63,6 +63,33 @@ def test_a_queue_gets_a_part_for_each_job(views, tmp_path, monkeypatch):
     assert lg.cluster.status(output).is_whole
 
 
+@pytest.mark.skipif(os.name == "nt", reason="a shell script stands in for sbatch")
+def test_no_queue_is_given_an_output_of_somebody_else(views, tmp_path, monkeypatch, capsys):
+    stand_in = tmp_path / "bin" / "sbatch"
+    stand_in.parent.mkdir()
+    stand_in.write_text("#!/bin/sh\necho 47")
+    stand_in.chmod(stand_in.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("PATH", f"{stand_in.parent}{os.pathsep}{os.environ['PATH']}")
+    lg.save(lg.open(views / "v0.zarr"), tmp_path / "mine.zarr")
+    assert main(words(views, tmp_path / "mine.zarr", "--slurm", "2")) == 1
+    assert "mine.zarr exists and has no ledger" in capsys.readouterr().err
+    assert not (tmp_path / "mine.zarr.ledger").exists()
+    assert main(words(views, tmp_path / "no" / "out.zarr", "--slurm", "2")) == 1
+    assert "does not exist. Make it first" in capsys.readouterr().err
+    assert not (tmp_path / "no").exists()
+    (tmp_path / "made.zarr.ledger").mkdir()  # as sbatch leaves it before its first job begins
+    (tmp_path / "made.zarr").mkdir()
+    with pytest.raises(lg.LumigraphError, match="has no ledger"):
+        lg.cluster.batch(picture, [{"seed": 1}], tmp_path / "made.zarr", workers=Here())
+
+
+def test_names_with_spaces_and_signs_reach_the_queue_as_they_are(tmp_path):
+    text = lg.cluster.slurm.script(["lumigraph", "--part"], tmp_path / "5 % of it.zarr", 2, ["--comment=a b"])
+    assert "#SBATCH '--job-name=lumigraph-5 % of it.zarr'\n" in text
+    assert "/5 %% of it.zarr.ledger/job-%A-%a.log'\n" in text
+    assert "#SBATCH '--comment=a b'\n" in text
+
+
 def test_numbers_become_a_table(views, tmp_path):
     for k in range(2):
         lg.save(np.random.default_rng(k).normal(100, 5, (20, 20)).astype(np.float32), tmp_path / f"{k}.tiff")

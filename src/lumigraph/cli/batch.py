@@ -162,10 +162,11 @@ def batch(
         work.bound(first, Path(place))  # refuse a line that is wrong before any worker starts
     if hands.slurm is not None:
         return hands.submitted(output)
+    workers, part = hands.cluster(), hands.share()
     with progress("batch") as shown, kept(output):
         line(f"how it stands: {cluster.page(output)}")
         found = cluster.batch(
-            work, items, output, what=what, workers=hands.cluster(), part=hands.share(),
+            work, items, output, what=what, workers=workers, part=part,
             progress=Standing(output, shown),
             estimated=lambda needed: line(str(needed)),
         )  # fmt: skip

@@ -88,7 +88,8 @@ def sweep(
         )  # fmt: skip
     save_table(output, axes)
     if found.failures:
-        raise LumigraphError(f"{len(found.failures)} of {found.count} failed: {min(found.failures.items())}.")
+        number, why = min(found.failures.items())
+        raise LumigraphError(f"{len(found.failures)} of {found.count} failed; number {number}: {why}")
     rows = [entry.values for _, entry in sorted(found.entries.items())]
     return _result(rows, list(varied), names, output)
 

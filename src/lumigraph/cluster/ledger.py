@@ -310,3 +310,17 @@ def _of_file(begun: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
         for one in (begun, asked)
     ]
     return f"{name} was modified at {when[0]}, now at {when[1]}"
+
+
+def require_free(output: Path) -> None:
+    """Refuse an output that no job can have begun, before anything is written.
+
+    Raises
+    ------
+    FormatError
+        Its folder does not exist, or it is somebody else's.
+    """
+    if not output.parent.is_dir():
+        raise FormatError(f"the folder {output.parent} for {output.name} does not exist. Make it first.")
+    if output.exists() and not (Ledger.beside(output).folder / "job.json").exists():
+        raise FormatError(f"{output} exists and has no ledger. Remove it, or give another output.")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from lumigraph.cluster.estimate import Estimate, many
-from lumigraph.cluster.ledger import LINK, PAGE, Entry, Ledger
+from lumigraph.cluster.ledger import LINK, PAGE, Entry, Ledger, require_free
 from lumigraph.cluster.pool import Pool
 from lumigraph.cluster.task import BUSY, FULL, Outcome, Task, Work
 from lumigraph.core import arrays, checks
@@ -180,7 +180,7 @@ def batch(
     cluster = Local(checks.whole("workers", workers)) if isinstance(workers, int) else workers
     task = Task(work, dict(enumerate(items)), output, len(items))
     first, last = _share(part, task.count)
-    _ready(output)
+    require_free(output)
     task.ledger.open(what or {}, items)
     with task.ledger.started(first, last):
         left = list(_left(task, first, last, progress))
@@ -362,10 +362,3 @@ def _share(part: tuple[int, int], count: int) -> tuple[int, int]:
     if not 1 <= number <= parts:
         raise LumigraphError(f"part is {number} of {parts} but must be from 1 to {parts}.")
     return (number - 1) * count // parts, number * count // parts
-
-
-def _ready(output: Path) -> None:
-    if not output.parent.is_dir():
-        raise LumigraphError(f"the folder {output.parent} for {output.name} does not exist. Make it first.")
-    if output.exists() and not Ledger.beside(output).folder.exists():  # it is somebody else's
-        raise LumigraphError(f"{output} exists and has no ledger. Remove it, or give another output.")

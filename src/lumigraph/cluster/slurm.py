@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lumigraph import store
-from lumigraph.cluster.ledger import Ledger
+from lumigraph.cluster.ledger import Ledger, require_free
 from lumigraph.errors import LumigraphError
 
 
@@ -33,10 +33,10 @@ def script(
     heads = [
         f"--job-name=lumigraph-{output.name}",
         f"--array=1-{jobs}",
-        f"--output={place}/job-%A-%a.log",
+        f"--output={str(place).replace('%', '%%')}/job-%A-%a.log",
         *options,
     ]
-    lines = ["#!/bin/sh", *(f"#SBATCH {head}" for head in heads)]
+    lines = ["#!/bin/sh", *(f"#SBATCH {shlex.quote(head)}" for head in heads)]
     lines += [f"cd {shlex.quote(str(folder or Path.cwd()))} || exit 1"]
     lines += [f'exec {shlex.join(command)} "$SLURM_ARRAY_TASK_ID/{jobs}"']
     return "\n".join(lines) + "\n"
@@ -48,10 +48,11 @@ def submit(text: str, output: Path) -> str:
     Raises
     ------
     LumigraphError
-        There is no `sbatch` here, or it refuses the script.
+        There is no `sbatch` here, it refuses the script, or the output is somebody else's.
     """
     if shutil.which("sbatch") is None:
         raise LumigraphError("there is no sbatch here. Run this on a machine that hands jobs to SLURM.")
+    require_free(output)
     place = Ledger.beside(output.absolute()).folder
     place.mkdir(parents=True, exist_ok=True)
     store.write_bytes(place / "job.sh", text.encode())
