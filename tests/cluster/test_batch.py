@@ -291,6 +291,16 @@ def test_the_estimate_is_told_and_what_cannot_fit_is_refused(tmp_path):
         cluster.Estimate.of([Entry(0, 2.0, 1, 2**50)], 100, 4).require(4, tmp_path / "out.zarr")
 
 
+def test_more_frames_are_tried_where_they_are_short(tmp_path, monkeypatch):
+    """Of 100: the first, one more by the one worker, and what it does in 5 s, at most 16; or in no time."""
+    told = []
+    for seconds in (5.0, 0.0):
+        monkeypatch.setattr("lumigraph.cluster.run._TRIAL", seconds)
+        output = tmp_path / f"{seconds}.csv"
+        cluster.batch(jobs.row, items(100), output, workers=jobs.Here(), estimated=told.append)
+    assert [needed.frames for needed in told] == [100 - 2 - 16, 100 - 2]
+
+
 def test_the_estimate_counts_what_other_workers_make_first_and_shared_processors():
     """Frames of 2 s after a first one of 12 s; a second worker starts in 1 s and makes the same first."""
     first = [Entry(0, 12.0, 1, 1, busy=15.0), Entry(1, 2.0, 1, 1, busy=3.0)]

@@ -129,6 +129,6 @@ def require_disk(
     free = shutil.disk_usage(place).free
     if needed > free:
         raise error(
-            f"{what} need up to {needed / 2**30:.3g} GiB but the disk of {folder} has {free / 2**30:.3g} GiB "
+            f"{what} need up to {told(needed)} but the disk of {folder} has {told(free)} "
             "free. Use fewer slices or samples, or another folder."
         )
