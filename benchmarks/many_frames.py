@@ -7,7 +7,7 @@
     python -m benchmarks.many_frames swept [--frames 200]      a sweep killed five times, and one not
     python -m benchmarks.many_frames warm [--frames 8]         a film's likelihood by warm starts
     python -m benchmarks.many_frames standard [--frames 8]     25 planes as fine as 1463 x 1273 pixels
-    python -m benchmarks.many_frames scaling [--frames 60]     two workers beside one
+    python -m benchmarks.many_frames scaling [--frames 60]     two workers with twice the frames beside one
     python -m benchmarks.many_frames cost                      by planes, samples and lenslets
 
 Times are those of this machine as busy as it is; two workers.
@@ -308,12 +308,15 @@ def standard(frames: int, folder: Path) -> None:
 
 
 def scaling(frames: int, folder: Path) -> None:
-    """Frames a second of two workers over those of one, from the first frame of the last worker on."""
-    inputs(folder, frames)
+    """Frames a second of two workers over those of one, from the first frame of the last worker on.
+
+    Each worker has as many frames.
+    """
+    inputs(folder, 2 * frames)
     print("| job | one worker, frames a second | two | times |", flush=True)
     print("|---|---|---|---|")
     for name in ("deconvolve, 5 planes, 3 samples", "deconvolve, 2.0", "depth", "dataset"):
-        one, two = (pace(name, frames, workers, folder) for workers in (1, 2))
+        one, two = (pace(name, frames * workers, workers, folder) for workers in (1, 2))
         print(f"| {name} | {one:.3g} | {two:.3g} | {two / one:.2f} |", flush=True)
 
 
@@ -321,6 +324,7 @@ def pace(name: str, frames: int, workers: int, folder: Path) -> float:
     """Frames a second."""
     output = folder / f"{list(JOBS).index(name)}by{workers}.zarr"
     words = [word.format(frames=frames) for word in JOBS[name]]
+    words += ["--page", f"0:{frames - 1}"] if words[0] == "batch" else []
     if lumigraph([*words, "-o", str(output), "--workers", str(workers)]):
         raise SystemExit(f"{name} failed")
     ends: dict[str, list[float]] = {}
