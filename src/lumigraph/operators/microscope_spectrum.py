@@ -232,7 +232,9 @@ class Spectra:
                 yield (part := self.sensor.parted(image))
                 evens.append(None if self.far is None else self.far.adjoint(part))
 
-        given = self.transforms[1].along_y(parts())
+        along_y = self.transforms[1].along_y(parts())
+        all_of_them = slice(0, self.matrices[0].shape[0])
+        shared = self.transforms[1].columns(along_y, all_of_them) if len(self.matrices) > 1 else None
         shape, s = [row.cells + 2 * row.margin for row in (self.told.rows, self.told.columns)], self._points
         like = {"dtype": images[0].dtype, "device": arrays.device(images[0])}
         volumes = [xp.empty((len(self.points), shape[0] * s, shape[1] * s), **like) for _ in images]
@@ -241,8 +243,8 @@ class Spectra:
             depths, matrix, points = group
             found = points.room(n, images[0])
             for some in self._blocks(n):
-                columns = self.transforms[1].columns(given, some)
-                points.put(found, _times(columns, xp.matrix_transpose(matrix[some, ...])), some)
+                sums = self.transforms[1].columns(along_y, some) if shared is None else shared[some, ...]
+                points.put(found, _times(sums, xp.matrix_transpose(matrix[some, ...])), some)
             cells = [xp.zeros((*shape, points.channels), **like) for _ in range(n)]
             points.add(cells, found)
             for volume, own, even in zip(volumes, cells, evens, strict=True):
