@@ -11,11 +11,15 @@ from lumigraph.elements import noll_to_nm
 from lumigraph.errors import FormatError, GeometryError, LumigraphError, ParaxialWarning
 from lumigraph.instruments import glass
 from lumigraph.io.prescription import FirstOrder, Rays
+from lumigraph.operators.seen import distorted, seen_points
+from lumigraph.operators.single_lens import points_image
 
 F, Z1, D = 0.1, 1.0, 0.01
 Z2 = 1 / (1 / F - 1 / Z1)
-TURN, SHRINK, BARREL = 0.12, 8.0, -0.5
-"""Chief rays' slope by the image's height over z2; by the field's square, less stop, and distortion."""
+EXIT = -0.025
+"""Of the exit pupil: m_p = 1 - EXIT / F = 1.25."""
+TURN, SHRINK, BARREL, LEAN = Z2 / (Z2 - EXIT), 8.0, -4.0, -6.0
+"""Chief rays' slope by the image's height over z2; by the field's square, less stop, distortion and slope."""
 
 
 class Lens:
@@ -28,7 +32,7 @@ class Lens:
         return 4e-7, 8e-7
 
     def first_order(self, wavelength):
-        return FirstOrder(F, 0.01, -0.02, -0.01, 1.25, 0.02)
+        return FirstOrder(F, 0.01, -0.02, EXIT, 1.25, 0.02)
 
     def focus(self, object_distance, image_distance, diameter):
         self.pupil = diameter
@@ -36,7 +40,7 @@ class Lens:
     def trace(self, wavelength, heights, pupil):
         field = heights[:, None] / Z1
         half = D / 2 / Z2 * (1 + 0.1 * (wavelength / 550e-9 - 1))  # wider in red
-        chief = -field * F / Z2 * TURN
+        chief = -field * (TURN + LEAN * field**2)
         along = chief - half * (1 - SHRINK * field**2) * pupil[:, 0]
         across = -half * np.ones_like(field) * pupil[:, 1]
         u, v = (chief - along) / (D / 2 / Z2), -across / (D / 2 / Z2)  # places of the thin lens' stop
@@ -55,6 +59,7 @@ def known(monkeypatch):
     monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
     monkeypatch.setattr(glass, "Prescription", Lens)
     glass._glass.cache_clear()
+    glass._first_order.cache_clear()
 
 
 def single(path, **lens):
@@ -93,15 +98,94 @@ def test_terms_are_those_of_the_wavefront(camera):
 
 def test_the_image_moves_and_the_pupil_turns_as_chief_rays_do(camera):
     found, at = camera.glass, np.array(camera.glass.aberrations.x)
-    refocused = found.defocus * at * F / Z2 * TURN  # chief rays go on to another plane
+    slopes = np.tan(np.arcsin(at * (TURN + LEAN * at**2)))
+    refocused = found.defocus * slopes  # chief rays go on to another plane
     assert found.moved == pytest.approx(BARREL * at**3 * Z2 + refocused, abs=1e-9)
-    assert found.turned == pytest.approx(at * F / Z2 * TURN - at, rel=1e-3, abs=1e-9)
+    assert found.turned == pytest.approx(slopes - at, rel=1e-6, abs=1e-9)
     text = str(camera.describe())
     assert "known.zmx" in text
     assert "a note." in text
-    assert "distortion of the main lens moves images by" in text
-    with pytest.warns(ParaxialWarning, match="distortion"):
+    assert "exit pupil to lenslets" in text
+    with pytest.warns(ParaxialWarning, match="a note"):
         camera.optics()
+
+
+def centroid(raw):
+    """Of a raw image (y, x) [m] from the middle."""
+    y, x = (np.arange(n) - n // 2 for n in raw.shape)
+    return np.array([raw.sum(1) @ y, raw.sum(0) @ x], float) / raw.sum() * 20e-6
+
+
+@pytest.mark.parametrize("dz", [0.0, 0.3])
+def test_a_point_stands_where_its_chief_ray_arrives(camera, dz):
+    """Distorted, and as seen from the entrance pupil, 20 mm before the lens; rays of coma have a mean."""
+    coarse = camera.replace(sensor={"pixel_pitch": "20 um", "shape": (21, 501)})
+    field, entrance = 0.036, EXIT / 1.25
+    x = field * (Z1 + dz + entrance) * Z1 / (Z1 + entrance)
+    raw, _ = points_image(coarse, lg.Points(np.array([[0.0, x, dz]]), np.ones(1)))
+    height = field * Z2 * (1 + BARREL * field**2) + coarse.glass.defocus * field * TURN
+    coma = -2e-6 * field / (D / 2 / Z2)
+    assert centroid(raw)[1] == pytest.approx(
+        height + coma, abs=2e-6
+    )  # distortion is 21 µm, the other pupil 37
+
+
+def test_samples_of_a_slice_go_where_points_do(camera):
+    space = camera.traced.objects
+    grid = lg.Grid((7, 9), 20e-6, (0.01, 0.04))
+    onto, seen = distorted(space, grid, camera.exit_pupil.object_distance, 15e-6)
+    picture, raw = np.random.default_rng(1).random(grid.shape), np.random.default_rng(2).random(onto.shape[0])
+    assert np.vdot(onto.forward(picture), raw) == pytest.approx(np.vdot(picture, onto.adjoint(raw)), rel=1e-6)
+    assert onto.forward(picture).sum() == pytest.approx(picture.sum(), rel=1e-4)
+    one = np.zeros(grid.shape)
+    one[5, 2] = 1
+    image = onto.forward(one)
+    point = lg.Points(np.array([[grid.y[5], grid.x[2], 0.0]]), np.ones(1))
+    (expected,) = seen_points(camera.optics(), point)[1].positions
+    assert image.sum(1) @ seen.y == pytest.approx(expected[0], abs=3e-7)  # of samples 15 µm apart
+    assert image.sum(0) @ seen.x == pytest.approx(expected[1], abs=3e-7)
+    assert abs(expected[1] - 1.25 * grid.x[2]) > 1e-4
+
+
+@pytest.fixture
+def plenoptic(camera):
+    return lg.PlenopticCamera(
+        wavelength="550 nm", object_distance=Z1,
+        main_lens={"focal_length": F, "diameter": D, "prescription": camera.main_lens.prescription},
+        lenslets={"pitch": "240 um", "focal_length": "2.6 mm", "count": (31, 31)},
+        sensor={"pixel_pitch": "12 um"},
+    )  # fmt: skip
+
+
+def test_micro_images_stand_where_chief_rays_have_them(plenoptic):
+    """In a white image by its own calibration: pitch of the exit pupil, and each centre by its own slope."""
+    white = lg.simulate(plenoptic, lg.targets.white(), lg.Incoherent(1e-2))
+    found, own = lg.calibrate(white), plenoptic.calibration
+    assert own.lattice.pitch == pytest.approx(20 * (1 + 2.6e-3 / (Z2 - EXIT)), rel=1e-9)
+    assert plenoptic.micro_image_pitch == pytest.approx(own.lattice.pitch * 12e-6)
+    assert found.lattice.pitch == pytest.approx(own.lattice.pitch, rel=2e-4)
+    assert abs(20 * (1 + 2.6e-3 / Z2) / found.lattice.pitch - 1) > 3e-3
+
+
+def test_micro_images_stand_aside_where_the_pupil_wanders(plenoptic, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "LEAN", -60.0)
+    white = lg.simulate(plenoptic, lg.targets.white(), lg.Incoherent(1e-2))
+    found, own = lg.calibrate(white).centers, plenoptic.calibration
+    straight = own.lattice.position(own.indices)
+    apart = [np.hypot(*(c - found[:, None]).transpose(2, 0, 1)).min(1) for c in (own.centers, straight)]
+    far = np.hypot(*(found - np.array(white.shape) / 2).T) > 0.4 * white.shape[0]
+    print([np.median(each[far]) for each in apart])
+    assert np.median(apart[0][far]) < 0.08
+    assert np.median(apart[1][far]) > 0.2
+
+
+def test_a_white_image_darkens_as_the_stop_narrows(plenoptic):
+    white = np.asarray(lg.simulate(plenoptic, lg.targets.white(), lg.Incoherent(1e-2)).data)
+    pitch, n = plenoptic.calibration.lattice.pitch, white.shape[0] // 2
+    across, box = round(13 * pitch), round(1.5 * pitch)
+    middle, side = (white[n - box : n + box, m - box : m + box].mean() for m in (n, n + across))
+    field = 13 * 240e-6 / Z2
+    assert side / middle == pytest.approx(1 - SHRINK * field**2, abs=8e-4)
 
 
 def test_its_stop_is_wider_where_its_rays_are(camera):

@@ -12,6 +12,8 @@ from lumigraph.errors import FormatError, GeometryError
 from lumigraph.io.prescription import Prescription
 from lumigraph.operators import varying
 from lumigraph.operators.point_light import point_light
+from lumigraph.operators.seen import seen_points
+from lumigraph.operators.single_lens import points_image
 from lumigraph.samples import lens_path
 
 pytest.importorskip("optiland")
@@ -56,7 +58,8 @@ def test_a_point_is_imaged_as_by_huygens(camera, lens, part, wavelength):
     one = replace(camera.optics(), wavelength=wavelength)
 
     def off(field):
-        light = point_light(varying.at(one, 0.0, field), Z1, 4e-5)
+        seen = np.interp(field, camera.glass.aberrations.x, camera.traced.fields)
+        light = point_light(varying.at(one, 0.0, seen), one.object_distance, 4e-5)
         found, expected = np.abs(light.at(places, places + middle)).T ** 2, np.asarray(psf.psf)
         share = np.sum(found * expected) / np.sum(found**2)
         return np.linalg.norm(share * found - expected) / np.linalg.norm(expected)
@@ -167,13 +170,54 @@ def test_a_glass_of_no_catalogue_is_noted(tmp_path):
     assert note == "N-NONE7 is in no catalogue: it is followed by its index and Abbe number"
 
 
-def test_points_of_a_plenoptic_camera_take_the_lens(camera):
-    plenoptic = lg.PlenopticCamera(
+def test_a_point_stands_where_optilands_chief_ray_arrives(camera, lens):
+    """Of fields that were not traced for it; a thin lens has the farther one 4 µm off."""
+    heights = Z1 * np.array([0.031, 0.062])
+    arrived = lens.trace(550e-9, heights, np.zeros((1, 2))).height[:, 0]
+    points = lg.Points(np.array([[0.0, height, 0.0] for height in heights]), np.ones(2))
+    thin, seen = seen_points(camera.optics(), points)
+    places = -seen.positions[:, 1] * thin.separation / thin.object_distance
+    assert places == pytest.approx(arrived, abs=5e-8)
+    assert abs(heights[1] * camera.magnification + arrived[1]) > 3e-6
+
+
+def test_a_points_image_is_there(camera, lens):
+    strip = camera.replace(sensor={"pixel_pitch": "10 um", "shape": (3, 721)})
+    raw, _ = points_image(strip, lg.Points(np.array([[0.0, 0.031 * Z1, 0.0]]), np.ones(1)))
+    at, line = (np.arange(raw.shape[1]) - raw.shape[1] // 2) * 10e-6, raw.sum(0)
+    near = np.abs(at - 0.031 * Z1 * camera.magnification) < 2e-4
+    y, x = np.meshgrid(*2 * [np.linspace(-1, 1, 41)], indexing="ij")
+    pupil = np.stack([y, x], axis=-1)[np.hypot(y, x) < 1]
+    mean = np.nanmean(lens.trace(550e-9, np.array([0.0, 0.031 * Z1]), pupil).height[1])
+    assert (line @ (at * near)) / (line @ near) == pytest.approx(-mean, abs=5e-7)
+
+
+@pytest.fixture
+def plenoptic(camera):
+    return lg.PlenopticCamera(
         wavelength="550 nm", object_distance=Z1,
         main_lens={"focal_length": F, "diameter": 0.01, "prescription": camera.main_lens.prescription},
         lenslets={"pitch": "100 um", "focal_length": "0.55 mm", "count": (13, 13)},
         sensor={"pixel_pitch": "5 um"},
     )  # fmt: skip
+
+
+def test_the_pitch_of_micro_images_is_that_of_optilands_exit_pupil(plenoptic, lens):
+    """Measured in a white image; a thin lens' differs by 5e-3 of it."""
+    far = plenoptic.replace(
+        lenslets={"pitch": "300 um", "focal_length": "1.65 mm", "count": (15, 15)},
+        sensor={"pixel_pitch": "15 um"},
+    )
+    white = lg.simulate(far, lg.targets.white(), lg.Incoherent(1e-2))
+    paraxial = lens._lens.paraxial
+    pupil = float(np.ravel(paraxial.XPL())[0]) * 1e-3  # from the image
+    found = lg.calibrate(white).lattice.pitch
+    expected, thin = 20 * (1 + 1.65e-3 / -pupil), 20 * (1 + 1.65e-3 / far.image_distance)
+    assert found == pytest.approx(expected, rel=5e-4)
+    assert abs(thin / found - 1) > 3e-3
+
+
+def test_points_of_a_plenoptic_camera_take_the_lens(plenoptic):
     far = math.tan(math.radians(0.5)) * Z1
     points = lg.targets.points([(0.0, 0.0), (far / 2, far)])
     real, ideal = (

@@ -51,7 +51,7 @@ class Bench:
 
             described = load_camera(self.camera)
             known = {
-                "pixel_pitch": described.sensor.pixel_pitch, "separation": described.separation,
+                "pixel_pitch": described.sensor.pixel_pitch, "separation": described.pupil_distance,
                 "lenslet_distance": described.lenslet_distance,
             }  # fmt: skip
         for name in known:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from lumigraph.core.grid import Grid
     from lumigraph.core.raw import RawImage
     from lumigraph.instruments import Instrument
-    from lumigraph.scene import Scene
+    from lumigraph.scene import Medium, Scene
 
 SCENES = (
     "white",
@@ -160,6 +160,13 @@ class Stage:
         the focused plane (.pfm, .tiff), or a picture, white for the first --depth and black for the second.
     planes
         Opaque slices that --depth-map is sorted into, 1 to 64; 8 if left out.
+    medium
+        What refracts before the scene, of light-field microscopes: a volume of refractive indices (OME-TIFF,
+        .zarr, .h5), as --medium-index says. Each point and each lit sample then has an image of its own.
+    medium_depth
+        By how much the volume's depths are moved, such as '-20 um' (nearer to the objective).
+    medium_index
+        difference: indices less that of the objective's medium; absolute: indices, such as 1.37.
     point
         A point of light at 'y, x' or 'y, x, depth' in object space, such as '0 mm, 1 mm, 5 mm'; may be
         given several times.
@@ -169,6 +176,9 @@ class Stage:
     depth: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True)] = None
     depth_map: Path | None = None
     planes: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
+    medium: Path | None = None
+    medium_depth: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    medium_index: Literal["difference", "absolute"] = "difference"
     point: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True)] = None
 
     def check(self) -> None:
@@ -177,6 +187,8 @@ class Stage:
             raise FormatError(
                 f"nothing is in front of the camera. Give --scene ({', '.join(SCENES)}) or --point."
             )
+        if self.medium is None and (self.medium_depth is not None or self.medium_index != "difference"):
+            raise FormatError("--medium-depth and --medium-index have no meaning without --medium.")
         if self.planes is not None and self.depth_map is None:
             raise FormatError("--planes has no meaning without --depth-map. Leave it out.")
         if self.depth_map is not None:
@@ -205,6 +217,31 @@ class Stage:
         if self.point:
             parts.append(targets.points([_point(text) for text in self.point]))
         return sum(parts, Scene())
+
+    def refracting(self, camera: "Instrument") -> "Medium | None":
+        """What the scene is seen through."""
+        if self.medium is None:
+            return None
+        from dataclasses import replace
+
+        from lumigraph import io
+        from lumigraph.core.volume import Volume
+        from lumigraph.instruments.capabilities import WithObjective
+        from lumigraph.scene import Medium
+
+        volume = io.open(self.medium)
+        if not isinstance(volume, Volume):
+            raise FormatError(
+                f"--medium {self.medium} holds a {type(volume).__name__} but must be a volume: planes with "
+                "their depths and the size of a sample."
+            )
+        if not isinstance(camera, WithObjective):
+            raise FormatError("--medium is of light-field microscopes: before a camera leave it out.")
+        moved = length("--medium-depth", self.medium_depth) or 0.0
+        data = volume.data
+        if self.medium_index == "absolute":
+            data = data - camera.objectives[0].medium
+        return Medium.of_index(replace(volume, data=data, depths=tuple(z + moved for z in volume.depths)))
 
     def _with_depths(self, camera: "Instrument", path: Path) -> "Scene":
         """The one picture as opaque slices at the depths of a map, which is resized with it."""
@@ -276,10 +313,10 @@ def simulate(
         raise FormatError(f"--seed is {seed} but must be at least 0.")
     described = load_camera(camera)
     coherence, spectrum = light.chosen(seed, described), light.spectrum()
-    scene = stage.built(described)
+    scene, medium = stage.built(described), stage.refracting(described)
     try:
         with progress("simulate") as shown, light.unasked():
-            raw = simulate(described, scene, coherence, spectrum=spectrum, progress=shown)
+            raw = simulate(described, scene, coherence, spectrum=spectrum, progress=shown, medium=medium)
     except Interrupted as stopped:
         kept = output.with_name(f"{output.name.split('.')[0]}.partial{''.join(output.suffixes)}")
         io.save(stopped.partial, kept)

@@ -19,6 +19,7 @@ from lumigraph.elements.lean import Lean
 from lumigraph.elements.lens import ThinLens
 from lumigraph.elements.lenslets import LensletArray
 from lumigraph.elements.masks import random_phase_mask, white_phase
+from lumigraph.elements.object_space import ObjectSpace
 from lumigraph.elements.scatter import Scatter
 from lumigraph.elements.train import Element, Train
 from lumigraph.elements.zernike import ZernikePlate, noll_to_nm, zernike
@@ -30,6 +31,7 @@ __all__ = [
     "FieldPlate",
     "Lean",
     "LensletArray",
+    "ObjectSpace",
     "Openings",
     "RectangularAperture",
     "Scatter",

@@ -215,17 +215,26 @@ class Openings:
         Ascending [m].
     axes
         Widths (wavelengths, fields, 2) along the field and across it, over the stop's diameter.
+    middles
+        Where their middles are along the fields (fields,), over half of that diameter; None for the axis.
     """
 
     x: Nodes
     wavelengths: Nodes
     axes: np.ndarray
+    middles: np.ndarray | None = None
 
     def at(self, field: float, wavelength: float) -> tuple[float, float]:
         """Of a field, a tangent, at a wavelength [m] that the lens' aberrations are known at."""
         axes = _through(self.wavelengths, self.axes, wavelength, None)
         along, across = _through(self.x, axes, min(field, self.x[-1]), np.ones(2))
         return float(along), float(across)
+
+    def middle(self, field: float) -> float:
+        """Of a field, a tangent, over half of the stop's diameter, along the field."""
+        if self.middles is None:
+            return 0.0
+        return float(_through(self.x, self.middles[:, None], min(field, self.x[-1]), -np.ones(1))[0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -265,7 +274,12 @@ class FieldPlate:
         plate = ZernikePlate({j: 2 * math.pi * rms for j, rms in waves.items()}, self.diameter)
         if self.openings is None:
             return plate
-        return replace(plate, axes=self.openings.at(math.hypot(y, x), wavelength), direction=math.atan2(y, x))
+        field, direction = math.hypot(y, x), math.atan2(y, x)
+        away = self.openings.middle(field) * self.diameter / 2
+        return replace(
+            plate, axes=self.openings.at(field, wavelength), direction=direction,
+            center=(away * math.sin(direction), away * math.cos(direction)),
+        )  # fmt: skip
 
     def __call__(self, light: Field) -> Field:
         """Refused: what one plate does is not what this one does."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
+from typing import Self
 
 from pydantic import Field
 
@@ -20,8 +21,9 @@ from lumigraph.design.layout import Layout, LensletLayout
 from lumigraph.elements import FieldPlate, LensletArray, ThinLens, Train, ZernikePlate
 from lumigraph.errors import GeometryError, ParaxialWarning
 from lumigraph.instruments import describe_glass, parameters, point_view
-from lumigraph.instruments.glass import Glass, Wanted, glass
+from lumigraph.instruments.glass import Glass, Wanted, first_order, glass
 from lumigraph.instruments.glass_layout import glass_layout
+from lumigraph.instruments.glass_optics import ExitPupil, Traced, behind_glass, traced
 from lumigraph.instruments.grids import Sampling
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.parameters import Parameter
@@ -66,6 +68,35 @@ class Camera(Instrument):
     def separation(self) -> float:
         """Main lens to lenslets, L, or to the sensor where there are none [m]."""
         return self.image_distance
+
+    @cached_property
+    def exit_pupil(self) -> ExitPupil:
+        """Where its light comes from: of a thin lens the lens, of a prescription as its glass has it.
+
+        Raises
+        ------
+        GeometryError
+            An exit pupil that is not before the image and the lenslets.
+        """
+        focal_length, path = self.main_lens.focal_length, self.main_lens.prescription
+        if path is None:
+            return ExitPupil(0.0, focal_length, self.image_distance)
+        behind = first_order(path, self.wavelength).exit_pupil
+        found = ExitPupil(behind, focal_length, self.image_distance)
+        found.check(path.name, self.separation)
+        return found
+
+    @property
+    def pupil_distance(self) -> float:
+        """Exit pupil to lenslets, L' [m]: L before a thin lens."""
+        return self.exit_pupil.to(self.separation)
+
+    @property
+    def object_scale(self) -> float:
+        """Size in the focused plane of what is 1 in the lenslet plane, z1/L before a thin lens."""
+        if not self.exit_pupil.behind:
+            return self.object_distance / self.separation
+        return self.exit_pupil.to_image / self.magnification / self.pupil_distance
 
     @property
     def lattice(self) -> Lattice | None:
@@ -167,6 +198,18 @@ class Camera(Instrument):
         path = self.main_lens.prescription
         return None if path is None else glass(path, self._wanted)
 
+    def at_wavelength(self, wavelength: float) -> Self:
+        """The same in light of another wavelength [m]: glass stays where its own brings it to focus."""
+        other = self.replace(wavelength=wavelength)
+        if self.main_lens.prescription is not None:
+            other.__dict__.update(exit_pupil=self.exit_pupil, glass=self.glass, traced=self.traced)
+        return other
+
+    @cached_property
+    def traced(self) -> Traced | None:
+        """What chief rays of a prescription say; None without one."""
+        return None if self.glass is None else traced(self.glass, self.exit_pupil, self.object_distance)
+
     @property
     def _wanted(self) -> Wanted:
         """What it asks of its glass."""
@@ -236,10 +279,13 @@ class Camera(Instrument):
         """What operators read of the camera, as plain values."""
         for text in describe_glass.warnings(self):
             warnings.warn(text, ParaxialWarning, stacklevel=2)
-        return CameraOptics(
+        thin = CameraOptics(
             self.wavelength, self.object_distance, self.separation, self.pupil_diameter, self.lens_train(),
             self.sensor, self.sampling.object_pitch, self.lenslet_array(), self.lenslet_distance,
         )  # fmt: skip
+        if self.glass is None or self.traced is None:
+            return thin
+        return behind_glass(thin, self.glass, self.traced, self.exit_pupil)
 
     def lenslet_array(self) -> LensletArray | None:
         """The lenslets; None without them."""
@@ -353,7 +399,9 @@ class Camera(Instrument):
 
     def alpha(self, dz: float) -> float:
         """Refocus factor α' = F/F' that brings an object at depth `dz` into focus."""
-        self.defocused(dz)
+        distance, pupil = self.defocused(dz), self.exit_pupil
+        if pupil.behind:
+            return pupil.to_image / pupil.to(thin_lens.image_distance(self.main_lens.focal_length, distance))
         return plenoptic1.refocus_factor(self.main_lens.focal_length, self.object_distance, dz)
 
     def _check_beyond_focus(self) -> None:

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
 from lumigraph.core.lightfield import LightField
+from lumigraph.elements.objective import Objective
+from lumigraph.instruments.glass_optics import ExitPupil
 from lumigraph.instruments.parts import MainLens
 from lumigraph.operators.microscope_pupil import PupilImages
 
@@ -70,6 +72,11 @@ class WithMainLens(Protocol):
     main_lens: MainLens
     object_distance: float
 
+    @property
+    def exit_pupil(self) -> ExitPupil:
+        """Where its light comes from."""
+        ...
+
     def alpha(self, dz: float) -> float:
         """Refocus factor of a depth `dz` [m] from the focused plane."""
         ...
@@ -78,6 +85,11 @@ class WithMainLens(Protocol):
 @runtime_checkable
 class WithObjective(Protocol):
     """An objective forms its image: depths are small and go with the refocus factor."""
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """The objective at each wavelength."""
+        ...
 
     @property
     def in_pupil(self) -> bool:

@@ -1,4 +1,4 @@
-"""What a camera's table says about the glass of its main lens, and what of it is not followed."""
+"""What a camera's table says about the glass of its main lens."""
 
 import math
 from collections.abc import Iterator
@@ -12,9 +12,6 @@ from lumigraph.instruments.row import Row
 if TYPE_CHECKING:
     from lumigraph.instruments.camera import Camera
 
-SEEN = 1.0
-"""Pixels by which light may arrive elsewhere without a warning."""
-
 ROUND = 0.02
 """How much narrower than round the stop may look without a warning."""
 
@@ -22,7 +19,7 @@ ROUND = 0.02
 def rows(camera: "Camera") -> Iterator[Row]:
     """Where the aberrations come from and how large they are; nothing without a prescription."""
     glass = camera.glass
-    if glass is None or camera.main_lens.prescription is None:
+    if glass is None or camera.traced is None or camera.main_lens.prescription is None:
         return
     first, wavelength, far = glass.first_order, camera.wavelength, glass.aberrations.x[-1] / MARGIN
     yield Row("prescription", camera.main_lens.prescription.name, "", "ray traced by Optiland")
@@ -30,7 +27,8 @@ def rows(camera: "Camera") -> Iterator[Row]:
     yield Row("entrance pupil", glass.entrance_pupil, "m", "D (m_p + m) / (m_p (1 + m)), the same aperture")
     yield Row("widest entrance pupil", first.widest, "m", "of the prescription")
     yield Row("pupil magnification", first.pupil_magnification, "", "m_p")
-    yield Row("exit pupil", first.exit_pupil, "m", "behind the rear principal plane; the thin lens' is in it")
+    yield Row("exit pupil", first.exit_pupil, "m", "e', behind the rear principal plane")
+    yield Row("exit pupil to lenslets", camera.pupil_distance, "m", "L' = L - e'; to the sensor without them")
     yield Row("refocused by", glass.defocus, "m", "paraxial image to the least rms wavefront on the axis")
     for part, name in ((0.0, "on the axis"), (0.5, "half-way out"), (1.0, "farthest out")):
         source = f"at {math.degrees(math.atan(part * far)):.3g} deg, tilt left out"
@@ -42,46 +40,32 @@ def rows(camera: "Camera") -> Iterator[Row]:
     yield Row("rim from its ellipse", glass.rim, "", "of the stop as the image sees it, over its radius")
     along, across = glass.openings.at(far, wavelength)
     yield Row("stop farthest out", along * across, "", "its area as the image sees it, over the round one's")
-    yield Row(
-        "distortion", _moved(camera, glass), "px", "at most, on the main lens' image, outwards; not followed"
-    )
-    yield Row(
-        "pupil from the thin lens'", _turned(camera, glass), "px", "of micro-images at most; not followed"
-    )
+    yield Row("distortion", _moved(camera, glass), "px", "at most, on the main lens' image, outwards")
+    if camera.lenslet_distance:
+        aside = _largest(camera.traced.lean) * camera.lenslet_distance / camera.pixels.pixel_pitch
+        yield Row(
+            "micro-images aside", aside, "px", "at most, outwards from where the exit pupil's middle is"
+        )
 
 
 def warnings(camera: "Camera") -> Iterator[str]:
-    """What of the glass is not followed and would be seen."""
+    """What of the glass is not as its file has it, or not followed and would be seen."""
     glass = camera.glass
     if glass is None:
         return
     yield from (f"{note}." for note in glass.notes)
-    if abs(moved := _moved(camera, glass)) > SEEN:
-        yield (
-            f"distortion of the main lens moves images by {moved:.3g} pixels farthest out, which is not "
-            "followed: points stay where a thin lens has them."
-        )
-    if abs(turned := _turned(camera, glass)) > SEEN:
-        yield (
-            f"micro-images farthest out would stand {turned:.3g} pixels aside, as the exit pupil does not "
-            "lie in the principal plane; a thin lens' are simulated."
-        )
     along, across = glass.openings.at(glass.aberrations.x[-1] / MARGIN, camera.wavelength)
-    if camera.lattice is not None and min(along, across) < 1 - ROUND:
+    angles = camera.pixels.angular_response is not None
+    if angles and camera.lattice is not None and min(along, across) < 1 - ROUND:
         yield (
             f"the stop is {along:.3g} x {across:.3g} of its width farthest out: points and slices have that, "
-            "white images a round one."
+            "white images a round one, as pixels respond to angles."
         )
 
 
 def _moved(camera: "Camera", glass: Glass) -> float:
     """Distortion at worst, on the main lens' image [px of the sensor]."""
     return _largest(glass.moved) / camera.pixels.pixel_pitch
-
-
-def _turned(camera: "Camera", glass: Glass) -> float:
-    """How far micro-images stand aside at worst [px]."""
-    return _largest(glass.turned) * (camera.lenslet_distance or 0.0) / camera.pixels.pixel_pitch
 
 
 def _largest(values: np.ndarray) -> float:

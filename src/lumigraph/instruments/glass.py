@@ -131,6 +131,33 @@ class Glass:
         return math.sqrt(sum(c**2 for j, c in waves.items() if j > 3))
 
 
+def first_order(path: Path, wavelength: float) -> FirstOrder:
+    """What a prescription is to first order at a wavelength [m]; errors as of `glass`."""
+    return _first_order(path, hashlib.sha256(content(path)).hexdigest(), wavelength)
+
+
+@lru_cache(16)
+def _first_order(path: Path, digest: str, wavelength: float) -> FirstOrder:
+    """`first_order`; traced by Optiland once, and kept."""
+
+    def traced() -> dict[str, np.ndarray]:
+        lens = Prescription(path)
+        _check_wavelength(lens, wavelength)
+        found = lens.first_order(wavelength)
+        return {"first_order": np.array([getattr(found, field.name) for field in fields(found)])}
+
+    key = hashlib.sha256(repr((VERSION, _version(), digest, wavelength)).encode()).hexdigest()
+    return FirstOrder(*cabinet.kept(f"glass-first-{key}", traced)["first_order"].tolist())
+
+
+def _version() -> str:
+    """Optiland's."""
+    try:
+        return metadata.version("optiland")
+    except metadata.PackageNotFoundError:
+        return ""  # it is refused when it is needed
+
+
 def glass(path: Path, wanted: Wanted) -> Glass:
     """Of a prescription, for a camera; what was traced once is kept.
 
@@ -153,11 +180,7 @@ def _numbers(wanted: Wanted) -> list[float]:
 @lru_cache(16)
 def _glass(path: Path, digest: str, numbers: tuple[float, ...]) -> Glass:
     wanted = Wanted(*numbers)
-    try:
-        version = metadata.version("optiland")
-    except metadata.PackageNotFoundError:
-        version = ""  # it is refused when it is needed
-    key = hashlib.sha256(repr((VERSION, version, digest, numbers)).encode()).hexdigest()
+    key = hashlib.sha256(repr((VERSION, _version(), digest, numbers)).encode()).hexdigest()
     kept = cabinet.kept(f"glass-{key}", lambda: _traced(path, wanted))
     return _of(kept)
 
@@ -214,13 +237,19 @@ def _enough(lens: Prescription, wanted: Wanted, wavelengths: np.ndarray) -> tupl
     )
 
 
-def _wavelengths(lens: Prescription, own: float) -> np.ndarray:
+def _check_wavelength(lens: Prescription, own: float) -> tuple[float, float]:
+    """From where to where all glasses are known [m], where the camera's own wavelength is among them."""
     low, high = lens.wavelengths()
     if not low <= own <= high:
         raise GeometryError(
             f"the wavelength is {own * 1e9:.6g} nm but glasses of {lens.name!r} are known from "
             f"{low * 1e9:.6g} to {high * 1e9:.6g} nm. Use another wavelength."
         )
+    return low, high
+
+
+def _wavelengths(lens: Prescription, own: float) -> np.ndarray:
+    low, high = _check_wavelength(lens, own)
     ends = max(low, min(VISIBLE[0], 0.9 * own)), min(high, max(VISIBLE[1], 1.1 * own))
     return np.unique([*np.linspace(ends[0], own, 4), *np.linspace(own, ends[1], 4)])
 

@@ -71,6 +71,11 @@ class Instrument(Part):
         return None
 
     @property
+    def pupil_distance(self) -> float | None:
+        """Where its light comes from, to lenslets, L' [m]: `separation` but behind lenses of glass."""
+        return self.separation
+
+    @property
     def lenslet_distance(self) -> float | None:
         """Lenslets to sensor, b [m]; None without lenslets."""
         return None
@@ -202,6 +207,10 @@ class Instrument(Part):
     def magnifications(self) -> Range:
         """Magnifications over which the trade-offs are worth a look."""
         raise NotImplementedError
+
+    def at_wavelength(self, wavelength: float) -> Self:
+        """The same instrument in light of another wavelength [m]."""
+        return self.replace(wavelength=wavelength)
 
     def replace(self, **changes: Any) -> Self:
         """The camera with other values; a mapping changes only the keys it has.

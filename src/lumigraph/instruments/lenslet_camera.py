@@ -100,18 +100,19 @@ class LensletCamera(Camera):
 
     @property
     def micro_image_pitch(self) -> float:
-        """Distance between neighbouring micro-images on the sensor, p (1 + b/L) [m]."""
-        return plenoptic1.micro_image_pitch(self.lenslets.pitch, self.separation, self.lenslet_distance)
+        """Distance between neighbouring micro-images on the sensor, p (1 + b/L') [m]."""
+        return plenoptic1.micro_image_pitch(self.lenslets.pitch, self.pupil_distance, self.lenslet_distance)
 
     @property
     def lenslet_size(self) -> float:
         """Of a lenslet in the focused plane, p z1/L [m]."""
-        return self.lenslets.pitch * self.object_distance / self.separation
+        return self.lenslets.pitch * self.object_scale
 
     @property
     def micro_image_width(self) -> float:
         """Width of a micro-image by ray optics: the main lens seen through a lenslet, D b / L [m]."""
-        return self.pupil_diameter * self.lenslet_distance / self.separation
+        wide = self.pupil_diameter * self.exit_pupil.wider
+        return wide * self.lenslet_distance / self.pupil_distance
 
     @property
     def lattice(self) -> Lattice:
@@ -126,27 +127,39 @@ class LensletCamera(Camera):
         so that the second and third kind of a multi-focus array trade places.
         """
         sensor, pitch = self.sensor, self.sensor.pixel_pitch
-        scale = -(1 + self.lenslet_distance / self.separation) / pitch
+        scale = -(1 + self.lenslet_distance / self.pupil_distance) / pitch
         lattice = self.lattice.scaled(scale).moved(sensor.shape[0] // 2, sensor.shape[1] // 2)
         indices = -self.lenslets.indices()[::-1]
         centers = lattice.position(indices)
         if self.lean is not None:
             centers = self._leaning_centers(centers, indices)
+        if self.traced is not None:
+            centers = self._traced_centers(centers, indices)
         off = float(np.sqrt(np.mean(np.sum((centers - lattice.position(indices)) ** 2, axis=1))))
         inside = ((centers >= -0.5) & (centers <= [n - 0.5 for n in sensor.shape])).all(axis=1)
         return Calibration(
             lattice, sensor.shape, indices[inside], centers[inside], off,
-            pixel_pitch=pitch, separation=self.separation, lenslet_distance=self.lenslet_distance,
+            pixel_pitch=pitch, separation=self.pupil_distance, lenslet_distance=self.lenslet_distance,
         )  # fmt: skip
+
+    def _traced_centers(self, centers: np.ndarray, indices: np.ndarray) -> np.ndarray:
+        """Of micro-images (k, 2) [px], whose chief rays do not come from the exit pupil's middle."""
+        assert self.traced is not None  # asked by `calibration`
+        places = self.lattice.position(-indices)
+        away = np.hypot(*places.T)
+        aside = (
+            self.traced.leans(away / self.pupil_distance) * self.lenslet_distance / self.sensor.pixel_pitch
+        )
+        return centers - places * (aside / np.maximum(away, 1e-12))[:, None]
 
     def _leaning_centers(self, centers: np.ndarray, indices: np.ndarray) -> np.ndarray:
         """Of micro-images (k, 2) [px], of lenslets that stand nearer to the sensor, or farther."""
         assert self.lean is not None  # asked by `calibration`
         y, x = self.lattice.position(-indices).T
-        array, scale = self.lean.of_array(y, x), 1 + self.lenslet_distance / self.separation
+        array, scale = self.lean.of_array(y, x), 1 + self.lenslet_distance / self.pupil_distance
         distance = self.lenslet_distance - array + self.lean.of_sensor(y * scale, x * scale)
         middle = np.array([n // 2 for n in self.sensor.shape])
-        return middle + (centers - middle) * ((1 + distance / (self.separation + array)) / scale)[:, None]
+        return middle + (centers - middle) * ((1 + distance / (self.pupil_distance + array)) / scale)[:, None]
 
     def _count(self) -> tuple[int, int]:
         return self.lenslets.count
@@ -200,7 +213,7 @@ class LensletCamera(Camera):
 
     def operator_grid(self, samples: int | None = None) -> Grid:
         """Object samples of its `operator` over the array's field, so many along a lenslet's pitch."""
-        scale, pitch = self.object_distance / self.separation, self.lenslets.pitch
+        scale, pitch = self.object_scale, self.lenslets.pitch
         finest = self.wavelength * self.separation / (2 * self.pupil_diameter)
         n = math.ceil(pitch / finest) if samples is None else checks.whole("samples_per_lenslet", samples)
         shape = tuple(max(1, round(2 * reach * n / pitch)) for reach in self.lenslets.reach)
@@ -211,7 +224,7 @@ class LensletCamera(Camera):
     def _covering_shape(self) -> tuple[int, int]:
         if self.built:  # the sensor was bought for what is described
             return self.described._covering_shape()
-        spread = 1 + self.lenslet_distance / self.separation
+        spread = 1 + self.lenslet_distance / self.pupil_distance
         # Micro-images can be wider than their pitch, where the main lens is too large.
         excess = max(0.0, self.micro_image_width - self.micro_image_pitch) / 2
         half = [(reach * spread + excess) / self.pixels.pixel_pitch for reach in self.lenslets.reach]
@@ -221,7 +234,7 @@ class LensletCamera(Camera):
     def sampling(self) -> grids.Sampling:
         """How finely the planes must be sampled, and are."""
         wavelength, diameter, pitch = self.wavelength, self.pupil_diameter, self.lenslets.pitch
-        scale, reach = self.object_distance / self.separation, self.lenslets.reach
+        scale, reach = self.object_scale, self.lenslets.reach
         object_half = (reach[0] * scale, reach[1] * scale)
         rules = self._plane_rules()
         # An odd number of samples per lenslet: the border between lenslets is one between samples.

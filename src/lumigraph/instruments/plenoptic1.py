@@ -88,7 +88,8 @@ class PlenopticCamera(LensletCamera):
         """Refocus factor α' = L/F' that brings an object at depth `dz` into focus."""
         if not self.built:
             return super().alpha(dz)
-        return self.separation / thin_lens.image_distance(self.main_lens.focal_length, self.defocused(dz))
+        image = thin_lens.image_distance(self.main_lens.focal_length, self.defocused(dz))
+        return self.pupil_distance / self.exit_pupil.to(image)
 
     def refocus_factor(self, dz: float, separation: float) -> float:
         """α' that focuses its views at a depth `dz` [m] from the focused plane, whatever their separation."""
@@ -98,9 +99,13 @@ class PlenopticCamera(LensletCamera):
         """Views of a textured plane at a refocus factor, by wave optics and a part of the lenslets."""
         count = tuple(min(n, _MOST_KNOWN) for n in self.lenslets.count)
         small = self.replace(lenslets={"count": count}, sensor={"shape": None})
-        focused = thin_lens.object_distance(self.main_lens.focal_length, self.separation)
-        dz = focused - self.object_distance
-        dz += plenoptic1.defocus(self.main_lens.focal_length, focused, alpha)
+        focal_length, behind = self.main_lens.focal_length, self.exit_pupil.behind
+        if behind:
+            image = behind + self.pupil_distance / alpha
+            dz = thin_lens.object_distance(focal_length, image) - self.object_distance
+        else:
+            focused = thin_lens.object_distance(focal_length, self.separation)
+            dz = focused - self.object_distance + plenoptic1.defocus(focal_length, focused, alpha)
         return plane_views(small, small.calibration, dz)
 
     def _own_parameters(self) -> tuple[Parameter, ...]:

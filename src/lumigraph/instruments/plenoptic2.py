@@ -142,7 +142,7 @@ class FocusedPlenopticCamera(LensletCamera):
     def patch_at(self, dz: float) -> float:
         """Piece of a micro-image that tiles the picture of an object at depth `dz` [px]; signed."""
         image = thin_lens.image_distance(self.main_lens.focal_length, self.defocused(dz))
-        width = closed_forms.patch(self.lenslets.pitch, self.magnification_at(dz), image, self.separation)
+        width = self._tile(self.magnification_at(dz), image)
         return width / self.pixels.pixel_pitch
 
     @property
@@ -152,9 +152,13 @@ class FocusedPlenopticCamera(LensletCamera):
         for focal_length in self.lenslets.focal_length:
             m = self.lenslet_distance / focal_length - 1
             image_distance = self.separation - self.lenslet_distance / m
-            width = closed_forms.patch(self.lenslets.pitch, m, image_distance, self.separation)
-            sizes.append(width / self.pixels.pixel_pitch)
+            sizes.append(self._tile(m, image_distance) / self.pixels.pixel_pitch)
         return tuple(sizes)
+
+    def _tile(self, magnification: float, image_distance: float) -> float:
+        """Patch of an image so far behind the main lens [m]."""
+        image = self.exit_pupil.to(image_distance)
+        return closed_forms.patch(self.lenslets.pitch, magnification, image, self.pupil_distance)
 
     def patches_on_raw(self) -> tuple[float, ...]:
         """Patch [px] at which each kind of lenslets is sharp, in the order of the calibration.

@@ -251,7 +251,7 @@ def _sure(found: Twin, *causes: str) -> bool:
 
 
 def _stopped(camera: LensletCamera, aperture: float) -> Train:
-    return camera.replace(main_lens={"diameter": camera.pupil_diameter * (1 + aperture)}).lens_train()
+    return camera.replace(main_lens={"diameter": camera.pupil_diameter * (1 + aperture)}).optics().lens
 
 
 def shown(white: np.ndarray) -> _Shown:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from lumigraph.core.lattice import Lattice
-from lumigraph.elements import Lean, LensletArray, Train
+from lumigraph.elements import Lean, LensletArray, ObjectSpace, Train
 from lumigraph.sensor import Sensor
 
 Model = Literal["paraxial", "exact", "auto"]
@@ -38,6 +38,9 @@ class CameraOptics:
         Rayleigh and Sommerfeld's; "auto", exact where the paraxial one misses the accuracy that is asked for.
     lean
         Of array and sensor; None where they are square to the axis.
+    objects
+        Of a lens of glass, by the thin lens in its exit pupil, whose values all others are then; None for a
+        thin lens.
     """
 
     wavelength: float
@@ -51,6 +54,7 @@ class CameraOptics:
     lenslet_distance: float | None = None
     model: Model = "paraxial"
     lean: Lean | None = None
+    objects: ObjectSpace | None = None
 
     def optics(self) -> "CameraOptics":
         """Itself: an operator takes an instrument, or the values that it reads of one."""

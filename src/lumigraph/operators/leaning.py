@@ -208,6 +208,8 @@ def _points(camera: CameraOptics) -> Points:
     assert camera.array is not None
     size = camera.array.extent or camera.sensor.grid.size
     pitch, scale = camera.array.lattice.pitch, -camera.object_distance / camera.separation
+    if camera.objects is not None:
+        scale /= camera.objects.pupil_magnification
     places = np.array([(0.13, -0.21), (0.35 * size[0] / pitch - 0.38, 0.35 * size[1] / pitch + 0.44)]) * pitch
     return Points(np.column_stack([scale * places, np.zeros(2)]), np.ones(2))
 

@@ -15,7 +15,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy import fft
-from scipy.interpolate import RectBivariateSpline
 
 from lumigraph.core import arrays, memory
 from lumigraph.core.grid import Grid
@@ -31,6 +30,9 @@ GRAZING = 0.97
 
 TAPER = 0.08
 """Of the index, over which light that is not followed fades out."""
+
+STEPS = 3
+"""Distances between slices whose factors are kept."""
 
 AROUND = 10.0
 """Wavelengths over NA around the cone of light that samples hold."""
@@ -64,8 +66,9 @@ class Multislice:
 
     @cached_property
     def bent(self) -> float:
-        """How much slices change n sin θ, by slopes or as gratings."""
-        return self.medium.steepest + self.objective.wavelength * self.medium.finest
+        """How much slices change n sin θ."""
+        n, aperture = self.objective.medium, self.objective.aperture
+        return self.medium.bent(self.objective.wavelength, aperture / math.sqrt(n * n - aperture**2))
 
     @cached_property
     def edge(self) -> tuple[float, float]:
@@ -78,7 +81,8 @@ class Multislice:
     def grid(self) -> Grid:
         """Samples around the point, that hold its light up to the last slice and the finest of its waves."""
         wave, n, widest = self.objective.wavelength, self.objective.medium, self.edge[1]
-        finest = max(n, widest + self.bent) * 1.02
+        # What a slice sends beyond propagating waves may come back as others that are cut off
+        finest = max(n, widest + self.medium.bent_once(wave) / 2) * 1.02
         away = self.dz - self.medium.depths[-1]
         half = away * widest / math.sqrt(n * n - widest**2) + AROUND * wave / self.objective.aperture
         count = int(fft.next_fast_len(math.ceil(2.2 * half * 2 * finest / wave)) or 0)
@@ -95,42 +99,63 @@ class Multislice:
 
     def factor(self, y: float, x: float, qy: np.ndarray, qx: np.ndarray) -> np.ndarray:
         """What slices multiply the pupil's amplitudes at (qy, qx) by, of a point at (y, x) [m]."""
-        with_slices, plain = self.light(y, x)
-        return self._waves(with_slices, qy, qx) / self._waves(plain, qy, qx)
+        known = self._plain_waves
+        if known.get("qx") is not qx:
+            known.update(qx=qx, waves=self._waves(np.fft.fftshift(arrays.ifft2(self._plain)), qy, qx))
+        return self._waves(self._seen(y, x), qy, qx) / known["waves"]
 
     def light(self, y: float, x: float) -> tuple[np.ndarray, np.ndarray]:
         """Amplitudes (y, x) behind the last slice, and there without slices, of a point at (y, x) [m]."""
-        grid, above = self.grid, self.dz
-        k, along = 2 * np.pi / self.objective.wavelength, self._along()
-        spectrum = self._source(along)
-        plain, field = spectrum, spectrum
-        seen = np.zeros(grid.shape, complex)
-        for depth, path in zip(self.medium.depths, self.medium.paths, strict=True):
-            step = np.where(along > 0, np.exp(1j * k * along * (above - depth)), 0)
-            plain, seen = plain * step, arrays.ifft2(field * step)
-            seen = seen * np.exp(1j * k * self._paths(path, y, x))
-            field, above = arrays.fft2(seen), depth
-        return np.fft.fftshift(seen), np.fft.fftshift(arrays.ifft2(plain))
+        return self._seen(y, x), np.fft.fftshift(arrays.ifft2(self._plain))
 
+    def _seen(self, y: float, x: float) -> np.ndarray:
+        """Amplitudes (y, x) behind the last slice."""
+        grid, above, k = self.grid, self.dz, 2 * np.pi / self.objective.wavelength
+        field, seen = self._source, np.zeros(grid.shape, complex)
+        for number, depth in enumerate(self.medium.depths):
+            seen = arrays.ifft2(field * self._step(above - depth), overwrite=True)
+            path = self.medium.path(number, grid.y + y, grid.x + x)
+            seen *= np.exp(1j * k * np.fft.ifftshift(path))
+            field, above = arrays.fft2(seen), depth
+        return np.fft.fftshift(seen)
+
+    def _step(self, away: float) -> np.ndarray:
+        """What a distance [m] does to plane waves; slices are often as far apart, so the last is kept."""
+        key = round(away * 1e12)
+        if key not in self._steps:
+            if len(self._steps) >= STEPS:
+                self._steps.pop(next(iter(self._steps)))
+            turn = 2j * np.pi / self.objective.wavelength * away
+            self._steps[key] = np.where(self._along > 0, np.exp(turn * self._along), 0)
+        return self._steps[key]
+
+    @cached_property
+    def _plain(self) -> np.ndarray:
+        """Spectrum behind the last slice, without slices."""
+        return self._source * self._step(self.dz - self.medium.depths[-1])
+
+    @cached_property
+    def _steps(self) -> dict[int, np.ndarray]:
+        return {}
+
+    @cached_property
+    def _plain_waves(self) -> dict[str, np.ndarray]:
+        return {}
+
+    @cached_property
     def _along(self) -> np.ndarray:
         """N cos θ of the samples' plane waves, 0 where they are evanescent."""
         grid, wave, n = self.grid, self.objective.wavelength, self.objective.medium
         q = wave * fft.fftfreq(grid.shape[0], grid.pitch[0])
         return np.sqrt(np.maximum(n * n - q[:, None] ** 2 - q**2, 0))
 
-    def _source(self, along: np.ndarray) -> np.ndarray:
+    @cached_property
+    def _source(self) -> np.ndarray:
         """Spectrum of an even wave, which fades out where it is not followed."""
-        (full, none), n = self.edge, self.objective.medium
+        (full, none), n, along = self.edge, self.objective.medium, self._along
         q = np.sqrt(n * n - along**2)
         fade = np.cos(np.pi / 2 * np.clip((q - full) / (none - full), 0, 1)) ** 2
         return np.where(along > 0, fade * n / np.where(along > 0, along, 1), 0).astype(complex)
-
-    def _paths(self, path: np.ndarray, y: float, x: float) -> np.ndarray:
-        """Of a slice (y, x) [m] on the samples around a place, in the order of an FFT."""
-        own, here = self.medium.grid, self.grid
-        degree = min(3, *(n - 1 for n in own.shape))
-        spline = RectBivariateSpline(own.y, own.x, path, kx=degree, ky=degree)
-        return np.fft.ifftshift(spline(here.y + y, here.x + x))
 
     def _waves(self, field: np.ndarray, qy: np.ndarray, qx: np.ndarray) -> np.ndarray:
         """Plane waves (rows, nodes) of a field (y, x); those of a row have one qy."""

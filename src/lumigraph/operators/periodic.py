@@ -47,6 +47,7 @@ from lumigraph.operators.over_field import over_field
 from lumigraph.operators.paraxial import field_matters, resolved
 from lumigraph.operators.places import Turn
 from lumigraph.operators.points import seen
+from lumigraph.operators.seen import Fields, seen_plane
 from lumigraph.operators.streamed import Streamed
 from lumigraph.operators.tiles import as_plane, by_cell, readout, spread
 
@@ -337,13 +338,17 @@ class _Making:
         return replace(self, progress=part_of(self.progress, number, count))
 
 
-def _varying(camera: CameraOptics, grid: Grid, dz: float, making: _Making) -> Linear:
-    """Of a plane before a lens that changes over the field."""
+def _varying(
+    camera: CameraOptics, grid: Grid, dz: float, making: _Making, fields: Fields | None = None
+) -> Linear:
+    """Of a plane before a lens that changes over the field; `fields`, its own where the grid has more."""
+    if camera.objects is not None:
+        return seen_plane(camera, grid, dz, lambda one, *plane: _varying(one, *plane[:2], making, plane[2]))
     distance, accuracy = camera.object_distance + dz, making.accuracy
     optics = Optics.of(camera, distance, accuracy)
     turns = mirrors.turns(optics.bricks)
     found = varying.lenses(
-        camera, (grid.y / distance, grid.x / distance), seen(camera, distance, accuracy), accuracy,
+        camera, fields or (grid.y / distance, grid.x / distance), seen(camera, distance, accuracy), accuracy,
         mirrors.of_fields(turns, optics.rotation),
     )  # fmt: skip
     count, number = len(found.sources), iter(range(len(found.sources)))

@@ -17,6 +17,7 @@ from lumigraph.operators.fineness import COARSEST, FINEST
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.point_light import PointLight, Sampled, point_light
 from lumigraph.operators.relay import Relay, relay
+from lumigraph.operators.seen import seen_points
 from lumigraph.operators.tiles import readout
 from lumigraph.scene import Points
 
@@ -47,7 +48,8 @@ def points_image(
     camera: HasOptics, points: Points, accuracy: float, known: dict[tuple[float, float], Relay] | None = None
 ) -> np.ndarray:
     """Raw image (ny, nx), to a relative rms error of `accuracy`; relays that are `known` are used again."""
-    camera, known = camera.optics(), {} if known is None else known
+    camera, points = seen_points(camera.optics(), points)
+    known = {} if known is None else known
     total = np.zeros(camera.sensor.shape, np.float32)
     for dz in np.unique(points.positions[:, 2]):
         mine = points.positions[:, 2] == dz
@@ -64,7 +66,8 @@ def points_image(
 
 def image_and_error(camera: HasOptics, points: Points, accuracy: float) -> tuple[np.ndarray, float]:
     """`points_image`, and its relative rms error: of the brightest point, beside a finer image of it."""
-    camera, known = camera.optics(), {}
+    camera, points = seen_points(camera.optics(), points)
+    known: dict[tuple[float, float], Relay] = {}
     image = points_image(camera, points, accuracy, known)
     if not np.any(points.intensities):
         return image, 0.0

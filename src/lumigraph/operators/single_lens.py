@@ -38,7 +38,9 @@ from lumigraph.operators import band, varying
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.band import Span
 from lumigraph.operators.camera import CameraOptics, HasOptics
+from lumigraph.operators.regrid import Regridded
 from lumigraph.operators.resampling import Resampling, averaged, represented
+from lumigraph.operators.seen import Fields, seen_plane, seen_points
 from lumigraph.operators.varying import FieldOperator
 from lumigraph.propagation import propagate
 from lumigraph.propagation.window import smooth_size
@@ -135,7 +137,7 @@ class SingleLensOperator(Chain):
 
 def single_lens_operator(
     camera: HasOptics, grid: Grid, dz: float = 0.0, accuracy: float = 1e-3
-) -> SingleLensOperator | FieldOperator:
+) -> SingleLensOperator | FieldOperator | Regridded:
     """Operator from a plane at depth `dz`, sampled on `grid`, to the raw image; transfers are kept for reuse.
 
     Parameters
@@ -159,11 +161,11 @@ def single_lens_operator(
     plain = camera.optics()
     if plain.array is not None:
         raise SamplingError("the camera has lenslets: use periodic_operator.")
+    if plain.objects is not None:
+        return seen_plane(plain, grid, dz, lambda one, *plane: _varying(one, *plane, accuracy))
     if varying.plate_of(plain) is not None:
         distance = plain.object_distance + dz
-        fields = grid.y / distance, grid.x / distance
-        found = varying.lenses(plain, fields, _seen(plain, distance), accuracy)
-        return varying.operator(plain, grid, distance, found, lambda one: single_lens_operator(one, grid, dz))
+        return _varying(plain, grid, dz, (grid.y / distance, grid.x / distance), accuracy)
     scale, pitch = -plain.separation / (plain.object_distance + dz), image_pitch(plain)
     here = _covering((scale * grid.y, scale * grid.x), pitch)
     points = [span.pitch / scale for span in here]  # descending in the object
@@ -174,6 +176,19 @@ def single_lens_operator(
     )
     maps = represented(grid, samples), *_imaging(plain, here, dz)
     return SingleLensOperator(maps, object_grid=grid)
+
+
+def _varying(camera: CameraOptics, grid: Grid, dz: float, fields: Fields, accuracy: float) -> FieldOperator:
+    """Of a plane before a lens that changes over the field."""
+    distance = camera.object_distance + dz
+    found = varying.lenses(camera, fields, _seen(camera, distance), accuracy)
+
+    def of(one: CameraOptics) -> SingleLensOperator:
+        result = single_lens_operator(one, grid, dz)
+        assert isinstance(result, SingleLensOperator)  # of one lens
+        return result
+
+    return varying.operator(camera, grid, distance, found, of)
 
 
 def _seen(camera: CameraOptics, distance: float) -> varying.Image:
@@ -190,7 +205,7 @@ def points_image(instrument: HasOptics, points: Points) -> tuple[np.ndarray, flo
 
     One convolution for each depth or, where the lens changes over the field, for each point.
     """
-    camera = instrument.optics()
+    camera, points = seen_points(instrument.optics(), points)
     if varying.plate_of(camera) is None:
         return _points_image(camera, points.positions, points.intensities)
     total, off = np.zeros(camera.sensor.shape, np.float32), 0.0

@@ -62,7 +62,7 @@ def at(camera: CameraOptics, y: float, x: float) -> CameraOptics:
     for part in camera.lens.elements:
         if isinstance(part, FieldPlate):
             plate = part.at(y, x, camera.wavelength)
-            if not plate.coefficients and plate.axes == (1.0, 1.0):
+            if not plate.coefficients and plate.axes == (1.0, 1.0) and plate.center == (0.0, 0.0):
                 return replace(camera, lens=_ideal(camera, plate.diameter))
             part = plate
         elements.append(part)

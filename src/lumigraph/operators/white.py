@@ -6,7 +6,8 @@ the white image is the image H of one wave along the axis, averaged over the ima
 
 .. math:: I(s) = \frac{4}{\pi D^2} \int_{|u| < D/2} |H(s + b u / L)|^2 \, d^2u,
 
-which multiplies its frequencies by 2 J₁(x)/x. What lenslets send farther than they are followed falls on all
+which multiplies its frequencies by 2 J₁(x)/x. A stop that each field sees as another ellipse (`stops`)
+averages it differently over the field. What lenslets send farther than they are followed falls on all
 cells around; its faint fringes are left out.
 """
 
@@ -17,10 +18,10 @@ from itertools import product
 
 import numpy as np
 from scipy import fft
-from scipy.special import j1
 
 from lumigraph.core import arrays
 from lumigraph.operators import cells as _cells
+from lumigraph.operators import stops
 from lumigraph.operators.camera import HasOptics
 from lumigraph.operators.cells import check_alike
 from lumigraph.operators.coherent import disc
@@ -78,7 +79,7 @@ def image_and_error(camera: HasOptics, accuracy: float) -> tuple[np.ndarray, flo
     pitches = _pitches(optics)
     raw, fringes = _followed(optics, pitches)
     beyond = max(0.0, 1 - pitches / _across(optics))
-    off = math.hypot(fringes, max(SAMPLED * accuracy, LEAST), leans(optics)[1])
+    off = math.hypot(fringes, max(SAMPLED * accuracy, LEAST), leans(optics)[1], stops.of(optics).left)
     if beyond:
         nearer, _ = _followed(optics, NEARER * pitches)
         missed = float(np.linalg.norm(raw - nearer)) / (float(np.linalg.norm(raw)) or 1.0)
@@ -96,10 +97,8 @@ def _of(camera: HasOptics, accuracy: float) -> Optics:
 def _followed(optics: Optics, pitches: float) -> tuple[np.ndarray, float]:
     """Raw image of light that is followed so far, and the relative rms of the fringes that it lacks."""
     cells, wave = optics.cells, WaveImage.of(optics, pitches)
-    short = _through_stop(wave, optics)
-    image = short[wave.sides[0].like][:, :, wave.sides[1].like]
-    far = _far(wave)[:, None, :, None]
-    image += wave.aside() * wave.through * far
+    far, stop = _far(wave)[:, None, :, None], stops.of(optics)
+    image = _over_cells(wave, optics, stop) + wave.aside() * wave.through * stop.area * far
     image = image.reshape([n * k for n, k in zip(cells.image, cells.samples, strict=True)])
     raw = readout(optics).forward(image.astype(np.float32) / optics.image_scale**2)
     return raw, FRINGES * _aside(optics, pitches) * float(far.max())
@@ -176,6 +175,18 @@ def _far(wave: WaveImage) -> np.ndarray:
     return fftconvolve(there, law, mode="same")
 
 
+def _over_cells(wave: WaveImage, optics: Optics, stop: stops.Stops) -> np.ndarray:
+    """Intensity (cells, samples, cells, samples), with the stop that each cell sees."""
+    rows, columns = (side.like for side in wave.sides)
+    if not stop.ellipses:
+        return _through_stop(wave, optics)[rows][:, :, columns]
+    even, total = np.abs(wave.amplitude()) ** 2, 0.0
+    for ellipse, weight in zip(stop.ellipses, stop.weights, strict=True):
+        short = _averaged(even, optics, ellipse.transform)
+        total = total + weight[:, None, :, None].astype(np.float32) * short[rows][:, :, columns]
+    return np.asarray(total)
+
+
 def _through_stop(wave: WaveImage, optics: Optics) -> np.ndarray:
     """Mean intensity (cells, samples, cells, samples) of waves from all over the stop.
 
@@ -183,13 +194,14 @@ def _through_stop(wave: WaveImage, optics: Optics) -> np.ndarray:
     places along each axis of the stop bring is interpolated between them (Lagrange).
     """
     if _cells.accepted(optics.camera) is None:
-        return _averaged(np.abs(wave.amplitude()) ** 2, optics)
+        return _averaged(np.abs(wave.amplitude()) ** 2, optics, stops.disc_of(_stop_radius(optics)))
     total, edge = np.zeros(()), _stop_radius(optics) / _cells.lenslet_distance(optics.camera)
     places = leans(optics)[0]
     for down, across in product(range(len(places)), repeat=2):
         tilted = replace(wave, tilt=(edge * places[down], edge * places[across]))
         image = np.abs(tilted.amplitude()) ** 2
-        total = total + _averaged(image, optics, (_lagrange(places, down), _lagrange(places, across)))
+        lean = _lagrange(places, down), _lagrange(places, across)
+        total = total + _averaged(image, optics, _Leaning(_stop_radius(optics), lean))
     return total
 
 
@@ -219,35 +231,36 @@ Weight = Callable[[np.ndarray], np.ndarray]
 """By the place in the stop along an axis, of its half."""
 
 
-def _averaged(image: np.ndarray, optics: Optics, lean: tuple[Weight, Weight] | None = None) -> np.ndarray:
-    """Mean of an image (cells, samples, cells, samples) over the stop's image, on the samples of `optics`.
-
-    With weights along y and x where they are given.
-    """
+def _averaged(image: np.ndarray, optics: Optics, stop: stops.Transform) -> np.ndarray:
+    """Mean of an image (cells, samples, cells, samples) over the stop's image, on the samples of `optics`."""
     y, x = (_Frequencies(optics, k, *image.shape[2 * k : 2 * k + 2]) for k in (0, 1))
     spectrum = arrays.rfft2(image.reshape(y.given, x.given), (y.fine, x.fine))
     spectrum = spectrum[y.number][:, : x.coarse // 2 + 1]
     across = slice(x.coarse // 2 + 1)
-    turns = np.pi * np.hypot((y.number / y.length)[:, None], (x.number / x.length)[across])
-    turns *= 2 * _stop_radius(optics)
-    if lean is None:
-        spectrum *= np.where(turns == 0, 1, 2 * j1(turns) / np.where(turns == 0, 1, turns))
-    else:
-        spectrum *= _weighed(y.number / y.length, (x.number / x.length)[across], _stop_radius(optics), lean)
+    spectrum *= stop(y.number / y.length, (x.number / x.length)[across])
     spectrum *= np.outer(y.moved(), x.moved()[across])
     found = arrays.irfft2(spectrum, (y.coarse, x.coarse))
     tiles = found.reshape(-1, y.samples, x.coarse // x.samples, x.samples)
     return tiles[: y.cells, :, : x.cells]
 
 
-def _weighed(y: np.ndarray, x: np.ndarray, radius: float, lean: tuple[Weight, Weight]) -> np.ndarray:
-    """Transform at frequencies (y, x) [1/m] of weights along both axes, over a disc."""
-    turns = 2 * math.pi * radius * max(np.abs(y).max(), np.abs(x).max())
-    angles, place, shares = disc(48 + math.ceil(1.2 * turns))
-    down, across = np.sin(angles), place
-    weights = shares * lean[0](down)[:, None] * lean[1](across)
-    left, right = (np.exp(2j * np.pi * radius * np.outer(f, at)) for f, at in ((y, down), (x, across)))
-    return left @ weights @ right.T
+@dataclass(frozen=True, slots=True)
+class _Leaning:
+    """Transform of weights along both axes, over a disc of a radius [m]."""
+
+    radius: float
+    lean: tuple[Weight, Weight]
+
+    def __call__(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """At frequencies (y, x) [1/m]."""
+        turns = 2 * math.pi * self.radius * max(np.abs(y).max(), np.abs(x).max())
+        angles, place, shares = disc(48 + math.ceil(1.2 * turns))
+        down, across = np.sin(angles), place
+        weights = shares * self.lean[0](down)[:, None] * self.lean[1](across)
+        left, right = (
+            np.exp(2j * np.pi * self.radius * np.outer(f, at)) for f, at in ((y, down), (x, across))
+        )
+        return left @ weights @ right.T
 
 
 def _lagrange(places: np.ndarray, number: int) -> Weight:

@@ -1,9 +1,13 @@
 """What light of a sample goes through before it reaches the objective: slices that delay it."""
 
-from dataclasses import dataclass
-from typing import Any
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
+from scipy.interpolate import RectBivariateSpline
+from scipy.ndimage import shift, zoom
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import to_numpy
@@ -12,8 +16,13 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.volume import Volume
 from lumigraph.errors import GeometryError
 
-HELD = 0.9999
-"""Of the variance of slices' paths, what is taken for their band."""
+STRAY = 1e-4
+"""Of the light, what may be bent farther than it is followed."""
+
+MOST_SAMPLES = 4096
+"""Along a side, of a path that is looked at to tell how far it bends light."""
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +38,9 @@ class Medium:
         Where the samples of every slice stand [m]; beside it, the border's paths go on.
     depths
         Of the slices from the focused plane (z,) [m], positive farther from the objective; in any order.
+    slabs
+        Whether slices are slabs of an index that changes from one to the next, as `of_index` has them: then
+        simulations tell whether they stand near enough to each other.
 
     Raises
     ------
@@ -46,6 +58,8 @@ class Medium:
     paths: np.ndarray
     grid: Grid
     depths: tuple[float, ...]
+    slabs: bool = False
+    _kept: dict[str, Any] = field(default_factory=dict, repr=False)
 
     __repr__ = brief
 
@@ -84,35 +98,110 @@ class Medium:
                 f"the volume has shape {data.shape} but indices need (z, y, x) of two planes at least: their "
                 "distance is the thickness. For one slice give Medium its paths."
             )
-        return cls(data * np.abs(np.gradient(depths))[:, None, None], difference.grid, difference.depths)
+        paths = data * np.abs(np.gradient(depths))[:, None, None]
+        return cls(paths, difference.grid, difference.depths, slabs=True)
 
     def before(self, dz: float) -> "Medium | None":
         """The slices that light of a point at a depth meets on its way to the objective; None without."""
         met = [k for k, depth in enumerate(self.depths) if depth < dz]
-        return Medium(self.paths[met], self.grid, tuple(self.depths[k] for k in met)) if met else None
+        return self._remembered(f"before {len(met)}", lambda: self._of(met)) if met else None
+
+    def _of(self, met: list[int]) -> "Medium":
+        return replace(self, paths=self.paths[met], depths=tuple(self.depths[k] for k in met), _kept={})
 
     def coarser(self) -> "Medium":
         """With neighbouring slices together, each pair halfway between: what tells how fine the steps are."""
-        pairs = [slice(k, k + 2) for k in range(0, len(self.depths), 2)]
-        paths = np.stack([self.paths[pair].sum(0) for pair in pairs])
-        return Medium(paths, self.grid, tuple(float(np.mean(self.depths[pair])) for pair in pairs))
 
-    @property
-    def steepest(self) -> float:
-        """Bound of what the slopes of all slices together change of n sin θ."""
-        slopes = np.gradient(self.paths, *self.grid.pitch, axis=(1, 2))
-        return float(np.hypot(*slopes).max((1, 2)).sum())
+        def paired() -> Medium:
+            pairs = [slice(k, k + 2) for k in range(0, len(self.depths), 2)]
+            paths = np.stack([self.paths[pair].sum(0) for pair in pairs])
+            depths = tuple(float(np.mean(self.depths[pair])) for pair in pairs)
+            return replace(self, paths=paths, depths=depths, _kept={})
 
-    @property
-    def finest(self) -> float:
-        """Spatial frequency up to which slices hold `HELD` of their paths' variance [1/m]: as gratings."""
-        ny, nx = self.grid.shape
-        window = np.hanning(ny + 2)[1:-1, None] * np.hanning(nx + 2)[1:-1]
-        mean = (self.paths * window).sum((1, 2), keepdims=True) / window.sum()
-        power = np.square(np.abs(np.fft.fft2((self.paths - mean) * window))).sum(0)
+        return self._remembered("coarser", paired)
+
+    def finer(self) -> "Medium":
+        """With twice as many slices, between which paths go over evenly: what tells how near planes stand.
+
+        Of slices that are given as such, and not of an index, themselves.
+        """
+        if not self.slabs or len(self.depths) < 2:
+            return self
+
+        def halved() -> Medium:
+            depths, paths = np.array(self.depths), self.paths
+            step = np.gradient(depths) / 4
+            depths = np.stack([depths - step, depths + step], 1).ravel()
+            before, after = np.roll(paths, 1, 0), np.roll(paths, -1, 0)
+            before[0], after[-1] = paths[0], paths[-1]
+            parts = np.stack([(3 * paths + before) / 8, (3 * paths + after) / 8], 1)
+            return replace(self, paths=parts.reshape(-1, *paths.shape[1:]), depths=tuple(depths), _kept={})
+
+        return self._remembered("finer", halved)
+
+    def path(self, number: int, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Of a slice at places (y,), (x,) [m]: splines through its samples, which are made once (y, x)."""
+
+        def spline() -> RectBivariateSpline:
+            degree = min(3, *(n - 1 for n in self.grid.shape))
+            return RectBivariateSpline(self.grid.y, self.grid.x, self.paths[number], kx=degree, ky=degree)
+
+        return self._remembered(f"spline {number}", spline)(y, x)
+
+    def bent(self, wavelength: float, slope: float) -> float:
+        """By how much all slices change n sin θ of light that leans by up to a slope.
+
+        All but `STRAY` of the light: it goes along straight lines, upright or leaning to four sides, and
+        paths along these add up.
+        """
+
+        def found() -> float:
+            leans = ((0.0, 0.0), (slope, 0.0), (-slope, 0.0), (0.0, slope), (0.0, -slope))
+            return max(self._spread(self._along(lean), wavelength) for lean in leans)
+
+        return self._remembered(f"bent {wavelength} {slope}", found)
+
+    def bent_once(self, wavelength: float) -> float:
+        """By how much a single slice changes n sin θ at most, of all but `STRAY` of the light."""
+
+        def found() -> float:
+            return max(self._spread(path, wavelength) for path in self.paths)
+
+        return self._remembered(f"bent once {wavelength}", found)
+
+    def _along(self, lean: tuple[float, float]) -> np.ndarray:
+        """Paths (y, x) that add up along lines of a slope (y, x) through the middle of the slices."""
+        away, total = np.array(self.depths) - np.mean(self.depths), np.zeros(self.grid.shape)
+        for path, z in zip(self.paths, away, strict=True):
+            total += shift(path, [z * s / p for s, p in zip(lean, self.grid.pitch, strict=True)], order=1,
+                           mode="nearest")  # fmt: skip
+        return total
+
+    def _spread(self, path: np.ndarray, wavelength: float) -> float:
+        """N sin θ that holds all but `STRAY` of a plane wave behind a path (y, x) [m]."""
+        slopes = [np.abs(np.diff(path, axis=k)).max(initial=0.0) for k in (0, 1)]
+        finer = min(max(1, math.ceil(4 * max(slopes) / wavelength)), MOST_SAMPLES // max(path.shape))
+        path = zoom(path, max(1, finer), order=3, mode="nearest", grid_mode=True)
+        windows = [_window(n) for n in path.shape]
+        wave = np.exp(2j * np.pi / wavelength * path) * windows[0][:, None] * windows[1]
+        power = np.square(np.abs(np.fft.fft2(wave)))
         f = np.hypot(
-            np.fft.fftfreq(ny, self.grid.pitch[0])[:, None], np.fft.fftfreq(nx, self.grid.pitch[1])
+            *np.meshgrid(
+                *(np.fft.fftfreq(n, p / finer) for n, p in zip(path.shape, self.grid.pitch, strict=True)),
+                indexing="ij",
+            )
         ).ravel()
         order = np.argsort(f)
         held = np.cumsum(power.ravel()[order])
-        return float(f[order][min(np.searchsorted(held, HELD * held[-1]), f.size - 1)]) if held[-1] else 0.0
+        return wavelength * float(f[order][min(np.searchsorted(held, (1 - STRAY) * held[-1]), f.size - 1)])
+
+    def _remembered(self, name: str, found: Callable[[], T]) -> T:
+        if name not in self._kept:
+            self._kept[name] = found()
+        return self._kept[name]
+
+
+def _window(count: int) -> np.ndarray:
+    """Even but for its ends, which rise and fall over a sixth of it."""
+    at = (np.arange(count) + 1) / (count + 1)
+    return np.sin(np.pi / 2 * np.clip(6 * np.minimum(at, 1 - at), 0, 1)) ** 2

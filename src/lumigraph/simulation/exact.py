@@ -8,11 +8,19 @@ import numpy as np
 from lumigraph.core import arrays
 from lumigraph.core.progress import Progress
 from lumigraph.core.progress import part as share
-from lumigraph.operators import CameraOptics, points, single_lens, single_lens_operator, white
+from lumigraph.operators import (
+    CameraOptics,
+    SingleLensOperator,
+    points,
+    single_lens,
+    single_lens_operator,
+    white,
+)
 from lumigraph.operators.coherent import coherent_image
 from lumigraph.operators.leaning import flat
 from lumigraph.operators.paraxial import left_by_field, resolved
 from lumigraph.operators.periodic import periodic_operator
+from lumigraph.operators.regrid import Regridded
 from lumigraph.operators.screens import Screen
 from lumigraph.operators.varying import FieldOperator
 from lumigraph.scene import Diffuser, Points, Slice
@@ -95,8 +103,9 @@ def _image_of(
     image, reached = operator.forward(intensity), error.of_operator(intensity, accuracy)
     if plain.model == "exact":
         return image, reached.and_also(left_by_field(plain, accuracy), ", alike over the field")
-    if isinstance(operator, FieldOperator):
-        reached = reached.and_also(operator.left, f", {len(operator.maps)} lenses over the field")
+    behind = operator.of if isinstance(operator, Regridded) else operator
+    if isinstance(behind, FieldOperator):
+        reached = reached.and_also(behind.left, f", {len(behind.maps)} lenses over the field")
     return image, reached.through(plain)
 
 
@@ -122,6 +131,6 @@ def _without_lenslets(camera: Camera, part: Part, accuracy: float) -> tuple[np.n
         return np.full(camera.sensor.shape, part.intensity), error.of_convolution(0.0)
     part = part.trimmed()
     operator = single_lens_operator(camera, part.grid, part.dz, accuracy)
-    several = ", lenses over the field" if isinstance(operator, FieldOperator) else ""
+    several = "" if isinstance(operator, SingleLensOperator) else ", lenses over the field"
     image = operator.forward(arrays.to_numpy(part.intensity).astype(np.float32))
     return image, error.of_convolution(operator.error, several)

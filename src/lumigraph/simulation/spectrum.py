@@ -17,7 +17,8 @@ from lumigraph.sensor import mosaic
 class Spectrum:
     """Wavelengths, and how much of each the sensor's channels see.
 
-    Lenses are thin and free of dispersion: what differs between the wavelengths is diffraction.
+    Thin lenses are free of dispersion: what differs between the wavelengths is diffraction. A main lens of a
+    prescription has the colours of its glass, focused at the camera's own wavelength.
 
     Parameters
     ----------
@@ -28,6 +29,8 @@ class Spectrum:
         scaled to a sum of 1, so that an even white scene has mean 1 in all of them.
     bayer
         Pattern of a colour filter, such as "RGGB": the raw image is (ny, nx). None keeps (ny, nx, 3).
+    error
+        What few wavelengths leave of a line's degree of coherence; raw images count it in their error.
 
     Raises
     ------
@@ -43,6 +46,7 @@ class Spectrum:
     wavelengths: tuple[float, ...]
     weights: tuple[tuple[float, ...], ...]
     bayer: str | None = None
+    error: float = 0.0
 
     def __post_init__(self) -> None:
         wavelengths = tuple(checks.positive("a wavelength", w) for w in self.wavelengths)
@@ -74,8 +78,8 @@ class Spectrum:
         Its degree of coherence over that way is right to an accuracy.
         """
         checks.instance("line", line, SpectralLine)
-        wavelengths, weights, _ = line.nodes(path_difference, accuracy)
-        return cls(tuple(wavelengths.tolist()), tuple((w,) for w in weights.tolist()))
+        wavelengths, weights, error = line.nodes(path_difference, accuracy)
+        return cls(tuple(wavelengths.tolist()), tuple((w,) for w in weights.tolist()), error=error)
 
     @classmethod
     def rgb(
@@ -115,8 +119,8 @@ class Spectrum:
 class Tunable(Protocol):
     """An instrument whose wavelength can be replaced."""
 
-    def replace(self, *, wavelength: float) -> Self:
-        """The same at another wavelength [m]."""
+    def at_wavelength(self, wavelength: float) -> Self:
+        """The same in light of another wavelength [m]."""
         ...
 
 
@@ -140,9 +144,14 @@ def by_wavelength(
             "Leave spectrum out, or use a camera such as PlenopticCamera."
         )
     raws = [
-        image(camera.replace(wavelength=wavelength), spectrum.lit(scene, number), number)
+        image(camera.at_wavelength(wavelength), spectrum.lit(scene, number), number)
         for number, wavelength in enumerate(spectrum.wavelengths)
     ]
     known = {**raws[0].metadata, "wavelength": spectrum.wavelengths}
+    if all("error" in raw.metadata for raw in raws):
+        worst = max((raw.metadata["error"] for raw in raws), key=lambda one: one["rms"])
+        known["error"] = worst | {"rms": worst["rms"] + spectrum.error}
+        if spectrum.error:
+            known["error"]["source"] += f"; {len(raws)} wavelengths of a line to {spectrum.error:.2g}"
     data = spectrum.seen([raw.data for raw in raws])
     return replace(raws[0], data=data, bayer=spectrum.bayer, metadata=known)

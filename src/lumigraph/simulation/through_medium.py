@@ -11,7 +11,7 @@ from lumigraph.core import arrays, checks
 from lumigraph.core.grid import Grid
 from lumigraph.core.progress import Progress
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
-from lumigraph.operators.microscope_medium import image_through
+from lumigraph.operators.microscope_medium import Seen
 from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.scene import Diffuser, Medium, Points, Scene, Slice
 from lumigraph.sensor import Sensor
@@ -19,6 +19,9 @@ from lumigraph.simulation import error
 
 MOST = 5000
 """Points that are followed: each takes some seconds."""
+
+SAID = 60.0
+"""Seconds that are said before they are spent."""
 
 PUPIL, FINEST = 0.7, 1e-5
 """Part of the accuracy that images without steps are made for: the distance of slices may take the rest."""
@@ -95,13 +98,15 @@ def medium_image(
     checks.instance("medium", medium, Medium)
     farthest = max(abs(float(dz)) for dz in (*points.positions[:, 2], *medium.depths))
     own = max(PUPIL * accuracy, FINEST)
-    images = scope.pupil_images((), farthest=farthest, accuracy=own)
-    whole, off, lost, steps = np.zeros(scope.sensor.shape), 0.0, 0.0, 0.0
+    seen = Seen(scope.pupil_images((), farthest=farthest, accuracy=own), medium)
+    _say_how_long(seen, points)
+    between = _between_planes(seen, points, accuracy)
+    whole, off, lost = np.zeros(scope.sensor.shape), 0.0, 0.0
     for number, (light, place) in enumerate(zip(points.intensities, points.positions, strict=True)):
-        seen = image_through(images, medium, place)
-        whole += float(light) * seen.image
-        off += (float(light) * error.norm(seen.image)) ** 2 * (own**2 + seen.steps**2)
-        lost, steps = max(lost, seen.lost), max(steps, seen.steps)
+        one = seen.image(place)
+        whole += float(light) * one.image
+        off += (float(light) * error.norm(one.image)) ** 2 * (own**2 + one.steps**2 + between**2)
+        lost = max(lost, one.lost)
         if progress is not None:
             progress((number + 1) / len(points.intensities))
     if lost > 10 * accuracy:
@@ -112,3 +117,34 @@ def medium_image(
             stacklevel=4,
         )
     return whole, math.sqrt(off) / (error.norm(whole) or 1.0)
+
+
+def _say_how_long(seen: Seen, points: Points) -> None:
+    """Warn, before anything starts, of points that take minutes."""
+    count, seconds = len(points.intensities), seen.seconds(points.positions[:, 2])
+    if seconds > SAID:
+        told = f"{seconds / 60:.2g} min" if seconds < 7200 else f"{seconds / 3600:.2g} h"
+        warnings.warn(
+            f"{count} point{'s' * (count > 1)} through the medium: some {told} of this processor, at least. "
+            "Use fewer points or slices, slices nearer to the points, or a smaller numerical aperture where "
+            "that is too long.",
+            SamplingWarning,
+            stacklevel=5,
+        )
+
+
+def _between_planes(seen: Seen, points: Points, accuracy: float) -> float:
+    """How far off a volume's planes are, of the brightest of the points that most of them stand before."""
+    deepest = points.positions[:, 2] >= points.positions[:, 2].max()
+    place = points.positions[int(np.argmax(np.where(deepest, points.intensities, -np.inf)))]
+    between = seen.between_planes(place)
+    if between > accuracy:
+        depths = seen.medium.depths
+        step = abs(depths[0] - depths[-1]) / (len(depths) - 1)
+        warnings.warn(
+            f"the volume's planes stand {step * 1e6:.3g} µm apart: with twice as many, interpolated, a "
+            f"point's image changes by {between:.2g} rms; {accuracy:g} was asked. Give nearer planes.",
+            SamplingWarning,
+            stacklevel=5,
+        )
+    return between

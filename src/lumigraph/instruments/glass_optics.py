@@ -1,0 +1,134 @@
+"""A camera's optics behind glass: the thin lens that stands in its exit pupil, and what it sees."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lumigraph.elements import FieldPlate, ObjectSpace, Openings, ThinLens, Train, ZernikeMap
+from lumigraph.errors import GeometryError
+from lumigraph.instruments.glass import Glass
+from lumigraph.operators import CameraOptics
+
+
+@dataclass(frozen=True, slots=True)
+class ExitPupil:
+    """Where light comes from behind a lens, and how objects stand before a thin lens there.
+
+    Parameters
+    ----------
+    behind
+        From the rear principal plane, positive behind [m]; 0 of a thin lens.
+    focal_length, image_distance
+        Of the camera's thin lens, f and z2 [m].
+    """
+
+    behind: float
+    focal_length: float
+    image_distance: float
+
+    @property
+    def magnification(self) -> float:
+        """Its width over the entrance pupil's, m_p = 1 - e'/f."""
+        return 1 - self.behind / self.focal_length
+
+    @property
+    def to_image(self) -> float:
+        """To the main lens' image, z2 - e' [m]."""
+        return self.image_distance - self.behind
+
+    @property
+    def wider(self) -> float:
+        """Its width over the thin lens' of the same aperture at the image."""
+        return self.to_image / self.image_distance
+
+    @property
+    def object_distance(self) -> float:
+        """From the focused plane, as the thin lens of focal length m_p f there has it [m]."""
+        return 1 / (1 / (self.magnification * self.focal_length) - 1 / self.to_image)
+
+    def to(self, separation: float) -> float:
+        """To a plane at a distance from the rear principal plane [m]."""
+        return separation - self.behind
+
+    def check(self, name: str, separation: float) -> None:
+        """Refuse a pupil that no thin lens can stand in.
+
+        Raises
+        ------
+        GeometryError
+            It lies behind the focal plane, where the entrance pupil is turned upside down, or behind the
+            lenslets.
+        """
+        farthest = min(self.focal_length, separation, self.image_distance)
+        if not self.behind < farthest:
+            raise GeometryError(
+                f"the exit pupil of {name!r} lies {self.behind * 1e3:.6g} mm behind its principal plane, but "
+                f"must lie before {farthest * 1e3:.6g} mm, the nearest of focus, image and lenslets. "
+                "Use a lens whose stop is farther in front."
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Traced:
+    """What chief rays say, over the fields that the thin lens in the exit pupil sees.
+
+    Parameters
+    ----------
+    fields
+        Tangents of images' heights over the pupil's distance.
+    objects
+        What that lens sees of objects.
+    lean
+        By how much chief rays are steeper than from the exit pupil's middle on the axis [rad], outwards.
+    """
+
+    fields: tuple[float, ...]
+    objects: ObjectSpace
+    lean: np.ndarray
+
+    def leans(self, field: np.ndarray) -> np.ndarray:
+        """At fields, tangents [rad]."""
+        return np.interp(field, self.fields, self.lean)
+
+
+def traced(glass: Glass, pupil: ExitPupil, object_distance: float) -> Traced:
+    """Of a lens at a distance from the focused plane [m]."""
+    at = np.array(glass.aberrations.x)
+    height = pupil.image_distance * at
+    stretch = np.append(1.0, 1 + glass.moved[1:] / height[1:])
+    own = pupil.magnification * object_distance / pupil.object_distance * at
+    lean = glass.turned + at - height * stretch / pupil.to_image
+    fields = own * stretch
+    if not (np.diff(fields) > 0).all():
+        raise GeometryError(
+            f"distortion folds the image: farthest out it is {stretch[-1]:.4g} times as high as without. "
+            "Use a smaller field."
+        )
+    # What is seen on the axis has no direction
+    lean[0] = 0.0
+    return Traced(
+        tuple(fields.tolist()), ObjectSpace(pupil.magnification, tuple(own.tolist()), stretch), lean
+    )
+
+
+def behind_glass(thin: CameraOptics, glass: Glass, found: Traced, pupil: ExitPupil) -> CameraOptics:
+    """A camera whose thin main lens, with its plate, becomes the one in the exit pupil."""
+    plate = next(part for part in thin.lens.elements if isinstance(part, FieldPlate))
+    diameter = thin.pupil_diameter * pupil.wider
+    aberrations, openings = glass.aberrations, glass.openings
+    lens = FieldPlate(
+        ZernikeMap(
+            aberrations.terms, aberrations.values, found.fields, None, aberrations.wavelengths,
+            aberrations.metres,
+        ),
+        diameter, plate.more,
+        Openings(
+            found.fields, openings.wavelengths, openings.axes, found.lean * pupil.to_image / (diameter / 2)
+        ),
+    )  # fmt: skip
+    m = pupil.magnification
+    return replace(
+        thin, object_distance=pupil.object_distance, separation=pupil.to(thin.separation),
+        pupil_diameter=diameter, lens=Train((lens, ThinLens(m * pupil.focal_length))),
+        object_pitch=m * thin.object_pitch, objects=found.objects,
+    )  # fmt: skip
