@@ -60,20 +60,29 @@ def test_coarse_slices_are_warned_of_and_finer_ones_are_not(scope):
     assert apart(found.data, expected.data) < 2 * stated
 
 
-def test_planes_that_stand_too_far_apart_are_warned_of(scope):
-    """A ball that every fourth of its planes is left of; whose slices together are as fine as before."""
-    grid, z = lg.Grid.square(60, 1 * um), (np.arange(16) - 24) * 2.5 * um
-    squared = grid.y[:, None] ** 2 + grid.x**2 + (z[:, None, None] + 30 * um) ** 2
-    index = 0.02 / (1 + np.exp((np.sqrt(squared) - 15 * um) / (2 * um)))
-    scene, off = lg.targets.points([(3 * um, 0, 5 * um)]), []
-    fine = lg.simulate(scope, scene, LIGHT, medium=lg.Medium.of_index(lg.Volume(index, grid, tuple(z))))
-    coarse = lg.Medium.of_index(lg.Volume(index[2::5], grid, tuple(z[2::5])))
-    with pytest.warns(lg.SamplingWarning, match=r"planes stand 12.5 µm apart: .* changes by 0\.\d+ rms"):
-        found = lg.simulate(scope, scene, LIGHT, medium=coarse)
-    off = apart(found.data, fine.data)
-    print(off, found.metadata["error"], fine.metadata["error"])
-    assert 1e-2 < off < 2 * found.metadata["error"]["rms"]
-    assert fine.metadata["error"]["rms"] < 1e-2
+def test_twice_as_many_slices_hold_an_index_that_goes_over_evenly():
+    """Paths of half the slabs, a quarter of the way to their neighbours'; given slices stay as they are."""
+    grid, z = lg.Grid.square(4, 1 * um), np.arange(5) * 2 * um
+    index = (0.01 + 0.003 * np.arange(5))[:, None, None] * np.ones((5, 4, 4))
+    medium = lg.Medium.of_index(lg.Volume(index, grid, tuple(z)))
+    finer = medium.finer()
+    np.testing.assert_allclose(finer.depths, np.arange(8.5, -1, -1) * um, atol=1e-12)
+    inner = slice(1, -1)
+    expected = (0.01 + 0.0015 * np.array(finer.depths) / um) * 1 * um
+    np.testing.assert_allclose(finer.paths[inner, 0, 0], expected[inner], rtol=1e-9)
+    given = lg.Medium(medium.paths, grid, medium.depths)
+    assert given.finer() is given
+
+
+def test_planes_that_stand_too_far_apart_are_warned_of(scope, monkeypatch):
+    grid = lg.Grid.square(8, 2 * um)
+    medium = lg.Medium.of_index(lg.Volume(np.full((2, 8, 8), 1e-4), grid, (-20 * um, -10 * um)))
+    monkeypatch.setattr(Seen, "between_planes", lambda self, place: 0.03)
+    with pytest.warns(lg.SamplingWarning) as told:
+        found = lg.simulate(scope, lg.targets.points([(0, 0, 1 * um)]), LIGHT, medium=medium)
+    assert "planes stand 10 µm apart" in str(told[0].message)
+    assert "changes by 0.03 rms; 0.01 was asked" in str(told[0].message)
+    assert found.metadata["error"]["rms"] > 0.03
 
 
 def test_minutes_are_said_before_they_are_spent(scope, monkeypatch):

@@ -16,7 +16,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.volume import Volume
 from lumigraph.errors import GeometryError
 
-STRAY = 1e-4
+STRAY = 1e-5
 """Of the light, what may be bent farther than it is followed."""
 
 MOST_SAMPLES = 4096
