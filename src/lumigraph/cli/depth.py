@@ -291,14 +291,15 @@ def _in_metres(
     from lumigraph import depth as verbs
     from lumigraph.core.arrays import to_numpy
     from lumigraph.core.lightfield import LightField
-    from lumigraph.instruments.capabilities import WithMainLens, WithObjective
+    from lumigraph.instruments.camera import Camera
+    from lumigraph.instruments.capabilities import WithObjective
 
     if isinstance(camera, WithObjective):
         return verbs.defocus(found, grounds, camera.depth_per_alpha), None
     lens = lengths.known(camera, grounds if isinstance(grounds, LightField) else None)
     if lens is None:
         return found, None
-    if isinstance(camera, WithMainLens) and (pupil := camera.exit_pupil).behind:
+    if isinstance(camera, Camera) and (pupil := camera.exit_pupil).behind:
         focal, m = pupil.magnification * pupil.focal_length, pupil.magnification
         seen = verbs.metric(found, grounds, focal_length=focal, object_distance=pupil.object_distance)
         values = to_numpy(seen.values).astype(float) / m**2

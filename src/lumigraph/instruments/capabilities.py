@@ -5,7 +5,6 @@ from typing import Protocol, runtime_checkable
 
 from lumigraph.core.lightfield import LightField
 from lumigraph.elements.objective import Objective
-from lumigraph.instruments.glass_optics import ExitPupil
 from lumigraph.instruments.parts import MainLens
 from lumigraph.operators.microscope_pupil import PupilImages
 
@@ -71,11 +70,6 @@ class WithMainLens(Protocol):
 
     main_lens: MainLens
     object_distance: float
-
-    @property
-    def exit_pupil(self) -> ExitPupil:
-        """Where its light comes from."""
-        ...
 
     def alpha(self, dz: float) -> float:
         """Refocus factor of a depth `dz` [m] from the focused plane."""
