@@ -202,21 +202,6 @@ def plenoptic(camera):
     )  # fmt: skip
 
 
-def test_the_pitch_of_micro_images_is_that_of_optilands_exit_pupil(plenoptic, lens):
-    """Measured in a white image; a thin lens' differs by 5e-3 of it."""
-    far = plenoptic.replace(
-        lenslets={"pitch": "300 um", "focal_length": "1.65 mm", "count": (15, 15)},
-        sensor={"pixel_pitch": "15 um"},
-    )
-    white = lg.simulate(far, lg.targets.white(), lg.Incoherent(1e-2))
-    paraxial = lens._lens.paraxial
-    pupil = float(np.ravel(paraxial.XPL())[0]) * 1e-3  # from the image
-    found = lg.calibrate(white).lattice.pitch
-    expected, thin = 20 * (1 + 1.65e-3 / -pupil), 20 * (1 + 1.65e-3 / far.image_distance)
-    assert found == pytest.approx(expected, rel=5e-4)
-    assert abs(thin / found - 1) > 3e-3
-
-
 def test_points_of_a_plenoptic_camera_take_the_lens(plenoptic):
     far = math.tan(math.radians(0.5)) * Z1
     points = lg.targets.points([(0.0, 0.0), (far / 2, far)])

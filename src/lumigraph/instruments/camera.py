@@ -202,7 +202,7 @@ class Camera(Instrument):
         """The same in light of another wavelength [m]: glass stays where its own brings it to focus."""
         other = self.replace(wavelength=wavelength)
         if self.main_lens.prescription is not None:
-            other.__dict__.update(exit_pupil=self.exit_pupil, glass=self.glass, traced=self.traced)
+            vars(other).update(exit_pupil=self.exit_pupil, glass=self.glass, traced=self.traced)
         return other
 
     @cached_property

@@ -343,7 +343,9 @@ def _varying(
 ) -> Linear:
     """Of a plane before a lens that changes over the field; `fields`, its own where the grid has more."""
     if camera.objects is not None:
-        return seen_plane(camera, grid, dz, lambda one, *plane: _varying(one, *plane[:2], making, plane[2]))
+        return seen_plane(
+            camera, grid, dz, lambda one, seen, depth, known: _varying(one, seen, depth, making, known)
+        )
     distance, accuracy = camera.object_distance + dz, making.accuracy
     optics = Optics.of(camera, distance, accuracy)
     turns = mirrors.turns(optics.bricks)

@@ -33,7 +33,7 @@ class Regridded(Linear):
     """
 
     of: Linear
-    onto: Resampling
+    onto: Linear
     placed: Grid
 
     title: ClassVar[str] = "Operator of an object on another grid"

@@ -162,7 +162,9 @@ def single_lens_operator(
     if plain.array is not None:
         raise SamplingError("the camera has lenslets: use periodic_operator.")
     if plain.objects is not None:
-        return seen_plane(plain, grid, dz, lambda one, *plane: _varying(one, *plane, accuracy))
+        return seen_plane(
+            plain, grid, dz, lambda one, seen, depth, fields: _varying(one, seen, depth, fields, accuracy)
+        )
     if varying.plate_of(plain) is not None:
         distance = plain.object_distance + dz
         return _varying(plain, grid, dz, (grid.y / distance, grid.x / distance), accuracy)

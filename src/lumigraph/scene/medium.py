@@ -181,7 +181,7 @@ class Medium:
         """N sin θ that holds all but `STRAY` of a plane wave behind a path (y, x) [m]."""
         slopes = [np.abs(np.diff(path, axis=k)).max(initial=0.0) for k in (0, 1)]
         finer = min(max(1, math.ceil(4 * max(slopes) / wavelength)), MOST_SAMPLES // max(path.shape))
-        path = zoom(path, max(1, finer), order=3, mode="nearest", grid_mode=True)
+        path = np.asarray(zoom(path, max(1, finer), order=3, mode="nearest", grid_mode=True))
         windows = [_window(n) for n in path.shape]
         wave = np.exp(2j * np.pi / wavelength * path) * windows[0][:, None] * windows[1]
         power = np.square(np.abs(np.fft.fft2(wave)))
