@@ -132,7 +132,9 @@ def distorted(space: ObjectSpace, grid: Grid, distance: float, finest: float) ->
     into, of = turned.coords
     into, of = (into % rows) * columns + into // rows, (of % ny) * columns + of // ny
     down = csr_array((turned.data, (into, of)), shape=(rows * columns, ny * columns))
-    return Distorted(across, down, (seen.shape, grid.shape), places), seen
+    # Samples of an operator are intensities: light over their own area
+    area = space.pupil_magnification**2 * np.prod(grid.pitch) / np.prod(seen.pitch)
+    return Distorted(across, down * np.float32(area), (seen.shape, grid.shape), places), seen
 
 
 def _covering(grid: Grid, magnification: float, places: tuple[np.ndarray, np.ndarray], finest: float) -> Grid:
