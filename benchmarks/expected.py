@@ -1,4 +1,4 @@
-"""The factors of expected errors, `lumigraph.depth.expected.FACTORS`: found on rendered scenes with truth.
+"""The factors of expected errors, `lumigraph.depth.expected.LINES`: found on rendered scenes with truth.
 
 An error at a place is taken to be of the mean Σ factor · term; the factors are those of the greatest Poisson
 likelihood of all errors, found by Richardson and Lucy's steps, which keep them above zero. What `expected`
@@ -9,12 +9,13 @@ that are not there (LUMIGRAPH_DATA) are left out.
 """
 
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 
 from benchmarks.depth import SCENES, there
 from lumigraph.depth.epi import lines_of
-from lumigraph.depth.expected import FACTORS, terms
+from lumigraph.depth.expected import LINES, terms
 from lumigraph.depth.pictures import Pictures
 
 CHOSEN = ("antinous", "cotton, 33 views")
@@ -33,7 +34,7 @@ def parts_of(name: str) -> Parts:
     found, evidence, _ = lines_of(pictures)
     known = np.isfinite(truth)
     parts = terms(found, evidence)
-    return np.stack([parts[name][known] for name in FACTORS]), np.abs(found - truth * pictures.reach)[known]
+    return np.stack([parts[name][known] for name in LINES]), np.abs(found - truth * pictures.reach)[known]
 
 
 def fitted(parts: np.ndarray, errors: np.ndarray) -> np.ndarray:
@@ -44,12 +45,12 @@ def fitted(parts: np.ndarray, errors: np.ndarray) -> np.ndarray:
     return factors
 
 
-def show(found: dict[str, Parts]) -> None:
+def show(found: dict[str, Parts], used: dict[str, float], chosen: Sequence[str]) -> None:
     """Print the factors by the chosen scenes, beside those in use, and the errors expected of each scene."""
-    joined = [np.concatenate([found[name][k] for name in CHOSEN if name in found], -1) for k in (0, 1)]
-    new, old = fitted(*joined), np.array(list(FACTORS.values()))
-    for name, factor, used in zip(FACTORS, new, old, strict=True):
-        print(f"{name:10} {factor:.3f}, in use {used:.3f}")
+    joined = [np.concatenate([found[name][k] for name in chosen if name in found], -1) for k in (0, 1)]
+    new, old = fitted(*joined), np.array(list(used.values()))
+    for name, factor, now in zip(used, new, old, strict=True):
+        print(f"{name:10} {factor:.3f}, in use {now:.3f}")
     for scene, (parts, errors) in found.items():
         ratios = [float((factors @ parts).mean() / errors.mean()) for factors in (new, old)]
         print(f"{scene}: expected over true error {ratios[0]:.2f}, by those in use {ratios[1]:.2f}")
@@ -69,6 +70,6 @@ def by_eighths(expected: np.ndarray, errors: np.ndarray) -> str:
 if __name__ == "__main__":
     measured = {name: parts_of(name) for name in there() if name.startswith(tuple(sys.argv[1:]) or "")}
     if set(CHOSEN) & set(measured):
-        show(measured)
+        show(measured, LINES, CHOSEN)
     else:
         print("skipped: no scene is there. Set LUMIGRAPH_DATA to a folder that holds hci_antinous.")

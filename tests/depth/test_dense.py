@@ -2,14 +2,16 @@
 
 import numpy as np
 import pytest
+from benchmarks.pixel_depth import CAMERAS, EVEN, SHAPE, grating, plain
 from scenes import texture, traced_raw
 from scipy.ndimage import distance_transform_edt
 
 from lumigraph import targets
 from lumigraph.core.arrays import namespace
 from lumigraph.core.grid import Grid
-from lumigraph.core.lattice import Lattice
 from lumigraph.depth import cloud, correlation, dense, metric
+from lumigraph.depth.micro_images import MicroImages
+from lumigraph.depth.repeats import of_micro_images
 from lumigraph.errors import CalibrationError, GeometryError, SamplingWarning
 from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.preparation import prepare
@@ -17,13 +19,6 @@ from lumigraph.rendering import render, sight_grid
 from lumigraph.rendering.patches import Layout, Patches
 from lumigraph.scene import Scene, Slice
 from lumigraph.simulation import Incoherent, simulate
-
-CAMERAS = {
-    "square": (Lattice.square(21.3, 0.01, (10, 10)), [6.0]),
-    "three kinds": (Lattice.hex(21.3, 0.0, (10, 10), kinds=3), [4.7, 6.0, 7.3]),
-    "Galilean": (Lattice.square(21.3, 0.0, (10, 10)), [-6.0]),
-}
-SHAPE = (150, 170)
 
 
 def measured(name, surfaces, truth, noise=0.01):
@@ -103,6 +98,45 @@ def test_a_texture_that_repeats_is_not_trusted():
     assert np.median(error) > 1
     assert np.median(found.confidence) < 0.1
     assert found.error.mean() > 0.5
+
+
+@pytest.mark.parametrize("name", ["square", "three kinds"])
+def test_noise_matches_by_chance(name):
+    lattice, focus = CAMERAS[name]
+    raw, calibration = traced_raw(lattice, SHAPE, EVEN, focus)
+    raw = np.maximum(raw + 0.3 * np.random.default_rng(5).standard_normal(raw.shape), 0)
+    lenslets = correlation(raw, calibration, (4, 9))
+    with pytest.warns(
+        SamplingWarning, match="100% of the places match no better than by chance: .* lenslets="
+    ):
+        found = dense(raw, calibration, lenslets, focus=focus if len(focus) > 1 else None)
+    assert np.asarray(found.confidence).max() < 0.1
+    assert (found.error / np.abs(found.values)).min() > 0.8
+
+
+def test_a_grating_may_be_off_by_its_period_in_the_micro_images():
+    """Of 12 px, shown 6/21.3 as large: patches of 6 - 3.38 and 6 + 3.38 px would show it as well."""
+    lattice, focus = CAMERAS["square"]
+    raw, calibration = traced_raw(lattice, SHAPE, grating(12, 6.0), focus)
+    raw = raw + 0.01 * np.random.default_rng(5).standard_normal(raw.shape)
+    found = dense(raw, calibration, correlation(raw, calibration, (5, 7)))
+    assert np.median(np.abs(found.values - 6)) < 0.05
+    assert np.median(found.error) == pytest.approx(12 * 6 / 21.3, rel=0.05)
+    assert np.median(found.confidence) < 0.01
+
+
+def test_of_a_texture_that_does_not_repeat_no_micro_image_looks_like_itself_elsewhere():
+    lattice, focus = CAMERAS["three kinds"]
+    raw, calibration = traced_raw(lattice, SHAPE, plain(6.0), focus)
+    assert not of_micro_images(MicroImages.read(np.sqrt(raw), calibration, 9.0), 10.0, 0.01).any()
+    raw, calibration = traced_raw(lattice, SHAPE, [(stripes, lambda y, x: 6.0 + 0 * y * x, None)], [6.0] * 3)
+    found = of_micro_images(MicroImages.read(np.sqrt(raw), calibration, 9.0), 10.0, 0.01)
+    # Along x the neighbours stand 1 and 1/2 pitches away: two periods look alike to both.
+    assert np.median(found) == pytest.approx(2 * 12 * 6 / 21.3, rel=0.05)
+
+
+def stripes(y, x):
+    return 1 + 0.4 * np.cos(2 * np.pi / 12 * x) + 0 * y
 
 
 def test_libraries_progress_and_grid(xp):

@@ -12,11 +12,11 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import silent
 from lumigraph.depth import alpha_of, disparity_of, epi
-from lumigraph.depth.lines import visible
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import Fit
 from lumigraph.depth.smooth import Stiffness, tears, update
 from lumigraph.depth.sweep import costs, span
+from lumigraph.depth.visible import visible
 from lumigraph.errors import GeometryError, SamplingWarning
 
 
@@ -128,7 +128,7 @@ def test_sure_places_have_smaller_errors(paint, rng):
     error, trust = np.abs(found.values - truth), np.asarray(found.confidence)
     sure = trust > np.median(trust)
     assert error[sure].mean() < 0.5 * error[~sure].mean()
-    assert found.error[:, :8].min() > 0.021 > found.error[:, 34:38].max()
+    assert found.error[:, :8].mean() > 10 * found.error[:, 34:38].mean()
     # The expected error is that of the whole scene to a factor of two, though it was never seen.
     assert 0.5 < np.mean(found.error) / error.mean() < 2
 

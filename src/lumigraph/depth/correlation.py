@@ -184,7 +184,7 @@ def _joined(scores: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarr
     beside = np.abs(np.linspace(-_TIE, _TIE, len(sizes)))[:, None, None]
     cost = (1 - scores + beside).astype(np.float32)
     flat = np.zeros(cost.shape[1:], np.float32)
-    best, _ = cheapest(semi_global(cost, flat, 0.02, 0.1))
+    best = cheapest(semi_global(cost, flat, 0.02, 0.1))
     values = sizes[0] + _STEP * best
     near = np.clip(np.rint(best).astype(int), 1, len(sizes) - 2)[None]
     below, at, above = (np.take_along_axis(cost, near + k, 0)[0] for k in (-1, 0, 1))
@@ -192,7 +192,7 @@ def _joined(scores: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarr
     trust = np.clip(1 - at, 0, 1) * bend / (bend + _BEND)
     # Where agreement still grows at the end of the range, the size lies beyond it.
     trust = np.where((cost.argmin(0) % (len(sizes) - 1) == 0) & (np.abs(best - near[0]) > 0.5), 0, trust)
-    aim = cheapest(np.concatenate([below[None], at[None], above[None]]))[0] - 1
+    aim = cheapest(np.concatenate([below[None], at[None], above[None]])) - 1
     aim = sizes[0] + _STEP * (near[0] + aim)
     information = bend * trust**2
     pull = information * np.clip(aim - values, -_STEP, _STEP)

@@ -3,6 +3,7 @@
 import math
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -14,9 +15,12 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.progress import Progress, silent, within
 from lumigraph.core.raw import RawImage
+from lumigraph.depth import repeats
+from lumigraph.depth.chance import by_chance, slowly
 from lumigraph.depth.correlation import WIDEST, correlation
-from lumigraph.depth.expected import Evidence, contrast, expected
+from lumigraph.depth.expected import MICRO_IMAGES, Evidence, contrast, deviation, expected
 from lumigraph.depth.flat import Flat
+from lumigraph.depth.micro_images import MicroImages
 from lumigraph.depth.pictures import LEAST_NOISE, noise_of
 from lumigraph.depth.sightings import Sightings
 from lumigraph.depth.smooth import Stiffness, tears, update
@@ -37,7 +41,9 @@ _TEAR = 1.0  # px between neighbours that are not of one surface
 _KINK, _STIFFNESS = 1e-3, 3e4  # px; per variance of the noise
 _FARTHEST = 1.2  # px that a round may move a place
 _WINDOW = 3  # samples to each side that tell what noise does
-_UNMET = 2.0  # deviations that what a window still asks for, and the stiff surface denies, is as much as
+_BLANK = 1e-4  # contrast between neighbours of what shows nothing
+_UNMET = 25  # deviations of a place that are as much as what a window asks for and the stiff surface denies
+_BY_CHANCE, _BLIND = 0.5, 0.25  # likelihood; part of the places that may be so without a warning
 _DOUBT = 0.8  # px: expected error with a confidence of 1/e
 
 
@@ -98,7 +104,7 @@ def dense(
     Warns
     -----
     SamplingWarning
-        Places have patches at the end of those that are tried.
+        Places have patches at the end of those that are tried, or match no better than by chance.
 
     References
     ----------
@@ -111,20 +117,38 @@ def dense(
         lenslets = correlation(raw, calibration, progress=within(progress, 0, 0.3))
     lenslets.check("patch")
     sizes = Patches.of(lenslets.values, calibration)
-    flat = Flat.of(raw, calibration)
-    sights = Sightings(flat, calibration, Layout.of(calibration, sizes, samples), kinds)
-    sign, reach = math.copysign(1.0, sizes.middle), flat.even
-    moves = _labels(np.abs(sizes.values), to_numpy(lenslets.confidence), reach, calibration.lattice.pitch)
-    guide = _joined(sights, lambda part, rows: part.picture(sizes.between(*part.fractional)))
-    first = _swept(sights, moves, (sign, guide), within(progress, 0.3, 0.8))
-    found, evidence = _refined(sights, first, (sign, guide), within(progress, 0.8, 1))
-    error = np.maximum(*(expected(side * found, evidence, slants=False) for side in (1, -1)))
-    error = np.minimum(error, reach)
-    _check_ends(found, error, moves, sign * np.exp(moves[[0, -1]] / reach))
+    layout = Layout.of(calibration, sizes, samples)
+    sights = Sightings(Flat.of(raw, calibration), calibration, layout, kinds)
+    trust = to_numpy(lenslets.confidence)
+    found, evidence, ends = moves_of(sights, (sizes, trust), within(progress, 0.3, 1))
+    sign, reach = math.copysign(1.0, sizes.middle), sights.flat.even
+    parts = [expected(side * found, evidence, MICRO_IMAGES, slants=False) for side in (1, -1)]
+    error = np.minimum(np.maximum(*parts), reach)
+    all_tried = np.ptp(ends) >= evidence.farthest
+    counts = (error < _DOUBT) | ((evidence.chance > _BY_CHANCE) & ~all_tried)
+    if not _beyond(found, counts, ends, sign * np.exp(ends / reach)):
+        _check_chance(evidence)
     values = sign * np.exp(found / reach)
     trust, error = np.exp(-error / _DOUBT), error * np.abs(values) / reach
     values, trust, error = (like(part, raw.data) for part in (values, trust, error))
     return DepthMap(values, trust, "patch", error)
+
+
+def moves_of(
+    sights: Sightings, lenslets: tuple[Patches, np.ndarray], progress: Progress = silent
+) -> tuple[np.ndarray, Evidence, np.ndarray]:
+    """Logarithms (y, x) of the sizes of patches times the reach [px], what they rest on, and the ends tried.
+
+    `lenslets` are their patches, and how sure each is.
+    """
+    (sizes, trust), reach = lenslets, sights.flat.even
+    sign = math.copysign(1.0, sizes.middle)
+    moves = _labels(np.abs(sizes.values), trust, reach, sights.calibration.lattice.pitch)
+    guide = _joined(sights, lambda part, rows: part.picture(sizes.between(*part.fractional)))
+    first = _swept(sights, moves, (sign, guide), within(progress, 0, 0.7))
+    found, evidence = _refined(sights, first, (sign, guide), within(progress, 0.7, 1))
+    evidence = replace(evidence, farthest=reach * math.log(WIDEST[1] / WIDEST[0]))
+    return found, evidence, moves[[0, -1]]
 
 
 def _labels(sizes: np.ndarray, trust: np.ndarray, reach: float, pitch: float) -> np.ndarray:
@@ -138,15 +162,29 @@ def _labels(sizes: np.ndarray, trust: np.ndarray, reach: float, pitch: float) ->
     return low + (high - low) * np.arange(count + 1) / count
 
 
-def _check_ends(found: np.ndarray, error: np.ndarray, moves: np.ndarray, ends: np.ndarray) -> None:
-    low, high = moves[0] + _STEP / 2, moves[-1] - _STEP / 2
-    share = float((((found < low) | (found > high)) & (error < _DOUBT)).mean())
+def _beyond(found: np.ndarray, counts: np.ndarray, ends: np.ndarray, sizes: np.ndarray) -> bool:
+    """Whether more than a few of the places that count lie at the ends: then warns."""
+    low, high = ends[0] + _STEP / 2, ends[1] - _STEP / 2
+    share = float((((found < low) | (found > high)) & counts).mean())
     if share > _BEYOND:
-        first, last = sorted(ends.tolist())
+        first, last = sorted(sizes.tolist())
         warnings.warn(
             f"{share:.1%} of the places have patches at the end of those tried, "
             f"{first:.4g} to {last:.4g} px: "
             "theirs may lie beyond. Give lenslets= by correlation with wider patches=(least, most).",
+            SamplingWarning,
+            stacklevel=3,
+        )
+    return share > _BEYOND
+
+
+def _check_chance(evidence: Evidence) -> None:
+    share = float(((evidence.chance > _BY_CHANCE) & (evidence.contrast > _BLANK)).mean())
+    if share > _BLIND:
+        warnings.warn(
+            f"{share:.0%} of the places match no better than by chance: their confidence is low. Give "
+            "lenslets= by correlation with other patches=(least, most), and check that the raw image shows "
+            "more than noise.",
             SamplingWarning,
             stacklevel=3,
         )
@@ -170,8 +208,10 @@ def _swept(
         progress((k + 1) / len(sights.blocks))
     cost = semi_global(guided(cost, guide, 3), guide, 0.2 * _MOST, _MOST)
     step = moves[1] - moves[0]
-    first = median_filter(moves[0] + cheapest(cost)[0] * step, 5)
-    return np.clip(first, moves[0], moves[-1]).astype(np.float32), rivals(cost, _MOST) * step
+    first = median_filter(moves[0] + cheapest(cost) * step, 5)
+    return np.clip(first, moves[0], moves[-1]).astype(np.float32), rivals(
+        cost, max(_MOST, 3 * noise_of(sights.flat.image))
+    ) * step
 
 
 def _refined(
@@ -182,32 +222,57 @@ def _refined(
 ) -> tuple[np.ndarray, Evidence]:
     """Labels (y, x) refined on all micro-images by least squares, and what they rest on."""
     (sign, guide), noise, (moves, others) = how, noise_of(sights.flat.image), first
-    pull = information = variance = disputed = np.zeros_like(moves)
+    slow, asked = slowly(guide, guide > 0), np.zeros((6, *moves.shape), np.float32)
     for k, jump in enumerate(_ROUNDS):
         sizes = sign * np.exp(moves / sights.flat.even)
-        asked = _joined(sights, partial(_asked, sizes=sizes, noise=noise))
-        pull, information, variance, disputed = np.moveaxis(asked, 1, 0)
+        asked = np.moveaxis(_joined(sights, partial(_asked, sizes=sizes, noise=noise, slow=slow)), 1, 0)
+        pull, information, variance = asked[:3]
         # By how lenslets differ: a micro-image has no even part, and its texture would pass for noise.
         noise = max(LEAST_NOISE, float(np.sqrt(np.median(variance))))
         held = Stiffness(_STIFFNESS * noise**2, _KINK, jump)
         change = update(moves, information, pull, held, None, tears(moves, _TEAR)) - moves
         change = np.clip(change, -_FARTHEST, _FARTHEST)
-        moves, pull = moves + change, pull - information * change
+        moves, asked[0] = moves + change, pull - information * change
         progress((k + 1) / len(_ROUNDS))
-    residual = np.sqrt(np.maximum(box(variance, 2), noise**2))
-    deviation = _deviation(residual, information, pull)
-    return moves, Evidence(deviation, box(disputed, 1), contrast(guide), others)
+    repeated = _period(sights, sign * np.exp(moves / sights.flat.even), noise)
+    return moves, replace(_evidence(sights, asked, (moves, guide), noise), rivals=others, period=repeated)
 
 
-def _deviation(residual: np.ndarray, information: np.ndarray, pull: np.ndarray) -> np.ndarray:
-    """Of the mean of a window (y, x): by noise, and by what lenslets ask and the stiff surface denies."""
-    information = box(information, _WINDOW) + 1e-12
-    unmet = np.abs(box(pull, _WINDOW)) / information
-    return np.hypot(residual / np.sqrt(information) / (2 * _WINDOW + 1), _UNMET * unmet)
+def _evidence(
+    sights: Sightings, asked: np.ndarray, maps: tuple[np.ndarray, np.ndarray], noise: float
+) -> Evidence:
+    """What a map of moves (y, x), with its picture, rests on, by what lenslets still ask of it (6, y, x)."""
+    pull, information, variance, disputed, shared, own = asked
+    variance = np.maximum(box(variance, 2), noise**2)
+    white = noise_of(sights.flat.image)
+    alone, around = deviation(maps[0], information, information * variance, MICRO_IMAGES)
+    unmet = np.abs(box(pull, _WINDOW)) / (box(information, _WINDOW) + 1e-12)
+    return Evidence(
+        np.hypot(alone, _UNMET * unmet),
+        around,
+        box(disputed, 1),
+        contrast(maps[1]),
+        np.zeros_like(maps[0]),
+        by_chance(shared, own, white, 1),
+    )
 
 
-def _asked(part: Sightings, rows: slice, sizes: np.ndarray, noise: float) -> np.ndarray:
-    return part.asked(sizes[rows], noise).swapaxes(0, 1)
+def _period(sights: Sightings, sizes: np.ndarray, noise: float) -> np.ndarray:
+    """By how much moves (y, x) could be off, and no lenslet would tell from none; see `repeats`."""
+    calibration, flat = sights.calibration, sights.flat
+    pitch = calibration.lattice.pitch
+    least, most = (part * pitch for part in WIDEST)
+    micro = MicroImages.read(flat.image, calibration, flat.radius)
+    found = repeats.of_micro_images(micro, most - least, noise)
+    lenslets = replace(Patches.of(np.ones(found.shape), calibration), values=found)
+    period = _joined(sights, lambda part, rows: lenslets.at(*part.index))
+    sizes = np.abs(sizes)
+    there = (sizes + period <= most) | (sizes - period >= least)
+    return np.where(there, period * flat.even / sizes, 0)
+
+
+def _asked(part: Sightings, rows: slice, sizes: np.ndarray, noise: float, slow: np.ndarray) -> np.ndarray:
+    return part.asked(sizes[rows], noise, slow[rows]).swapaxes(0, 1)
 
 
 def _joined(sights: Sightings, made: Callable[[Sightings, slice], np.ndarray]) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Depth from the lines of epipolar-plane images."""
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from lumigraph.core.arrays import like, to_numpy
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Progress, silent, within
-from lumigraph.depth.expected import Evidence, about, expected, uniform
+from lumigraph.depth.expected import LINES, Evidence, expected, uniform
 from lumigraph.depth.lines import refined
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.repeats import repeats
@@ -90,14 +90,13 @@ def epi(
     """
     pictures = Pictures.of(views)
     found, evidence, searched = lines_of(pictures, disparities, progress)
-    alike, blind = searched.repeats(found), evidence.chance * searched.farthest / 2
-    usual, even = expected(found, evidence), uniform(evidence) * about(found)
-    error = np.maximum(np.maximum(usual, even), np.maximum(alike, blind)) / pictures.reach
+    evidence = replace(evidence, period=searched.repeats(found), farthest=searched.farthest)
+    error = expected(found, evidence, LINES) / pictures.reach
     found = found / pictures.reach
     if disparities is not None:
         _check_ends(found, error, disparities, _STEP / pictures.reach)
     _check_chance(evidence, searched)
-    _check_repeats(alike / pictures.reach)
+    _check_repeats(np.asarray(evidence.period) / pictures.reach)
     _check_saturated(pictures.center.mean(0), evidence)
     known = _known(views) & (pictures.seen is None or pictures.seen[pictures.middle])
     found, error = np.where(known, found, np.nan), np.where(known, error, np.nan)

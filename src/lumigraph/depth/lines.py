@@ -1,19 +1,22 @@
 """Slopes of the lines of all epipolar-plane images at once, by least squares about a first estimate."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.ndimage import map_coordinates, maximum_filter, spline_filter
 
 from lumigraph.core.progress import Progress
-from lumigraph.depth.chance import by_chance
-from lumigraph.depth.expected import Evidence, contrast
+from lumigraph.depth.chance import of_views
+from lumigraph.depth.expected import LINES, Evidence, contrast, deviation
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import WINDOW, Fit, Shading
 from lumigraph.depth.smooth import Stiffness, tears, update
+from lumigraph.depth.visible import BEFORE, visible
 from lumigraph.depth.volume import box
+from lumigraph.depth.vote import agreed
 
 _spline: Any = spline_filter
 
@@ -25,57 +28,117 @@ _STIFFNESS = 4000.0  # per variance of the noise, and per `_lever`
 _EDGE = 0.003  # contrast between neighbours [of a picture from 0 to 1] where a surface may end
 _USUAL, _AROUND = 1.3, 8  # times the mean contrast within so many px, which is texture
 _LOOSEST = 0.1  # part of its stiffness that a surface keeps at the sharpest edge
-_LEAST_SAID = 0.15  # of what gradients seem to say
+_LEAST_SAID, _WINDOW = 0.15, 3  # of what gradients seem to say; samples to each side that tell it
 _MOST_LEFT = 0.2  # of a picture from 0 to 1: more says only that a place is wrong
-_BEFORE = 1.2  # how much nearer an occluder is [px in the outermost view]
 _TEAR = 2.0  # px in the outermost view between neighbours that are not of one surface
 _BESIDE = 2  # px beside an occluder whose differences show its edge
 
 
 def refined(
-    pictures: Pictures, swept: tuple[np.ndarray, np.ndarray], shading: Shading, progress: Progress
+    pictures: Pictures, swept: tuple[Sequence[np.ndarray], np.ndarray], shading: Shading, progress: Progress
 ) -> tuple[np.ndarray, Evidence]:
     """Movements (y, x) in the outermost view [px], refined on all views, and what they rest on.
 
-    `swept` are the first movements (y, x), and how far others lie that explain a place as well.
+    `swept` are one or two first maps of movements (y, x), and how far others lie that explain a place as
+    well. Two are both refined, first on some of the views; then each place takes the one that the views agree
+    with.
 
     Each round asks every view that sees a place by how much it should move there, r = g Δ: the residual r
     against the middle view, and the gradient g along the view's own direction. The answers, weighted by what
     they say, are joined by a smooth surface.
     """
-    grey = pictures.data.mean(2)
-    lines = np.stack([[_spline(view, 3, output=np.float32) for view in row] for row in grey])
-    moves, rivals = (part.astype(np.float32) for part in swept)
-    edged = contrast(grey[pictures.middle])
-    edges, asked = _edges(edged), _asked(pictures, lines, moves, shading)
-    stiffness = _STIFFNESS * pictures.noise**2 * _lever(pictures)
-    for k, jump in enumerate(_JUMPS):
-        if k:
-            asked = _asked(pictures, lines, moves, asked.shading)
+    (maps, rivals), grey = swept, pictures.data.mean(2)
+    lines = _Lines(pictures, _splines(grey, pictures.lit), contrast(grey[pictures.middle]))
+    some = replace(lines, pictures=few(pictures)) if len(maps) > 1 else lines
+    found = []
+    for k, one in enumerate(maps):
+        moves, left = some.moved(one, shading, _JUMPS[0])
+        asked = _asked(pictures, lines.splines, moves, left)
+        change = lines.changed(moves, asked, _JUMPS[1]) - moves
+        found.append((moves + change, _evidence(lines, asked, moves + change, rivals), left))
+        progress((k + 1) / len(maps))
+    if len(found) == 1:
+        return found[0][:2]
+    (first, evidence, left), (second, other, _) = found
+    better = agreed(pictures, (first, second), left)
+    return np.where(better, second, first), evidence.where(better, other)
+
+
+def few(pictures: Pictures) -> Pictures:
+    """The same with every second lit view of the cross and the diagonals, from the outermost ones on."""
+    lit = np.zeros_like(pictures.lit)
+    lit[pictures.middle] = True
+    for way in np.ndindex(3, 3):
+        step = np.array(way) - 1
+        if step.any():
+            arm = list(_along(pictures, step))
+            for place in arm[::-2]:
+                lit[place] = True
+    return replace(pictures, lit=lit)
+
+
+def _along(pictures: Pictures, step: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Lit views in steps from the middle one."""
+    v, u = np.array(pictures.middle) + step
+    while 0 <= v < pictures.lit.shape[0] and 0 <= u < pictures.lit.shape[1]:
+        if pictures.lit[v, u]:
+            yield int(v), int(u)
+        v, u = v + step[0], u + step[1]
+
+
+def _splines(grey: np.ndarray, lit: np.ndarray) -> np.ndarray:
+    """Of lit views (v, u, y, x), for `map_coordinates`."""
+    out = np.zeros_like(grey)
+    for view in np.argwhere(lit):
+        _spline(grey[tuple(view)], 3, output=out[tuple(view)])
+    return out
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """Views, their splines (v, u, y, x), and the contrast of the middle one (y, x)."""
+
+    pictures: Pictures
+    splines: np.ndarray
+    contrast: np.ndarray
+
+    @cached_property
+    def _edges(self) -> np.ndarray:
+        """Part (y, x) of the stiffness that a surface keeps where its picture has a contrast."""
+        usual = box(self.contrast, _AROUND)
+        above = np.maximum(self.contrast - _USUAL * usual, 0)
+        return np.maximum(np.exp(-above / (_EDGE + usual)), _LOOSEST)
+
+    def moved(self, moves: np.ndarray, shading: Shading, jump: float) -> tuple[np.ndarray, Shading]:
+        """A map after a round, and the shading that is left."""
+        asked = _asked(self.pictures, self.splines, moves, shading)
+        return self.changed(moves, asked, jump), asked.shading
+
+    def changed(self, moves: np.ndarray, asked: "_Asked", jump: float) -> np.ndarray:
+        """A map (y, x) moved by what views ask for."""
+        stiffness = _STIFFNESS * self.pictures.noise**2 * _lever(self.pictures)
         how = Stiffness(stiffness, _KINK, jump)
-        change = update(moves, asked.information, asked.pull, how, edges, tears(moves, _TEAR)) - moves
-        moves = moves + np.clip(change, -_BEFORE, _BEFORE)
-        progress((k + 1) / len(_JUMPS))
-    deviation, chance = _deviation(pictures, asked), by_chance(pictures, asked.shown)
-    return moves, Evidence(deviation, box(asked.disputed, 1), edged, rivals, chance)
+        change = update(moves, asked.information, asked.pull, how, self._edges, tears(moves, _TEAR)) - moves
+        return moves + np.clip(change, -BEFORE, BEFORE)
 
 
-def _deviation(pictures: Pictures, asked: "_Asked") -> np.ndarray:
-    """Standard deviation (y, x) [px in the outermost view] by the residuals that are left.
+def _evidence(lines: _Lines, asked: "_Asked", moves: np.ndarray, rivals: np.ndarray) -> Evidence:
+    """What a map (y, x) rests on, by what views still ask of it.
 
     Noise has gradients of its own, which say nothing.
     """
-    information = box(asked.information, 3)
+    pictures, usual = lines.pictures, box(asked.information, _WINDOW)
     nothing = 0.25 * pictures.noise**2 * _lever(pictures)
-    information = np.maximum(information - nothing, _LEAST_SAID * information)
-    return np.maximum(box(asked.residual, 2), pictures.noise) / np.sqrt(information + 1e-12)
-
-
-def _edges(edged: np.ndarray) -> np.ndarray:
-    """Part (y, x) of the stiffness that a surface keeps where its picture has a contrast (y, x)."""
-    usual = box(edged, _AROUND)
-    above = np.maximum(edged - _USUAL * usual, 0)
-    return np.maximum(np.exp(-above / (_EDGE + usual)), _LOOSEST)
+    said = np.maximum(1 - nothing / (usual + 1e-12), _LEAST_SAID)
+    variance = np.maximum(box(asked.residual, 2), pictures.noise) ** 2 * asked.information * said
+    information = asked.information * said
+    return Evidence(
+        *deviation(moves, information, variance, LINES),
+        box(asked.disputed, 1),
+        lines.contrast,
+        rivals,
+        of_views(pictures, asked.shown),
+    )
 
 
 def _lever(pictures: Pictures) -> float:
@@ -103,7 +166,7 @@ class _Asked:
 def _asked(pictures: Pictures, lines: np.ndarray, moves: np.ndarray, shading: Shading) -> _Asked:
     center = pictures.center.mean(0)
     slope = np.gradient(center)
-    pull, information, down, right, agreed, off, count, shown = (np.zeros_like(moves) for _ in range(8))
+    pull, information, down, right, alike, off, count, shown = (np.zeros_like(moves) for _ in range(8))
     fit, usual = Fit(moves.shape, pictures.noise), 2.5 * pictures.noise
     for (y, x), seen, view in _warped(pictures, lines, moves):
         residual, along = view - center, np.gradient(view)
@@ -116,16 +179,16 @@ def _asked(pictures: Pictures, lines: np.ndarray, moves: np.ndarray, shading: Sh
         information += pulled * gradient
         down += y * pulled
         right += x * pulled
-        agreed += weight
+        alike += weight
         off += seen * np.minimum(left, _MOST_LEFT)
         count += seen
         shown += np.where(seen, view, 0)
     shading = fit.solved(WINDOW)
     pull += shading.down * down + shading.right * right
-    clear = maximum_filter(moves, 2 * _BESIDE + 1) - moves < _BEFORE
+    clear = maximum_filter(moves, 2 * _BESIDE + 1) - moves < BEFORE
     shown = np.where(count > 0, shown / np.maximum(count, 1), center)
     count = np.maximum(count, 1)
-    return _Asked(pull * clear, information * clear, shading, off / count, 1 - agreed / count, shown)
+    return _Asked(pull * clear, information * clear, shading, off / count, 1 - alike / count, shown)
 
 
 def _warped(
@@ -138,24 +201,3 @@ def _warped(
         at = [place + moves * w for place, w in zip(places, stands, strict=True)]
         view = map_coordinates(lines[v, u], at, order=3, mode="nearest", prefilter=False)
         yield stands, seen & pictures.sees((v, u), at), view
-
-
-def visible(pictures: Pictures, moves: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
-    """For each lit view (v, u) but the middle one, which places (y, x) of the middle view it sees.
-
-    Places are put into the view from far to near: where another one ends up on top, they are hidden.
-    """
-    order = np.argsort(moves, axis=None)
-    y, x = np.divmod(order, moves.shape[1])
-    sorted_moves = moves.ravel()[order]
-    last = [n - 1 for n in moves.shape]
-    for v, u in np.argwhere(pictures.lit):
-        if (v, u) == pictures.middle:
-            continue
-        row = np.clip(np.rint(y + sorted_moves * pictures.down[v]), 0, last[0]).astype(np.intp)
-        column = np.clip(np.rint(x + sorted_moves * pictures.right[u]), 0, last[1]).astype(np.intp)
-        nearest = np.empty_like(moves)
-        nearest[row, column] = sorted_moves
-        seen = np.empty(moves.size, bool)
-        seen[order] = nearest[row, column] < sorted_moves + _BEFORE
-        yield int(v), int(u), seen.reshape(moves.shape)

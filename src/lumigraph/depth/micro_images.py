@@ -17,6 +17,7 @@ from lumigraph.rendering import lenslet_indices
 from lumigraph.rendering.interpolate import sample
 
 _REACH = 1.8  # pitches: nearest neighbours, and the next ones, which in a multi-focus array have one kind
+_NEXT = 1.2  # pitches: beyond the nearest neighbours
 _LEAST_SEEN = 0.12  # part of a micro-image that both must show
 _NOISE = 0.01  # of the picture's white
 _BLOCK = 128  # lenslets at a time: what is read over and over stays in the processor's cache
@@ -46,6 +47,12 @@ class MicroImages:
     @classmethod
     def of(cls, raw: RawImage, calibration: Calibration) -> "MicroImages":
         """Those of all whole lenslets. Raises LumigraphError if they would not fit in memory."""
+        image = grey(raw)
+        return cls.read(gaussian_filter(image, 0.5), calibration, lit_radius(image, calibration))
+
+    @classmethod
+    def read(cls, image: np.ndarray, calibration: Calibration, radius: float) -> "MicroImages":
+        """Those of an image (y, x), which count up to a radius [px]."""
         indices = lenslet_indices(calibration)
         half = int(calibration.lattice.pitch / 2)
         size = (2 * half + 1) ** 2
@@ -54,7 +61,6 @@ class MicroImages:
             f"comparing {indices.shape[0]} x {indices.shape[1]} micro-images of {2 * half + 1} px",
             "Crop the raw image to a part {factor:.1f}x smaller.",
         )
-        image = gaussian_filter(grey(raw), 0.5)
         steps = np.arange(-half, half + 1.0)
         centers = calibration.position(indices)
         data = np.empty((indices[..., 0].size, size), np.float32)
@@ -63,8 +69,28 @@ class MicroImages:
             seen = sample(image, y + steps[:, None], x + steps, "cubic")
             data[part] = np.reshape(seen, (-1, size))
         data -= data.mean(1, keepdims=True)
-        inside = np.hypot(steps[:, None], steps) <= lit_radius(grey(raw), calibration)
+        inside = np.hypot(steps[:, None], steps) <= radius
         return cls(data, inside.astype(np.float32), indices, calibration)
+
+    @property
+    def radius(self) -> float:
+        """To which their pixels count [px]."""
+        return math.sqrt(float(self.inside.sum()) / math.pi)
+
+    def differences(self, moves: np.ndarray) -> np.ndarray:
+        """Half the mean square (ways, n, rows, cols) by which each differs from itself, moved by (n,) px.
+
+        In the directions of the two or three nearest neighbours; NaN where too little of it is left.
+        """
+        ways = [way for way in self._ways() if way > (0, 0) and math.hypot(*self._vector(way)) < _NEXT]
+        out = np.full((len(ways), len(moves), len(self.data)), np.nan, np.float32)
+        for k, way in enumerate(ways):
+            readings = self._readings(way, moves)
+            for part in _blocks(len(self.data)):
+                mine = np.ascontiguousarray(self.data[part].T)
+                for j, reading in readings.items():
+                    out[k, j, part] = reading.difference(mine)
+        return out.reshape(*out.shape[:2], *self.indices.shape[:2])
 
     def scores(self, sizes: np.ndarray, progress: Progress) -> np.ndarray:
         """Agreement (n, rows, cols) with the neighbours at each patch size [px] of `sizes` (n,), at most 1.
@@ -150,6 +176,11 @@ class Reading:
         power = self.weight @ np.square(mine, out=mine) - mean**2
         its_power = self.weight @ np.square(its, out=its) - its_mean**2
         return shared / np.sqrt((power + _NOISE**2) * (its_power + _NOISE**2))
+
+    def difference(self, mine: np.ndarray) -> np.ndarray:
+        """Half the mean square (lenslets,) by which micro-images (height * width, lenslets) differ, moved."""
+        off = mine.take(self.places, 0) - self.matrix @ mine
+        return 0.5 * (self.weight @ np.square(off) - (self.weight @ off) ** 2)
 
 
 def _blocks(count: int) -> Iterator[slice]:

@@ -26,6 +26,7 @@ FEWEST_VIEWS, LEAST_SIDE = 2, 8
 """Along one axis, and lenslets across a view: fewer show no lines."""
 
 _WINDOW, _SMOOTH = 4, 0.1  # px; part of the windows that show nothing but noise
+_NEAR = 32  # px across, of blocks that have a noise of their own
 _OF_NOISE = 0.81  # of its mean: how rough the smoothest tenth of the windows of noise alone is
 _LIT = 0.1  # of a picture from 0 to 1: what is darker may be cut off
 _BRIGHT, _GLARING = 0.999, 1e6  # part of the middle view; times as bright is no light
@@ -181,8 +182,27 @@ def noise_of(picture: np.ndarray) -> float:
     ----------
     Immerkær, "Fast noise variance estimation", Comput. Vis. Image Underst. 64, 300 (1996), in windows.
     """
+    return _noise(_rough(picture), picture)
+
+
+def noise_near(picture: np.ndarray) -> np.ndarray:
+    """The same of each block of a picture, at its places (y, x)."""
+    rough, out = _rough(picture), np.empty_like(picture)
+    for start in np.ndindex(*(max(n // _NEAR, 1) for n in picture.shape)):
+        ends = [
+            n if n < (k + 2) * _NEAR else (k + 1) * _NEAR for k, n in zip(start, picture.shape, strict=True)
+        ]
+        block = tuple(slice(k * _NEAR, end) for k, end in zip(start, ends, strict=True))
+        out[block] = _noise(rough[block], picture[block])
+    return out
+
+
+def _rough(picture: np.ndarray) -> np.ndarray:
     kernel = np.array([[1.0, -2, 1], [-2, 4, -2], [1, -2, 1]])
-    rough = box(np.abs(convolve(picture, kernel)), _WINDOW)
+    return box(np.abs(convolve(picture, kernel)), _WINDOW)
+
+
+def _noise(rough: np.ndarray, picture: np.ndarray) -> float:
     lit = rough[box(picture, _WINDOW) > _LIT]
     smooth = float(np.quantile(lit if lit.size else rough, _SMOOTH)) / _OF_NOISE
     return max(smooth * math.sqrt(np.pi / 2) / 6, LEAST_NOISE)

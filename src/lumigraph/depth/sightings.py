@@ -17,6 +17,7 @@ Pair = tuple[np.ndarray, np.ndarray]
 
 _SHARP = 1.5  # px of blur by which another kind of lenslet loses against the sharpest one
 _FARTHEST = 3.0  # pitches to the farthest lenslet that is asked
+_ALONE = 0.9  # sum of the squares of parts of the weight: one lenslet has nearly all of it
 _FINE = 64  # weights per px of the distance from a micro-image's centre
 _BAND, _BLOCK = 1 << 15, 32  # samples at a time, and across: so that they stay in the processor's cache
 
@@ -99,14 +100,14 @@ class Sightings:
         return inverse[0, 0] * dy + inverse[0, 1] * dx, inverse[1, 0] * dy + inverse[1, 1] * dx
 
     @cached_property
-    def _index(self) -> Pair:
+    def index(self) -> Pair:
         """Of the lenslet nearest to each place."""
         return self.calibration.lattice.index(self.layout.y[:, None], self.layout.x)
 
     @cached_property
     def _kinds(self) -> np.ndarray:
         """Of the lenslets nearest to each place (n,)."""
-        return self.calibration.lattice.kind(*self._index).astype(np.int8).ravel()
+        return self.calibration.lattice.kind(*self.index).astype(np.int8).ravel()
 
     @cached_property
     def _nearest(self) -> Pair:
@@ -117,7 +118,7 @@ class Sightings:
     @cached_property
     def _middles(self) -> Pair:
         """Of the lenslets nearest to each place (n,), in a regular lattice, along y and x [px]."""
-        points = self.calibration.lattice.position(np.stack(self._index, -1))
+        points = self.calibration.lattice.position(np.stack(self.index, -1))
         return points[..., 0].ravel(), points[..., 1].ravel()
 
     def _centers(self, here: np.ndarray, step: tuple[int, int]) -> Pair:
@@ -226,11 +227,13 @@ class Sightings:
             weights += sight.weight
         return total / weights
 
-    def asked(self, size: np.ndarray, noise: float) -> np.ndarray:
-        """What lenslets pull at patches (y, x), their information, variance, and disputed part (4, y, x).
+    def asked(self, size: np.ndarray, noise: float, slow: np.ndarray) -> np.ndarray:
+        """What lenslets pull at patches (y, x), and what that rests on (6, y, x).
 
-        The first two for a step of the patch by which a detail moves by 1 px where it stands at a
-        micro-image's edge. Values that are off by more than their noise count less: as the last says.
+        Pull and information are for a step of the patch by which a detail moves by 1 px where it stands at a
+        micro-image's edge; then the variance of the values, and the disputed part: values that are off by
+        more than their noise count less. Last what two lenslets share of the texture of a place, which is
+        what they show beyond the `slow` part (y, x) of the picture, and the square of what one shows.
         """
         step = np.asarray(size / self.calibration.lattice.pitch / self.flat.even, np.float32)
         sights = list(self.around(size, finer=True))
@@ -245,7 +248,8 @@ class Sightings:
         off = values - (weights * values).sum(0) / total
         pulled, variance = weights * slopes, (weights * off**2).sum(0) / total
         disputed = 1 - total / (seen.sum(0) + np.float32(1e-9))
-        return np.stack([-(pulled * off).sum(0), (pulled * slopes).sum(0), variance, disputed])
+        pull, information = -(pulled * off).sum(0), (pulled * slopes).sum(0)
+        return np.stack([pull, information, variance, disputed, *_shared(seen, values - slow)])
 
     def _slope(self, sight: Sight) -> np.ndarray:
         """How much a lenslet's value changes with the logarithm of the patch, over patch/pitch (y, x)."""
@@ -257,6 +261,15 @@ class Sightings:
                 ends.append(_linear(image, at))
             slope -= away.ravel()[sight.here] * (ends[1] - ends[0])
         return self._spread(slope, sight.here)
+
+
+def _shared(weight: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Means (y, x) of the products of the values of two, and of the squares of those of one (k, y, x)."""
+    part = weight / (weight.sum(0) + np.float32(1e-9))
+    own, alone = (part * value**2).sum(0), (part**2).sum(0)
+    both = ((part * value).sum(0) ** 2 - (part**2 * value**2).sum(0)) / (1 - alone + np.float32(1e-6))
+    several = alone < _ALONE
+    return both * several, own * several
 
 
 def _linear(image: np.ndarray, at: Sequence[np.ndarray]) -> np.ndarray:

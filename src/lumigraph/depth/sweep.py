@@ -5,7 +5,7 @@ a place hides it from the views of one side; so the better of the left and the r
 better of the upper and the lower.
 
 Near views move little between labels, and may mislead, as on glass and polished steel. So the outermost
-views are also swept alone, and each place takes the map that the views agree with better.
+views are also swept alone; `lines` refines both maps, and each place takes the one that the views agree with.
 """
 
 import math
@@ -19,7 +19,6 @@ from lumigraph.core.progress import Progress, silent, within
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import WINDOW, Fit, Shading
 from lumigraph.depth.volume import box, cheapest, guided, rivals, semi_global
-from lumigraph.depth.vote import agreed
 from lumigraph.errors import GeometryError
 
 _STEP = 0.4  # between labels: how far a point moves in the outermost view [px]
@@ -27,6 +26,7 @@ _MOST_LABELS = 2000
 _MOST_DIFFERENCE = 0.017  # of a picture from 0 to 1: more says only that the label is wrong
 _FAR = 0.15  # part of a picture's width that a point may cross from the middle view to the outermost
 _COARSE = 4
+_BAND = 1 << 16  # values at a time, which stay in the processor's cache
 _SLOW = 2.0  # px of the small pictures: what varies over more may be shading
 _DISTANT = 0.5  # power of a view's distance by which it counts; of 0, 0.5, 1, 2 on *antinous* and *cotton*
 _MODEST = 0.05  # preference for small movements where the views do not say
@@ -46,8 +46,10 @@ def labels(low: float, high: float) -> np.ndarray:
 
 def swept(
     pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Progress
-) -> tuple[np.ndarray, np.ndarray]:
-    """Movement (y, x) of each place in the outermost view [px], to a fraction of a label; its `rivals` [px].
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Movements (y, x) of places in the outermost view [px], to a fraction of a label, and their `rivals`.
+
+    One map by all views of the cross, and where it has others than the outermost, one by these alone.
 
     Raises
     ------
@@ -64,11 +66,11 @@ def swept(
     ends = outermost(pictures)
     share = 1.0 if ends is None else 0.7
     total = _matched(pictures, moves, most, shading, within(progress, 0, share))
-    found, others = _cheapest(total, moves), rivals(total, most) * step
+    found, others = [_cheapest(total, moves)], rivals(total, most) * step
+    del total
     if ends is not None:
-        del total
         second = _matched(ends, moves, most, shading, within(progress, share, 1))
-        found = agreed(pictures, (found, _cheapest(second, moves)), shading)
+        found.append(_cheapest(second, moves))
     return found, others
 
 
@@ -83,7 +85,7 @@ def _matched(
 
 def _cheapest(total: np.ndarray, moves: np.ndarray) -> np.ndarray:
     """Movements (y, x) of the least cost, less those of single places."""
-    found = median_filter(moves[0] + cheapest(total)[0] * (moves[1] - moves[0]), 5)
+    found = median_filter(moves[0] + cheapest(total) * (moves[1] - moves[0]), 5)
     return np.clip(found, moves[0], moves[-1]).astype(np.float32)
 
 
@@ -104,13 +106,18 @@ def costs(
     """Disagreement (n, y, x) of the cross of views for each movement, at most 2 `most`."""
     pad = math.ceil(float(np.abs(moves).max())) + 1
     halves = _halves(pictures, shading or Shading.none(pictures.center.shape[1:]), pad)
-    out = np.zeros((len(moves), *pictures.center.shape[1:]), np.float32)
-    room = np.empty_like(pictures.center), np.empty_like(pictures.center[0])
-    for k, move in enumerate(moves):
-        for sides in halves:
-            means = [_disagreement(side, float(move), most, room) for side in sides]
-            out[k] += np.minimum(*means) if len(means) == 2 else means[0]
-        progress((k + 1) / len(moves))
+    colours, count, width = pictures.center.shape
+    out = np.zeros((len(moves), count, width), np.float32)
+    band = max(1, _BAND // (colours * width))
+    room = np.empty((colours, band, width), np.float32), np.empty((band, width), np.float32)
+    for start in range(0, count, band):
+        rows = slice(start, min(start + band, count))
+        here = room[0][:, : rows.stop - start], room[1][: rows.stop - start]
+        for k, move in enumerate(moves):
+            for sides in halves:
+                means = [_disagreement(side, float(move), most, (rows, *here)) for side in sides]
+                out[k, rows] += np.minimum(*means) if len(means) == 2 else means[0]
+            progress((start + (rows.stop - start) * (k + 1) / len(moves)) / count)
     return out
 
 
@@ -118,39 +125,54 @@ def costs(
 class _View:
     """A view of the cross, and the middle view as bright as it is seen from there (c, y, x).
 
-    `place` is where it stands along `axis` of its array; `data` goes on at its edges, and so does `seen`
-    (y, x), which places are not cut off.
+    `place` is where it stands along `axis` of its array; `data` goes on by `pad` px at its edges, and so do
+    its steps `slope` from each sample to the next, and `seen` (y, x), which places are not cut off.
     """
 
     data: np.ndarray
+    slope: np.ndarray
     middle: np.ndarray
     place: float
     axis: int
+    pad: int
     seen: np.ndarray | None
 
-    def difference(self, move: float, out: np.ndarray) -> np.ndarray:
-        """From the middle view (c, y, x) if all places move by `move`, linearly between samples."""
+    def difference(self, move: float, rows: slice, out: np.ndarray) -> np.ndarray:
+        """From rows of the middle view (c, y, x) if all places move by `move`, linearly between samples."""
         below = math.floor(move * self.place)
         part = np.float32(move * self.place - below)
-        first, second = self._read(self.data, below), self._read(self.data, below + 1)
-        np.subtract(second, first, out=out)
-        out *= part
-        out += first
-        out -= self.middle
+        np.multiply(self._read(self.slope, below, rows), part, out=out)
+        out += self._read(self.data, below, rows)
+        out -= self.middle[:, rows]
         return np.abs(out, out=out)
 
-    def sees(self, move: float) -> np.ndarray | None:
-        """Which places (y, x) are not cut off if all places move by `move`; None for all."""
+    def sees(self, move: float, rows: slice) -> np.ndarray | None:
+        """Which places (y, x) of some rows are not cut off if all move by `move`; None for all."""
         if self.seen is None:
             return None
         below = math.floor(move * self.place)
-        return (self._read(self.seen[None], below) & self._read(self.seen[None], below + 1))[0]
+        first, second = (self._read(self.seen[None], below + k, rows) for k in (0, 1))
+        return (first & second)[0]
 
-    def _read(self, data: np.ndarray, start: int) -> np.ndarray:
-        count = self.middle.shape[self.axis]
-        start += (data.shape[self.axis] - count) // 2
-        places = slice(start, start + count)
-        return data[:, places] if self.axis == 1 else data[:, :, places]
+    def _read(self, data: np.ndarray, start: int, rows: slice) -> np.ndarray:
+        start += self.pad
+        if self.axis == 1:
+            return data[:, start + rows.start : start + rows.stop]
+        return data[:, rows, start : start + self.middle.shape[2]]
+
+    def outside(self, image: np.ndarray, move: float, rows: slice) -> np.ndarray:
+        """The part of rows (y, x) that is read beyond the view's edge if all places move by `move`."""
+        far = move * self.place
+        if self.axis == 2:
+            return (
+                image[:, : math.ceil(-far)]
+                if far < 0
+                else image[:, max(image.shape[1] - math.ceil(far), 0) :]
+            )
+        last = self.middle.shape[1] - math.ceil(far)
+        return (
+            image[: max(math.ceil(-far) - rows.start, 0)] if far < 0 else image[max(last - rows.start, 0) :]
+        )
 
 
 def _halves(pictures: Pictures, shading: Shading, pad: int) -> list[list[list[_View]]]:
@@ -181,42 +203,36 @@ def _view(
     data = np.pad(pictures.data[which], wider, "edge")
     seen = None if pictures.seen is None else np.pad(pictures.seen[which], wider[1:], "edge")
     gloss = shading.at(place, 0.0) if axis == 1 else shading.at(0.0, place)
-    return _View(data, pictures.center + gloss, place, axis, seen)
+    slope = np.diff(data, axis=axis, append=data.take([-1], axis))
+    return _View(data, slope, pictures.center + gloss, place, axis, pad, seen)
 
 
 def _disagreement(
-    side: list[_View], move: float, most: float, room: tuple[np.ndarray, np.ndarray]
+    side: list[_View], move: float, most: float, room: tuple[slice, np.ndarray, np.ndarray]
 ) -> np.ndarray:
-    """Mean over the views of one side of how much they differ from the middle one (y, x).
+    """Mean over the views of one side of how much they differ from rows of the middle one (y, x).
 
     Far views count more: in near ones a wrong place moves less, and differs less. Where all of them are cut
     off, as much as counts.
     """
-    total = np.zeros(room[1].shape, np.float32)
+    rows, space, difference = room
+    total = np.zeros(difference.shape, np.float32)
     weights: np.ndarray | np.float32 = np.float32(0)
-    difference = room[1]
     for view in side:
-        colours = view.difference(move, room[0])
+        colours = view.difference(move, rows, space)
         np.copyto(difference, colours[0])
         for colour in colours[1:]:
             difference += colour
         difference /= len(colours)
         np.minimum(difference, np.float32(most), out=difference)
-        _outside(difference, move * view.place, view.axis - 1)[...] = most
-        sees, distant = view.sees(move), np.float32(abs(view.place) ** _DISTANT)
+        view.outside(difference, move, rows)[...] = most
+        sees, distant = view.sees(move, rows), np.float32(abs(view.place) ** _DISTANT)
         weight = distant if sees is None else distant * sees
         difference *= weight
         total += difference
         weights = weights + weight
     total /= np.where(np.equal(weights, 0), 1, weights)
     return np.where(np.equal(weights, 0), np.float32(most), total)
-
-
-def _outside(image: np.ndarray, distance: float, axis: int) -> np.ndarray:
-    """The part of an image (y, x) that is read beyond its edge when moved by `distance`."""
-    count = min(math.ceil(abs(distance)), image.shape[axis])
-    places = slice(0, count) if distance < 0 else slice(image.shape[axis] - count, None)
-    return image[places] if axis == 0 else image[:, places]
 
 
 def farthest(pictures: Pictures) -> float:
@@ -239,9 +255,10 @@ def span(pictures: Pictures) -> tuple[tuple[float, float], Shading]:
     shading, texture = Shading.none(guide.shape), guide
     for grounds in (_textures(small), small):
         cost = guided(costs(grounds, moves, limit, silent, shading if grounds is small else None), guide, 2)
-        texture = np.maximum(np.median(cost, axis=0) - cost.min(0) - 2 * pictures.noise / size, 0)
+        if grounds is small:
+            texture = np.maximum(np.median(cost, axis=0) - cost.min(0) - 2 * pictures.noise / size, 0)
         cost += (_MODEST * limit * np.abs(moves) / moves[-1])[:, None, None]
-        best, _ = cheapest(semi_global(cost, guide, 0.1 * limit, limit))
+        best = cheapest(semi_global(cost, guide, 0.1 * limit, limit))
         found = moves[0] + best * (moves[1] - moves[0])
         shading = _shading(small, found.astype(np.float32), radius, limit)
     low, high = _quantiles(found * size, texture**2, (0.01, 0.99))

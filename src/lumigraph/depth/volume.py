@@ -91,8 +91,8 @@ def _sweep(
         before = path
 
 
-def cheapest(cost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Label (y, x) of the least cost, between labels by a parabola; and how much it stands out, 0 to 1."""
+def cheapest(cost: np.ndarray) -> np.ndarray:
+    """Label (y, x) of the least cost, between labels by a parabola."""
     n = len(cost)
     best = cost.argmin(0)
     middle = np.clip(best, 1, n - 2)
@@ -100,9 +100,7 @@ def cheapest(cost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     bend = below - 2 * at + above
     safe = np.where(bend > 0, bend, 1)
     move = np.where((bend > 0) & (middle == best), np.clip((below - above) / (2 * safe), -0.5, 0.5), 0)
-    usual = np.median(cost, axis=0)
-    contrast = (usual - cost.min(0)) / np.where(usual > 0, usual, 1)
-    return best + move, np.clip(contrast, 0, 1)
+    return best + move
 
 
 _VALLEY = 0.1  # of a jump on each path: what a rival's cost must fall below that between it and the best

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from lumigraph.depth.lines import visible
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import Shading
+from lumigraph.depth.visible import visible
 from lumigraph.depth.volume import box
 
 _WINDOW = 10  # px to each side that decide together; of 1, 3, 6, 10 on *antinous* and *cotton*
@@ -15,13 +15,13 @@ _MOST = 0.1  # of a picture from 0 to 1: more says only that a place is wrong
 
 
 def agreed(pictures: Pictures, maps: tuple[np.ndarray, np.ndarray], shading: Shading) -> np.ndarray:
-    """Of two maps of movements (y, x) [px in the outermost view], at each place the one that fits better.
+    """Whether (y, x) the second of two maps of movements (y, x) [px in the outermost view] fits better.
 
     Fits: the views of the cross that see the place, each moved by the map, differ less from the middle view
     and its shading, over a window.
     """
     first, second = (box(_left(pictures, one, shading), _WINDOW) for one in maps)
-    return np.where(second < first, maps[1], maps[0])
+    return second < first
 
 
 def _left(pictures: Pictures, moves: np.ndarray, shading: Shading) -> np.ndarray:

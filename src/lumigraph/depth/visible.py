@@ -1,0 +1,31 @@
+"""Which views see a place, and which do not because something nearer is in the way."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from lumigraph.depth.pictures import Pictures
+
+BEFORE = 1.2
+"""How much nearer an occluder is [px in the outermost view]."""
+
+
+def visible(pictures: Pictures, moves: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
+    """For each lit view (v, u) but the middle one, which places (y, x) of the middle view it sees.
+
+    Places are put into the view from far to near: where another one ends up on top, they are hidden.
+    """
+    order = np.argsort(moves, axis=None)
+    y, x = np.divmod(order, moves.shape[1])
+    sorted_moves = moves.ravel()[order]
+    last = [n - 1 for n in moves.shape]
+    for v, u in np.argwhere(pictures.lit):
+        if (v, u) == pictures.middle:
+            continue
+        row = np.clip(np.rint(y + sorted_moves * pictures.down[v]), 0, last[0]).astype(np.intp)
+        column = np.clip(np.rint(x + sorted_moves * pictures.right[u]), 0, last[1]).astype(np.intp)
+        nearest = np.empty_like(moves)
+        nearest[row, column] = sorted_moves
+        seen = np.empty(moves.size, bool)
+        seen[order] = nearest[row, column] < sorted_moves + BEFORE
+        yield int(v), int(u), seen.reshape(moves.shape)
