@@ -40,8 +40,8 @@ def refined(
     """Movements (y, x) in the outermost view [px], refined on all views, and what they rest on.
 
     `swept` are one or two first maps of movements (y, x), and how far others lie that explain a place as
-    well. Two are both refined, first on some of the views; then each place takes the one that the views agree
-    with.
+    well. Two are both refined, the second one on some of the views, which takes less time; then each place
+    takes the one that the views agree with.
 
     Each round asks every view that sees a place by how much it should move there, r = g Δ: the residual r
     against the middle view, and the gradient g along the view's own direction. The answers, weighted by what
@@ -51,11 +51,11 @@ def refined(
     lines = _Lines(pictures, _splines(grey, pictures.lit), contrast(grey[pictures.middle]))
     some = replace(lines, pictures=few(pictures)) if len(maps) > 1 else lines
     found = []
-    for k, one in enumerate(maps):
+    for k, (one, last) in enumerate(zip(maps, (lines, some), strict=False)):
         moves, left = some.moved(one, shading, _JUMPS[0])
-        asked = _asked(pictures, lines.splines, moves, left)
-        change = lines.changed(moves, asked, _JUMPS[1]) - moves
-        found.append((moves + change, _evidence(lines, asked, moves + change, rivals), left))
+        asked = _asked(last.pictures, lines.splines, moves, left)
+        moves = last.changed(moves, asked, _JUMPS[1])
+        found.append((moves, _evidence(last, asked, moves, rivals), left))
         progress((k + 1) / len(maps))
     if len(found) == 1:
         return found[0][:2]
