@@ -1,9 +1,9 @@
 """Depth of pixels of drawn plenoptic 2.0 pictures (`lg.depth.dense`): errors, and those expected.
 
 Three cameras (one kind of lenslets, three kinds, Galilean) before a disc and a plane, a bent surface, a
-slanted one, and steps; then pictures that hold no depth, or not one. With --factors it compares the factors in
-use, `lumigraph.depth.expected.MICRO_IMAGES`, with those of the greatest likelihood of the scenes in `FITTED`.
-Those in use are less for noise, which a surface without bends averages over more places than the fit knows.
+slanted one, and steps; then pictures that hold no depth, or not one. With --factors it compares the factors
+in use, `lumigraph.depth.expected.MICRO_IMAGES`, with those of the greatest likelihood of the scenes in
+`FITTED`. Those in use are less for noise, which a surface without bends averages over more places.
 
     python -m benchmarks.pixel_depth [camera or case ...]
     python -m benchmarks.pixel_depth --factors

@@ -67,7 +67,7 @@ def test_a_slanted_plane_is_smooth_and_right(name):
     assert np.median(error) < 0.015
     assert np.quantile(error, 0.98) < 0.15
     assert found.error is not None
-    assert 0.5 < np.mean(found.error) / np.mean(error) < 2.3
+    assert 0.5 < np.mean(found.error) / np.mean(error) < 2.6
 
 
 @pytest.mark.parametrize("name", CAMERAS)
@@ -82,7 +82,7 @@ def test_a_bent_surface_is_not_flattened_and_its_error_is_told(name):
     found, truth = measured(name, ((paint, bent, None),), bent)
     error = np.abs(found.values - truth)
     assert np.mean(error) < 0.035
-    assert 0.5 < np.mean(found.error) / np.mean(error) < 2.3
+    assert 0.5 < np.mean(found.error) / np.mean(error) < 2.6
 
 
 def test_a_texture_that_repeats_is_not_trusted():

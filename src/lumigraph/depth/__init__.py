@@ -12,7 +12,7 @@
 - `fuse`: several maps as one, smooth but for kinks and jumps
 - `metric`: distances through the camera's geometry: metres, virtual depths, points in space
 - `pictures`, `sweep`, `lines`: the steps of `epi`: even views, a plane sweep, least squares on all views;
-  `vote`: which of two sweeps the views agree with;
+  `visible`: which views see a place; `vote`: which of two maps they agree with;
   `shading`: how a place's brightness changes from view to view
 - `expected`: the error to expect; `chance`: matches no better than by chance; `repeats`: pictures that repeat
 - `volume`: costs of many labels: guided filter, semi-global matching, the best label

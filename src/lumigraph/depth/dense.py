@@ -265,7 +265,7 @@ def _period(sights: Sightings, sizes: np.ndarray, noise: float) -> np.ndarray:
     micro = MicroImages.read(flat.image, calibration, flat.radius)
     found = repeats.of_micro_images(micro, most - least, noise)
     lenslets = replace(Patches.of(np.ones(found.shape), calibration), values=found)
-    period = _joined(sights, lambda part, rows: lenslets.at(*part.index))
+    period = _joined(sights, lambda part, rows: np.asarray(lenslets.at(*part.index)))
     sizes = np.abs(sizes)
     there = (sizes + period <= most) | (sizes - period >= least)
     return np.where(there, period * flat.even / sizes, 0)

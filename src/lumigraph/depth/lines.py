@@ -40,7 +40,7 @@ def refined(
     """Movements (y, x) in the outermost view [px], refined on all views, and what they rest on.
 
     `swept` are one or two first maps of movements (y, x), and how far others lie that explain a place as
-    well. Two are both refined, the second one on some of the views, which takes less time; then each place
+    well. Two are both refined, first on some of the views, which takes less time, then on all; each place
     takes the one that the views agree with.
 
     Each round asks every view that sees a place by how much it should move there, r = g Δ: the residual r
@@ -51,11 +51,11 @@ def refined(
     lines = _Lines(pictures, _splines(grey, pictures.lit), contrast(grey[pictures.middle]))
     some = replace(lines, pictures=few(pictures)) if len(maps) > 1 else lines
     found = []
-    for k, (one, last) in enumerate(zip(maps, (lines, some), strict=False)):
+    for k, one in enumerate(maps):
         moves, left = some.moved(one, shading, _JUMPS[0])
-        asked = _asked(last.pictures, lines.splines, moves, left)
-        moves = last.changed(moves, asked, _JUMPS[1])
-        found.append((moves, _evidence(last, asked, moves, rivals), left))
+        asked = _asked(pictures, lines.splines, moves, left)
+        moves = lines.changed(moves, asked, _JUMPS[1])
+        found.append((moves, _evidence(lines, asked, moves, rivals), left))
         progress((k + 1) / len(maps))
     if len(found) == 1:
         return found[0][:2]
