@@ -38,6 +38,7 @@ CAMERAS: dict[str, tuple[Callable[[], Any], float]] = {
     "1.0, 1e-3": (lambda: plenoptic().replace(lenslets={"count": (31, 31)}), 1e-3),
     "2.0, round, 1e-2": (lambda: camera(count=(21, 21), shape="round"), 1e-2),
     "2.0, round, 1e-3": (lambda: camera(count=(21, 21), shape="round"), 1e-3),
+    "2.0, round, 1e-4": (lambda: camera(count=(7, 7), shape="round"), 1e-4),
     "2.0, hexagonal, 1e-2": (lambda: camera(count=(24, 21), layout="hex"), 1e-2),
     "2.0, hexagonal, 1e-3": (lambda: camera(count=(24, 21), layout="hex"), 1e-3),
     "2.0, three kinds, 1e-2": (

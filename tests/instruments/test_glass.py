@@ -327,3 +327,44 @@ def test_other_files_are_refused(tmp_path):
     (tmp_path / "lens.txt").write_text("x")
     with pytest.raises(FormatError, match="is no prescription"):
         _ = single(tmp_path / "lens.txt").glass
+
+
+@pytest.mark.long  # an operator for the field's side, and light through each of its lenslets
+def test_a_slice_of_a_plenoptic_camera_is_the_sum_of_its_points(plenoptic):
+    """At the side of the field, where the thin lens on the axis has it elsewhere."""
+    lenslets = {"pitch": "50 um", "focal_length": "0.54 mm", "count": (3, 9)}
+    one = plenoptic.replace(lenslets=lenslets, sensor={"pixel_pitch": "5 um", "shape": None})
+    grid, picture = lg.Grid((2, 3), 60e-6, (0.0003, -0.0015)), np.random.default_rng(1).random((2, 3))
+    y, x = (part.ravel() for part in np.meshgrid(grid.y, grid.x, indexing="ij"))
+    share = picture.ravel() * (60e-6 * 1.25 / one.optics().object_pitch) ** 2
+    points = lg.Points(np.stack([y, x, 0 * x], axis=1), share)
+    found, expected, thin = (
+        lg.simulate(camera, lg.Scene([part]), lg.Incoherent(1e-2)).data
+        for camera, part in (
+            (one, lg.Slice(picture, grid)), (one, points),
+            (one.replace(main_lens={"prescription": None}), lg.Slice(picture, grid)),
+        )
+    )  # fmt: skip
+    assert np.linalg.norm(found - expected) < 5e-3 * np.linalg.norm(expected)
+    assert np.linalg.norm(thin - expected) > 2e-2 * np.linalg.norm(expected)
+
+
+@pytest.mark.long  # a white image of 93 lenslets, 20 px each
+def test_micro_images_move_where_chief_rays_are_less_steep(plenoptic, monkeypatch):
+    """Inwards at the side of the field, by the slope's difference from the exit pupil's middle times b."""
+    here = sys.modules[__name__]
+    monkeypatch.setattr(here, "LEAN", -200.0)
+    monkeypatch.setattr(here, "D", 0.005)  # gaps between micro-images
+    glass._glass.cache_clear()
+    one = plenoptic.replace(main_lens={"diameter": 0.005}, lenslets={"count": (3, 31)})
+    white = np.asarray(lg.simulate(one, lg.targets.white(), lg.Incoherent(1e-2)).data)
+    lattice, b = one.calibration.lattice, 2.6e-3
+    for j in (-12, 12):
+        y, x = np.rint(lattice.position(np.array([0, j]))).astype(int)
+        part = white[y - 9 : y + 10, x - 9 : x + 10]
+        moved = part.sum(0) @ (x + np.arange(-9, 10)) / part.sum() - lattice.position(np.array([0, j]))[1]
+        height = -j * 240e-6
+        field = height / Z2
+        lean = field**3 * (-200 - TURN * BARREL)  # of an object at +field; its image is on the other side
+        assert moved * 12e-6 == pytest.approx(-lean * b, rel=0.1)
+        assert abs(moved) > 0.5
