@@ -49,8 +49,9 @@ def test_a_disc_before_a_plane_has_its_outline_to_two_samples(name):
     inside, seen = truth == near, np.abs(found.values - near) < 1
     beyond = np.where(inside, distance_transform_edt(inside), distance_transform_edt(~inside))
     assert beyond[inside != seen].max(initial=0) <= 2
-    error = np.abs(found.values - truth)
-    assert np.corrcoef(found.confidence.ravel(), error.ravel())[0, 1] < -0.2
+    # Ten places at the outline are off by 2 px: one that is wrong is wrong
+    error = np.minimum(np.abs(found.values - truth), 0.3)
+    assert np.corrcoef(found.confidence.ravel(), error.ravel())[0, 1] < -0.25
 
 
 @pytest.mark.parametrize("name", CAMERAS)
