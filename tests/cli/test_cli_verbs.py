@@ -141,8 +141,9 @@ def test_simulate_adds_noise_that_the_seed_repeats(lumigraph, bench):
 def test_simulate_passes_the_light_and_the_scene_on(lumigraph, bench, monkeypatch, words, expected):
     seen = {}
 
-    def simulate(camera, scene, coherence, *, spectrum, progress):
+    def simulate(camera, scene, coherence, *, spectrum, progress, medium):
         assert spectrum is None
+        assert medium is None
         seen.update(scene=scene, coherence=coherence)
         return io.open(bench / "raw.tiff")
 

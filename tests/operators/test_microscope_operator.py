@@ -258,7 +258,7 @@ def test_a_disk_without_room_is_refused_before_anything_is_computed(tmp_path, mo
     monkeypatch.setattr(shutil, "disk_usage", full)
     monkeypatch.setattr(building, "slice_kernel", None)
     with pytest.raises(
-        SamplingError, match=r"images of points need up to .* GiB but the disk of .* has .* free"
+        SamplingError, match=r"images of points need up to .* KiB but the disk of .* has 0.977 KiB free"
     ):
         microscope_operator([SCOPE], LENSLET, LAYOUT, DEPTHS, folder=tmp_path / "new")
 

@@ -1,5 +1,6 @@
 """Bundle adjustment: camera and poses that explain all corners best, and how well each is known."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +21,9 @@ _ROUNDS = 3
 _WILD = 6.0
 """Standard deviations beyond which a place is another corner's."""
 
+
+_SAME_TURN, _SAME_DISTANCE = 0.05, 0.02
+"""Boards that turn by less [rad], and stand no farther apart, of their distance, count as the same."""
 
 _FLAT = 1e-3
 """To which a board is taken to be flat at first, over its diagonal: paper on a plate."""
@@ -234,11 +238,24 @@ def adjust(
         problem, kept = _again(replace(first, bow=problem.bow), unknowns)
         problem, found = _settled(problem, unknowns)
     numbers, heights, poses = problem.split(found)
+    check_poses(poses)  # whose camera may be none
     whole = replace(first, bow=problem.bow)
     misfit, own = whole.misfit(found), problem.noise.each(corners.kind, whole.magnification(found))
     covariance = _covariance(problem, found)
     known = replace(board, heights=tuple(heights.tolist())) if len(heights) else board
     return Adjusted(camera.with_numbers(numbers), poses, covariance, problem.noise, misfit, kept, known, own)
+
+
+def check_poses(poses: np.ndarray) -> None:
+    """Whether boards (frames, 6) stood differently: otherwise lengths follow from noise alone."""
+    turn = float(np.linalg.norm(np.ptp(poses[:, :3], axis=0)))
+    away = float(np.ptp(poses[:, 3]) / abs(np.median(poses[:, 3])))
+    if turn < _SAME_TURN and away < _SAME_DISTANCE:
+        raise CalibrationError(
+            f"the board stands the same on all {len(poses)} pictures, to {math.degrees(turn):.2g}° and "
+            f"{away:.2%} of its distance, which does not tell the camera. Take it at different distances and "
+            "angles, 10° and 10 % apart or more."
+        )
 
 
 def _settled(problem: Problem, unknowns: np.ndarray, loss: str = "linear") -> tuple[Problem, np.ndarray]:

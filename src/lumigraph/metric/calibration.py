@@ -11,7 +11,7 @@ from lumigraph.core.brief import brief
 from lumigraph.core.result import Quantity
 from lumigraph.errors import CalibrationError
 from lumigraph.metric import geometry
-from lumigraph.metric.adjustment import Adjusted, Problem, adjust, placed
+from lumigraph.metric.adjustment import Adjusted, Problem, adjust, check_poses, placed
 from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.metric.known import disagreement
@@ -27,9 +27,6 @@ _TIED = 0.95
 
 _BENT = 5e-4
 """Rms height of a board's corners over its diagonal from which on a note says so."""
-
-_SAME_TURN, _SAME_DISTANCE = 0.05, 0.02
-"""Turns [rad] and distances, over themselves, within which boards stand the same."""
 
 _LENGTHS = ("f", "L", "b")
 
@@ -233,20 +230,8 @@ def board(corners: Corners, board: Board, nominal: Nominal) -> Measured:
     usable = np.isin(corners.frame, known)
     found = adjust(corners[usable], board, nominal, camera, np.array([poses[f] for f in known.tolist()]))
     found = turned_over(found, corners[usable], board, nominal)
-    _check_poses(found.poses)
+    check_poses(found.poses)
     return _measured(found, corners[usable], found.board, nominal, len(corners.frames) - len(known))
-
-
-def _check_poses(poses: np.ndarray) -> None:
-    """Whether boards (frames, 6) stood differently: otherwise lengths follow from noise alone."""
-    turn = float(np.linalg.norm(np.ptp(poses[:, :3], axis=0)))
-    away = float(np.ptp(poses[:, 3]) / abs(np.median(poses[:, 3])))
-    if turn < _SAME_TURN and away < _SAME_DISTANCE:
-        raise CalibrationError(
-            f"the board stands the same on all {len(poses)} pictures, to {math.degrees(turn):.2g}° and "
-            f"{away:.2%} of its distance, which does not tell the camera. Take it at different distances and "
-            "angles, 10° and 10 % apart or more."
-        )
 
 
 def _measured(found: Adjusted, corners: Corners, board: Board, nominal: Nominal, unused: int) -> Measured:
