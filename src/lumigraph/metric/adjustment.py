@@ -220,7 +220,8 @@ def adjust(
     Raises
     ------
     CalibrationError
-        More corners than there is memory for, or an adjustment that does not settle.
+        More corners than there is memory for, an adjustment that does not settle, or a board that stands the
+        same on all pictures.
     """
     frame = np.searchsorted(corners.frames, corners.frame)
     kinds = len(camera.gains)
@@ -238,7 +239,7 @@ def adjust(
         problem, kept = _again(replace(first, bow=problem.bow), unknowns)
         problem, found = _settled(problem, unknowns)
     numbers, heights, poses = problem.split(found)
-    check_poses(poses)  # whose camera may be none
+    _check_poses(poses)  # whose camera may be none
     whole = replace(first, bow=problem.bow)
     misfit, own = whole.misfit(found), problem.noise.each(corners.kind, whole.magnification(found))
     covariance = _covariance(problem, found)
@@ -246,7 +247,7 @@ def adjust(
     return Adjusted(camera.with_numbers(numbers), poses, covariance, problem.noise, misfit, kept, known, own)
 
 
-def check_poses(poses: np.ndarray) -> None:
+def _check_poses(poses: np.ndarray) -> None:
     """Whether boards (frames, 6) stood differently: otherwise lengths follow from noise alone."""
     turn = float(np.linalg.norm(np.ptp(poses[:, :3], axis=0)))
     away = float(np.ptp(poses[:, 3]) / abs(np.median(poses[:, 3])))

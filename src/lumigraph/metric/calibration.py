@@ -11,7 +11,7 @@ from lumigraph.core.brief import brief
 from lumigraph.core.result import Quantity
 from lumigraph.errors import CalibrationError
 from lumigraph.metric import geometry
-from lumigraph.metric.adjustment import Adjusted, Problem, adjust, check_poses, placed
+from lumigraph.metric.adjustment import Adjusted, Problem, adjust, placed
 from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.metric.known import disagreement
@@ -230,7 +230,6 @@ def board(corners: Corners, board: Board, nominal: Nominal) -> Measured:
     usable = np.isin(corners.frame, known)
     found = adjust(corners[usable], board, nominal, camera, np.array([poses[f] for f in known.tolist()]))
     found = turned_over(found, corners[usable], board, nominal)
-    check_poses(found.poses)
     return _measured(found, corners[usable], found.board, nominal, len(corners.frames) - len(known))
 
 
