@@ -40,8 +40,8 @@ def refined(
     """Movements (y, x) in the outermost view [px], refined on all views, and what they rest on.
 
     `swept` are one or two first maps of movements (y, x), and how far others lie that explain a place as
-    well. Two are both refined, first on some of the views, which takes less time, then on all; each place
-    takes the one that the views agree with.
+    well. Two are both refined on some of the views; each place takes the one that the views agree with, and
+    what is so joined is refined on all.
 
     Each round asks every view that sees a place by how much it should move there, r = g Δ: the residual r
     against the middle view, and the gradient g along the view's own direction. The answers, weighted by what
@@ -50,18 +50,15 @@ def refined(
     (maps, rivals), grey = swept, pictures.data.mean(2)
     lines = _Lines(pictures, _splines(grey, pictures.lit), contrast(grey[pictures.middle]))
     some = replace(lines, pictures=few(pictures)) if len(maps) > 1 else lines
-    found = []
-    for k, one in enumerate(maps):
-        moves, left = some.moved(one, shading, _JUMPS[0])
-        asked = _asked(pictures, lines.splines, moves, left)
-        moves = lines.changed(moves, asked, _JUMPS[1])
-        found.append((moves, _evidence(lines, asked, moves, rivals), left))
-        progress((k + 1) / len(maps))
-    if len(found) == 1:
-        return found[0][:2]
-    (first, evidence, left), (second, other, _) = found
-    better = agreed(pictures, (first, second), left)
-    return np.where(better, second, first), evidence.where(better, other)
+    found = [some.moved(one, shading, _JUMPS[0]) for one in maps]
+    moves, left = found[0]
+    progress(0.5)
+    if len(found) > 1:
+        moves = np.where(agreed(pictures, (moves, found[1][0]), left), found[1][0], moves)
+    asked = _asked(pictures, lines.splines, moves, left)
+    moves = lines.changed(moves, asked, _JUMPS[1])
+    progress(1.0)
+    return moves, _evidence(lines, asked, moves, rivals)
 
 
 def few(pictures: Pictures) -> Pictures:

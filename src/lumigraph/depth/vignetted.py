@@ -36,7 +36,8 @@ def even(data: np.ndarray, lit: np.ndarray, middle: tuple[int, int]) -> np.ndarr
     """
     views = [(int(v), int(u)) for v, u in np.argwhere(lit)]
     center = data[middle].copy()
-    if not any(_varies(data[at], center) for at in views):
+    usual = _brightness(center)
+    if not any(_varies(data[at], usual) for at in views):
         return None
     seen = _seen(data, views)
     for at in views:
@@ -49,11 +50,14 @@ def _radius(shape: tuple[int, ...]) -> int:
     return max(16, min(shape[-2:]) // _BROAD)
 
 
-def _varies(picture: np.ndarray, center: np.ndarray) -> bool:
-    """Whether the brightness of a picture (c, y, x) over another's does."""
-    radius = _radius(picture.shape)
-    first, second = (box(one.mean(0), radius) + np.float32(_PEDESTAL) for one in (picture, center))
-    low, high = np.percentile((first / second)[::4, ::4], (5, 95))
+def _brightness(picture: np.ndarray) -> np.ndarray:
+    """Of a picture (c, y, x), over a window (y, x), a little more of it everywhere."""
+    return box(picture.mean(0), _radius(picture.shape)) + np.float32(_PEDESTAL)
+
+
+def _varies(picture: np.ndarray, usual: np.ndarray) -> bool:
+    """Whether the brightness of a picture (c, y, x) over another's (y, x) does."""
+    low, high = np.percentile((_brightness(picture) / usual)[::4, ::4], (5, 95))
     return bool(high > math.sqrt(_VIGNETTED) * low)
 
 

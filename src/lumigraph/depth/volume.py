@@ -53,17 +53,17 @@ def semi_global(cost: np.ndarray, guide: np.ndarray, step: float, jump: float) -
     ----------
     Hirschmüller, "Stereo processing by semiglobal matching and mutual information", IEEE PAMI 30, 328 (2008).
     """
-    rows = np.ascontiguousarray(np.moveaxis(cost, 0, -1))
+    rows = np.ascontiguousarray(cost.swapaxes(0, 1))
     total = np.zeros_like(rows)
     for side in (1, -1):
         for slant in (0, 1, -1):
             _sweep(rows, total, guide, side, slant, (step, jump))
-    columns = np.ascontiguousarray(rows.swapaxes(0, 1))
+    columns = np.ascontiguousarray(rows.T)
     across = np.zeros_like(columns)
     for side in (1, -1):
         _sweep(columns, across, guide.T, side, 0, (step, jump))
-    total += across.swapaxes(0, 1)
-    return np.moveaxis(total, -1, 0)
+    total += across.T
+    return np.ascontiguousarray(total.swapaxes(0, 1))
 
 
 _EDGE = 0.03  # contrast between neighbours across which a jump is cheap
@@ -72,21 +72,23 @@ _EDGE = 0.03  # contrast between neighbours across which a jump is cheap
 def _sweep(
     cost: np.ndarray, total: np.ndarray, guide: np.ndarray, side: int, slant: int, price: tuple[float, float]
 ) -> None:
-    """Add the paths that come from one side to `total` (y, x, n)."""
+    """Add the paths that come from one side to `total` (y, n, x)."""
     order = range(len(cost)) if side > 0 else range(len(cost) - 1, -1, -1)
     before = None
     for y in order:
         path = cost[y]
         if before is not None:
-            came, seen = np.roll(before, slant, 0), np.roll(guide[y - side], slant)
-            came = came - came.min(-1, keepdims=True)
+            came, seen = np.roll(before, slant, -1), np.roll(guide[y - side], slant)
+            came -= came.min(0)
             jump = price[0] + price[1] * np.exp(-np.abs(guide[y] - seen) / _EDGE)
-            best = np.minimum(came, jump[:, None].astype(cost.dtype))
-            np.minimum(best[:, 1:], came[:, :-1] + price[0], out=best[:, 1:])
-            np.minimum(best[:, :-1], came[:, 1:] + price[0], out=best[:, :-1])
+            best = np.minimum(came, jump.astype(cost.dtype))
+            came += price[0]
+            np.minimum(best[1:], came[:-1], out=best[1:])
+            np.minimum(best[:-1], came[1:], out=best[:-1])
             if slant:
-                best[0 if slant > 0 else -1] = 0  # nothing comes from outside
-            path = path + best
+                best[:, 0 if slant > 0 else -1] = 0  # nothing comes from outside
+            best += path
+            path = best
         total[y] += path
         before = path
 
@@ -130,5 +132,7 @@ def rivals(total: np.ndarray, jump: float) -> np.ndarray:
             top = np.where(k > start, np.maximum(top, here), low)
             fall = top - here
             valley = (fall > least) & (here < order[k - 1]) & (here <= beyond)
-            away += valley * (k - start) * np.square(fall / np.maximum(top - low, least))
+            fall, top_there, below = fall[valley], top[valley], low[valley]
+            deep = np.square(fall / np.maximum(top_there - below, least))
+            away[valley] += (k - start[valley]) * deep
     return away
