@@ -44,6 +44,23 @@ def test_each_frame_is_what_the_verb_alone_gives(views, tmp_path, capsys):
     assert 'http-equiv="refresh"' not in page
 
 
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        (["--camera", "none.toml"], "no camera file 'none.toml'"),
+        (["--camera", "lfm-none"], "'lfm-none' is neither a camera file nor in the catalogue"),
+        (["--calibration", "none.toml"], "none.toml does not exist"),
+        (["--white", "none.png"], "none.png does not exist"),
+        (["--white", "{here}", "--dark", "none.png"], "none.png does not exist"),
+    ],
+)
+def test_files_that_are_not_there_are_told_before_any_worker_starts(said, why, views, tmp_path, capsys):
+    said = [word.format(here=views / "v0.zarr") for word in said]
+    assert main(words(views, tmp_path / "out.zarr", *said)) == 1
+    assert why in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.skipif(os.name == "nt", reason="a shell script stands in for sbatch")
 def test_a_queue_gets_a_part_for_each_job(views, tmp_path, monkeypatch):
     """With a stand-in for sbatch, which runs the jobs one after the other: no SLURM is here."""

@@ -132,6 +132,8 @@ def test_beads_and_photographs(camera, tmp_path):
         (["-n", "1", "--layout", "beads", "--layout", "slanted"], "two data sets"),
         (["-n", "1", "--photographs", "none*.jpg"], "no file matches"),
         (["-n", "1", "-t", "separation=±1 mm"], "--cameras is 0 but must be above 0"),
+        (["-n", "1", "--accuracy", "-1"], "accuracy is -1 but must lie between 1e-05 and 0.01"),
+        (["-n", "1", "--accuracy", "nan"], "accuracy is nan"),
         (["-n", "1", "--cameras", "2"], "there are no tolerances"),
         (["-n", "1", "--cameras", "-1"], "--cameras is -1"),
         (["-n", "1", "--cameras", "9", "-t", "lenslets.rotation=±30 deg"], "a data set has one shape"),
@@ -140,6 +142,13 @@ def test_beads_and_photographs(camera, tmp_path):
 def test_what_cannot_be_is_refused(said, why, camera, tmp_path, capsys):
     assert main(["dataset", str(camera), *DEPTHS, *said, "-o", str(tmp_path / "t.zarr")]) == 1
     assert why in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_accuracies_that_no_microscope_has_are_refused(tmp_path, capsys):
+    words = ["dataset", "lfm-guv", "-n", "1", "--z", "0 um", "--accuracy", "0.2"]
+    assert main([*words, "-o", str(tmp_path / "t.zarr")]) == 1
+    assert "accuracy is 0.2 but must be from 1e-5 to 0.1" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

@@ -1,7 +1,6 @@
 """`lumigraph batch`: another verb for each of many frames."""
 
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -158,8 +157,7 @@ def batch(
     first = items[0]
     if verb == "deconvolve" and "--warm" in options:
         items, what = runs(items, run), {**what, "run": run}
-    with tempfile.TemporaryDirectory(prefix="lumigraph-") as place:
-        work.bound(first, Path(place))  # refuse a line that is wrong before any worker starts
+    work.check(first)
     if hands.slurm is not None:
         return hands.submitted(output)
     workers, part = hands.cluster(), hands.share()

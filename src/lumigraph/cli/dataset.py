@@ -98,6 +98,7 @@ def dataset(
     if seed < 0:
         raise FormatError(f"--seed is {seed} but must be at least 0.")
     given, varied = load_camera(camera), dict(map(values, vary or []))
+    given.check_accuracy(accuracy)
     meant = [changed(given, one) for one in combinations(varied)]
     taking = tuple(one.to_toml() for one in _as_built(meant, tolerance, cameras, seed))
     layouts = tuple(dict.fromkeys(layout or ("patches", "slanted")))

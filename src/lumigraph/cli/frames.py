@@ -4,7 +4,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stderr
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from functools import partial
 from importlib import import_module
 from io import StringIO
@@ -46,6 +46,9 @@ KINDS = {
 }  # fmt: skip
 """Verbs that are taken."""
 
+_INPUTS = {"calibration", "white", "dark"}
+"""Files that come with each frame."""
+
 SIDE = 4
 """Frames of 'deconvolve' that a worker is given at a time; how many of them share products, it finds out."""
 
@@ -82,6 +85,29 @@ class Frames:
         if KINDS[self.verb].is_table:
             return Values({"file": item["file"], **_numbers(result)})
         return result.thing
+
+    def check(self, item: dict[str, Any]) -> None:
+        """Refuse a line that is wrong, or names files that are not there, before any worker starts.
+
+        Raises
+        ------
+        CycloptsError
+            Words that the verb does not take.
+        FormatError
+            No such file, or no such camera.
+        """
+        from lumigraph.instruments import load_camera
+        from lumigraph.io.source import existing
+
+        with tempfile.TemporaryDirectory(prefix="lumigraph-") as place:
+            given = _flat(self.bound(item, Path(place))[1].arguments)
+        if given.get("camera") is not None:
+            load_camera(given["camera"])
+        for name in _INPUTS & given.keys():
+            found = given[name]
+            for path in found if isinstance(found, list | tuple) else [found]:
+                if path is not None:
+                    existing(path)
 
     @property
     def side_by_side(self) -> int:
@@ -131,6 +157,14 @@ class Frames:
         words += ["--output", str(folder / f"frame{kind.ending}")] if kind.ending else []
         command, bound, _ = app.parse_args(words, exit_on_error=False, print_error=False)
         return command, bound
+
+
+def _flat(arguments: dict[str, Any]) -> dict[str, Any]:
+    """Values by name, those of groups of options among them."""
+    own = {name: value for name, value in arguments.items() if not is_dataclass(value)}
+    return own | {
+        name: one for value in arguments.values() if is_dataclass(value) for name, one in vars(value).items()
+    }
 
 
 def items_of(paths: Sequence[str], pages: str | None) -> Iterator[dict[str, Any]]:

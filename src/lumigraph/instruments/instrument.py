@@ -23,6 +23,7 @@ from lumigraph.instruments.problems import readable
 from lumigraph.instruments.quantities import FROM_FILE
 from lumigraph.instruments.row import Row
 from lumigraph.instruments.trade_offs import Range
+from lumigraph.operators.fineness import Fineness
 from lumigraph.sensor import Sensor
 
 
@@ -125,6 +126,18 @@ class Instrument(Part):
             Planes too large for an answer at once.
         """
         raise NotImplementedError
+
+    def check_accuracy(self, accuracy: float) -> None:
+        """Refuse what `operator` cannot be as exact as, before any work.
+
+        Raises
+        ------
+        SamplingError
+            A relative rms out of 1e-5 to 1e-2.
+        GeometryError
+            Of a microscope, out of 1e-5 to 0.1.
+        """
+        Fineness(accuracy)
 
     def operator_for(
         self,

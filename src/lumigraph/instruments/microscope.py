@@ -277,6 +277,10 @@ class LightFieldMicroscope(DescribedMicroscope):
         width = narrowed(fill * apart, N) if degree == 1 else fill * apart
         return CellSampling(samples, N, width, degree, fill**2)
 
+    def check_accuracy(self, accuracy: float) -> None:
+        """Refuse what `operator` cannot be as exact as, before any work."""
+        require_accuracy(accuracy)
+
     def magnifications(self) -> trade_offs.Range:
         """Of the objective."""
         own = self.objective.magnification
