@@ -14,7 +14,7 @@ from lumigraph.operators.microscope_patterns import all_patterns, few_of_pixels
 from lumigraph.operators.microscope_pixels import b_spline
 from lumigraph.operators.microscope_sensor import Samples, Straight, sensor
 from lumigraph.operators.microscope_tiles import Row, Tiling
-from lumigraph.operators.microscope_transforms import Transforms
+from lumigraph.operators.microscope_transforms import add_cells, columns
 from lumigraph.operators.resampling import Resampling, banded
 
 SCOPE = Objective(525e-9, 0.5)
@@ -186,17 +186,12 @@ def test_sums_are_the_transform_of_cells_turned_and_lead_back_to_them(of_image, 
     """By a fast transform: (-i)^odd times it, of an image its inverse, as real and imaginary parts."""
     told, odd = Tiling(Row(4, 0, 2, 1), Row(5, 0, 2, 1)), np.array([[0, 0, 1, 1], [0, 1, 0, 1]])
     cells, (ly, lx) = rng.random((4, 5, 4)), told.lengths
-    transforms = Transforms.of(told, odd, cells, of_image=of_image)
-    given, hy = transforms.along_y([cells, 2 * cells]), ly // 2 + 1
-    found = transforms.columns(given, slice(0, hy))
+    found = columns([cells, 2 * cells], 2, told, odd, of_image=of_image)
     turned = np.fft.rfft2(cells, (ly, lx), axes=(0, 1)) * (1j if of_image else -1j) ** odd.sum(0)
     above, below = turned[: ly // 2 + 1], turned[-np.arange(ly // 2 + 1) % ly] * (-1.0) ** odd[0]
-    cc, sc, cs, ss = np.moveaxis(found[:, 0], 2, 0)  # along y, then x
+    cc, cs, sc, ss = np.moveaxis(found.reshape(ly // 2 + 1, lx // 2 + 1, 2, 4, 4)[:, :, 0], 2, 0)
     np.testing.assert_allclose(cc - ss - 1j * (cs + sc), above, atol=1e-12)
     np.testing.assert_allclose(cc + ss - 1j * (cs - sc), below, atol=1e-12)
     again = np.zeros((2, *cells.shape))
-    along_y = transforms.room(2, cells)
-    for some in (slice(0, 1), slice(1, hy)):
-        transforms.put(along_y, transforms.columns(given, some), some)
-    transforms.add(list(again), along_y)
+    add_cells(list(again), found, told, odd, of_image=of_image)
     np.testing.assert_allclose(again, [cells, 2 * cells], atol=1e-12)

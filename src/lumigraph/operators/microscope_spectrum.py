@@ -28,7 +28,7 @@ from lumigraph.operators.microscope_kernels import SliceKernel
 from lumigraph.operators.microscope_patterns import Patterns, of_images, parted, quadrant, whole
 from lumigraph.operators.microscope_sensor import Sensor, sensor
 from lumigraph.operators.microscope_tiles import Tiling, tilings
-from lumigraph.operators.microscope_transforms import Transforms
+from lumigraph.operators.microscope_transforms import add_cells, columns
 
 LEAST = 8
 """Lenslets along each side of a tile, at least, where there are so many."""
@@ -42,9 +42,6 @@ to one number of a tile (transforms, parts and copies). The former was measured,
 
 SIDE = 4
 """Objects that go through a matrix one after the other, at most: with more, their columns leave the cache."""
-
-BLOCK = 2**21
-"""Numbers of sums at some frequencies that are held at a time, at most, or those of one frequency along y."""
 
 GROUP = 2**22
 """Numbers of the transforms of all tiles that are treated at a time, at most, if one depth has fewer: they
@@ -129,9 +126,7 @@ class Spectra:
     pixels
         Patterns of the image.
     matrices
-        R (f_y, f_x, patterns of some depths, those of the image), of the depths of each of `groups`.
-    transforms
-        Of the patterns of each of those, and of the image.
+        R (frequencies, patterns of some depths, those of the image), of the depths of each of `groups`.
     sensor
         From patterns of the image to the image.
     far
@@ -142,7 +137,6 @@ class Spectra:
     points: Sequence[Patterns]
     pixels: Patterns
     matrices: Sequence[Array]
-    transforms: tuple[Sequence[Transforms], Transforms]
     sensor: Sensor
     far: FarLight | None = None
 
@@ -166,50 +160,32 @@ class Spectra:
             matrix = np.empty(shape, np.float32)
             for kernel, one, places in zip(kernels[depths], chosen, _places(chosen), strict=True):
                 _fill(matrix, places, kernel, (one, pixels), told)
-            by_axis = (length // 2 + 1 for length in told.lengths)
-            return arrays.like(matrix.reshape(*by_axis, *shape[1:]), like)
+            return arrays.like(matrix, like)
 
-        together = groups(points, told)
-        matrices = list(each(found, together))
-        lit = [Transforms.of(told, _odd(points[depths]), like, of_image=False) for depths in together]
-        seen = Transforms.of(told, pixels.odd, like, of_image=True)
-        return cls(told, points, pixels, matrices, (lit, seen), sensor(pixels, placement, like), far)
+        matrices = list(each(found, groups(points, told)))
+        return cls(told, points, pixels, matrices, sensor(pixels, placement, like), far)
 
     def forward(self, volumes: Sequence[Array]) -> list[Array]:
         """Images (ny, nx) of volumes (z, rows s, columns s), which are those of each alone bit for bit."""
-        seen = self.transforms[1]
+        told, side = self.told, len(volumes)
 
-        def lit(group: tuple[slice, Array, Transforms]) -> list[Array]:
-            depths, matrix, points = group
+        def lit(group: tuple[slice, Array]) -> Array:
+            depths, matrix = group
             chosen = self.points[depths]
 
             def cells(volume: Array) -> Array:
                 found = [parted(volume[k + depths.start, ...], one) for k, one in enumerate(chosen)]
                 return _ordered(found, chosen)
 
-            given, found = points.along_y(map(cells, volumes)), seen.room(len(volumes), volumes[0])
-            for some in self._blocks(len(volumes)):
-                seen.put(found, _times(points.columns(given, some), matrix[some, ...]), some)
-            return found
+            return _times(columns(map(cells, volumes), side, told, _odd(chosen), of_image=False), matrix)
 
-        found = each(lit, self._groups())
+        found = each(lit, zip(groups(self.points, told), self.matrices, strict=True))
         sums = next(found)
         for part in found:
-            for one, more in zip(sums, part, strict=True):
-                one += more
+            sums += part
         images = [self._far_image(volume) for volume in volumes]
-        seen.add(images, sums)
+        add_cells(images, sums, told, self.pixels.odd, of_image=True)
         return [self.sensor.whole(image) for image in images]
-
-    def _groups(self) -> Iterator[tuple[slice, Array, Transforms]]:
-        """Depths that are treated together, their matrices and their transforms."""
-        return zip(groups(self.points, self.told), self.matrices, self.transforms[0], strict=True)
-
-    def _blocks(self, side: int) -> Iterator[slice]:
-        """Frequencies along y, some at a time: what lies between should stay in the processor's cache."""
-        hy, hx = self.matrices[0].shape[:2]
-        step = max(BLOCK // (4 * self.told.count * side * hx * self.pixels.count), 1)
-        return (slice(start, min(start + step, hy)) for start in range(0, hy, step))
 
     def _far_image(self, volume: Array) -> Array:
         """Patterns (rows, columns, r) of far light."""
@@ -225,45 +201,41 @@ class Spectra:
 
     def adjoint(self, images: Sequence[Array]) -> list[Array]:
         """Transpose of `forward`: volumes (z, rows s, columns s)."""
-        xp, n, evens = arrays.namespace(images[0]), len(images), []
+        xp, told, n, evens = arrays.namespace(images[0]), self.told, len(images), []
 
         def parts() -> Iterator[Array]:
             for image in images:
                 yield (part := self.sensor.parted(image))
                 evens.append(None if self.far is None else self.far.adjoint(part))
 
-        along_y = self.transforms[1].along_y(parts())
-        all_of_them = slice(0, self.matrices[0].shape[0])
-        shared = self.transforms[1].columns(along_y, all_of_them) if len(self.matrices) > 1 else None
-        shape, s = [row.cells + 2 * row.margin for row in (self.told.rows, self.told.columns)], self._points
+        sums = columns(parts(), n, told, self.pixels.odd, of_image=True)
+        shape, s = tuple(row.cells + 2 * row.margin for row in (told.rows, told.columns)), self._points
         like = {"dtype": images[0].dtype, "device": arrays.device(images[0])}
         volumes = [xp.empty((len(self.points), shape[0] * s, shape[1] * s), **like) for _ in images]
 
-        def seen(group: tuple[slice, Array, Transforms]) -> None:
-            depths, matrix, points = group
-            found = points.room(n, images[0])
-            for some in self._blocks(n):
-                sums = self.transforms[1].columns(along_y, some) if shared is None else shared[some, ...]
-                points.put(found, _times(sums, xp.matrix_transpose(matrix[some, ...])), some)
-            cells = [xp.zeros((*shape, points.channels), **like) for _ in range(n)]
-            points.add(cells, found)
+        def seen(group: tuple[slice, Array]) -> None:
+            depths, matrix = group
+            chosen = self.points[depths]
+            cells = [xp.zeros((*shape, matrix.shape[1]), **like) for _ in range(n)]
+            product = _times(sums, xp.matrix_transpose(matrix))
+            add_cells(cells, product, told, _odd(chosen), of_image=False)
             for volume, own, even in zip(volumes, cells, evens, strict=True):
-                _put_planes(volume, own, even, self.points[depths], depths.start)
+                _put_planes(volume, own, even, chosen, depths.start)
 
-        for _ in each(seen, self._groups()):
+        for _ in each(seen, zip(groups(self.points, told), self.matrices, strict=True)):
             pass
         return volumes
 
 
 def _times(sums: Array, matrix: Array) -> Array:
-    """Sums (f_y, objects, f_x, 4 tiles, channels) times matrices (f_y, f_x, channels, others).
+    """Sums (frequencies, objects, 4 tiles, channels) times matrices (frequencies, channels, others).
 
     Each object has a product of its own: the bits of one row may depend on the others of a product, and on
     its place among them (OpenBLAS, processors without AVX-512). NumPy does all of a frequency before the
     next, while its matrix is in the processor's cache.
     """
     if arrays.is_numpy(sums):
-        return sums @ matrix[:, None, ...]
+        return sums @ matrix[:, None]
     each_one = [sums[:, k, ...] @ matrix for k in range(sums.shape[1])]
     return arrays.namespace(sums).stack(each_one, axis=1)
 

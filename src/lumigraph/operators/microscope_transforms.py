@@ -9,7 +9,6 @@ between them is real.
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,139 +19,64 @@ from lumigraph.operators.microscope_patterns import PARITIES
 from lumigraph.operators.microscope_tiles import Span, Tiling
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Piece:
-    """Channels of one parity in one tile.
+def columns(parts: Iterable[Array], side: int, told: Tiling, odd: np.ndarray, *, of_image: bool) -> Array:
+    """Four sums (frequencies, side, 4 tiles, channels) of cells' parts (rows, columns, channels).
 
     Parameters
     ----------
-    tile
-        Its number.
-    cells
-        Where they are (rows, columns, channels).
-    there, back
-        Matrices along y and along x: `waves`, and `back`.
+    parts
+        Of `side` objects or images.
+    odd
+        (2, channels): whether they are odd along y and x, in the order of `PARITIES`.
+    of_image
+        Whether they are those of an image, not of points.
     """
-
-    tile: int
-    cells: tuple[slice, slice, slice]
-    there: tuple[Array, Array]
-    back: tuple[Array, Array]
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Sums along y, columns, channels."""
-        _, columns, channels = self.cells
-        return self.there[0].shape[0], columns.stop - columns.start, channels.stop - channels.start
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Transforms:
-    """Between cells' parts (rows, columns, channels) and their sums at each frequency.
-
-    What lies between are sums along y alone: of each object or image, those of each piece in turn.
-
-    Parameters
-    ----------
-    told
-        Tiles.
-    channels
-        Of each cell.
-    pieces
-        Of all tiles and parities.
-    """
-
-    told: Tiling
-    channels: int
-    pieces: Sequence[Piece]
-
-    @classmethod
-    def of(cls, told: Tiling, odd: np.ndarray, like: Array, *, of_image: bool) -> "Transforms":
-        """For arrays of one library and precision.
-
-        Parameters
-        ----------
-        odd
-            (2, channels): whether they are odd along y and x, in the order of `PARITIES`.
-        of_image
-            Whether they are those of an image, not of points.
-        """
-
-        def piece(tile: int, spans: tuple[Span, Span], parity: tuple[int, int], own: slice) -> Piece:
-            cells, at = _places(spans, of_image)
-            counts = (one.stop - one.start for one in cells)
-            axes = list(zip(told.lengths, at, counts, parity, strict=True))
-            y, x = (arrays.like(waves(*one, of_image), like) for one in axes)
-            down, across = (arrays.like(back(*one, of_image), like) for one in axes)
-            return Piece(tile, (*cells, own), (y, x), (down, across))
-
-        return cls(told, odd.shape[1], [piece(*one) for one in _pieces(told, odd)])
-
-    def along_y(self, parts: Iterable[Array]) -> list[Array]:
-        """Sums (2 f_y, columns, channels) of the parts of each object or image."""
-        return [_product(one.there[0], cells[one.cells]) for cells in parts for one in self.pieces]
-
-    def columns(self, along_y: Sequence[Array], some: slice) -> Array:
-        """Four sums (f_y, objects, f_x, 4 tiles, channels), of some of the frequencies along y.
-
-        They lie in memory so that none of them is copied: those of one frequency stand side by side, those of
-        one piece at one distance from each other.
-        """
-        first, hx = along_y[0], self.told.lengths[1] // 2 + 1
-        xp, side, hy = arrays.namespace(first), len(along_y) // len(self.pieces), some.stop - some.start
-        shape = hy, side, 2 * hx, self.told.count, 2, self.channels
-        found = xp.empty(shape, dtype=first.dtype, device=arrays.device(first))
-        for (n, piece), sums in self._each(along_y):
-            given = xp.reshape(sums[2 * some.start : 2 * some.stop, ...], (hy, 2, *sums.shape[1:]))
-            place = found[:, n, :, piece.tile, :, piece.cells[2]]
-            _put_product(xp.permute_dims(place, (0, 2, 1, 3)), piece.there[1], given)
-        return xp.reshape(found, (hy, side, hx, 4 * self.told.count, self.channels))
-
-    def room(self, side: int, like: Array) -> list[Array]:
-        """Room for the sums along y of so many objects or images."""
-        kind = {"dtype": like.dtype, "device": arrays.device(like)}
-        return [arrays.namespace(like).empty(one.shape, **kind) for _ in range(side) for one in self.pieces]
-
-    def put(self, along_y: Sequence[Array], columns: Array, some: slice) -> None:
-        """Write the sums along y whose `columns` these are, at some of the frequencies along y."""
-        xp, (hy, side, hx) = arrays.namespace(columns), columns.shape[:3]
-        columns = xp.reshape(columns, (hy, side, 2 * hx, self.told.count, 2, self.channels))
-        for (n, piece), sums in self._each(along_y):
-            place = xp.reshape(sums[2 * some.start : 2 * some.stop, ...], (hy, 2, *sums.shape[1:]))
-            given = columns[:, n, :, piece.tile, :, piece.cells[2]]
-            _put_product(place, piece.back[1], xp.permute_dims(given, (0, 2, 1, 3)))
-
-    def add(self, parts: Sequence[Array], along_y: Sequence[Array]) -> None:
-        """Add to the parts of cells those whose sums along y these are."""
-        for (n, piece), sums in self._each(along_y):
-            place = parts[n][piece.cells]
-            place += _product(piece.back[0], sums)
-
-    def _each(self, along_y: Sequence[Array]) -> Iterator[tuple[tuple[int, Piece], Array]]:
-        """Number of an object and a piece, with its sums along y."""
-        return zip(((n, piece) for n in itertools.count() for piece in self.pieces), along_y, strict=False)
+    parts = iter(parts)
+    first = next(parts)
+    hy, hx = _halves(told)
+    shape = hy, hx, side, told.count, 2, 2, first.shape[-1]
+    xp = arrays.namespace(first)
+    found = xp.empty(shape, dtype=first.dtype, device=arrays.device(first))
+    for n, cells in enumerate(itertools.chain([first], parts)):
+        for k, (spans, parity, own) in _pieces(told, odd):
+            (rows, places), at = _places(spans, of_image)
+            tile = cells[rows, places, own]
+            y, x = _sums(told, at, tile.shape, parity, of_image, tile)
+            down = xp.reshape(y @ xp.reshape(tile, (tile.shape[0], -1)), (2 * hy, *tile.shape[1:]))
+            four = xp.reshape(x @ down, (hy, 2, hx, 2, -1))
+            found[:, :, n, k, :, :, own] = xp.permute_dims(four, (0, 2, 1, 3, 4))
+    return xp.reshape(found, (told.frequencies, side, 4 * told.count, first.shape[-1]))
 
 
-def _product(matrix: Array, array: Array) -> Array:
-    """Along the first axis of an array."""
-    xp = arrays.namespace(array)
-    return xp.reshape(matrix @ xp.reshape(array, (array.shape[0], -1)), (-1, *array.shape[1:]))
+def add_cells(parts: Sequence[Array], sums: Array, told: Tiling, odd: np.ndarray, *, of_image: bool) -> None:
+    """Add to cells' parts (rows, columns, channels) those whose `columns` these are."""
+    xp, (hy, hx) = arrays.namespace(sums), _halves(told)
+    sums = xp.reshape(sums, (hy, hx, len(parts), told.count, 2, 2, -1))
+    for (n, cells), (k, (spans, parity, own)) in itertools.product(
+        enumerate(parts), list(_pieces(told, odd))
+    ):
+        (rows, places), at = _places(spans, of_image)
+        place = cells[rows, places, own]
+        four = xp.permute_dims(sums[:, :, n, k, :, :, own], (0, 2, 1, 3, 4))
+        y, x = _backs(told, at, place.shape, parity, of_image, place)
+        across = x @ xp.reshape(four, (2 * hy, 2 * hx, -1))
+        place += xp.reshape(y @ xp.reshape(across, (2 * hy, -1)), place.shape)
 
 
-def _put_product(place: Array, matrix: Array, given: Array) -> None:
-    """Write products into a view."""
-    if arrays.is_numpy(place):
-        np.matmul(matrix, given, out=place)
-    else:
-        place[...] = matrix @ given
+def _halves(told: Tiling) -> tuple[int, int]:
+    """Frequencies from 0 on, along y and x."""
+    y, x = told.lengths
+    return y // 2 + 1, x // 2 + 1
 
 
-def _pieces(told: Tiling, odd: np.ndarray) -> Iterator[tuple[int, tuple[Span, Span], tuple[int, int], slice]]:
+def _pieces(
+    told: Tiling, odd: np.ndarray
+) -> Iterator[tuple[int, tuple[tuple[Span, Span], tuple[int, int], slice]]]:
     """Number and spans of each tile, with each parity that there is and its channels."""
     stops = np.searchsorted(2 * odd[0] + odd[1], np.arange(5)).tolist()
     own = [(p, slice(*ends)) for p, ends in zip(PARITIES, itertools.pairwise(stops), strict=True)]
     own = [(p, one) for p, one in own if one.stop > one.start]
-    return ((k, spans, *piece) for (k, spans), piece in itertools.product(told.tiles(), own))
+    return ((k, (spans, *piece)) for (k, spans), piece in itertools.product(told.tiles(), own))
 
 
 def _places(spans: tuple[Span, Span], of_image: bool) -> tuple[tuple[slice, slice], tuple[int, int]]:
@@ -161,6 +85,22 @@ def _places(spans: tuple[Span, Span], of_image: bool) -> tuple[tuple[slice, slic
     if of_image:
         return (y.image, x.image), (y.image_at, x.image_at)
     return (y.points, x.points), (y.points_at, x.points_at)
+
+
+def _sums(
+    told: Tiling, at: tuple[int, int], shape: Sequence[int], odd: tuple[int, int], of_image: bool, like: Array
+) -> tuple[Array, Array]:
+    """`waves` along y and x."""
+    y, x = (waves(*one, of_image) for one in zip(told.lengths, at, shape[:2], odd, strict=True))
+    return arrays.like(y, like), arrays.like(x, like)
+
+
+def _backs(
+    told: Tiling, at: tuple[int, int], shape: Sequence[int], odd: tuple[int, int], of_image: bool, like: Array
+) -> tuple[Array, Array]:
+    """`back` along y and x."""
+    y, x = (back(*one, of_image) for one in zip(told.lengths, at, shape[:2], odd, strict=True))
+    return arrays.like(y, like), arrays.like(x, like)
 
 
 @remembered
