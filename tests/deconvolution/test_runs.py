@@ -21,6 +21,8 @@ from lumigraph.deconvolution import (
     TotalVariation,
     Wavelets,
 )
+from lumigraph.deconvolution.methods import State
+from lumigraph.deconvolution.problem import Problem, Scale
 from lumigraph.store import atomic
 
 SHAPE = (14, 13)
@@ -226,6 +228,23 @@ def test_a_series_needs_one_sensitivity_and_one_frame_at_a_time(rng):
     assert len(list(volumes)) == 97
     assert len(calls) == 100 * 2 + 1
     np.testing.assert_array_equal(first[2].data, lg.deconvolve(pictures[2], operator, 2).data)
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_frames_begin_with_an_image_that_they_share(raw, method, monkeypatch):
+    """With an uneven response: the first model is that of the even object."""
+    asked = []
+    forward = Matrix._forward
+    monkeypatch.setattr(Matrix, "_forward", lambda self, o: asked.append(o) or forward(self, o))
+    camera = Exposure(response=np.linspace(0.5, 1.5, raw.size).reshape(SHAPE), background=3.0)
+    deconvolver = Deconvolver(OPERATOR, 1, method=method)
+    deconvolver(raw, camera)
+    first = len(asked)
+    again = deconvolver(2 * raw, camera)
+    assert len(asked) == 2 * first - 1
+    problem = Problem.of(2 * raw, camera, Scale.of(OPERATOR, camera, raw))
+    state = method.step(problem, State.at(problem, problem.flat()))
+    np.testing.assert_allclose(again, state.estimate, rtol=2e-5, atol=1e-5 * float(again.max()))
 
 
 def drifting(rng, count=5):

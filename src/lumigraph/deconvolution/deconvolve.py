@@ -343,7 +343,7 @@ class Deconvolver:
         if self._scale is None or self._scale[0] != key:
             _require(self._wide, data)
             scale = Scale.of(self._wide, exposure, data, least_seen(self.operator))
-            self._scale = key, scale
+            self._scale = key, scale if self.method.start is not None else scale.begun()
             if looks_beyond(self.operator):
                 self._pictured = scale.pictured(BESIDE)
         return self._scale[1]

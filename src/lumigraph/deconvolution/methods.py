@@ -42,6 +42,13 @@ class State:
         model = problem.model(estimate)
         return cls(estimate, model, problem.deviance(model), memory or {}, done)
 
+    @classmethod
+    def even(cls, problem: Problem) -> "State":
+        """That of the even object as bright as the data."""
+        flat, light = problem.flat(), problem.scale.even
+        model = problem.model(flat, None if light is None else problem.level * light)
+        return cls(flat, model, problem.deviance(model))
+
 
 class Method(Protocol):
     """One way to deconvolve: settings, and the step from one state to the next."""

@@ -1,6 +1,6 @@
 """A raw image, its camera and its noise, put together: what every method asks of them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,8 @@ class Scale:
         Truth values: which object samples the sensor sees.
     gain
         Electrons per unit of the data.
+    even
+        A of an object of intensity 1 where it is seen (ny, nx), with which frames begin; None if not known.
     """
 
     operator: Linear
@@ -45,6 +47,7 @@ class Scale:
     sensitivity: Array
     seen: Array
     gain: float
+    even: Array | None = None
 
     @classmethod
     def of(cls, operator: Linear, exposure: Exposure, like: Array, least: float = UNSEEN) -> "Scale":
@@ -69,6 +72,11 @@ class Scale:
         if getattr(total, "shape", ()):  # a dark image's noise may reach below the black level
             total = xp.where(total > 0, total, xp.zeros_like(total))
         return cls(operator, response, weights, total, sensitivity, seen, exposure.gain or 1.0)
+
+    def begun(self) -> "Scale":
+        """The same with `even`."""
+        xp = arrays.namespace(self.sensitivity)
+        return replace(self, even=self.operator.forward(xp.astype(self.seen, self.sensitivity.dtype)))
 
     def pictured(self, least: float) -> Array:
         """Truth values: samples that send at least this part of their light onto pixels that count.
@@ -138,9 +146,9 @@ class Problem:
             raise CalibrationError("the raw image is dark: there is nothing to deconvolve.")
         return cls(scale, data, FAINT * float(xp.mean(data)))
 
-    def model(self, estimate: Array) -> Array:
-        """Expected data (ny, nx) of an estimate: v A o + b, kept above 0."""
-        light = self.scale.operator.forward(estimate)
+    def model(self, estimate: Array, light: Array | None = None) -> Array:
+        """Expected data (ny, nx) of an estimate: v A o + b, kept above 0; `light` is A o if that is known."""
+        light = self.scale.operator.forward(estimate) if light is None else light
         xp = arrays.namespace(light)
         if self.scale.response is not None:
             light = light * self.scale.response

@@ -103,7 +103,7 @@ class Run:
         if self.start is not None:
             return State.at(self.problem, self.start)
         if self.method.start is None:
-            return State.at(self.problem, self.problem.flat())
+            return State.even(self.problem)
         start, needed = self.method.start, tuple(self.wanted[0].shape[1])
         if tuple(start.shape) != needed:
             raise GeometryError(f"start has shape {tuple(start.shape)} but the object has {needed}.")
