@@ -46,7 +46,7 @@ class State:
     def even(cls, problem: Problem) -> "State":
         """That of the even object as bright as the data."""
         flat, light = problem.flat(), problem.scale.even
-        model = problem.model(flat, None if light is None else problem.level * light)
+        model = problem.model(flat) if light is None else problem.read(problem.level * light)
         return cls(flat, model, problem.deviance(model))
 
 

@@ -146,9 +146,12 @@ class Problem:
             raise CalibrationError("the raw image is dark: there is nothing to deconvolve.")
         return cls(scale, data, FAINT * float(xp.mean(data)))
 
-    def model(self, estimate: Array, light: Array | None = None) -> Array:
-        """Expected data (ny, nx) of an estimate: v A o + b, kept above 0; `light` is A o if that is known."""
-        light = self.scale.operator.forward(estimate) if light is None else light
+    def model(self, estimate: Array) -> Array:
+        """Expected data (ny, nx) of an estimate: v A o + b, kept above 0."""
+        return self.read(self.scale.operator.forward(estimate))
+
+    def read(self, light: Array) -> Array:
+        """Expected data (ny, nx) where light A o falls on the pixels."""
         xp = arrays.namespace(light)
         if self.scale.response is not None:
             light = light * self.scale.response
