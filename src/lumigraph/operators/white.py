@@ -66,7 +66,7 @@ LARGEST = 2.0**25
 def white_image(camera: HasOptics, accuracy: float) -> np.ndarray:
     """Raw image (ny, nx) of light of 1 on the lenslets."""
     optics = _of(camera, accuracy)
-    return _followed(optics, _pitches(optics))[0]
+    return _followed(optics, _pitches(optics), stops.of(optics))[0]
 
 
 def image_and_error(camera: HasOptics, accuracy: float) -> tuple[np.ndarray, float]:
@@ -76,12 +76,12 @@ def image_and_error(camera: HasOptics, accuracy: float) -> tuple[np.ndarray, flo
     are left out.
     """
     optics = _of(camera, accuracy)
-    pitches = _pitches(optics)
-    raw, fringes = _followed(optics, pitches)
+    pitches, stop = _pitches(optics), stops.of(optics)
+    raw, fringes = _followed(optics, pitches, stop)
     beyond = max(0.0, 1 - pitches / _across(optics))
-    off = math.hypot(fringes, max(SAMPLED * accuracy, LEAST), leans(optics)[1], stops.of(optics).left)
+    off = math.hypot(fringes, max(SAMPLED * accuracy, LEAST), leans(optics)[1], stop.left)
     if beyond:
-        nearer, _ = _followed(optics, NEARER * pitches)
+        nearer, _ = _followed(optics, NEARER * pitches, stop)
         missed = float(np.linalg.norm(raw - nearer)) / (float(np.linalg.norm(raw)) or 1.0)
         more = SLOWLY if _cells.edges(optics.array) == "other" else 1.0
         off = math.hypot(off, more * min(1.0, beyond / ENDING) * missed)
@@ -94,10 +94,10 @@ def _of(camera: HasOptics, accuracy: float) -> Optics:
     return Optics.of(camera, camera.object_distance, accuracy)
 
 
-def _followed(optics: Optics, pitches: float) -> tuple[np.ndarray, float]:
+def _followed(optics: Optics, pitches: float, stop: stops.Stops) -> tuple[np.ndarray, float]:
     """Raw image of light that is followed so far, and the relative rms of the fringes that it lacks."""
     cells, wave = optics.cells, WaveImage.of(optics, pitches)
-    far, stop = _far(wave)[:, None, :, None], stops.of(optics)
+    far = _far(wave)[:, None, :, None]
     image = _over_cells(wave, optics, stop) + wave.aside() * wave.through * stop.area * far
     image = image.reshape([n * k for n, k in zip(cells.image, cells.samples, strict=True)])
     raw = readout(optics).forward(image.astype(np.float32) / optics.image_scale**2)
@@ -180,9 +180,9 @@ def _over_cells(wave: WaveImage, optics: Optics, stop: stops.Stops) -> np.ndarra
     rows, columns = (side.like for side in wave.sides)
     if not stop.ellipses:
         return _through_stop(wave, optics)[rows][:, :, columns]
-    even, total = np.abs(wave.amplitude()) ** 2, 0.0
+    even, total = _Even.of(np.abs(wave.amplitude()) ** 2, optics), 0.0
     for ellipse, weight in zip(stop.ellipses, stop.weights, strict=True):
-        short = _averaged(even, optics, ellipse.transform)
+        short = even.averaged(ellipse.transform)
         total = total + weight[:, None, :, None].astype(np.float32) * short[rows][:, :, columns]
     return np.asarray(total)
 
@@ -194,14 +194,15 @@ def _through_stop(wave: WaveImage, optics: Optics) -> np.ndarray:
     places along each axis of the stop bring is interpolated between them (Lagrange).
     """
     if _cells.accepted(optics.camera) is None:
-        return _averaged(np.abs(wave.amplitude()) ** 2, optics, stops.disc_of(_stop_radius(optics)))
+        even = _Even.of(np.abs(wave.amplitude()) ** 2, optics)
+        return even.averaged(stops.disc_of(_stop_radius(optics)))
     total, edge = np.zeros(()), _stop_radius(optics) / _cells.lenslet_distance(optics.camera)
     places = leans(optics)[0]
     for down, across in product(range(len(places)), repeat=2):
         tilted = replace(wave, tilt=(edge * places[down], edge * places[across]))
-        image = np.abs(tilted.amplitude()) ** 2
+        even = _Even.of(np.abs(tilted.amplitude()) ** 2, optics)
         lean = _lagrange(places, down), _lagrange(places, across)
-        total = total + _averaged(image, optics, _Leaning(_stop_radius(optics), lean))
+        total = total + even.averaged(_Leaning(_stop_radius(optics), lean))
     return total
 
 
@@ -229,19 +230,6 @@ def leans(optics: Optics) -> tuple[np.ndarray, float]:
 
 Weight = Callable[[np.ndarray], np.ndarray]
 """By the place in the stop along an axis, of its half."""
-
-
-def _averaged(image: np.ndarray, optics: Optics, stop: stops.Transform) -> np.ndarray:
-    """Mean of an image (cells, samples, cells, samples) over the stop's image, on the samples of `optics`."""
-    y, x = (_Frequencies(optics, k, *image.shape[2 * k : 2 * k + 2]) for k in (0, 1))
-    spectrum = arrays.rfft2(image.reshape(y.given, x.given), (y.fine, x.fine))
-    spectrum = spectrum[y.number][:, : x.coarse // 2 + 1]
-    across = slice(x.coarse // 2 + 1)
-    spectrum *= stop(y.number / y.length, (x.number / x.length)[across])
-    spectrum *= np.outer(y.moved(), x.moved()[across])
-    found = arrays.irfft2(spectrum, (y.coarse, x.coarse))
-    tiles = found.reshape(-1, y.samples, x.coarse // x.samples, x.samples)
-    return tiles[: y.cells, :, : x.cells]
 
 
 @dataclass(frozen=True, slots=True)
@@ -326,3 +314,30 @@ class _Frequencies:
         """From the middle of the fine samples to that of the coarse ones, and their number (coarse,)."""
         shift = 1 / self.coarse - 1 / self.fine
         return np.exp(1j * np.pi * self.number * shift) * (self.coarse / self.fine)
+
+
+@dataclass(frozen=True, slots=True)
+class _Even:
+    """Transform of the image of one wave, at the frequencies that the samples of an operator hold."""
+
+    spectrum: np.ndarray
+    y: _Frequencies
+    x: _Frequencies
+
+    @classmethod
+    def of(cls, image: np.ndarray, optics: Optics) -> "_Even":
+        """Of an image (cells, samples, cells, samples)."""
+        y, x = (_Frequencies(optics, k, *image.shape[2 * k : 2 * k + 2]) for k in (0, 1))
+        spectrum = arrays.rfft2(image.reshape(y.given, x.given), (y.fine, x.fine))
+        spectrum = spectrum[y.number][:, : x.coarse // 2 + 1]
+        spectrum *= np.outer(y.moved(), x.moved()[: x.coarse // 2 + 1])
+        return cls(spectrum, y, x)
+
+    def averaged(self, stop: stops.Transform) -> np.ndarray:
+        """Mean (cells, samples, cells, samples) over the image of a stop."""
+        y, x = self.y, self.x
+        spectrum = self.spectrum.copy()
+        spectrum *= stop(y.number / y.length, (x.number / x.length)[: x.coarse // 2 + 1])
+        found = arrays.irfft2(spectrum, (y.coarse, x.coarse))
+        tiles = found.reshape(-1, y.samples, x.coarse // x.samples, x.samples)
+        return tiles[: y.cells, :, : x.cells]
