@@ -43,6 +43,9 @@ to one number of a tile (transforms, parts and copies). The former was measured,
 SIDE = 4
 """Objects that go through a matrix one after the other, at most: with more, their columns leave the cache."""
 
+BLOCK = 2**18
+"""Numbers of the sums at some frequencies that are added up at a time, if one frequency has fewer."""
+
 GROUP = 2**22
 """Numbers of the transforms of all tiles that are treated at a time, at most, if one depth has fewer: they
 should stay in the processor's cache."""
@@ -84,10 +87,12 @@ def held_numbers(told: Tiling, points: Sequence[Patterns], pixels: Patterns) -> 
     threads, columns = min(arrays.WORKERS, len(counts)), 4 * told.frequencies * told.count
     cells = max(math.prod(row.cells + 2 * max(row.margin, 0) for row in (told.rows, told.columns)), 1)
     transformed = 6 * told.lengths[0] * (told.lengths[1] // 2 + 1)  # three times real and imaginary parts
-    ahead = min(2 * threads, len(counts)) + 1
-    of_groups = threads * max(counts) * (2 * cells + columns + transformed) + ahead * columns * pixels.count
+    of_groups = threads * max(counts) * (2 * cells + transformed)
+    of_sums = columns * (sum(counts) + pixels.count) + arrays.WORKERS * max(
+        BLOCK, columns * pixels.count // told.frequencies
+    )
     of_image = pixels.count * (2 * columns + transformed) + 3 * len(pixels.along) ** 2 * math.prod(told.cells)
-    return max(of_groups, of_image)
+    return max(of_groups + of_sums, of_image)
 
 
 def cost(told: Tiling, points: int, pixels: int) -> float:
@@ -169,23 +174,40 @@ class Spectra:
         """Images (ny, nx) of volumes (z, rows s, columns s), which are those of each alone bit for bit."""
         told, side = self.told, len(volumes)
 
-        def lit(group: tuple[slice, Array]) -> Array:
-            depths, matrix = group
+        def lit(depths: slice) -> Array:
             chosen = self.points[depths]
 
             def cells(volume: Array) -> Array:
                 found = [parted(volume[k + depths.start, ...], one) for k, one in enumerate(chosen)]
                 return _ordered(found, chosen)
 
-            return _times(columns(map(cells, volumes), side, told, _odd(chosen), of_image=False), matrix)
+            return columns(map(cells, volumes), side, told, _odd(chosen), of_image=False)
 
-        found = each(lit, zip(groups(self.points, told), self.matrices, strict=True))
-        sums = next(found)
-        for part in found:
-            sums += part
+        sums = self._summed(list(each(lit, groups(self.points, told))))
         images = [self._far_image(volume) for volume in volumes]
         add_cells(images, sums, told, self.pixels.odd, of_image=True)
         return [self.sensor.whole(image) for image in images]
+
+    def _summed(self, given: Sequence[Array]) -> Array:
+        """Sums (frequencies, objects, 4 tiles, channels) of the image, of those of the points of `groups`.
+
+        All depths of some frequencies before the next ones: what they add up to stays in the cache.
+        """
+        xp, like = arrays.namespace(given[0]), {"dtype": given[0].dtype, "device": arrays.device(given[0])}
+        sums = xp.empty((*given[0].shape[:-1], self.pixels.count), **like)
+
+        def put(some: slice) -> None:
+            pairs = zip(given, self.matrices, strict=True)
+            parts = (_times(part[some, ...], matrix[some, ...]) for part, matrix in pairs)
+            total = next(parts)
+            for part in parts:
+                total += part
+            sums[some, ...] = total
+
+        step = max(BLOCK // math.prod(sums.shape[1:]), 1) if arrays.is_numpy(sums) else sums.shape[0]
+        for _ in each(put, (slice(start, start + step) for start in range(0, sums.shape[0], step))):
+            pass
+        return sums
 
     def _far_image(self, volume: Array) -> Array:
         """Patterns (rows, columns, r) of far light."""
