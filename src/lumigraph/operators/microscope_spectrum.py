@@ -87,12 +87,10 @@ def held_numbers(told: Tiling, points: Sequence[Patterns], pixels: Patterns) -> 
     threads, columns = min(arrays.WORKERS, len(counts)), 4 * told.frequencies * told.count
     cells = max(math.prod(row.cells + 2 * max(row.margin, 0) for row in (told.rows, told.columns)), 1)
     transformed = 6 * told.lengths[0] * (told.lengths[1] // 2 + 1)  # three times real and imaginary parts
-    of_groups = threads * max(counts) * (2 * cells + transformed)
-    of_sums = columns * (sum(counts) + pixels.count) + arrays.WORKERS * max(
-        BLOCK, columns * pixels.count // told.frequencies
-    )
+    of_groups = threads * max(counts) * (2 * cells + transformed) + columns * (sum(counts) + pixels.count)
+    blocks = arrays.WORKERS * max(BLOCK, 4 * told.count * pixels.count)
     of_image = pixels.count * (2 * columns + transformed) + 3 * len(pixels.along) ** 2 * math.prod(told.cells)
-    return max(of_groups + of_sums, of_image)
+    return max(of_groups + blocks, of_image)
 
 
 def cost(told: Tiling, points: int, pixels: int) -> float:
