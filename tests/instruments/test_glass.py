@@ -225,6 +225,13 @@ def test_a_prescription_without_focal_length_names_the_remedy(tmp_path):
         )  # fmt: skip
 
 
+def test_in_other_light_glass_stays_where_its_own_brings_it_to_focus(camera):
+    other = camera.at_wavelength(700e-9)
+    assert other.wavelength == 700e-9
+    assert (other.glass, other.exit_pupil) == (camera.glass, camera.exit_pupil)
+    assert camera.replace(wavelength=700e-9).glass is not camera.glass  # focused anew
+
+
 def test_simulated_points_take_it(camera):
     small = camera.replace(sensor={"shape": (101, 101)})
     raw = lg.simulate(small, lg.targets.points([(0.0, 0.0)]))

@@ -1,11 +1,13 @@
 """Light of several wavelengths: colours, Bayer filters, and the operator of a band."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import cameras
 from lumigraph.errors import GeometryError
-from lumigraph.scene import Scene, Slice
+from lumigraph.scene import Scene, Slice, SpectralLine
 from lumigraph.simulation import Incoherent, Spectrum, simulate
 from lumigraph.units import nm, um
 
@@ -34,6 +36,19 @@ def test_each_colour_is_the_image_at_its_own_wavelength(camera):
         part = Slice(scene.parts[0].intensity[..., k], camera.object_grid)
         alone = simulate(camera.replace(wavelength=wavelength), Scene([part]), ROUGH)
         np.testing.assert_array_equal(raw.data[..., k], alone.data)
+
+
+def test_a_lines_error_is_counted_and_told(camera):
+    """Of 10 nm over 30 um, by wavelengths that leave 1e-3."""
+    line = Spectrum.line(SpectralLine(550 * nm, 10 * nm), 30 * um)
+    known = simulate(camera, picture(camera, 1), ROUGH, spectrum=line).metadata["error"]
+    alike = simulate(camera, picture(camera, 1), ROUGH, spectrum=replace(line, error=0.0)).metadata["error"]
+    assert 1e-5 < line.error <= 1e-3
+    assert known["rms"] == pytest.approx(alike["rms"] + line.error)
+    assert (
+        known["source"]
+        == f"{alike['source']}; {len(line.wavelengths)} wavelengths of a line to {line.error:.2g}"
+    )
 
 
 def test_a_bayer_filter_shows_one_colour_to_each_pixel(camera):
