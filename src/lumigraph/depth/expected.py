@@ -1,6 +1,6 @@
 """The error of a map to expect: what noise does, and what is at stake beside an edge of depth."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import grey_closing, grey_opening, maximum_filter, minimum_filter
@@ -76,14 +76,6 @@ class Evidence:
     chance: np.ndarray | float = 0.0
     farthest: float = 0.0
     period: np.ndarray | float = 0.0
-
-    def where(self, which: np.ndarray, other: "Evidence") -> "Evidence":
-        """Of a map that has another's values at some places (y, x)."""
-        parts = {
-            name: np.where(which, getattr(other, name), getattr(self, name))
-            for name in ("deviation", "around", "disputed", "rivals", "chance")
-        }
-        return replace(self, **parts)
 
 
 def deviation(
