@@ -215,14 +215,6 @@ def ifft(array: Array, n: int | None = None, axis: int = -1, *, overwrite: bool 
     return namespace(array).fft.ifft(array, n=n, axis=axis)
 
 
-def put_complex(place: Array, real: Array, imaginary: Array) -> None:
-    """Write real and imaginary parts into a complex array of their shape."""
-    if is_numpy_array(place):
-        np.real(place)[...], np.imag(place)[...] = real, imaginary  # views
-    else:
-        place[...] = real + 1j * imaginary
-
-
 def rfft(array: Array, n: int, axis: int = -1) -> Array:
     """1-D DFT of a real array along one axis, zero-padded to `n`: n // 2 + 1 frequencies."""
     if is_numpy_array(array):
