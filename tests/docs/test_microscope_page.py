@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "microscope.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.long  # 20 s of deconvolution
 def test_the_page_finds_its_beads():
     names: dict = {}
     for code in re.findall(r"```python\n(.*?)```", PAGE, re.S):
@@ -38,6 +39,7 @@ def test_the_microscope_file_of_the_page_is_read(tmp_path):
     np.testing.assert_allclose(changed, focal_lengths, rtol=1e-12)
 
 
+@pytest.mark.long  # half a minute of deconvolution
 def test_the_example_finds_its_vesicle(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(ROOT / "examples" / "microscope.py"), run_name="__main__")

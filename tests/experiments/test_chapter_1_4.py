@@ -16,7 +16,12 @@ def test_both_chapters_are_there():
     assert len(IDS) == 12
 
 
-@pytest.mark.parametrize("name", IDS)
+SLOW = ("table-4.2", "figure-1.20")  # half a minute each and more; their full size is run, too
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.long] * (name in SLOW)) for name in IDS]
+)
 def test_all_rows_pass_at_reduced_size(name, monkeypatch):
     monkeypatch.delenv("LUMIGRAPH_DATA", raising=False)
     (one,) = find([name])

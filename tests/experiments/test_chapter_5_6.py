@@ -61,6 +61,7 @@ def test_table_6_1_marks_the_cells_that_do_not_follow_from_its_formulas():
     assert wrong == set(table_6_1.MISPRINTS)
 
 
+@pytest.mark.long  # 20 s of points
 def test_lines_behind_a_lined_camera_are_those_of_simulated_points():
     """Operator against `simulate`: a line is the sum of its points, here over one lenslet's height."""
     found = camera(0.5, 11).replace(sensor={"pixel_pitch": 150e-6 * (1 + 7.8 / 135.6) / 21})
