@@ -14,6 +14,7 @@ Times are those of this machine as busy as it is; two workers.
 """
 
 import argparse
+import multiprocessing
 import os
 import random
 import signal
@@ -310,14 +311,42 @@ def standard(frames: int, folder: Path) -> None:
 def scaling(frames: int, folder: Path) -> None:
     """Frames a second of two workers over those of one, from the first frame of the last worker on.
 
-    Each worker has as many frames.
+    Each worker has as many frames. Before it, what the machine itself gives two processes.
     """
     inputs(folder, 2 * frames)
     print("| job | one worker, frames a second | two | times |", flush=True)
     print("|---|---|---|---|")
+    one, two = (sum(applied(workers)) for workers in (1, 2))
+    print(f"| no batch: an operator and its adjoint | {one:.3g} | {two:.3g} | {two / one:.2f} |", flush=True)
     for name in ("deconvolve, 5 planes, 3 samples", "deconvolve, 2.0", "depth", "dataset"):
         one, two = (pace(name, frames * workers, workers, folder) for workers in (1, 2))
         print(f"| {name} | {one:.3g} | {two:.3g} | {two / one:.2f} |", flush=True)
+
+
+def applied(processes: int, seconds: float = 10.0) -> list[float]:
+    """How often a second each of some processes applies `lfm-guv`, of 5 planes, and its adjoint."""
+    context = multiprocessing.get_context("spawn")
+    found, ready = context.Queue(), context.Barrier(processes)
+    running = [context.Process(target=_apply, args=(seconds, ready, found)) for _ in range(processes)]
+    for process in running:
+        process.start()
+    rates = [found.get() for _ in running]
+    for process in running:
+        process.join()
+    return rates
+
+
+def _apply(seconds: float, ready: Any, found: Any) -> None:
+    operator = lg.LightFieldMicroscope.from_catalogue("lfm-guv").operator(
+        [k * 5 * um for k in range(-2, 3)], 3
+    )
+    volume = operator.adjoint(np.ones(operator.shape[0], np.float32))
+    ready.wait()
+    began, count = time.perf_counter(), 0
+    while time.perf_counter() - began < seconds:
+        operator.adjoint(operator.forward(volume))
+        count += 1
+    found.put(count / (time.perf_counter() - began))
 
 
 def pace(name: str, frames: int, workers: int, folder: Path) -> float:
