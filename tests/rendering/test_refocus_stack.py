@@ -1,11 +1,8 @@
 """Focal stacks: the sums that all planes share, what invalid samples do, and how long it takes."""
 
-import time
-
 import numpy as np
 import pytest
 
-from data_folder import real
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
@@ -100,17 +97,3 @@ def test_progress_counts_the_rows_of_views(rng):
     seen = []
     refocus_stack(field(rng.random((3, 2, 8, 8))), [1.1], progress=seen.append)
     assert seen == [1 / 3, 2 / 3, 1]
-
-
-@pytest.mark.long
-def test_twenty_planes_of_a_benchmark_field_in_time():
-    from PIL import Image
-
-    pictures = [np.asarray(Image.open(real("hci_antinous", f"input_Cam{k:03}.png"))) for k in range(81)]
-    data = np.stack(pictures).reshape(9, 9, 512, 512, 3).astype(np.float32)
-    views = LightField(data, Grid((9, 9), 10.0), Grid((512, 512), 1.0), 10.0)
-    start = time.process_time()
-    stack = refocus_stack(views, 1 - np.linspace(-3.1, 2.7, 20) / 10)
-    # 1.3 s on a quiet core; the sum written out takes 8.
-    assert time.process_time() - start < 2.5
-    assert stack.shape == (20, 512, 512, 3)
