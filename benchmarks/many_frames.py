@@ -291,7 +291,7 @@ def standard(frames: int, folder: Path) -> None:
             "model": "scalar",
         },
         lenslets={"pitch": "125 um", "focal_length": "2.5 mm", "count": (77, 67)},
-        sensor={"shape": (1463, 1273), "pixel_pitch": "6.5789 um"},
+        sensor={"shape": (1463, 1273), "pixel_pitch": 125 * um / 19},
     )
     (folder / "standard.toml").write_text(scope.to_toml())
     film = np.random.default_rng(0).poisson(200, (frames, 1463, 1273)).astype(np.uint16)

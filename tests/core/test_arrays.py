@@ -34,11 +34,11 @@ def test_transforms_agree_with_numpy_and_leave_their_input(xp, forward, back, rn
 @pytest.mark.parametrize("shape", [(5, 4), (3, 5, 4)])
 def test_planes_one_at_a_time_give_what_all_at_once_give(xp, rng, shape):
     one, other = (xp.asarray(rng.random(shape)) for _ in range(2))
-    found = arrays.by_plane(lambda a, b: xp.where(a > b, a - b, 0 * a), one, other)
+    found = arrays.by_part(lambda a, b: xp.where(a > b, a - b, 0 * a), one, other)
     expected = np.maximum(arrays.to_numpy(one) - arrays.to_numpy(other), 0)
     np.testing.assert_array_equal(arrays.to_numpy(found), expected)
     assert found.dtype == one.dtype
-    total = arrays.sum_by_plane(lambda a, b: a * b, one, other)
+    total = arrays.sum_by_part(lambda a, b: a * b, one, other)
     assert total == pytest.approx(np.vdot(arrays.to_numpy(one), arrays.to_numpy(other)), rel=1e-12)
 
 

@@ -88,7 +88,7 @@ def test_results_of_a_function_are_kept_by_its_arguments_within_the_shared_budge
 @pytest.mark.parametrize(
     ("module", "name", "arguments"),
     [
-        ("deconvolution.filters", "lanczos", (300, 2.5)),
+        ("deconvolution.filters", "lanczos", (300, 40.0)),
         ("operators.microscope_patterns", "parts", (33,)),
         ("operators.microscope_patterns", "all_patterns", (7,)),
     ],

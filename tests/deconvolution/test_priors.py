@@ -188,7 +188,14 @@ def test_the_low_pass_keeps_even_objects_and_removes_what_is_finer(xp):
     found = np.asarray(LowPass((3.0, 0.5))(stack))
     np.testing.assert_array_equal(found[1], waves[4])
     np.testing.assert_allclose(np.asarray(LowPass(7.0)(xp.asarray(np.ones((9, 40))))), 1, rtol=1e-12)
-    np.testing.assert_allclose(lanczos(50, 2.5).sum(1), 1, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("n", "width"), [(9, 7.0), (50, 2.5), (300, 19.0)])
+def test_the_low_pass_is_lanczos_kernel_at_all_places(n, width):
+    off = (np.arange(n)[:, None] - np.arange(n)) / width
+    expected = np.where(np.abs(off) < 4, np.sinc(off) * np.sinc(off / 4), 0.0)
+    expected /= expected.sum(1, keepdims=True)
+    np.testing.assert_allclose(lanczos(n, width).down(np.eye(n)), expected, atol=1e-12)
 
 
 def test_the_low_pass_keeps_the_lattice_out_of_the_estimate(rng):

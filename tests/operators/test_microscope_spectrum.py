@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from lumigraph.core.banded import banded
 from lumigraph.elements.objective import Objective
 from lumigraph.operators import microscope_spectrum as module
 from lumigraph.operators.microscope_building import Layout, microscope_operator
@@ -15,7 +16,7 @@ from lumigraph.operators.microscope_pixels import b_spline
 from lumigraph.operators.microscope_sensor import Samples, Straight, sensor
 from lumigraph.operators.microscope_tiles import Row, Tiling
 from lumigraph.operators.microscope_transforms import add_cells, columns
-from lumigraph.operators.resampling import Resampling, banded
+from lumigraph.operators.resampling import Resampling
 
 SCOPE = Objective(525e-9, 0.5)
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from lumigraph.core.arrays import to_numpy
+from lumigraph.core.banded import Banded, banded
 from lumigraph.core.grid import Grid
-from lumigraph.operators.resampling import Banded, averaged, banded, represented
+from lumigraph.operators.resampling import averaged, represented
 
 
 def dense(matrix: Banded) -> np.ndarray:

@@ -6,7 +6,7 @@ computed by NumPy in float64 and cast last, by `like`.
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
@@ -39,6 +39,9 @@ else:
 
 WORKERS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 """Threads that one FFT may use: the processors this process may run on."""
+
+PART = 2**15
+"""Values that are treated at a time, one operation after the other: they stay in a processor's own cache."""
 
 _SINGLE = ("float32", "complex64", "float16")
 
@@ -162,25 +165,34 @@ def untiled(tiles: Array) -> Array:
     return xp.reshape(plane, (*batch, rows * ky, columns * kx))
 
 
-def by_plane(function: Callable[..., Array], first: Array, *others: Array) -> Array:
-    """``function(first, *others)`` of one value at a time, for volumes (z, y, x) of one shape.
+def by_part(function: Callable[..., Array], first: Array, *others: Array) -> Array:
+    """``function(first, *others)`` of one value at a time, for arrays of one shape.
 
-    NumPy's go plane by plane: what lies between stays in the processor's cache, and is no new memory.
+    NumPy's go part by part: what lies between stays in the processor's cache, and is no new memory.
     """
-    if not is_numpy_array(first) or first.ndim < 3:
+    if not is_numpy_array(first):
         return function(first, *others)
     result = np.empty_like(first)
-    for k in range(len(first)):
-        result[k] = function(first[k], *(other[k] for other in others))
+    for part, *given in _parts(result, first, *others):
+        part[...] = function(*given)
     return result
 
 
-def sum_by_plane(function: Callable[..., Array], first: Array, *others: Array) -> float:
-    """Sum of ``function(first, *others)`` over all values; see `by_plane`."""
-    if not is_numpy_array(first) or first.ndim < 3:
+def sum_by_part(function: Callable[..., Array], first: Array, *others: Array) -> float:
+    """Sum of ``function(first, *others)`` over all values; see `by_part`."""
+    if not is_numpy_array(first):
         return float(namespace(first).sum(function(first, *others)))
-    planes = zip(first, *others, strict=True)
-    return float(sum(np.sum(function(*plane), dtype=np.float64) for plane in planes))
+    return float(sum(np.sum(function(*given), dtype=np.float64) for given in _parts(first, *others)))
+
+
+def _parts(*whole: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
+    """Parts of arrays of one shape, of `PART` values where they are contiguous, else of a row or plane."""
+    if whole[0].ndim < 2 or all(one.flags.c_contiguous for one in whole):
+        whole = tuple(one.reshape(-1) for one in whole)
+        for start in range(0, whole[0].size, PART):
+            yield tuple(one[start : start + PART] for one in whole)
+    else:
+        yield from zip(*whole, strict=True)
 
 
 def as_complex(array: Array) -> Array:

@@ -134,7 +134,7 @@ def cut(estimate: Array, inside: Inside, pictured: Array | None) -> Array:
         return found
     where = arrays.namespace(estimate).where
     kept = pictured[..., inside[0], inside[1]]
-    return arrays.by_plane(lambda values, kept: where(kept, values, 0 * values), found, kept)
+    return arrays.by_part(lambda values, kept: where(kept, values, 0 * values), found, kept)
 
 
 def continued(start: Array, shape: tuple[int, ...], inside: Inside) -> Array:

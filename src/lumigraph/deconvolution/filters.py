@@ -18,6 +18,7 @@ import numpy as np
 
 from lumigraph.core import arrays, checks
 from lumigraph.core.arrays import Array
+from lumigraph.core.banded import Banded, banded
 from lumigraph.core.cache import remembered
 from lumigraph.errors import GeometryError
 
@@ -72,16 +73,20 @@ class LowPass:
 def _filtered(plane: Array, width: float) -> Array:
     if width <= 1:
         return plane
-    rows, columns = (arrays.like(lanczos(n, width), plane) for n in plane.shape)
-    return rows @ plane @ arrays.namespace(plane).matrix_transpose(columns)
+    rows, columns = (lanczos(n, width) for n in plane.shape)
+    return columns.right(rows.down(plane))
 
 
 @remembered
-def lanczos(n: int, width: float) -> np.ndarray:
+def lanczos(n: int, width: float) -> Banded:
     """Matrix (n, n) of the filter along one axis; its rows sum to 1. Never write into it."""
-    off = (np.arange(n)[:, None] - np.arange(n)) / width
-    kernel = np.where(np.abs(off) < LOBES, np.sinc(off) * np.sinc(off / LOBES), 0.0)
-    return kernel / kernel.sum(1, keepdims=True)
+    places = np.arange(float(n))
+
+    def kernel(off: np.ndarray) -> np.ndarray:
+        return np.sinc(off / width) * np.sinc(off / (LOBES * width))
+
+    whole = banded(places, places, kernel, LOBES * width)
+    return Banded(n, tuple((first, m / m.sum(1, keepdims=True)) for first, m in whole.blocks))
 
 
 def widths_of(distances: Sequence[float], pitch: float) -> tuple[float, ...]:

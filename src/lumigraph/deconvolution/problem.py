@@ -31,9 +31,10 @@ class Scale:
     background
         b + σ²/g, less the black level: a number or (ny, nx), at least 0.
     sensitivity
-        Aᵀ(v w): light on the pixels of each object sample, per intensity.
-    seen
-        Truth values: which object samples the sensor sees.
+        Aᵀ(v w): light on the pixels of each object sample, per intensity; infinite where it is so little that
+        the sensor does not see the sample, so that what is divided by it is 0 there.
+    light_of_even
+        On the pixels that count, of an object of intensity 1 where it is seen.
     gain
         Electrons per unit of the data.
     even
@@ -45,7 +46,7 @@ class Scale:
     weights: Array | None
     background: Array | float
     sensitivity: Array
-    seen: Array
+    light_of_even: float
     gain: float
     even: Array | None = None
 
@@ -68,15 +69,27 @@ class Scale:
         if not highest > 0:
             raise GeometryError("no light of the object reaches a pixel that counts. Check grid and weights.")
         seen = sensitivity > least * highest
+        light = arrays.sum_by_part(
+            lambda light, seen: light * xp.astype(seen, light.dtype), sensitivity, seen
+        )
+        sensitivity = xp.where(seen, sensitivity, xp.full_like(sensitivity, float("inf")))
         total = background + exposure.offset
         if getattr(total, "shape", ()):  # a dark image's noise may reach below the black level
             total = xp.where(total > 0, total, xp.zeros_like(total))
-        return cls(operator, response, weights, total, sensitivity, seen, exposure.gain or 1.0)
+        return cls(operator, response, weights, total, sensitivity, light, exposure.gain or 1.0)
 
     def begun(self) -> "Scale":
         """The same with `even`."""
+        return replace(self, even=self.operator.forward(self.where_seen(1.0)))
+
+    def where_seen(self, value: float) -> Array:
+        """A value in object samples that the sensor sees, 0 in the others."""
         xp = arrays.namespace(self.sensitivity)
-        return replace(self, even=self.operator.forward(xp.astype(self.seen, self.sensitivity.dtype)))
+
+        def chosen(light: Array) -> Array:
+            return xp.where(xp.isfinite(light), xp.full_like(light, value), xp.zeros_like(light))
+
+        return arrays.by_part(chosen, self.sensitivity)
 
     def pictured(self, least: float) -> Array:
         """Truth values: samples that send at least this part of their light onto pixels that count.
@@ -87,25 +100,20 @@ class Scale:
         if self.response is not None:
             ones = xp.ones_like(self.response) if self.weights is None else self.weights
             light = self.operator.adjoint(ones)
+        else:
+            light = xp.where(xp.isfinite(light), light, xp.zeros_like(light))
         return light > least * float(xp.max(light))
 
     @property
     def mean_sensitivity(self) -> float:
         """Of the object samples that are seen."""
-        xp, dtype = arrays.namespace(self.sensitivity), self.sensitivity.dtype
-        return self.light_of_even / arrays.sum_by_plane(lambda seen: xp.astype(seen, dtype), self.seen)
-
-    @property
-    def light_of_even(self) -> float:
-        """On the pixels that count, of an object of intensity 1 where it is seen."""
-        xp = arrays.namespace(self.sensitivity)
-        return arrays.sum_by_plane(
-            lambda light, seen: light * xp.astype(seen, light.dtype), self.sensitivity, self.seen
-        )
+        xp, like = arrays.namespace(self.sensitivity), self.sensitivity.dtype
+        seen = arrays.sum_by_part(lambda light: xp.astype(xp.isfinite(light), like), self.sensitivity)
+        return self.light_of_even / seen
 
     def over_sensitivity(self, values: Array) -> Array:
         """`values` over the sensitivity; 0 where nothing is seen."""
-        return arrays.by_plane(_divided, values, self.sensitivity, self.seen)
+        return arrays.by_part(lambda value, light: value / light, values, self.sensitivity)
 
     def back(self, residual: Array) -> Array:
         """Aᵀ(v w residual): an object from (ny, nx)."""
@@ -166,11 +174,7 @@ class Problem:
 
     def flat(self) -> Array:
         """The even object of `level`, 0 where nothing is seen."""
-        xp, level = arrays.namespace(self.data), self.level
-        return arrays.by_plane(
-            lambda light, seen: xp.where(seen, xp.zeros_like(light) + level, xp.zeros_like(light)),
-            self.scale.sensitivity, self.scale.seen,
-        )  # fmt: skip
+        return self.scale.where_seen(self.level)
 
     def deviance(self, model: Array) -> float:
         r"""Poisson deviance of a model per pixel that counts, in electrons; near 1 where only noise is left.
@@ -212,12 +216,6 @@ def values(raw: RawImage | Array, operator: Linear, exposure: Exposure) -> Array
     if not xp.isdtype(data.dtype, "real floating") or str(data.dtype).endswith("float16"):
         data = xp.astype(data, xp.float32)
     return data
-
-
-def _divided(values: Array, by: Array, where: Array) -> Array:
-    """`values` over numbers where those count; 0 elsewhere."""
-    xp = arrays.namespace(values)
-    return xp.where(where, values / xp.where(where, by, xp.ones_like(by)), xp.zeros_like(values))
 
 
 def pixels(name: str, plane: Array | None, shape: tuple[int, ...], like: Array) -> Array | None:

@@ -62,9 +62,9 @@ class RichardsonLucy:
 
     def step(self, problem: Problem, state: State) -> State:
         """The next state: one application of Aᵀ and one of A, or up to three where it would fit far worse."""
-        factor = problem.scale.over_sensitivity(problem.scale.back(problem.data / state.model))
+        light = problem.scale.back(problem.data / state.model)
         most = state.deviance * (1.0 if self.prior is None and self.filter is None else _RISE)
-        estimate, memory = self._improved(problem, state, self._filtered(problem, factor))
+        estimate, memory = self._drawn(problem, state, self._improved(problem, state, light))
         if self.accelerated:
             change = estimate - state.estimate
             ahead = _ahead(estimate, change, state)
@@ -75,18 +75,27 @@ class RichardsonLucy:
         found = State.at(problem, estimate, memory, state.done + 1)
         if self.filter is None or found.deviance <= most:
             return found
-        return State.at(problem, *self._improved(problem, state, factor), state.done + 1)
+        return State.at(problem, *self._drawn(problem, state, _plain(problem, state, light)), state.done + 1)
 
-    def _filtered(self, problem: Problem, factor: Array) -> Array:
+    def _improved(self, problem: Problem, state: State, light: Array) -> Array:
         if self.filter is None:
-            return factor
-        return self.filter(arrays.by_plane(_where_seen, factor, problem.scale.seen))
+            return _plain(problem, state, light)
+        factor = arrays.by_part(_where_seen, problem.scale.over_sensitivity(light), problem.scale.sensitivity)
+        return arrays.by_part(_times, state.estimate, self.filter(factor))
 
-    def _improved(self, problem: Problem, state: State, factor: Array) -> tuple[Array, dict[str, Array]]:
-        estimate = arrays.by_plane(lambda before, times: _positive(before * times), state.estimate, factor)
+    def _drawn(self, problem: Problem, state: State, estimate: Array) -> tuple[Array, dict[str, Array]]:
         if self.prior is None:
             return estimate, {}
         return self.prior.shrink(problem, estimate, state)
+
+
+def _plain(problem: Problem, state: State, light: Array) -> Array:
+    """The estimate times `light` over the sensitivity, in one go: arrays may be far larger than caches."""
+
+    def after(before: Array, light: Array, by: Array) -> Array:
+        return _times(before, light / by)
+
+    return arrays.by_part(after, state.estimate, light, problem.scale.sensitivity)
 
 
 def _ahead(estimate: Array, change: Array, state: State) -> Array:
@@ -100,11 +109,15 @@ def _ahead(estimate: Array, change: Array, state: State) -> Array:
     return _positive(estimate + min(max(part, 0.0), 1.0) * (estimate - last))
 
 
-def _where_seen(factor: Array, seen: Array) -> Array:
+def _where_seen(factor: Array, sensitivity: Array) -> Array:
     xp = arrays.namespace(factor)
-    return xp.where(seen, factor, xp.ones_like(factor))
+    return xp.where(xp.isfinite(sensitivity), factor, xp.ones_like(factor))
+
+
+def _times(before: Array, factor: Array) -> Array:
+    return _positive(before * factor)
 
 
 def _positive(values: Array) -> Array:
     xp = arrays.namespace(values)
-    return xp.where(values > 0, values, xp.zeros_like(values))
+    return xp.maximum(values, xp.zeros_like(values))

@@ -83,7 +83,8 @@ class Run:
         yield state
         while not self.limits.reached(state.done, state.deviance, change):
             before, state = state, self.method.step(self.problem, state)
-            change = _change(before.estimate, state.estimate)
+            if self.progress is not None or self.limits.change is not None:
+                change = _change(before.estimate, state.estimate)
             if self.checkpoint is not None:
                 self.checkpoint.keep(self.problem, state, self.key)
             yield state
@@ -150,6 +151,6 @@ def _placed(estimate: Array, raw: RawImage | Array, operator: Linear) -> Result:
 
 
 def _change(before: Array, after: Array) -> float:
-    moved = arrays.sum_by_plane(lambda one, other: (one - other) ** 2, after, before)
-    whole = arrays.sum_by_plane(lambda one: one**2, after)
+    moved = arrays.sum_by_part(lambda one, other: (one - other) ** 2, after, before)
+    whole = arrays.sum_by_part(lambda one: one**2, after)
     return math.sqrt(moved / whole) if whole > 0 else 0.0

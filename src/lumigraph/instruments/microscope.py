@@ -23,7 +23,7 @@ from lumigraph.operators.fourier_points import FourierPoints
 from lumigraph.operators.microscope_bench import DEGREE
 from lumigraph.operators.microscope_building import Layout, microscope_operator, require_accuracy
 from lumigraph.operators.microscope_cell import CellSampling
-from lumigraph.operators.microscope_pixels import narrowed, placement
+from lumigraph.operators.microscope_pixels import narrowed, placement, whole_pixels
 from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.microscope_samples import samples_needed
 from lumigraph.operators.points import OUTSIDE
@@ -255,7 +255,12 @@ class LightFieldMicroscope(DescribedMicroscope):
         calibration = self.calibration if pixels is None else pixels
         if not isinstance(calibration, Calibration):
             raise GeometryError(f"pixels is {pixels!r} but must be a whole number, a Calibration or None.")
-        sampling = self._sampling(samples, calibration.lattice.pitch, max(depths, key=abs), accuracy)
+        N = None if self.objective.model == "rays" else whole_pixels(calibration, accuracy)
+        sampling = (
+            self._sampled(samples, N, 1 / N, 0)
+            if N
+            else self._sampling(samples, calibration.lattice.pitch, max(depths, key=abs), accuracy)
+        )
         placed, cells, middle = placement(calibration, sampling.pixels, sampling.degree)
         step = self.lenslet_size / calibration.lattice.pitch
         center = tuple((middle[k] - calibration.shape[k] // 2) * step for k in (0, 1))

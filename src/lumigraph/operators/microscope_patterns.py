@@ -30,8 +30,9 @@ WORTH = 0.8
 WHOLE = 0.9
 """Of the accuracy, that patterns of the pixels may fill up: the rest is for the sampling of slices."""
 
-SEPARATE = 8
-"""Places along a side of a cell from which on patterns are taken along y and then along x."""
+SEPARATE, FEW = 8, 300
+"""Places along a side of a cell, and patterns, from which on these are taken along y and then along x: below,
+one product takes less time (19 × 19 places, 100 patterns: 11 ms a plane instead of 37)."""
 
 PARITIES = (0, 0), (0, 1), (1, 0), (1, 1)
 """Whether patterns are odd along y, and along x."""
@@ -95,14 +96,21 @@ class Patterns:
     def held(self, like: Array) -> tuple[Array | None, tuple[Array, ...]]:
         """`along` and `vectors`, none where they are all products, in the library and precision of an array.
 
-        Of small cells None, and the `basis` alone: one product takes less time there.
+        Of small cells, or few patterns, None, and the `basis` alone: one product takes less time there.
         """
-        key = arrays.placement(like)
+        if len(self.along) >= SEPARATE and self.count >= FEW:
+            return self.separate(like)
+        key = arrays.placement(like), "basis"
         if key not in self._held:
-            small = len(self.along) < SEPARATE
-            vectors = (self.basis,) if small else self.vectors or ()
-            along = None if small else arrays.like(self.along, like)
-            self._held[key] = along, tuple(arrays.like(one, like) for one in vectors)
+            self._held[key] = None, (arrays.like(self.basis, like),)
+        return self._held[key]
+
+    def separate(self, like: Array) -> tuple[Array, tuple[Array, ...]]:
+        """`along` and `vectors` of any number of patterns."""
+        key = arrays.placement(like), "along"
+        if key not in self._held:
+            vectors = tuple(arrays.like(one, like) for one in self.vectors or ())
+            self._held[key] = arrays.like(self.along, like), vectors
         return self._held[key]
 
     def places(self) -> list[tuple[slice, slice]]:

@@ -8,9 +8,10 @@ import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
+from lumigraph.core.banded import Banded
 from lumigraph.core.linear import Linear
-from lumigraph.operators.microscope_patterns import PARITIES, Patterns, parted, whole
-from lumigraph.operators.resampling import Banded, Resampling
+from lumigraph.operators.microscope_patterns import PARITIES, SEPARATE, Patterns, parted, whole
+from lumigraph.operators.resampling import Resampling
 
 Pieces = Sequence[tuple[slice, Array]]
 
@@ -29,7 +30,7 @@ class Sensor(Protocol):
 
 def sensor(patterns: Patterns, placement: Linear | None, like: Array) -> Sensor:
     """For arrays of one library and precision."""
-    if isinstance(placement, Resampling) and patterns.held(like)[0] is not None:
+    if isinstance(placement, Resampling) and len(patterns.along) >= SEPARATE:
         y, x = (_pieces(axis, patterns.along, like) for axis in (placement.y, placement.x))
         return Straight(patterns, y, x, placement.shape[0])
     return Samples(patterns, placement)
@@ -117,7 +118,7 @@ class Straight:
     def _flat(self, sides: Sequence[Array], like: Array) -> list[tuple[Array, Array | None]]:
         """Of each parity its products (cells, products), as views, and its vectors."""
         xp, found = arrays.namespace(like), []
-        vectors = self.patterns.held(like)[1] or (None,) * 4
+        vectors = self.patterns.separate(like)[1] or (None,) * 4
         rows = [xp.reshape(side, (len(self.y) * len(self.x), -1)) for side in sides]
         for (odd_y, odd_x), v in zip(PARITIES, vectors, strict=True):
             own, width = self._along_x()[odd_y], sides[odd_x].shape[-1]

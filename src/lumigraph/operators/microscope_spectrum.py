@@ -267,9 +267,10 @@ def _put_planes(
     xp = arrays.namespace(cells)
     for k, one, places in zip(itertools.count(start), chosen, _places(chosen)):
         own = xp.take(cells, xp.asarray(places, device=arrays.device(cells)), axis=-1)
-        plane, s = whole(own, one), math.isqrt(len(one.basis))
+        plane, (rows, columns) = whole(own, one), cells.shape[:2]
         if even is not None:
-            plane = arrays.untiled(arrays.tiled(plane, (s, s)) + even[k, ..., None, None])
+            cut = xp.reshape(plane, (rows, plane.shape[0] // rows, columns, plane.shape[1] // columns))
+            plane = xp.reshape(cut + even[k, :, None, :, None], plane.shape)
         volume[k, ...] = plane
 
 

@@ -8,11 +8,12 @@ import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
+from lumigraph.core.banded import Banded, banded
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear, Shape
 from lumigraph.errors import GeometryError
 from lumigraph.operators.band import HALF_WIDTH, kernel
-from lumigraph.operators.resampling import Banded, Resampling, banded
+from lumigraph.operators.resampling import Resampling
 
 SAME = 1e-6
 """Part of a pitch by which samples may be off and still coincide."""

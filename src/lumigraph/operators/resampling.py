@@ -1,79 +1,16 @@
 """Band-limited pictures from one sampling to another: a banded matrix for each axis."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
+from lumigraph.core.banded import Banded, banded
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear, Shape
 from lumigraph.operators.band import HALF_WIDTH, integral, kernel
-
-_ROWS = 64
-"""Of a block."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Banded:
-    """Matrix (rows, columns) of blocks of rows that see few columns each.
-
-    Parameters
-    ----------
-    columns
-        Their number.
-    blocks
-        (first column, matrix), row after row.
-    """
-
-    columns: int
-    blocks: tuple[tuple[int, np.ndarray], ...]
-
-    @property
-    def rows(self) -> int:
-        """Their number."""
-        return sum(len(m) for _, m in self.blocks)
-
-    def _parts(self, like: Array) -> Iterator[tuple[slice, slice, Array]]:
-        """Rows, columns and matrix of each block."""
-        row = 0
-        for first, m in self.blocks:
-            yield slice(row, row + len(m)), slice(first, first + m.shape[1]), arrays.like(m, like)
-            row += len(m)
-
-    def down(self, plane: Array) -> Array:
-        """``matrix @ plane``: (columns, n) to (rows, n)."""
-        result = _zeros(plane, (self.rows, plane.shape[1]))
-        for rows, columns, m in self._parts(plane):
-            result[rows, :] = m @ plane[columns, :]
-        return result
-
-    def up(self, plane: Array) -> Array:
-        """``matrix.T @ plane``: (rows, n) to (columns, n)."""
-        xp, result = arrays.namespace(plane), _zeros(plane, (self.columns, plane.shape[1]))
-        for rows, columns, m in self._parts(plane):
-            result[columns, :] += xp.matrix_transpose(m) @ plane[rows, :]
-        return result
-
-    def right(self, plane: Array) -> Array:
-        """``plane @ matrix.T``: (n, columns) to (n, rows)."""
-        xp, result = arrays.namespace(plane), _zeros(plane, (plane.shape[0], self.rows))
-        for rows, columns, m in self._parts(plane):
-            result[:, rows] = plane[:, columns] @ xp.matrix_transpose(m)
-        return result
-
-    def left(self, plane: Array) -> Array:
-        """``plane @ matrix``: (n, rows) to (n, columns)."""
-        result = _zeros(plane, (plane.shape[0], self.columns))
-        for rows, columns, m in self._parts(plane):
-            result[:, columns] += plane[:, rows] @ m
-        return result
-
-
-def _zeros(like: Array, shape: tuple[int, int]) -> Array:
-    return arrays.namespace(like).zeros(shape, dtype=like.dtype, device=arrays.device(like))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -103,7 +40,7 @@ class Resampling(Linear):
     @property
     def memory_bytes(self) -> float:
         """Of the matrices and of a picture on the way [bytes]."""
-        held = sum(m.nbytes for axis in (self.y, self.x) for _, m in axis.blocks)
+        held = self.y.nbytes + self.x.nbytes
         between = min(self.y.rows * self.x.columns, self.y.columns * self.x.rows)
         return held + 4.0 * (between + self.y.rows * self.x.rows)
 
@@ -148,30 +85,6 @@ def _on_both_axes(matrix: Callable[[int], Banded], *grids: Grid) -> Resampling:
     y = matrix(0)
     alike = all(len({*pair}) == 1 for grid in grids for pair in (grid.shape, grid.pitch, grid.center))
     return Resampling(y, y if alike else matrix(1))
-
-
-def banded(
-    rows: np.ndarray,
-    columns: np.ndarray,
-    entries: Callable[[np.ndarray], np.ndarray],
-    reach: float,
-    height: int = _ROWS,
-    dtype: type = np.float64,
-) -> Banded:
-    """Matrix ``entries(row - column)`` of sorted positions; farther apart than `reach` it is zero.
-
-    Its blocks have `height` rows.
-    """
-    blocks = []
-    for start in range(0, len(rows), height):
-        mine = rows[start : start + height]
-        first = int(np.searchsorted(columns, mine.min() - reach, "left"))
-        last = int(np.searchsorted(columns, mine.max() + reach, "right"))
-        offsets = mine[:, None] - columns[first:last]
-        near, block = np.abs(offsets) <= reach, np.zeros(offsets.shape, dtype)
-        block[near] = entries(offsets[near])
-        blocks.append((first, block))
-    return Banded(len(columns), tuple(blocks))
 
 
 def _descending(grid: Grid, axis: int) -> np.ndarray:

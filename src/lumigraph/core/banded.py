@@ -1,0 +1,101 @@
+"""Matrices whose rows see few columns each, in blocks."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from lumigraph.core import arrays
+from lumigraph.core.arrays import Array
+
+_ROWS = 64
+"""Of a block."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Banded:
+    """Matrix (rows, columns) of blocks of rows that see few columns each.
+
+    Parameters
+    ----------
+    columns
+        Their number.
+    blocks
+        (first column, matrix), row after row.
+    """
+
+    columns: int
+    blocks: tuple[tuple[int, np.ndarray], ...]
+
+    @property
+    def nbytes(self) -> int:
+        """Of the blocks."""
+        return sum(m.nbytes for _, m in self.blocks)
+
+    @property
+    def rows(self) -> int:
+        """Their number."""
+        return sum(len(m) for _, m in self.blocks)
+
+    def _parts(self, like: Array) -> Iterator[tuple[slice, slice, Array]]:
+        """Rows, columns and matrix of each block."""
+        row = 0
+        for first, m in self.blocks:
+            yield slice(row, row + len(m)), slice(first, first + m.shape[1]), arrays.like(m, like)
+            row += len(m)
+
+    def down(self, plane: Array) -> Array:
+        """``matrix @ plane``: (columns, n) to (rows, n)."""
+        result = _zeros(plane, (self.rows, plane.shape[1]))
+        for rows, columns, m in self._parts(plane):
+            result[rows, :] = m @ plane[columns, :]
+        return result
+
+    def up(self, plane: Array) -> Array:
+        """``matrix.T @ plane``: (rows, n) to (columns, n)."""
+        xp, result = arrays.namespace(plane), _zeros(plane, (self.columns, plane.shape[1]))
+        for rows, columns, m in self._parts(plane):
+            result[columns, :] += xp.matrix_transpose(m) @ plane[rows, :]
+        return result
+
+    def right(self, plane: Array) -> Array:
+        """``plane @ matrix.T``: (n, columns) to (n, rows)."""
+        xp, result = arrays.namespace(plane), _zeros(plane, (plane.shape[0], self.rows))
+        for rows, columns, m in self._parts(plane):
+            result[:, rows] = plane[:, columns] @ xp.matrix_transpose(m)
+        return result
+
+    def left(self, plane: Array) -> Array:
+        """``plane @ matrix``: (n, rows) to (n, columns)."""
+        result = _zeros(plane, (plane.shape[0], self.columns))
+        for rows, columns, m in self._parts(plane):
+            result[:, columns] += plane[:, rows] @ m
+        return result
+
+
+def banded(
+    rows: np.ndarray,
+    columns: np.ndarray,
+    entries: Callable[[np.ndarray], np.ndarray],
+    reach: float,
+    height: int = _ROWS,
+    dtype: type = np.float64,
+) -> Banded:
+    """Matrix ``entries(row - column)`` of sorted positions; farther apart than `reach` it is zero.
+
+    Its blocks have `height` rows.
+    """
+    blocks = []
+    for start in range(0, len(rows), height):
+        mine = rows[start : start + height]
+        first = int(np.searchsorted(columns, mine.min() - reach, "left"))
+        last = int(np.searchsorted(columns, mine.max() + reach, "right"))
+        offsets = mine[:, None] - columns[first:last]
+        near, block = np.abs(offsets) <= reach, np.zeros(offsets.shape, dtype)
+        block[near] = entries(offsets[near])
+        blocks.append((first, block))
+    return Banded(len(columns), tuple(blocks))
+
+
+def _zeros(like: Array, shape: tuple[int, int]) -> Array:
+    return arrays.namespace(like).zeros(shape, dtype=like.dtype, device=arrays.device(like))
