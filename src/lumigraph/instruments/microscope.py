@@ -35,7 +35,7 @@ MODELLED = 1e-2
 FINER = 1.5
 """Samples of light that is traced by rays, over whole pixels: those between are interpolated."""
 
-PIXELS = 0.6
+PIXELS = 0.65
 """Of the accuracy, what the interpolation of pixels may take."""
 
 
@@ -242,7 +242,8 @@ class LightFieldMicroscope(DescribedMicroscope):
             raise GeometryError(
                 "derivatives by the pupil's phase need configuration '1.0' or '2.0', not 'fourier'."
             )
-        layout = self._layout(SAMPLES, pixels, (checks.finite("farthest", farthest),), accuracy)
+        depths = checks.finite("farthest", farthest), -farthest  # one side is seen more finely
+        layout = self._layout(SAMPLES, pixels, depths, accuracy)
         return PupilImages(self.objectives, self.lenslet, layout, tuple(terms), accuracy, double)
 
     def _layout(
@@ -259,21 +260,23 @@ class LightFieldMicroscope(DescribedMicroscope):
         sampling = (
             self._sampled(samples, N, 1 / N, 0)
             if N
-            else self._sampling(samples, calibration.lattice.pitch, max(depths, key=abs), accuracy)
+            else self._sampling(samples, calibration.lattice.pitch, tuple(depths), accuracy)
         )
         placed, cells, middle = placement(calibration, sampling.pixels, sampling.degree)
         step = self.lenslet_size / calibration.lattice.pitch
         center = tuple((middle[k] - calibration.shape[k] // 2) * step for k in (0, 1))
         return Layout(cells, sampling, placed, (center[0], center[1]))
 
-    def _sampling(self, samples: int, pitch: float, dz: float, accuracy: float) -> CellSampling:
+    def _sampling(
+        self, samples: int, pitch: float, depths: tuple[float, ...], accuracy: float
+    ) -> CellSampling:
         """For pixels of which `pitch` make a lenslet's."""
         fill = self.pixels.fill_factor
         if self.objective.model == "rays":
             N = math.ceil(max(FINER, math.sqrt(2) / fill) * pitch)
             return self._sampled(samples, N, 1 / pitch, 1)
         shortest, width = min(self.objectives, key=lambda one: one.wavelength), fill / pitch
-        N = samples_needed(shortest, self.lenslet, width, dz, PIXELS * require_accuracy(accuracy))
+        N = samples_needed(shortest, self.lenslet, width, depths, PIXELS * require_accuracy(accuracy))
         return self._sampled(samples, N, 1 / pitch, DEGREE)
 
     def _sampled(self, samples: int, N: int, apart: float, degree: int) -> CellSampling:

@@ -185,4 +185,5 @@ def _kept(
         else None
     )
     error, passed = (float(value) for value in found["told"])
-    return SliceKernel(found["offsets"], found["blocks"], sampling, symmetric, far, error, passed)
+    offsets = np.array(found["offsets"])  # a mapped file takes a microsecond for each look at it
+    return SliceKernel(offsets, found["blocks"], sampling, symmetric, far, error, passed)

@@ -200,7 +200,7 @@ def few_of_pixels(kernels: Sequence[SliceKernel], left_out: float) -> Patterns:
     roots = _roots(whole, kernels[0].sampling.degree)
 
     def light(kernel: SliceKernel) -> list[np.ndarray]:
-        """ΣwIIᵀ of each parity, of a depth's images I."""
+        """ΣwIIᵀ of each parity, of a depth's images I, over their light²."""
         parts, weights = _images(kernel, whole, roots)
         found = [np.tensordot(weights, part.transpose(0, 2, 1) @ part, 1) for part in parts]
         power = sum(float(np.trace(one)) for one in found)
@@ -212,7 +212,11 @@ def few_of_pixels(kernels: Sequence[SliceKernel], left_out: float) -> Patterns:
         own = (np.square(part @ vectors) for part, (_, vectors) in zip(parts, found, strict=True))
         return np.concatenate([_of_all_cells(one, kernel) for one in own], axis=1)
 
-    found = [np.linalg.eigh(sum(one)) for one in zip(*map(light, kernels), strict=True)]
+    found = [np.linalg.eigh(sum(one)) for one in zip(*each(light, kernels), strict=True)]
+    energies = np.sort(np.concatenate([energy for energy, _ in found]))
+    needed = (np.cumsum(energies) > left_out**2 * len(kernels)).sum()  # if all points lost as much
+    if needed > WORTH * whole.count:
+        return whole
     few = _strongest(whole, found, np.concatenate([shares(one) for one in kernels]), left_out)
     if few.vectors is None:
         return few
