@@ -23,7 +23,6 @@ ROWS = 16
 FRAME = 1
 """Lenslets around those that are seen, to each side, whose light falls on pixels."""
 
-
 STEADY = 0.025
 """Pixels of the accuracy asked for that pixels may stand beside samples which count as the pixels.
 
@@ -36,9 +35,10 @@ def whole_pixels(calibration: Calibration, accuracy: float) -> int | None:
     """How many pixels each lenslet has along each side, all at the same places; None if they have not.
 
     >>> from lumigraph.core.lattice import Lattice
-    >>> whole_pixels(Calibration(Lattice(15.0, (30, 30)), (61, 61)), 1e-2)
-    15
-    >>> whole_pixels(Calibration(Lattice(15.01, (30, 30)), (61, 61)), 1e-2)
+    >>> pitches, center = (15.0, 15.01), np.array([[30.0, 30.0]])
+    >>> lattices = [Lattice.square(pitch, 0.0, (30.0, 30.0)) for pitch in pitches]
+    >>> [whole_pixels(Calibration(one, (61, 61), np.zeros((1, 2), int), center, 0.0), 1e-2) for one in lattices]
+    [15, None]
     """
     N = round(calibration.lattice.pitch)
     at = _places(calibration) * N + (N - 1) / 2
