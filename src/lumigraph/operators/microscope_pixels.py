@@ -35,9 +35,10 @@ def whole_pixels(calibration: Calibration, accuracy: float) -> int | None:
     """How many pixels each lenslet has along each side, all at the same places; None if they have not.
 
     >>> from lumigraph.core.lattice import Lattice
-    >>> pitches, center = (15.0, 15.01), np.array([[30.0, 30.0]])
-    >>> lattices = [Lattice.square(pitch, 0.0, (30.0, 30.0)) for pitch in pitches]
-    >>> [whole_pixels(Calibration(one, (61, 61), np.zeros((1, 2), int), center, 0.0), 1e-2) for one in lattices]
+    >>> center = np.array([[30.0, 30.0]])
+    >>> lattices = [Lattice.square(pitch, 0.0, (30.0, 30.0)) for pitch in (15.0, 15.01)]
+    >>> given = [Calibration(one, (61, 61), np.zeros((1, 2), int), center, 0.0) for one in lattices]
+    >>> [whole_pixels(one, 1e-2) for one in given]
     [15, None]
     """
     N = round(calibration.lattice.pitch)
