@@ -35,7 +35,7 @@ MODELLED = 1e-2
 FINER = 1.5
 """Samples of light that is traced by rays, over whole pixels: those between are interpolated."""
 
-PIXELS = 0.65
+PIXELS = 0.6
 """Of the accuracy, what the interpolation of pixels may take."""
 
 
