@@ -24,8 +24,12 @@ from lumigraph.errors import CalibrationError, SamplingError
 from lumigraph.instruments import LightFieldMicroscope
 from lumigraph.scene import Points
 
-ACCURACY = 3e-2
-"""Of points' images."""
+ACCURACY = 2e-2
+"""Of points' images.
+
+With 3e-2, 0.3 waves of astigmatism before a textured volume came out 0.01 to 0.03 too low, by how pixels were
+sampled; with 2e-2 or 1e-2, 0.01.
+"""
 
 SAMPLES = 3
 """Of the volume along a lenslet."""
