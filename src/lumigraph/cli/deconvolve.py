@@ -23,7 +23,6 @@ from lumigraph.errors import FormatError, LumigraphError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
-    from inspect import BoundArguments
 
     from lumigraph.core.calibration import Calibration
     from lumigraph.core.linear import Linear
@@ -129,14 +128,14 @@ def _check(
 
 
 def side_by_side(
-    line: "BoundArguments", frames: "Sequence[Callable[[], tuple[Path, str | None]]]"
+    line: "Mapping[str, Any]", frames: "Sequence[Callable[[], tuple[Path, str | None]]]"
 ) -> "Iterator[list[Any]]":
     """Objects of several raw images, by the arguments of a `deconvolve` of one, or the error of each.
 
     Each frame gives its file and page, or an error. Those that share an operator are taken some at a time.
     """
     group: list[Any] = []
-    for begun in (_begun(line.arguments, frame) for frame in frames):
+    for begun in (_begun(line, frame) for frame in frames):
         if not _joins(begun, group):
             yield _objects(group)
             group = []

@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stderr
 from dataclasses import dataclass, is_dataclass
-from functools import partial
+from functools import lru_cache, partial
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
@@ -123,8 +123,7 @@ class Frames:
             return
         os.chdir(self.folder)
         with tempfile.TemporaryDirectory(prefix="lumigraph-") as place:
-            line = self.bound(items[0], Path(place))[1]
-            line.apply_defaults()
+            line = {**_line(self), "output": Path(place) / f"frame{KINDS[self.verb].ending}"}
             groups = side_by_side(line, [partial(_place, item) for item in items])
             while True:
                 with redirect_stderr(StringIO()):
@@ -157,6 +156,14 @@ class Frames:
         words += ["--output", str(folder / f"frame{kind.ending}")] if kind.ending else []
         command, bound, _ = app.parse_args(words, exit_on_error=False, print_error=False)
         return command, bound
+
+
+@lru_cache(maxsize=4)
+def _line(frames: Frames) -> dict[str, Any]:
+    """What all frames of a line have in common; reading the line takes as long as an iteration of one."""
+    line = frames.bound({"file": "frame", "page": None}, Path())[1]
+    line.apply_defaults()
+    return dict(line.arguments)
 
 
 def _flat(arguments: dict[str, Any]) -> dict[str, Any]:

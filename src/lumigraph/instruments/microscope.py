@@ -114,6 +114,11 @@ class LightFieldMicroscope(DescribedMicroscope):
         progress
             Called as ``progress(fraction)`` after each slice.
 
+        Warns
+        -----
+        SamplingWarning
+            Images that are less exact than asked for, with the depth where they are off most.
+
         Raises
         ------
         SamplingError
@@ -249,6 +254,7 @@ class LightFieldMicroscope(DescribedMicroscope):
     def _layout(
         self, samples: int, pixels: int | Calibration | None, depths: Sequence[float], accuracy: float
     ) -> Layout:
+        require_accuracy(accuracy)
         if isinstance(pixels, int) and not isinstance(pixels, bool):
             if pixels < 2:
                 raise GeometryError(f"pixels is {pixels} but a lenslet needs at least 2 along each side.")
@@ -276,7 +282,7 @@ class LightFieldMicroscope(DescribedMicroscope):
             N = math.ceil(max(FINER, math.sqrt(2) / fill) * pitch)
             return self._sampled(samples, N, 1 / pitch, 1)
         shortest, width = min(self.objectives, key=lambda one: one.wavelength), fill / pitch
-        N = samples_needed(shortest, self.lenslet, width, depths, PIXELS * require_accuracy(accuracy))
+        N = samples_needed(shortest, self.lenslet, width, depths, PIXELS * accuracy)
         return self._sampled(samples, N, 1 / pitch, DEGREE)
 
     def _sampled(self, samples: int, N: int, apart: float, degree: int) -> CellSampling:

@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -15,7 +16,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress
 from lumigraph.elements.objective import Objective
-from lumigraph.errors import FormatError, GeometryError, SamplingError
+from lumigraph.errors import FormatError, GeometryError, SamplingError, SamplingWarning
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_far import Far
 from lumigraph.operators.microscope_kernels import (
@@ -29,8 +30,9 @@ from lumigraph.operators.microscope_kernels import (
 )
 from lumigraph.operators.microscope_operator import MicroscopeOperator, suits_frequencies
 from lumigraph.operators.microscope_pixels import FRAME
+from lumigraph.units import um
 
-VERSION = 6
+VERSION = 7
 """Of the kernels' numbers: a change of theirs makes those that are kept useless."""
 
 
@@ -126,12 +128,24 @@ def microscope_operator(
         kernels.append(_kept(objectives, lenslet, layout.sampling, dz, demand, folder))
         if progress is not None:
             progress((done + 1) / len(planes))
+    _warn_if_missed(kernels, planes, accuracy)
     left_out = 0.0 if objectives[0].model == "rays" else SHARES["patterns"] * accuracy
     return MicroscopeOperator(
         tuple(kernels), layout.cells, layout.placement, -layout.frame,
         suits_frequencies(kernels, layout.cells, -layout.frame, left_out), left_out,
         object_grid=_object_grid(lenslet, layout), depths=None if depths is None else planes,
     )  # fmt: skip
+
+
+def _warn_if_missed(kernels: Sequence[SliceKernel], planes: Sequence[float], accuracy: float) -> None:
+    worst = max(range(len(planes)), key=lambda k: kernels[k].error)
+    if kernels[worst].error > accuracy:
+        warnings.warn(
+            f"an accuracy of {accuracy:g} was asked for but points' images at {planes[worst] / um:g} um are "
+            f"off by some {kernels[worst].error:.2g} rms. Ask for a smaller one, or take it as it is.",
+            SamplingWarning,
+            stacklevel=4,  # whoever asked a microscope
+        )
 
 
 def require_accuracy(accuracy: float) -> float:

@@ -290,14 +290,13 @@ def _patterns(average: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def _near(off: np.ndarray, T: int, wanted: float, symmetric: bool) -> tuple[np.ndarray, float]:
-    """Cells (T²,) that are not far, the same after every flip and transposition, and the rms of the rest."""
+    """Cells (T²,) that are not far, the same after every flip and transposition; the rms of the others."""
     if symmetric:
         off = _symmetrised(off.reshape(T * T, 1), T)[:, 0]
         off = np.round(off / off.max(), 12) * off.max()
     order = np.argsort(off)
-    faint = np.cumsum(off[order]) <= wanted**2
-    threshold = off[order][faint].max(initial=-1.0)
-    kept = off > threshold
+    needed = off[order][np.cumsum(off[order]) > wanted**2]
+    kept = off >= needed.min(initial=np.inf)  # with all that are as strong, as flipped cells are
     return kept, math.sqrt(off[~kept].sum())
 
 

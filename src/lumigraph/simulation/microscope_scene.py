@@ -4,6 +4,7 @@ All light is incoherent: fluorescence. What stands beyond the field that the len
 """
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
@@ -15,7 +16,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.progress import Progress
 from lumigraph.core.raw import RawImage
 from lumigraph.elements.objective import Objective
-from lumigraph.errors import GeometryError
+from lumigraph.errors import GeometryError, SamplingWarning
 from lumigraph.operators.microscope_building import Layout
 from lumigraph.operators.microscope_cell import Lenslet
 from lumigraph.operators.microscope_kernels import Demand, point_cells, require_window
@@ -136,7 +137,7 @@ def _image(scope: Microscope, part: Slice | Points | Diffuser, accuracy: float) 
         return _slice_image(scope, part, accuracy)
     if isinstance(part, Points):
         return _points_image(scope, part, accuracy)
-    operator = scope.operator((0.0,), SAMPLES, accuracy=accuracy)
+    operator = _operator(scope, 0.0, SAMPLES, accuracy)
     return part.intensity * _white(operator), operator.error
 
 
@@ -180,10 +181,17 @@ class _Found:
 
 
 def _by_operator(scope: Microscope, part: Slice, samples: int, accuracy: float) -> _Found:
-    operator = scope.operator((part.dz,), samples, accuracy=accuracy)
+    operator = _operator(scope, part.dz, samples, accuracy)
     image = operator.forward(_plane(part, operator.object_grid))
     sampled = _sampling_error(operator, part, image)
     return _Found(image, math.hypot(operator.error, sampled), sampled)
+
+
+def _operator(scope: Microscope, dz: float, samples: int, accuracy: float) -> Any:
+    """Without its own warning: that of the whole raw image counts."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SamplingWarning)
+        return scope.operator((dz,), samples, accuracy=accuracy)
 
 
 def _plane(part: Slice, grid: Grid) -> np.ndarray:
