@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from lumigraph.core import checks, memory
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress
+from lumigraph.core.threads import each
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import FormatError, GeometryError, SamplingError, SamplingWarning
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
@@ -123,9 +125,13 @@ def microscope_operator(
             raise FormatError(f"folder {folder} cannot be made ({error.strerror}). Give another.") from error
         share = len(octant(layout.sampling.points)) / layout.sampling.classes if objectives[0].is_round else 1
         memory.require_disk(sum(sizes) * share, folder, "the images of points", SamplingError)
-    kernels = []
-    for done, dz in enumerate(planes):
-        kernels.append(_kept(objectives, lenslet, layout.sampling, dz, demand, folder))
+    kernels, turn = [], Lock()
+
+    def kept(dz: float) -> SliceKernel:
+        return _kept(objectives, lenslet, layout.sampling, dz, demand, folder, turn)
+
+    for done, kernel in enumerate(each(kept, planes, 2)):
+        kernels.append(kernel)
         if progress is not None:
             progress((done + 1) / len(planes))
     _warn_if_missed(kernels, planes, accuracy)
@@ -179,13 +185,18 @@ def _kept(
     dz: float,
     demand: Demand,
     folder: str | PathLike[str] | None,
+    turn: Lock,
 ) -> SliceKernel:
-    """The kernel of a depth, mapped from its file in the folder, or in the user's cache."""
+    """The kernel of a depth, mapped from its file in the folder, or in the user's cache.
+
+    One is computed at a time, while the one before is written.
+    """
     told = repr((VERSION, tuple(objectives), lenslet, sampling, dz, demand))
     key = f"slice-{hashlib.sha256(told.encode()).hexdigest()[:20]}"
 
     def built() -> dict[str, np.ndarray]:
-        kernel = slice_kernel(objectives, lenslet, sampling, dz, demand)
+        with turn:
+            kernel = slice_kernel(objectives, lenslet, sampling, dz, demand)
         held = {"offsets": kernel.offsets, "blocks": kernel.blocks}
         if kernel.far is not None:
             held |= {f"far_{name}": getattr(kernel.far, name) for name in ("offsets", "weights", "images")}

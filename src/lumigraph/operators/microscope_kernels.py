@@ -276,8 +276,12 @@ def _symmetrised(average: np.ndarray, T: int) -> np.ndarray:
 
 def _sectors(offsets: np.ndarray) -> np.ndarray:
     """What part (n, SECTORS) of each offset belongs to each direction: linear between two."""
-    at = np.arctan2(offsets[:, 0], offsets[:, 1])[:, None] * SECTORS / (2 * np.pi) - np.arange(SECTORS)
-    return np.maximum(1 - np.abs((at + SECTORS / 2) % SECTORS - SECTORS / 2), 0).astype(np.float32)
+    at = np.arctan2(offsets[:, 0], offsets[:, 1]) * SECTORS / (2 * np.pi)
+    first, rows = np.floor(at).astype(int), np.arange(len(at))
+    found = np.zeros((len(at), SECTORS), np.float32)
+    found[rows, first % SECTORS] = 1 - (at - first)
+    found[rows, (first + 1) % SECTORS] = at - first
+    return found
 
 
 def _patterns(average: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
