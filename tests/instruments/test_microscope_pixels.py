@@ -82,10 +82,9 @@ def test_cells_that_are_as_strong_are_near_or_far_together():
     assert lost == pytest.approx(0.2)
 
 
-@pytest.mark.parametrize("dz", [-12e-6, 0.0])
-def test_ten_pixels_behind_a_lenslet_are_as_exact_as_asked_for(dz):
+def test_ten_pixels_behind_a_lenslet_are_as_exact_as_asked_for():
     shown, truth = (
-        scope((90, 90), 125e-6 / 10).operator((dz,), 3, accuracy=accuracy) for accuracy in (1e-2, 1e-4)
+        scope((90, 90)).operator((-12e-6,), 3, pixels=10, accuracy=accuracy) for accuracy in (1e-2, 1e-3)
     )
     point = (0, *(n // 2 - 1 for n in shown.shape[1][1:]))
-    assert 2e-3 < rms(shown.psf(point) - truth.psf(point)) / rms(truth.psf(point)) < 1e-2
+    assert 1e-3 < rms(shown.psf(point) - truth.psf(point)) / rms(truth.psf(point)) < 5e-3

@@ -383,7 +383,8 @@ def _bench(
         more = min(int(math.sqrt(BESIDE / told[1].accuracy)), BESIDE_MOST)
     if lenslet.is_round:
         return Bench(objective, lenslet, sampling, reach, margin, more)
-    return Crossed(objective, lenslet, sampling, reach, margin, SHARES["rank"] * told[1].accuracy, more)
+    asked = told[1].accuracy
+    return Crossed(objective, lenslet, sampling, reach, margin, SHARES["rank"] * asked, more, asked)
 
 
 def require_window(
@@ -409,7 +410,8 @@ def require_window(
         of_each = threads * field if fine % points else max(field, 8.0 * objective.modes + 8 + 32 * threads)
         held = of_each * (cells * fine) ** 2
     else:
-        held = Crossed(objective, lenslet, sampling, reach, margin).held_bytes(points)
+        bench = Crossed(objective, lenslet, sampling, reach, margin, accuracy=demand.accuracy)
+        held = bench.held_bytes(points)
     memory.require(held, what, "Use depths nearer to the focused plane.", SamplingError)
 
 

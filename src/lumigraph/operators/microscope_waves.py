@@ -74,6 +74,8 @@ class Crossed:
         Relative rms of fields that a low rank may leave out.
     beside
         Lenslets beyond `guard` whose light is followed into the window, to each side.
+    accuracy
+        Relative rms of images: how many nodes the mean over a pixel has.
     """
 
     def __init__(
@@ -85,7 +87,9 @@ class Crossed:
         margin: float,
         left_out: float = 0.0,
         beside: int = 0,
+        accuracy: float = 1e-2,
     ) -> None:
+        self.accuracy = accuracy
         self.objective, self.lenslet, self.sampling = objective, lenslet, sampling
         self.reach, self.left_out = reach, left_out
         self.fine, self.guard = fineness(objective, lenslet, margin), guard(objective, lenslet) + beside
@@ -201,8 +205,16 @@ class Crossed:
 
     @property
     def _nodes(self) -> int:
-        """Of the quadrature over a pixel, along an axis."""
-        return 1 if self.sampling.degree else math.ceil(1 + self.fine * self.sampling.width / 2)
+        """Of the quadrature over a pixel, along an axis.
+
+        Gauss and Legendre's needs more nodes than half the phase of the steepest light from the middle of a
+        pixel to its edge. Measured beside four more: 20x/0.5 and 60x/1.2, 7 to 27 px behind a lenslet, two
+        depths, 1e-2 to 1e-4: off by at most 0.67 of the accuracy.
+        """
+        if self.sampling.degree:
+            return 1
+        half = math.pi / 4 * self.fine * self.sampling.width
+        return math.ceil(half + 0.35 + 0.4 * (-math.log10(self.accuracy) - 2))
 
     def _seen(self, fields: Sequence[Pair]) -> tuple[np.ndarray, float]:
         """Samples of what does not interfere, and the relative rms that they do not hold."""
