@@ -56,7 +56,7 @@ def test_a_larger_sensor_sees_the_same_around_whole_cells(rng):
     np.testing.assert_allclose(inner[4:-4, 4:-4], whole.psf(point), atol=1e-6 * float(inner.max()))
 
 
-@pytest.mark.parametrize("accuracy", [1e-2, 3e-3])
+@pytest.mark.parametrize("accuracy", [1e-2, pytest.param(3e-3, marks=pytest.mark.long)])
 def test_interpolated_pixels_are_as_exact_as_asked_for_at_the_finest_depth(accuracy):
     """By the focused plane and the farthest one alone, -15 um was off by 1.4e-2 where 1e-2 was asked for."""
     operator = scope((176, 140), "6.5789 um").operator(
