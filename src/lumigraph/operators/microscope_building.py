@@ -115,7 +115,8 @@ def microscope_operator(
         require_window(one, lenslet, layout.sampling, max(planes, key=abs), demand, layout.sampling.points)
     sizes = [kernel_bytes(objectives[0], lenslet, layout.sampling, dz, demand) for dz in planes]
     stored = 1 if folder is None else 0
-    needed = max(sizes) * 2 + stored * sum(sizes) * (0.25 if objectives[0].is_round else 1)
+    worked_on = max(sizes) * min(len(sizes) + 1, 3)  # the one before is being written
+    needed = worked_on + stored * sum(sizes) * (0.25 if objectives[0].is_round else 1)
     remedy = "Use fewer slices or samples, or folder= to keep them on disk."
     memory.require(needed, f"the images of points at {len(planes)} depths", remedy, SamplingError)
     if folder is not None:
