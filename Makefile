@@ -50,8 +50,8 @@ bench: $(TOOLS)  ## speed against plain SciPy, ratios within one run
 	$(BIN)/python -m benchmarks
 
 reproduce: $(TOOLS)  ## the thesis' experiments at full size, and the long tests; resumes what was interrupted
-	$(BIN)/lumigraph reproduce
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -m long --timeout 1800 tests
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m long --timeout 1800 tests; \
+	tested=$$?; $(BIN)/lumigraph reproduce && exit $$tested
 
 fuzz: $(TOOLS)  ## 100,000 damaged files for every reader, each in a process of its own with bounds on memory and time
 	$(BIN)/python tests/fuzz/run.py --count 100000

@@ -294,14 +294,14 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.long  # 40 starts, each killed after a while: a minute
+@pytest.mark.long  # 20 starts, each killed after a while
 @pytest.mark.skipif(sys.platform == "win32", reason="processes are killed by signals")
 def test_killed_at_any_time_it_goes_on_to_the_same_bits(tmp_path):
     output, log, rng = tmp_path / "out.zarr", tmp_path / "log", random.Random(4)
     script = tmp_path / "job.py"
     here = str(Path(jobs.__file__).parent)
     script.write_text(KILLED.format(tests=here, items=items(200, log=str(log)), output=str(output)))
-    for _ in range(40):
+    for _ in range(20):
         started = subprocess.Popen([sys.executable, str(script)], start_new_session=True)
         try:
             started.wait(rng.uniform(1.0, 3.0))

@@ -154,7 +154,7 @@ def test_the_plane_by_rows_of_the_pupil_is_that_by_harmonics(model):
 def test_strong_aberrations_have_as_many_harmonics_as_they_need():
     # With 64 directions for all, the harmonics of this wave of tetrafoil were wrong by a fifth.
     objective = Objective(WAVE, 0.5, aberrations={14: 0.7, 10: 0.7})
-    y = x = np.linspace(-12e-6, 12e-6, 13)
+    y = x = np.linspace(-12e-6, 12e-6, 5)
     found = objective.fields(y[:, None], x[None, :], 3e-6)
     single = objective.fields(*np.meshgrid(y, x, indexing="ij"), 3e-6)
     assert np.linalg.norm(found - single) < 1e-5 * np.linalg.norm(single)

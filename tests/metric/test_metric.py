@@ -225,10 +225,10 @@ def test_corners_survive_their_table(seen: Corners, tmp_path) -> None:
         lg.metric.load_corners(tmp_path / "corners.csv")
 
 
-@pytest.mark.long  # 40 adjustments
+@pytest.mark.long  # 20 adjustments
 def test_the_truth_lies_in_nine_of_ten_intervals() -> None:
     inside = []
-    for seed in range(40):
+    for seed in range(20):
         found = board(corners(np.random.default_rng(100 + seed), frames=5, shared=0.15), BOARD, NOMINAL)
         off = np.abs(found.camera.numbers - CAMERA.numbers) / found.errors
         inside.append(off[[0, 1, 2]] < 1.96)

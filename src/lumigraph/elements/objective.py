@@ -339,9 +339,7 @@ def _power_of(apodised: list[tuple[int, int, np.ndarray]], cosine: np.ndarray, w
 
 
 @remembered
-def _tables(
-    objective: Objective, dz: float, farthest: float
-) -> tuple[float, list[list[tuple[int, np.ndarray]]]]:
+def _tables(objective: Objective, dz: float, farthest: float) -> tuple[float, list[radial.Table]]:
     """Step of the radii [m], and for each mode the harmonics with their radial integrals as cubic pieces."""
     nyquist = objective.wavelength / (2 * objective.numerical_aperture)
     steps = np.arange(math.ceil(farthest / nyquist * PER_NYQUIST) + 2) * (nyquist / PER_NYQUIST)
@@ -353,11 +351,11 @@ def _tables(
     count = _azimuths(objective)
     angle = np.arange(count) * (2 * np.pi / count)
     waves = _aberrated(objective, q / objective.numerical_aperture, angle)
-    tables = []
-    for harmonic, _, amplitude in apodised:
-        spectrum = np.fft.fft(_turned(harmonic, angle)[:, None] * waves, axis=0) / count
-        tables.append(radial.harmonics_of(spectrum, amplitude * weight * wave * scale, k * q, steps))
-    return float(steps[1]), tables
+    modes = [
+        (np.fft.fft(_turned(h, angle)[:, None] * waves, axis=0) / count, amplitude * weight * wave * scale)
+        for h, _, amplitude in apodised
+    ]
+    return float(steps[1]), radial.tables_of(modes, k * q, steps)
 
 
 def _azimuths(objective: Objective) -> int:

@@ -1,5 +1,7 @@
 """Radial integrals of azimuthal harmonics, tabulated as cubic pieces and interpolated."""
 
+from collections.abc import Iterator, Sequence
+from itertools import count
 from threading import Lock
 
 import numpy as np
@@ -28,37 +30,67 @@ def power(turn: np.ndarray | float, order: int) -> np.ndarray | float:
     return turn**order if order > 0 else np.conj(turn) ** -order
 
 
-def harmonics_of(
-    spectrum: np.ndarray, amplitude: np.ndarray, q: np.ndarray, steps: np.ndarray
-) -> list[tuple[int, np.ndarray]]:
-    """Order and radial integral, in cubic pieces (2, 4, radii), of each azimuthal harmonic that counts."""
-    strength = np.abs(spectrum).max(1)
-    found = []
-    for row in np.flatnonzero(strength > _WEAK * strength.max()):
-        order = int(row) if row < len(spectrum) // 2 else int(row) - len(spectrum)
-        bessel = _bessel(abs(order), q, float(steps[1]), len(steps))
-        wave = amplitude * spectrum[row]
-        parts = bessel @ np.stack([wave.real, wave.imag], axis=1)
-        values = CubicSpline(np.arange(len(steps)), 1j ** abs(order) * (parts[:, 0] + 1j * parts[:, 1]))
-        found.append((order, np.stack([values.c.real, values.c.imag])))
+Table = list[tuple[int, np.ndarray]]
+"""Order and radial integral, in cubic pieces (2, 4, radii), of each azimuthal harmonic that counts."""
+
+
+def tables_of(
+    modes: Sequence[tuple[np.ndarray, np.ndarray]], q: np.ndarray, steps: np.ndarray
+) -> list[Table]:
+    """Of modes, each of a spectrum (orders, nodes) over the azimuth and an amplitude (nodes,)."""
+    counted = [_counted(spectrum) for spectrum, _ in modes]
+    found: list[Table] = [[] for _ in modes]
+    highest = max(abs(order) for orders in counted for order in orders)
+    for order, bessel in zip(range(highest + 1), _bessels(q, steps), strict=False):
+        for table, orders, (spectrum, amplitude) in zip(found, counted, modes, strict=True):
+            for signed in sorted({order, -order} & orders):
+                wave = amplitude * spectrum[signed]
+                real, imaginary = (bessel @ np.stack([wave.real, wave.imag], axis=1)).T
+                values = CubicSpline(np.arange(len(steps)), 1j**order * (real + 1j * imaginary))
+                table.append((signed, np.stack([values.c.real, values.c.imag])))
     return found
 
 
-_BESSEL: dict[tuple, np.ndarray] = {}
+def _counted(spectrum: np.ndarray) -> set[int]:
+    strength, half = np.abs(spectrum).max(1), len(spectrum) // 2
+    strong = strength > _WEAK * strength.max()
+    return {order for order in range(-half, len(spectrum) - half) if strong[order]}
+
+
+def _bessels(q: np.ndarray, steps: np.ndarray) -> Iterator[np.ndarray]:
+    """J of the orders 0, 1, 2 and so on at (radii, nodes): each from both before it.
+
+    Where the argument is below the order, the recurrence is not stable, and far below it J is none.
+    """
+    yield from (_first(order, q, steps) for order in range(3))
+    before, now = _first(1, q, steps), _first(2, q, steps)
+    argument = np.arange(len(steps))[:, None] * (float(steps[1]) * q)
+    double = 2 / np.where(argument > 0, argument, 1)
+    for order in count(3):
+        before, now = now, (order - 1) * double * now - before
+        lower = argument < order
+        near = lower & (argument > order - 12 * order ** (1 / 3))
+        now[lower] = 0
+        now[near] = jv(order, argument[near])
+        yield now
+
+
+_FIRST: dict[tuple, np.ndarray] = {}
 _LOCK = Lock()
 
 
-def _bessel(order: int, q: np.ndarray, step: float, count: int) -> np.ndarray:
-    """J of this order at (radii, nodes); the last few are kept, for depths share them."""
-    key = order, len(q), float(q[-1]), float(q[0]), step, count
+def _first(order: int, q: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """J of the orders 0 to 2 at (radii, nodes); the last few are kept, for depths share them."""
+    key = order, len(q), float(q[-1]), float(q[0]), float(steps[1]), len(steps)
     with _LOCK:
-        if key not in _BESSEL:
-            argument = np.arange(count)[:, None] * (step * q)
-            while len(_BESSEL) > 5:
-                _BESSEL.pop(next(iter(_BESSEL)))
-            if order == 2:  # by recurrence, three times as fast as jv
-                near = np.where(argument > 0, argument, 1)
-                _BESSEL[key] = 2 * j1(argument) / near - np.where(argument > 0, j0(argument), 0)
-            else:
-                _BESSEL[key] = {0: j0, 1: j1}.get(order, lambda x: jv(order, x))(argument)
-        return _BESSEL[key]
+        if key not in _FIRST:
+            while len(_FIRST) > 5:
+                _FIRST.pop(next(iter(_FIRST)))
+            _FIRST[key] = (j0, j1, _j2)[order](np.arange(len(steps))[:, None] * (float(steps[1]) * q))
+        return _FIRST[key]
+
+
+def _j2(argument: np.ndarray) -> np.ndarray:
+    """By recurrence, three times as fast as jv."""
+    near = np.where(argument > 0, argument, 1)
+    return 2 * j1(argument) / near - np.where(argument > 0, j0(argument), 0)
