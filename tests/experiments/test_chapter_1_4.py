@@ -16,12 +16,10 @@ def test_both_chapters_are_there():
     assert len(IDS) == 12
 
 
-SLOW = ("table-4.2", "figure-1.20")  # half a minute each and more; their full size is run, too
+SLOW = ("table-4.2", "figure-1.20")  # half a minute each and more: run at full size alone
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.long] * (name in SLOW)) for name in IDS]
-)
+@pytest.mark.parametrize("name", [name for name in IDS if name not in SLOW])
 def test_all_rows_pass_at_reduced_size(name, monkeypatch):
     monkeypatch.delenv("LUMIGRAPH_DATA", raising=False)
     (one,) = find([name])

@@ -30,7 +30,12 @@ IDS = (
 )
 
 
-@pytest.mark.parametrize("name", IDS)
+SLOW = ("figure-5.3", "table-5.3", "table-5.4")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.long] * (name in SLOW)) for name in IDS]
+)
 def test_every_row_passes_at_reduced_size(name):
     (one,) = find([name])
     outcome = one.run(Context(quick=True))

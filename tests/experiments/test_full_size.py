@@ -16,3 +16,4 @@ def test_every_row_passes(one):
     (result,) = run.run([one], FOLDER)
     failed = [f"{row.quantity}: {row.got:.6g}, not {row.expected:.6g}" for row in result.failed]
     assert not failed, result.error
+    assert result.why

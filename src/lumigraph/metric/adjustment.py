@@ -125,12 +125,18 @@ class Problem:
 
     def misfit(self, unknowns: np.ndarray) -> np.ndarray:
         """(n, 2) Computed minus measured [px]: places, or centres of corners in views."""
+        return self._misfit(self.split(unknowns)[0], self._points(unknowns))
+
+    def _points(self, unknowns: np.ndarray) -> np.ndarray:
+        """(n, 3) What is seen, before the camera."""
         numbers, _, poses = self.split(unknowns)
-        pitch, seen, flat = self.camera.pixel_pitch, self.corners, self._flat(unknowns)
+        flat, in_views = self._flat(unknowns), self.corners.in_views
         if radius := self.board.radius:
-            points = geometry.dots(numbers, flat, poses[self.frame], radius, in_views=seen.in_views)
-        else:
-            points = geometry.moved(flat, poses[self.frame])
+            return geometry.dots(numbers, flat, poses[self.frame], radius, in_views=in_views)
+        return geometry.moved(flat, poses[self.frame])
+
+    def _misfit(self, numbers: np.ndarray, points: np.ndarray) -> np.ndarray:
+        pitch, seen = self.camera.pixel_pitch, self.corners
         if seen.in_views:
             return (
                 geometry.centers(numbers, points, (seen.place, seen.center), seen.kind, pitch) - seen.center
@@ -154,10 +160,17 @@ class Problem:
 
     def slopes(self, unknowns: np.ndarray) -> np.ndarray:
         """(n, 2, unknowns) Derivatives of `misfit`."""
-        camera = self.free.shape[1]
+        free, still = self.free, None if self.board.radius else self._points(unknowns)
+        camera, fixed = free.shape[1], unknowns[free.shape[1] :]
+
+        def of_camera(mine: np.ndarray) -> np.ndarray:
+            if still is None:  # where outlines of dots have their middles depends on it
+                return self.misfit(np.concatenate([mine, fixed]))
+            return self._misfit(self.camera.numbers + free @ mine, still)
+
         result = np.zeros((len(self.corners), 2, len(unknowns)))
         for k in range(camera):
-            result[..., k] = geometry.slope(self.misfit, unknowns, np.s_[k])
+            result[..., k] = geometry.slope(of_camera, unknowns[:camera], np.s_[k])
         rows, poses = np.arange(len(self.corners)), camera + self.heights
         if self.heights:  # all at once: each place depends on one
             column = camera + self.corners.corner

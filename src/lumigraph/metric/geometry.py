@@ -158,10 +158,16 @@ def moved(points: np.ndarray, poses: np.ndarray) -> np.ndarray:
         (n, 6) or (6,): rotation vector (z, y, x) [rad], right-handed in the frame (x, y, z), then
         displacement (z, y, x) [m].
     """
-    vector, shift = poses[..., :3], poses[..., 3:]
-    squared = np.sum(vector * vector, axis=-1, keepdims=True) + _TINY
+    a, b, c = (poses[..., k] for k in range(3))
+    z, y, x = (points[..., k] for k in range(3))
+    squared = a * a + b * b + c * c + _TINY
     angle = np.sqrt(squared)
+    cosine, sine, along = np.cos(angle), np.sin(angle) / angle, a * z + b * y + c * x
+    along = along * (1 - cosine) / squared
     # (z, y, x) is left-handed: the cross product changes its sign.
-    once = -np.cross(vector, points)
-    twice = -np.cross(vector, once)
-    return points + np.sin(angle) / angle * once + (1 - np.cos(angle)) / squared * twice + shift
+    turned = (
+        z * cosine + (c * y - b * x) * sine + a * along,
+        y * cosine + (a * x - c * z) * sine + b * along,
+        x * cosine + (b * z - a * y) * sine + c * along,
+    )
+    return np.stack(turned, axis=-1) + poses[..., 3:]
