@@ -33,11 +33,12 @@ def fineness(objective: Objective, lenslet: Lenslet, margin: float, points: int 
     steepest = objective.numerical_aperture / lenslet.magnification
     steepest += lenslet.pitch / (2 * abs(lenslet.focal_length))
     least = math.ceil(lenslet.pitch * 2 * margin * steepest / objective.wavelength)
-    shared = _fast(math.ceil(least / points)) * points
-    return shared if points > 1 and shared <= MORE * least else _fast(least)
+    shared = fast_length(math.ceil(least / points)) * points
+    return shared if points > 1 and shared <= MORE * least else fast_length(least)
 
 
-def _fast(least: int) -> int:
+def fast_length(least: int) -> int:
+    """At least so many samples, of a number that is quick to transform."""
     return int(scipy.fft.next_fast_len(least) or least)
 
 
