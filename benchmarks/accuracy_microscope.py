@@ -134,6 +134,10 @@ MICROSCOPES = {
         {"pitch": 125e-6, "focal_length": 2.5e-3}, {"pixel_pitch": 8e-6},
         magnification=20.0, numerical_aperture=0.5,
     ),
+    "microscope, 20x/0.5, whole pixels": lambda: _scope(
+        {"pitch": 125e-6, "focal_length": 2.5e-3}, {"pixel_pitch": 125e-6 / 15},
+        magnification=20.0, numerical_aperture=0.5,
+    ),
     "microscope, 60x/1.2, vector": lambda: lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
         lenslets={"count": (7, 7)}, sensor={"shape": (109, 109)}
     ),

@@ -16,7 +16,7 @@ def test_both_chapters_are_there():
     assert len(IDS) == 12
 
 
-SLOW = ("table-4.2", "figure-1.20")  # half a minute each and more: run at full size alone
+SLOW = ("table-4.2", "figure-1.20", "figure-4.8", "figure-4.12")  # 10 s and more: run at full size alone
 
 
 @pytest.mark.parametrize("name", [name for name in IDS if name not in SLOW])

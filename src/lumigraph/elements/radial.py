@@ -60,7 +60,7 @@ def _counted(spectrum: np.ndarray) -> set[int]:
 def _bessels(q: np.ndarray, steps: np.ndarray) -> Iterator[np.ndarray]:
     """J of the orders 0, 1, 2 and so on at (radii, nodes): each from both before it.
 
-    Where the argument is below the order, the recurrence is not stable, and far below it J is none.
+    Where the argument is below the order, the recurrence is not stable, and far below it J is 0.
     """
     yield from (_first(order, q, steps) for order in range(3))
     before, now = _first(1, q, steps), _first(2, q, steps)
