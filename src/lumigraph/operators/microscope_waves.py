@@ -31,7 +31,8 @@ FINER = 1.4
 """Factor of the samples of the light on the grid that tells what one misses.
 
 It tells 0.7 to 1.1 times what the whole image is off by, beside three times as many samples: 20x/0.5 and
-40x/0.95, 9 to 21 px behind a lenslet, -9 to 20 um, 1e-2 and 1e-3.
+40x/0.95, 9 to 21 px behind a lenslet, -9 to 30 um, 1e-2 and 1e-3. Where it is below a tenth of these, 0.4 to
+1.2 times.
 """
 
 GRID = 0.5
