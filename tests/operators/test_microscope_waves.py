@@ -5,8 +5,10 @@ import tracemalloc
 import numpy as np
 import pytest
 
+import lumigraph as lg
+from lumigraph.core import memory
 from lumigraph.elements.objective import Objective
-from lumigraph.operators import microscope_waves
+from lumigraph.operators import microscope_bench, microscope_samples
 from lumigraph.operators.microscope_bench import Bench, spline_response
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_kernels import Demand, margin_of
@@ -55,7 +57,7 @@ def of_corner(way, asked, pixels, dz, **options):
 @pytest.mark.parametrize("dz", [-12e-6, -30e-6])
 def test_the_mean_over_a_pixel_has_enough_nodes(accuracy, pixels, dz, monkeypatch):
     """With as many as half the samples in a pixel, and one, off by up to 4.2 times the accuracy."""
-    monkeypatch.setattr(microscope_waves, "GRID", np.inf)  # of the same light
+    monkeypatch.setattr(microscope_bench, "GRID", np.inf)  # of the same light
     asked = accuracy, pixels, dz
     found, truth = (of_corner(Crossed, *asked, accuracy=one) for one in (accuracy, accuracy * 1e-6))
     assert off(found, truth) < 0.7 * accuracy
@@ -73,8 +75,13 @@ SPARSE = CellSampling(3, 53, 0.064, 3)
 """Splines almost as close as samples of the light: what these alias is seen."""
 
 
-def middle_of(sampling, dz, margin):
-    bench = Crossed(Objective(525e-9, 0.5), LENSLET, sampling, 3, margin, accuracy=1e-3)
+ROUND = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6, is_round=True)
+
+
+def middle_of(sampling, dz, margin, lenslet=LENSLET, accuracy=1e-3):
+    way = Bench if lenslet.is_round else Crossed
+    reach = 6 if lenslet.is_round else 3  # as at 1e-3
+    bench = way(Objective(525e-9, 0.5), lenslet, sampling, reach, margin, accuracy=accuracy)
     before = bench.fine
     ((image, stated),) = bench.images(dz, [(0, 1)])
     return image, stated, bench.fine / before
@@ -89,14 +96,40 @@ def test_the_grid_of_the_light_is_made_finer_where_it_misses_too_much():
     assert stated < 1e-3
 
 
-@pytest.mark.parametrize(("pixels", "dz"), [(15, 20e-6), (9, 20e-6), (15, -9e-6)])
-def test_what_the_grid_of_the_light_misses_is_stated(pixels, dz):
+def test_the_grid_of_round_lenslets_is_made_finer_where_it_misses_too_much():
+    """They were off by up to twice what was asked for, without a word."""
+    image, stated, finer = middle_of(PIXELS, -9e-6, 3.4, ROUND, 3e-4)
+    assert finer > 1.3
+    truth, *_ = middle_of(PIXELS, -9e-6, 8.0, ROUND, 1.0)
+    assert stated < 1.5e-4
+    assert off(image, truth) < 1.5 * stated
+
+
+@pytest.mark.parametrize(
+    ("pixels", "dz", "lenslet"),
+    [(15, 20e-6, LENSLET), (9, 20e-6, LENSLET), (15, -9e-6, LENSLET), (15, -20e-6, ROUND)],
+)
+def test_what_the_grid_of_the_light_misses_is_stated(pixels, dz, lenslet):
     """Nothing else is left out, and samples are pixels: it is all that they are off by."""
     sampling = CellSampling(3, pixels, 1 / pixels)
-    image, stated, finer = middle_of(sampling, dz, 3.4)
+    image, stated, finer = middle_of(sampling, dz, 3.4, lenslet)
     assert finer == 1
-    truth, *_ = middle_of(sampling, dz, 10.0)
+    truth, *_ = middle_of(sampling, dz, 10.0, lenslet)
     assert stated == pytest.approx(off(image, truth), rel=0.35)
+
+
+@pytest.mark.parametrize("lenslet", [LENSLET, ROUND])
+def test_a_finer_grid_that_cannot_fit_is_refused(lenslet, monkeypatch):
+    monkeypatch.setattr(memory, "available", lambda: 1e6)
+    sampling, accuracy = (PIXELS, 1e-4) if lenslet.is_round else (SPARSE, 1e-3)
+    with pytest.raises(lg.errors.SamplingError, match=r"at 20 µm, on \d+ samples along a lenslet, needs"):
+        middle_of(sampling, 20e-6, 3.4, lenslet, accuracy)
+
+
+def test_samples_that_hold_no_more_of_the_light_are_not_looked_for(monkeypatch):
+    """Points in focus at 60x/1.2 had no end: the grid itself is coarser than 1e-5 asks for."""
+    monkeypatch.setattr(microscope_samples, "MOST", 0.5)
+    assert 30 < microscope_samples.samples_needed(Objective(525e-9, 0.5), LENSLET, 1 / 15, (0.0,), 1e-7) < 100
 
 
 def test_a_low_rank_leaves_out_what_it_says():

@@ -34,7 +34,7 @@ from lumigraph.operators.microscope_operator import MicroscopeOperator, suits_fr
 from lumigraph.operators.microscope_pixels import FRAME
 from lumigraph.units import um
 
-VERSION = 9
+VERSION = 10
 """Of the kernels' numbers: a change of theirs makes those that are kept useless."""
 
 

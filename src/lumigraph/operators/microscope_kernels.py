@@ -16,11 +16,10 @@ from functools import lru_cache
 import numpy as np
 
 from lumigraph.core import memory
-from lumigraph.core.arrays import WORKERS
 from lumigraph.core.threads import single_products
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import SamplingError
-from lumigraph.operators.microscope_bench import Bench, fineness, guard
+from lumigraph.operators.microscope_bench import Bench, bench_bytes, fineness, guard
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_far import Far
 from lumigraph.operators.microscope_rays import ray_images
@@ -378,12 +377,11 @@ def _bench(
     objective: Objective, lenslet: Lenslet, sampling: CellSampling, reach: int, told: tuple[float, Demand]
 ) -> Bench | Crossed:
     margin = margin_of(objective, lenslet, *told)
-    more = 0
+    more, asked = 0, told[1].accuracy
     if _lit(objective, lenslet, told[0]) > reach:
-        more = min(int(math.sqrt(BESIDE / told[1].accuracy)), BESIDE_MOST)
+        more = min(int(math.sqrt(BESIDE / asked)), BESIDE_MOST)
     if lenslet.is_round:
-        return Bench(objective, lenslet, sampling, reach, margin, more)
-    asked = told[1].accuracy
+        return Bench(objective, lenslet, sampling, reach, margin, more, asked)
     return Crossed(objective, lenslet, sampling, reach, margin, SHARES["rank"] * asked, more, asked)
 
 
@@ -404,11 +402,7 @@ def require_window(
     cells = 2 * (reach + guard(objective, lenslet)) + 1
     what = f"the image of a point at {dz * 1e6:.4g} µm, which lights {cells} lenslets across,"
     if lenslet.is_round:
-        fine = fineness(objective, lenslet, margin, points)
-        field, threads = 16.0 * objective.modes + 64, min(WORKERS, points)
-        # Points share one field if it moves by whole samples, and each thread holds its light.
-        of_each = threads * field if fine % points else max(field, 8.0 * objective.modes + 8 + 32 * threads)
-        held = of_each * (cells * fine) ** 2
+        held = bench_bytes(objective.modes, cells, fineness(objective, lenslet, margin, points), points)
     else:
         bench = Crossed(objective, lenslet, sampling, reach, margin, accuracy=demand.accuracy)
         held = bench.held_bytes(points)

@@ -4,6 +4,8 @@ import math
 from dataclasses import replace
 from functools import lru_cache
 
+import numpy as np
+
 from lumigraph.core import arrays
 from lumigraph.elements.objective import Objective
 from lumigraph.operators.microscope_bench import DEGREE, Bench, sampled
@@ -22,6 +24,12 @@ At 20x/0.5, depths to ±60 µm, 35 samples chosen by the focused plane and the f
 are off by 1.3e-2, where 1e-2 was asked for. At 60x/1.2 the worst depth is a third of the farthest.
 """
 
+MOST = 2
+"""Samples for each of the fine grid's: more hold it no better, and images say what they miss.
+
+At 60x/1.2, points in focus: 216 miss 1.3e-5 and 840 7e-6, where 6e-6 were looked for without an end.
+"""
+
 
 @lru_cache(maxsize=64)
 def samples_needed(
@@ -29,7 +37,8 @@ def samples_needed(
 ) -> int:
     """Samples N along a lenslet from which pixels of a width [lenslets] are interpolated to an accuracy.
 
-    By the spectra of points in the focused plane, at the farthest depth, a third as far, and at `FINEST`.
+    By the spectra of points in the focused plane, at the farthest depth, a third as far, and at `FINEST`;
+    `MOST` for each of the fine grid's at most.
     """
     cutoff = 2 * lenslet.pitch**2 / (objective.wavelength * abs(lenslet.distance))
     spread = objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
@@ -44,9 +53,13 @@ def samples_needed(
         for k in FINEST:
             finest = _nearest(depths, sign * k * size / spread)
             places |= {((0.02, -0.01), finest), ((0.47, 0.47), finest)}
+
+    def lost(spectrum: np.ndarray, N: int) -> float:
+        return sampled(spectrum, bench.fine, replace(sampling, pixels=N))[1]
+
     spectra = [arrays.fft2(light) for point, at in sorted(places) for light in bench.lights(at, [point])]
     N = max(2, math.floor(cutoff))
-    while max(sampled(one, bench.fine, replace(sampling, pixels=N))[1] for one in spectra) > accuracy:
+    while MOST * bench.fine > N and max(lost(one, N) for one in spectra) > accuracy:
         N = math.ceil(1.06 * N)
     return N
 

@@ -21,22 +21,18 @@ import numpy as np
 from lumigraph.core import arrays
 from lumigraph.core.threads import each
 from lumigraph.elements.objective import Objective
-from lumigraph.operators.microscope_bench import fast_length, fineness, guard, sampled, series
+from lumigraph.operators.microscope_bench import (
+    fineness,
+    guard,
+    refined,
+    require_finer,
+    sampled,
+    series,
+)
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet, parts
 
 SMEARED = 4
 """Periods in a pitch by which the soft border of a window widens a field's spectrum, to each side."""
-
-FINER = 1.4
-"""Factor of the samples of the light on the grid that tells what one misses.
-
-It tells 0.7 to 1.1 times what the whole image is off by, beside three times as many samples: 20x/0.5 and
-40x/0.95, 9 to 21 px behind a lenslet, -9 to 30 um, 1e-2 and 1e-3. Where it is below a tenth of these, 0.4 to
-1.2 times.
-"""
-
-GRID = 0.5
-"""Of the accuracy, that the grid of the light may take; it is made finer where it takes more."""
 
 MIDDLE = 2
 """Cells to each side of a point's own by which the grid is judged."""
@@ -115,7 +111,11 @@ class Crossed:
     def images(self, dz: float, points: Sequence[Point]) -> Iterator[tuple[np.ndarray, float]]:
         """Samples ((2 reach + 1) N, the same) of points (ky, kx) at a depth, in order; as `Bench.image`."""
         turns, modes, missing = self._modes(dz, len(points))
-        missed = self._refined(turns, modes, points[len(points) // 2])
+        middle = points[len(points) // 2]
+        told = self.fine, 1, self.accuracy
+        self.fine, missed = refined(*told, lambda fine: self._middle(fine, turns, modes, middle))
+        if self.fine > told[0]:
+            require_finer(self.held_bytes(len(points)), self.fine, dz)
         fields = self._fields(turns, modes, points)
 
         def image(point: Point) -> tuple[np.ndarray, float]:
@@ -140,17 +140,6 @@ class Crossed:
         found = [self._factors(spectrum, points, allowed) for spectrum in spectra]
         missing = math.sqrt(sum(left for *_, left in found) / power)
         return turns, [(down, across) for down, across, _ in found], missing
-
-    def _refined(self, turns: np.ndarray, modes: Sequence[Pair], point: Point) -> float:
-        """Make the grid as fine as images need; the relative rms that it misses then, by one of them."""
-        most = 4 * self.fine
-        while True:
-            finer = fast_length(math.ceil(FINER * self.fine))
-            shown, truth = each(lambda fine: self._middle(fine, turns, modes, point), (self.fine, finer))
-            missed = float(np.linalg.norm(truth - shown) / np.linalg.norm(truth))
-            if missed <= GRID * self.accuracy or finer > most:
-                return missed
-            self.fine = finer
 
     def _middle(self, fine: int, turns: np.ndarray, modes: Sequence[Pair], point: Point) -> np.ndarray:
         """Of a point's image, on some grid."""
