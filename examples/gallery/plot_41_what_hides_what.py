@@ -60,7 +60,9 @@ truth = depth[3::6, 3::6]  # in the middle of each lenslet
 near_edge = abs(gaussian_filter(truth, 1.5) - truth) > 1 * mm
 for name, where in (("beside edges", near_edge), ("elsewhere", ~near_edge)):
     off = abs(found.values - truth)[where]
-    print(f"{name}: median error {np.median(off) / mm:.1f} mm of 21 mm, {np.mean(off > 5 * mm):.0%} above 5 mm")
+    print(
+        f"{name}: median error {np.median(off) / mm:.1f} mm of 21 mm, {np.mean(off > 5 * mm):.0%} above 5 mm"
+    )
 middle = views.view(*(n // 2 for n in views.data.shape[:2]))
 pictures = [(middle, "middle view"), (truth, "depth"), (np.clip(found.values, -12 * mm, 13 * mm), "found")]
 figure = lg.plots.images(pictures)

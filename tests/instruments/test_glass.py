@@ -225,6 +225,26 @@ def test_a_prescription_without_focal_length_names_the_remedy(tmp_path):
         )  # fmt: skip
 
 
+@pytest.mark.parametrize("dz", [-0.1, 0.0, 0.2])
+def test_a_refocus_factor_has_the_depth_that_the_glass_gives_it(plenoptic, dz):
+    """By the thin lens of the same focal length: -10 and 16 mm."""
+    from lumigraph.viewer.opening import _metres
+
+    aperture = lg.Grid.square(9, 1e-3)
+    views = lg.LightField(np.zeros((9, 9, 1, 1)), aperture, lg.Grid((1, 1), 125e-6), plenoptic.pupil_distance)
+    alpha = lg.DepthMap(np.array([[plenoptic.alpha(dz)]]), np.ones((1, 1)), "alpha")
+    assert plenoptic.in_metres(alpha, views).values.item() == pytest.approx(dz, rel=1e-6, abs=1e-9)
+    shown = _metres(plenoptic, views)
+    assert shown is not None
+    disparity = lg.depth.disparity_of(alpha, views).values
+    assert shown(disparity).item() == pytest.approx(dz, rel=1e-4, abs=1e-6)
+
+
+def test_perspective_has_its_centre_in_the_entrance_pupil(plenoptic):
+    """Which stands at e'/m behind the front principal plane."""
+    assert plenoptic.object_to_pupil() == pytest.approx(Z1 + EXIT / 1.25)
+
+
 def test_in_other_light_glass_stays_where_its_own_brings_it_to_focus(camera):
     other = camera.at_wavelength(700e-9)
     assert other.wavelength == 700e-9

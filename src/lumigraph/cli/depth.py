@@ -289,21 +289,16 @@ def _in_metres(
 ) -> "tuple[DepthMap, float | None]":
     """The map in metres where the lens is known, and the distance of the plane in focus."""
     from lumigraph import depth as verbs
-    from lumigraph.core.arrays import to_numpy
     from lumigraph.core.lightfield import LightField
-    from lumigraph.instruments.camera import Camera
-    from lumigraph.instruments.capabilities import WithObjective
+    from lumigraph.instruments.capabilities import WithDepth, WithObjective
 
     if isinstance(camera, WithObjective):
         return verbs.defocus(found, grounds, camera.depth_per_alpha), None
     lens = lengths.known(camera, grounds if isinstance(grounds, LightField) else None)
     if lens is None:
         return found, None
-    if isinstance(camera, Camera) and (pupil := camera.exit_pupil).behind:
-        focal, m = pupil.magnification * pupil.focal_length, pupil.magnification
-        seen = verbs.metric(found, grounds, focal_length=focal, object_distance=pupil.object_distance)
-        values = to_numpy(seen.values).astype(float) / m**2
-        return seen.replaced(values, "depth", 1 / m**2), lens[1]
+    if isinstance(camera, WithDepth) and lengths == Lengths():
+        return camera.in_metres(found, grounds), camera.object_to_pupil()
     return verbs.metric(found, grounds, focal_length=lens[0], object_distance=lens[1]), lens[1]
 
 

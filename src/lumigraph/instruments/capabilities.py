@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
+from lumigraph.core.calibration import Calibration
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.elements.objective import Objective
 from lumigraph.instruments.parts import MainLens
@@ -73,6 +75,21 @@ class WithMainLens(Protocol):
 
     def alpha(self, dz: float) -> float:
         """Refocus factor of a depth `dz` [m] from the focused plane."""
+        ...
+
+
+@runtime_checkable
+class WithDepth(Protocol):
+    """What is found behind its lenslets has a depth that follows from the lens equation."""
+
+    main_lens: MainLens
+
+    def in_metres(self, found: DepthMap, source: LightField | Calibration) -> DepthMap:
+        """Depth of each place from the focused plane [m]."""
+        ...
+
+    def object_to_pupil(self) -> float:
+        """From the focused plane to where the lens sees it from [m]."""
         ...
 
 

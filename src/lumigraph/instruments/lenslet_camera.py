@@ -9,11 +9,14 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from lumigraph.core import checks
+from lumigraph.core import arrays, checks
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
+from lumigraph.core.lightfield import LightField
 from lumigraph.core.linear import Linear
+from lumigraph.depth import metric
 from lumigraph.design import plenoptic1, plenoptic2, resolution
 from lumigraph.design.layout import LensletLayout
 from lumigraph.elements import Lean, LensletArray, Scatter, Train
@@ -308,3 +311,23 @@ class LensletCamera(Camera):
                 f"{(self.separation - self.image_distance) * 1e3:.6g} mm. "
                 "Use a shorter lenslet focal length or a magnification nearer to -1."
             )
+
+    def in_metres(self, found: DepthMap, source: LightField | Calibration) -> DepthMap:
+        """Depth of each place from the focused plane [m]: `lumigraph.depth.metric`, as the glass has it.
+
+        Parameters
+        ----------
+        found
+            Disparities or refocus factors of views, or patches of a camera 2.0.
+        source
+            These views, or the calibration.
+        """
+        pupil = self.exit_pupil
+        f, scale = pupil.magnification * pupil.focal_length, pupil.magnification**2
+        seen = metric(found, source, focal_length=f, object_distance=pupil.object_distance)
+        values = arrays.to_numpy(seen.values).astype(float) / scale
+        return seen.replaced(values, "depth", 1 / scale)
+
+    def object_to_pupil(self) -> float:
+        """From the focused plane to the entrance pupil, where perspective has its centre [m]."""
+        return self.exit_pupil.object_distance / self.exit_pupil.magnification**2

@@ -15,7 +15,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.errors import LumigraphError
-from lumigraph.instruments.capabilities import WithMainLens
+from lumigraph.instruments.capabilities import WithDepth
 from lumigraph.rendering import focus_range, focus_span
 
 _FEWEST_PIXELS = 200
@@ -170,19 +170,16 @@ def object_depths(
 
 
 def depth_of_pixels(
-    raw: RawImage, calibration: Calibration, focus: list[float] | None, camera: WithMainLens | None
+    raw: RawImage, calibration: Calibration, focus: list[float] | None, camera: WithDepth | None
 ) -> DepthMap:
     """Depth of each pixel of a camera 2.0's picture, as `lumigraph depth` measures it.
 
     Depths from the focused plane [m] where the camera's description is known, else patches [px].
     """
-    from lumigraph.depth import metric, of_pixels
+    from lumigraph.depth import of_pixels
 
     found = of_pixels(raw, calibration, focus=focus).depth
-    if camera is None:
-        return found
-    lens, distance = camera.main_lens.focal_length, camera.object_distance
-    return metric(found, calibration, focal_length=lens, object_distance=distance)
+    return found if camera is None else camera.in_metres(found, calibration)
 
 
 def grey_or_colour(views: LightField) -> LightField:

@@ -23,7 +23,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError, SamplingWarning
-from lumigraph.instruments.capabilities import Decoded, Rendered, WithMainLens, WithObjective
+from lumigraph.instruments.capabilities import Decoded, Rendered, WithDepth, WithMainLens, WithObjective
 from lumigraph.preparation import Described, Given, prepare, read_pages, sharp_kinds
 from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_of, depth_of_pixels
 
@@ -206,7 +206,7 @@ def of_raw(
     patch = patch if patch is not None else _own_patch(raw, calibration)
     if patch is not None:
         camera = origin.camera
-        camera = camera if isinstance(camera, Rendered) and isinstance(camera, WithMainLens) else None
+        camera = camera if isinstance(camera, Rendered) and isinstance(camera, WithDepth) else None
         sizes = () if camera is None else camera.patches_on_raw()
         focus = sharp_kinds(calibration, sizes, origin.calibration)
         planes = rendered(raw, calibration, patch, focus)
@@ -241,19 +241,18 @@ def _decoded(raw: RawImage, calibration: Calibration, camera: Described | None) 
 
 def _metres(camera: Described | None, views: LightField) -> Callable[[np.ndarray], np.ndarray] | None:
     """Depths from the focused plane [m] of disparities, as `lumigraph depth` has them; None if unknown."""
-    from lumigraph.depth import defocus, metric
+    from lumigraph.depth import defocus
 
     def disparities(values: np.ndarray) -> DepthMap:
         return DepthMap(values, np.ones(values.shape), "disparity")
 
     if isinstance(camera, WithObjective) and not camera.in_pupil:
         return lambda values: to_numpy(defocus(disparities(values), views, camera.depth_per_alpha).values)
-    if isinstance(camera, Rendered) or not isinstance(camera, WithMainLens):
+    if isinstance(camera, Rendered) or not isinstance(camera, WithDepth):
         return None
-    lens = camera.main_lens.focal_length
-    if views.separation <= lens:
+    if views.separation <= camera.main_lens.focal_length:
         return None
-    return lambda values: to_numpy(metric(disparities(values), views, focal_length=lens).values)
+    return lambda values: to_numpy(camera.in_metres(disparities(values), views).values)
 
 
 def rendered(
