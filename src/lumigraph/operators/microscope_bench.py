@@ -35,7 +35,7 @@ FINER = 1.4
 
 It tells 0.7 to 1.1 times what the whole image is off by, beside three times as many samples: 20x/0.5 and
 40x/0.95, 9 to 21 px behind a lenslet, -9 to 30 um, 1e-2 and 1e-3. Where it is below a tenth of these, 0.4 to
-1.2 times. Round lenslets: 0.6 to 1 times.
+1.2 times. Round lenslets: 0.5 to 1 times.
 """
 
 GRID = 0.5
@@ -44,7 +44,7 @@ GRID = 0.5
 MIDDLE = 6
 """Cells to each side of a point's own by which the grid behind round lenslets is judged.
 
-Of images that reach as far it tells 0.6 to 1 times what they are off by; 0.2 to 0.5 with 2 cells, as steep
+Of images that reach as far it tells 0.5 to 1 times what they are off by; 0.2 to 0.5 with 2 cells, as steep
 light goes far.
 """
 
@@ -190,10 +190,10 @@ class Bench:
     def images(self, dz: float, points: Sequence[tuple[float, float]]) -> Iterator[tuple[np.ndarray, float]]:
         """`image` of points (ky, kx) at a depth, in order; what the grid misses counts."""
         middle = points[len(points) // 2]
-        told = self.fine, self.sampling.points, self.accuracy
-        fine, missed = refined(*told, lambda fine: self._middle(fine, dz, middle))
+        lines = self.sampling.points
+        fine, missed = refined(self.fine, lines, self.accuracy, lambda fine: self._middle(fine, dz, middle))
         if fine > self.fine:
-            require_finer(bench_bytes(self.objective.modes, self.cells, fine, told[1]), fine, dz)
+            require_finer(bench_bytes(self.objective.modes, self.cells, fine, lines), fine, dz)
             self._lay(fine, self.reach)
         fields = self.fields(dz)
 
