@@ -63,16 +63,28 @@ def wave(optics, place, lenslet):
     to = np.cos(np.arange(20)[:, None] * np.arccos(nodes)) / 10
     to[0] /= 2
     at, weight = legendre.leggauss(64)
-    smooth = chebyshev.chebgrid2d(at, at, to @ values @ to.T)
-    y, x = np.meshgrid(PITCH / 2 * at, PITCH / 2 * at, indexing="ij")
-    f, b, L = optics.array.focal_length, optics.lenslet_distance, optics.separation
-    path, inverse = np.sqrt(b**2 + y**2 + x**2) - b, 1 / f - 1 / b
-    if inverse > 1e-6:
-        path = path + np.sqrt(inverse**-2 + y**2 + x**2) - 1 / inverse
+    half, path, amplitude = through(optics)
+    y, x = np.meshgrid(half * at, half * at, indexing="ij")
+    squared, L = y**2 + x**2, optics.separation
+    smooth = chebyshev.chebgrid2d(at * half / (PITCH / 2), at * half / (PITCH / 2), to @ values @ to.T)
     y, x = y + lenslet[0], x + lenslet[1]
-    phase = 2 * np.pi / optics.wavelength * (np.sqrt(L**2 + y**2 + x**2) - L - path)
-    field = smooth * np.exp(1j * phase) * np.outer(weight, weight) * PITCH**2 / 4
+    phase = 2 * np.pi / optics.wavelength * (np.sqrt(L**2 + y**2 + x**2) - L - path(squared))
+    field = smooth * amplitude(squared) * np.exp(1j * phase) * np.outer(weight, weight) * half**2
     return y.ravel(), x.ravel(), field.ravel()
+
+
+def through(optics):
+    """Half the width of lenslets; path taken away and amplitude, by the squared distance from the middle."""
+    f, b, surface = optics.array.focal_length, optics.lenslet_distance, optics.surface
+    if surface is not None:
+        half, known = surface.seen(PITCH / 2, f), (PITCH / 2, f)
+        return half, lambda q: surface.path(q, *known), lambda q: surface.amplitude(q, *known)
+    inverse = max(1 / f - 1 / b, 1e-9)
+
+    def path(q):
+        return np.sqrt(b**2 + q) - b + q / (np.sqrt(inverse**-2 + q) + 1 / inverse)
+
+    return PITCH / 2, path, np.ones_like
 
 
 def reference(camera, place, middle, around=3):
@@ -118,6 +130,25 @@ def test_points_are_those_of_a_direct_sum(magnification, cell):
     expected, first = reference(known, place, middle)
     assert off(seen(known, place, first), expected) > 4e-3
     assert off(seen(known.replace(model="exact"), place, first), expected) < 1e-3
+
+
+@pytest.mark.long  # a direct sum over stop and lenslets: 15 s
+def test_points_behind_glass_are_those_of_a_direct_sum():
+    middle = (2 * PITCH, -PITCH)
+    place = (middle[0] + 1.2e-6, middle[1] - 2.1e-6)
+    ideal = camera(model="exact")
+    known = ideal.replace(lenslets={"index": 1.5, "conic": 0.0})
+    expected, first = reference(known, place, middle)
+    assert off(seen(known, place, first), expected) < 1e-3
+    assert off(seen(ideal, place, first), expected) > 3e-2
+
+
+def test_paraxial_images_say_what_glass_changes():
+    ideal = camera(f_number=2.7)
+    spheres = ideal.replace(lenslets={"conic": 0.0, "index": 1.5})
+    assert paraxial_error(spheres.optics()) > 1.5 * paraxial_error(ideal.optics())
+    keys = {Optics.of(known.replace(model="exact"), 8e-3, 1e-2).key for known in (ideal, spheres)}
+    assert len(keys) == 2
 
 
 def test_slow_lenslets_are_paraxial():

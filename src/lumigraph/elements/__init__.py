@@ -6,6 +6,7 @@
 - `lens`: `ThinLens`
 - `lenslets`: `LensletArray`, square or hexagonal, of one or three focal lengths
 - `scatter`: `Scatter`, how lenslets of an array differ from each other; `form`, terms of their form
+- `surface`: `Surface`, the curved side of lenslets of glass
 - `lean`: `Lean`, by how much arrays and sensors lean
 - `zernike`: Zernike polynomials in Noll's order and `ZernikePlate`
 - `field_plate`: Zernike terms that change over the field, and their plate
@@ -21,6 +22,7 @@ from lumigraph.elements.lenslets import LensletArray
 from lumigraph.elements.masks import random_phase_mask, white_phase
 from lumigraph.elements.object_space import ObjectSpace
 from lumigraph.elements.scatter import Scatter
+from lumigraph.elements.surface import Surface
 from lumigraph.elements.train import Element, Train
 from lumigraph.elements.zernike import ZernikePlate, noll_to_nm, zernike
 
@@ -35,6 +37,7 @@ __all__ = [
     "Openings",
     "RectangularAperture",
     "Scatter",
+    "Surface",
     "ThinLens",
     "Train",
     "ZernikeMap",

@@ -4,7 +4,7 @@
 - `plenoptic1`: `PlenopticCamera`, lenslets at the main-lens image
 - `plenoptic2`: `FocusedPlenopticCamera`, lenslets that relay the main-lens image
 - `microscope`: `LightFieldMicroscope` and its operator; `microscope_objective`: its `MicroscopeObjective`
-- `parts`: `MainLens`, `Lenslets`, `Pixels`: the tables of a camera file
+- `parts`: `MainLens`, `Pixels`, and `lenslets`: `Lenslets`: the tables of a camera file
 - `built`: `Built`, distances as built; `tolerances`: `Tolerance`, how far values may be off
 - `joint`: `joint_operator` of several raw images of one object, `scan`, shifts between them
 - `loading`: `load_camera` for every kind
@@ -23,11 +23,12 @@ from lumigraph.instruments.files import catalogue
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.joint import joint_operator, scan
 from lumigraph.instruments.lenslet_camera import LensletCamera
+from lumigraph.instruments.lenslets import Lenslets
 from lumigraph.instruments.loading import load_camera
 from lumigraph.instruments.microscope import LightFieldMicroscope
 from lumigraph.instruments.microscope_objective import MicroscopeObjective
 from lumigraph.instruments.over_field import OverField
-from lumigraph.instruments.parts import Lenslets, MainLens, Pixels
+from lumigraph.instruments.parts import MainLens, Pixels
 from lumigraph.instruments.plenoptic1 import PlenopticCamera
 from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
 from lumigraph.instruments.row import Row

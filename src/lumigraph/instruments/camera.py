@@ -3,7 +3,7 @@
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from os import PathLike
 from typing import Self
@@ -26,6 +26,7 @@ from lumigraph.instruments.glass_layout import glass_layout
 from lumigraph.instruments.glass_optics import ExitPupil, Traced, behind_glass, traced
 from lumigraph.instruments.grids import Sampling
 from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.making import Making
 from lumigraph.instruments.parameters import Parameter
 from lumigraph.instruments.parts import MainLens, Pixels
 from lumigraph.instruments.point_view import PointImage
@@ -35,15 +36,6 @@ from lumigraph.operators import CameraOptics
 from lumigraph.propagation import Propagate
 from lumigraph.sensor import Sensor
 from lumigraph.simulation import Spectrum
-
-
-@dataclass(frozen=True, slots=True)
-class Making:
-    """How an operator is made: how exactly, where it is kept, and who hears of its progress."""
-
-    accuracy: float
-    folder: str | PathLike[str] | None
-    progress: Progress | None
 
 
 class Camera(Instrument):
@@ -200,10 +192,14 @@ class Camera(Instrument):
 
     def at_wavelength(self, wavelength: float) -> Self:
         """The same in light of another wavelength [m]: glass stays where its own brings it to focus."""
-        other = self.replace(wavelength=wavelength)
+        other = self._in_light_of(wavelength)
         if self.main_lens.prescription is not None:
             vars(other).update(exit_pupil=self.exit_pupil, glass=self.glass, traced=self.traced)
         return other
+
+    def _in_light_of(self, wavelength: float) -> Self:
+        """With another wavelength [m], and what follows from it but for the main lens."""
+        return self.replace(wavelength=wavelength)
 
     @cached_property
     def traced(self) -> Traced | None:
@@ -344,7 +340,7 @@ class Camera(Instrument):
         maps, count = [], len(spectrum.wavelengths)
         for number, wavelength in enumerate(spectrum.wavelengths):
             told = replace(making, progress=part(progress, number, count))
-            plain = replace(optics, wavelength=wavelength)
+            plain = replace(self.at_wavelength(wavelength).optics(), sensor=optics.sensor)
             maps.append(self._planes(plain, planes, grid, told))
         weights = tuple(weight for (weight,) in spectrum.weights)
         return Sum(tuple(maps), weights, object_grid=maps[0].object_grid, depths=maps[0].depths)
@@ -366,7 +362,7 @@ class Camera(Instrument):
         raise NotImplementedError
 
     def _planes(
-        self, optics: CameraOptics, depths: Sequence[float] | None, grid: Grid, making: "Making"
+        self, optics: CameraOptics, depths: Sequence[float] | None, grid: Grid, making: Making
     ) -> Linear:
         raise NotImplementedError
 

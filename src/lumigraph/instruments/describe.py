@@ -187,6 +187,7 @@ def _lenslets(camera: "LensletCamera") -> Iterator[Row]:
     for number, focal_length in enumerate(parts.focal_length):
         kind = "" if len(parts.focal_length) == 1 else f" {number + 1}"
         yield Row(f"lenslet focal length{kind}", focal_length, "m", "f_µ, given")
+    yield from _glass(camera)
     if camera.scatter is not None:
         yield Row("focal length scatter", camera.built.focal_length_scatter, "", "rms part, as built")
         yield Row("decentre scatter", camera.built.decentre_scatter, "m", "rms along each axis, as built")
@@ -209,6 +210,21 @@ def _lenslets(camera: "LensletCamera") -> Iterator[Row]:
     yield Row("micro-image pitch", camera.micro_image_pitch, "m", "p (1 + b/L)")
     yield Row("micro-image pitch in pixels", camera.micro_image_pitch / pixel, "px", "")
     yield Row("micro-image width", camera.micro_image_width, "m", "D b / L, without diffraction")
+
+
+def _glass(camera: "LensletCamera") -> Iterator[Row]:
+    """Of lenslets with a surface, or whose focal length changes with the wavelength."""
+    parts, surface = camera.lenslets, camera.lenslets.surface(camera.wavelength)
+    if parts.abbe is not None:
+        yield Row("lenslet Abbe number", parts.abbe, "", "V_d, given")
+    if surface is None:
+        return
+    facing = "sensor" if surface.thickness is None else "main lens"
+    yield Row("lenslet index", surface.index, "", "n at the wavelength")
+    yield Row("lenslet radius", (surface.index - 1) * parts.focal_length[0], "m", "(n - 1) f_µ")
+    yield Row("lenslet conic", surface.conic, "", f"K, given; faces the {facing}")
+    if surface.thickness is not None:
+        yield Row("lenslet thickness", surface.thickness, "m", "given; counts as thickness / n")
 
 
 def _sensor(camera: "Camera") -> Iterator[Row]:

@@ -18,8 +18,9 @@ from lumigraph.elements.objective import Model, Objective
 from lumigraph.errors import GeometryError
 from lumigraph.instruments.angular import refuse_angles, refuse_gaps
 from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.lenslets import Lenslets
 from lumigraph.instruments.microscope_objective import MicroscopeObjective
-from lumigraph.instruments.parts import Lenslets, Pixels
+from lumigraph.instruments.parts import Pixels
 from lumigraph.instruments.quantities import Displacement, Length, Positive, Wavelength
 from lumigraph.operators.fourier_microscope import Mosaic
 from lumigraph.operators.microscope_cell import Lenslet
@@ -53,6 +54,11 @@ class DescribedMicroscope(Instrument):
             if given != (self.configuration == configuration):
                 verb = "needs" if self.configuration == configuration else "has no use for"
                 raise GeometryError(f"configuration {self.configuration!r} {verb} {key}. Change one of them.")
+        if self.lenslets.conic is not None or self.lenslets.abbe is not None:
+            raise GeometryError(
+                "lenslets.conic and lenslets.abbe are of cameras, not of microscopes, whose lenslets are "
+                "parabolic. Leave them out."
+            )
         refuse_angles(self.pixels.angular_response, "microscopes")
         if self.configuration == "fourier":
             refuse_gaps(self.pixels.fill_factor, "Fourier microscopes")

@@ -23,9 +23,10 @@ from lumigraph.elements import Lean, LensletArray, Scatter, Train
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import grids, point_view
 from lumigraph.instruments.built import Built
-from lumigraph.instruments.camera import Camera, Making
+from lumigraph.instruments.camera import Camera
+from lumigraph.instruments.lenslets import Lenslets
+from lumigraph.instruments.making import Making
 from lumigraph.instruments.parameters import Parameter, optional
-from lumigraph.instruments.parts import Lenslets
 from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.tolerances import Tolerances
 from lumigraph.operators import CameraOptics, Model, is_possible, periodic_operator
@@ -193,9 +194,22 @@ class LensletCamera(Camera):
             accuracy=making.accuracy, folder=making.folder, progress=making.progress,
         )  # fmt: skip
 
+    def _in_light_of(self, wavelength: float) -> Self:
+        """Also with the focal length that lenslets of glass have, behind the same main lens and pixels."""
+        parts, same = self.lenslets, super()._in_light_of(wavelength)
+        weaker = (parts.index_at(self.wavelength) - 1) / max(parts.index_at(wavelength) - 1, 1e-9)
+        if parts.abbe is None or weaker == 1:
+            return same
+        return same.replace(
+            lenslets={"focal_length": tuple(f * weaker for f in parts.focal_length)},
+            built={"separation": self.separation, "lenslet_distance": self.lenslet_distance},
+            main_lens={"diameter": self.pupil_diameter}, sensor={"shape": self.sensor.shape},
+        )  # fmt: skip
+
     def optics(self) -> CameraOptics:
         """What operators read of the camera, as plain values."""
-        plain = replace(super().optics(), model=self.model, lean=self.lean)
+        surface = self.lenslets.surface(self.wavelength)
+        plain = replace(super().optics(), model=self.model, lean=self.lean, surface=surface)
         if self.lean is not None and self.model != "paraxial":
             raise GeometryError(
                 f'model is "{self.model}" but array or sensor lean, which the paraxial model follows alone. '
@@ -302,6 +316,16 @@ class LensletCamera(Camera):
             )
         # "auto" pads by no more than light spreads over the short way b: a fraction of the window.
         return Train((self.lenslet_array(), Propagate(self.lenslet_distance, "auto", grid=self.image_grid)))
+
+    def _check_glass(self) -> None:
+        """Refuse surfaces of lenslets that cannot be, and glass that the sensor stands in."""
+        surface, b = self.lenslets.surface(self.wavelength), self.lenslet_distance
+        glass = 0.0 if surface is None else (surface.thickness or 0.0) / surface.index
+        if glass > b:
+            raise GeometryError(
+                f"lenslets.thickness over their index is {glass * 1e6:.5g} µm, but the sensor is only "
+                f"{b * 1e6:.5g} µm behind the vertex, counted so. Use thinner glass."
+            )
 
     def _check_lenslets_behind_lens(self) -> None:
         if self.separation <= 0:

@@ -6,7 +6,8 @@ from typing import Any
 
 from lumigraph.core import checks
 from lumigraph.errors import FormatError
-from lumigraph.instruments.parts import Lenslets, Pixels
+from lumigraph.instruments.lenslets import Lenslets
+from lumigraph.instruments.parts import Pixels
 
 MOST_LENSLETS = 301
 """Along each side, so that every answer comes at once."""

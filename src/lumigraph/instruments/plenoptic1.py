@@ -36,9 +36,9 @@ class PlenopticCamera(LensletCamera):
     matching
         "views" or "full", which are the same here.
     model
-        "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration and
-        Rayleigh and Sommerfeld's integral, for square lenslets of one focal length; "auto": exact where the
-        paraxial one misses the accuracy that is asked for.
+        "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration, or
+        lenslets of glass, and Rayleigh and Sommerfeld's integral, for square lenslets of one focal length;
+        "auto": exact where the paraxial one misses the accuracy that is asked for.
     built
         `Built`: distances as built, where they are not the description's.
     tolerances
@@ -78,6 +78,7 @@ class PlenopticCamera(LensletCamera):
                 "lenslets.focal_length has 3 lengths, but the sensor of a plenoptic camera 1.0 stands in one "
                 "focal plane. Give one, or use kind 'focused-plenoptic'."
             )
+        self._check_glass()
         return self
 
     @property

@@ -33,9 +33,9 @@ class FocusedPlenopticCamera(LensletCamera):
         "views": D = z2 p / b, with which 1/m lenslets per axis see a point; "full": D = p L / b, with which
         micro-images are as wide as the lenslets.
     model
-        "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration and
-        Rayleigh and Sommerfeld's integral, for square lenslets of one focal length; "auto": exact where the
-        paraxial one misses the accuracy that is asked for.
+        "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration, or
+        lenslets of glass, and Rayleigh and Sommerfeld's integral, for square lenslets of one focal length;
+        "auto": exact where the paraxial one misses the accuracy that is asked for.
     built
         `Built`: distances as built, where they are not the description's.
     tolerances
@@ -83,6 +83,7 @@ class FocusedPlenopticCamera(LensletCamera):
                 "lenslets that image infinity are kind 'plenoptic'."
             )
         self._check_lenslets_behind_lens()
+        self._check_glass()
         if self.built:
             self._check_built()
         return self

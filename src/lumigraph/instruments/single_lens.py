@@ -16,8 +16,9 @@ from lumigraph.elements import Train
 from lumigraph.errors import FormatError, GeometryError, SamplingError, SamplingWarning
 from lumigraph.instruments import describe, grids, trade_offs
 from lumigraph.instruments.angular import refuse_angles
-from lumigraph.instruments.camera import Camera, Making
+from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.description import Description
+from lumigraph.instruments.making import Making
 from lumigraph.instruments.row import Row
 from lumigraph.operators import CameraOptics, single_lens_operator
 from lumigraph.operators.single_lens import FINEST

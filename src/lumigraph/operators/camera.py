@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from lumigraph.core.lattice import Lattice
-from lumigraph.elements import Lean, LensletArray, ObjectSpace, Train
+from lumigraph.elements import Lean, LensletArray, ObjectSpace, Surface, Train
 from lumigraph.sensor import Sensor
 
 Model = Literal["paraxial", "exact", "auto"]
@@ -34,13 +34,16 @@ class CameraOptics:
     lenslet_distance
         Lenslets to sensor, b [m]; None without lenslets.
     model
-        "paraxial", parabolic phases and Fresnel's distances; "exact", lenses free of spherical aberration and
-        Rayleigh and Sommerfeld's; "auto", exact where the paraxial one misses the accuracy that is asked for.
+        "paraxial", parabolic phases and Fresnel's distances; "exact", lenses free of spherical aberration, or
+        lenslets of glass, and Rayleigh and Sommerfeld's; "auto", exact where the paraxial one misses the
+        accuracy that is asked for.
     lean
         Of array and sensor; None where they are square to the axis.
     objects
         Of a lens of glass, by the thin lens in its exit pupil, whose values all others are then; None for a
         thin lens.
+    surface
+        Of lenslets of glass, which "exact" follows; None of ideal ones.
     """
 
     wavelength: float
@@ -55,6 +58,7 @@ class CameraOptics:
     model: Model = "paraxial"
     lean: Lean | None = None
     objects: ObjectSpace | None = None
+    surface: Surface | None = None
 
     def optics(self) -> "CameraOptics":
         """Itself: an operator takes an instrument, or the values that it reads of one."""

@@ -10,7 +10,8 @@ distance a before it to one point of the sensor, with 1/a = 1/f - 1/b,
 .. math:: t = e^{-i k [\sqrt{b^2 + v^2} - b \pm (\sqrt{a^2 + v^2} - |a|)]}.
 
 The main lens' light comes with the sphere around the middle of its stop, :math:`e^{i k \sqrt{L^2 + w^2}}`.
-None of the three is a product of a function of y and one of x, as their paraxial forms are, but each is a sum
+Lenslets of glass take the path of their `Surface` away instead, and have its amplitude and width. None of the
+three is a product of a function of y and one of x, as their paraxial forms are, but each is a sum
 of few: singular values of what is left of them beside their own axes' phases.
 """
 
@@ -23,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from lumigraph.elements import LensletArray
+from lumigraph.elements import LensletArray, Surface
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.cell_response import (
     MIDDLE,
@@ -108,21 +109,32 @@ class ExactLenslets(Lenslets):
         Main lens to lenslets, L [m].
     accuracy
         Relative rms of the image.
+    surface
+        Of glass; None where lenslets are ideal.
     """
 
     def __init__(
         self, axes: tuple[Axis, Axis], array: LensletArray, wavelength: float, distance: float,
-        separation: float, accuracy: float, pixels: Accepted | None = None,
+        separation: float, accuracy: float, pixels: Accepted | None = None, surface: Surface | None = None,
     ) -> None:  # fmt: skip
         scale = 1 + distance / separation
         super().__init__(axes, array, wavelength, distance / scale, pixels)
         self.b, self.L, self.scale, self.k = distance, separation, scale, 2 * np.pi / wavelength
         self.least = KEPT * accuracy
         (self.focal_length,) = focal_lengths(array)
+        self.surface, self.width = surface, array.fill_factor * array.lattice.pitch / 2
+        self.half = self.width if surface is None else surface.seen(self.width, self.focal_length)
         self._terms: dict[Box, tuple[tuple[Products, ...], list[tuple[int, ...]]]] = {}
 
     def _bent(self, squared: np.ndarray) -> np.ndarray:
-        return bent(squared, self.focal_length, self.b)
+        if self.surface is None:
+            return bent(squared, self.focal_length, self.b)
+        return self.surface.path(squared, self.width, self.focal_length)
+
+    def _bright(self, squared: np.ndarray) -> Any:
+        if self.surface is None:
+            return 1.0
+        return self.surface.amplitude(squared, self.width, self.focal_length)
 
     def terms(self, box: Box) -> tuple[tuple[Products, ...], list[tuple[int, ...]]]:
         """For cells centred in a box: way to the sensor, lenslets, sphere; and numbers of their products.
@@ -165,13 +177,11 @@ class ExactLenslets(Lenslets):
         return products(beside, middle, half, self._turns(far, b), self.least, bright)
 
     def _lenslet(self) -> Products:
-        down, across = (self.array.fill_factor * pitch / 2 for pitch in self.array.lattice.pitches)
-
         def beside(y: np.ndarray, x: np.ndarray) -> np.ndarray:
-            return np.exp(-1j * self.k * _left(self._bent, y, x))
+            return self._bright(y * y + x * x) * np.exp(-1j * self.k * _left(self._bent, y, x))
 
-        turns = 2 * self._turns(max(down, across), self.b)
-        return products(beside, (0.0, 0.0), (down, across), turns, self.least)
+        turns = 2 * self._turns(self.half, self.b)
+        return products(beside, (0.0, 0.0), (self.half, self.half), turns, self.least)
 
     def _sphere_around(self, box: Box) -> Products:
         def beside(y: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -193,7 +203,7 @@ class ExactLenslets(Lenslets):
         """As `Lenslets.along`: (terms, samples, window), whose products are added up."""
         axis, (coefficients, light) = self.axes[which], self._bases[which]
         step, (parts, terms) = abs(self.array.lattice.basis[1 - which][which]), self.terms(box)
-        half, reach = self.array.fill_factor * step / 2, axis.size / 2 + axis.neighbourhood
+        half, reach = self.half, axis.size / 2 + axis.neighbourhood
         count = nodes(half, self.focal_length, axis, self.optics)
         total = np.zeros((len(terms), axis.samples, len(coefficients)), complex)
         for middle in row(self.array.lattice.origin[which] - center, step, reach, limits):
@@ -233,8 +243,9 @@ def lenslets_of(optics: Optics) -> Lenslets:
         return Lenslets(axes, array, camera.wavelength, telecentric, _cells.accepted(camera))
     distance, accuracy = _cells.lenslet_distance(camera), optics.fineness.accuracy
     return ExactLenslets(
-        axes, array, camera.wavelength, distance, camera.separation, accuracy, _cells.accepted(camera)
-    )
+        axes, array, camera.wavelength, distance, camera.separation, accuracy, _cells.accepted(camera),
+        camera.surface,
+    )  # fmt: skip
 
 
 def terms_of(optics: Optics) -> int:

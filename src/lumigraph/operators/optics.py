@@ -71,8 +71,7 @@ class Optics:
                 _cells.lens(camera), self.array, self.cells, self.fineness, self.distance, camera.model,
                 self.place,
             ))  # fmt: skip
-            if (pixels := _cells.accepted(camera)) is not None:
-                known += repr(pixels)
+            known += "".join(repr(x) for x in (_cells.accepted(camera), camera.surface) if x is not None)
         return hashlib.sha256(known.encode()).hexdigest()[:32]
 
     @property

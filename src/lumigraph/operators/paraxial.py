@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from lumigraph.elements import Surface
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.cell_response import bent, focal_lengths, legendre, sphere
@@ -104,6 +105,7 @@ class _Bench:
     edge: float
     pixel: float
     around: int
+    surface: Surface | None
 
     @classmethod
     def of(cls, camera: CameraOptics) -> "_Bench":
@@ -113,8 +115,14 @@ class _Bench:
             _cells.lenslet_distance(camera), min(focal_lengths(array), key=abs), camera.pupil_diameter,
             array.lattice.pitch * array.fill_factor, half_field(camera),
             camera.sensor.pixel_pitch,
-            2 + math.ceil(_cells.blur(camera, camera.object_distance) / array.lattice.pitch),
+            2 + math.ceil(_cells.blur(camera, camera.object_distance) / array.lattice.pitch), camera.surface,
         )  # fmt: skip
+
+    def bent(self, squared: np.ndarray) -> np.ndarray:
+        """Path that a lenslet takes away [m], beyond the paraxial."""
+        if self.surface is None:
+            return bent(squared, self.focal_length, self.lenslet_distance)
+        return self.surface.path(squared, self.lenslet / 2, self.focal_length)
 
 
 def _apart(bench: _Bench, one: tuple[bool, float], others: tuple[tuple[bool, float], ...]) -> float:
@@ -141,7 +149,7 @@ def _image(bench: _Bench, exact: bool, towards: float) -> np.ndarray:
         turns = (pitch / abs(f) + (2 * around + 1) * pitch / b + D / L) * pitch / wavelength
         off, weight = legendre(-pitch / 2, pitch / 2, 24 + math.ceil(2 * turns))
         there = middle + lenslet * pitch + off
-        path = bent(off**2, f, b) if exact else off**2 / (2 * f)
+        path = bench.bent(off**2) if exact else off**2 / (2 * f)
         light = _light(bench, there, middle + PLACE * pitch, exact) * weight * np.exp(-1j * k * path)
         squared = (seen[:, None] - there) ** 2
         way = sphere(squared, b) if exact else squared / (2 * b)

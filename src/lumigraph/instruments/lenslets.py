@@ -1,0 +1,297 @@
+"""The lenslet array, as the table of a camera file."""
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from lumigraph.core.lattice import Lattice
+from lumigraph.elements import Surface
+from lumigraph.elements.surface import index_at
+from lumigraph.errors import FormatError, GeometryError
+from lumigraph.instruments.part import Part
+from lumigraph.instruments.quantities import (
+    Angle,
+    Counts,
+    Displacement,
+    Fraction,
+    Length,
+    Number,
+    Offset,
+    OneOrThree,
+    Positive,
+)
+
+MOST_LENSLETS = 2**20
+"""Largest array: 1024 x 1024."""
+MOST_CHANGE = 0.5
+"""Of a single lenslet's focal length."""
+MOST_INDEX = 4.0
+"""Of lenslets: germanium's."""
+MOST_CONIC = 100.0
+"""Of their surfaces, either way."""
+
+
+class OneLenslet(Part):
+    """What a lenslet has of its own, table ``[lenslets.single.N]``.
+
+    Parameters
+    ----------
+    focal_change
+        By what part its focal length is longer than the array's: 0.03 is 3 % longer.
+    offset_y, offset_x
+        Of it, aperture and all, from its place on the lattice.
+    """
+
+    focal_change: Number = 0.0
+    offset_y: Displacement = 0.0
+    offset_x: Displacement = 0.0
+
+    @field_validator("focal_change")
+    @classmethod
+    def _is_a_part(cls, change: float) -> float:
+        if not abs(change) <= MOST_CHANGE:
+            raise GeometryError(f"{change:g} is beyond ±{MOST_CHANGE:g}. Give a part, such as 0.03 for 3 %.")
+        return change
+
+
+def _singles(value: Any) -> Any:
+    """Numbers of lenslets, which a file has as text."""
+    if not isinstance(value, Mapping):
+        raise FormatError(f"{value!r} is not a table. Write [lenslets.single.1] above what lenslet 1 has.")
+    for key in value:
+        if not str(key).isdecimal() or int(key) < 1:
+            raise FormatError(f"{key!r} is no number of a lenslet. Count them from 1, row by row.")
+    return {int(key): one for key, one in value.items()}
+
+
+Singles = Annotated[dict[int, OneLenslet], BeforeValidator(_singles)]
+"""What single lenslets have, by number."""
+
+
+class Lenslets(Part):
+    """The lenslet array.
+
+    Parameters
+    ----------
+    pitch
+        Between neighbouring lenslets.
+    focal_length
+        One, or three for a multi-focus array in a "hex" layout; kept as a tuple.
+    count
+        Rows and columns (ny, nx). An odd number has a lenslet on the axis, an even one straddles it. The
+        rows of a "hex" array hold nx and nx - 1 in turn, or nx each if ny is even.
+    layout
+        "square" or "hex".
+    magnification
+        Of a focused plenoptic camera, m = b/a of the first focal length: above 0 Keplerian, between -1
+        and 0 Galilean.
+    shape
+        Of a lenslet: "square" or "hex", the lattice's cell, or "round"; left out, the cell.
+    fill_factor
+        Width of a lenslet over the pitch; the rest is opaque.
+    rotation
+        From +x towards +y [rad], or text such as "2 mrad".
+    offset
+        Of the lenslets from the axis (y, x), less than half a pitch.
+    index
+        Refractive index of the lenslets, which tilts and surfaces need: at the camera's wavelength, or n_d
+        beside an Abbe number.
+    conic
+        Constant K of the curved side of plano-convex lenslets, 0 of spheres, whose rays model "exact" then
+        follows; left out, lenslets are free of spherical aberration.
+    thickness
+        Of the glass from vertex to flat side, where the curved side faces the main lens; left out, it faces
+        the sensor. Of distances to the sensor, glass counts as thickness over index.
+    abbe
+        Abbe number V_d, by which the focal length changes with the wavelength; left out, it does not.
+    single
+        Lenslets that differ from the others, in the pupil of a Fourier microscope: `OneLenslet` by number,
+        from 1 on row by row as `indices` has them.
+    """
+
+    pitch: Length
+    focal_length: OneOrThree
+    count: Counts
+    layout: Literal["square", "hex"] = "square"
+    magnification: Number | None = None
+    shape: Literal["square", "hex", "round"] | None = None
+    fill_factor: Fraction = 1.0
+    rotation: Angle = 0.0
+    offset: Offset = (0.0, 0.0)
+    index: Number | None = None
+    conic: Number | None = None
+    thickness: Length | None = None
+    abbe: Positive | None = None
+    single: Singles = Field(default_factory=dict)
+
+    @field_validator("index")
+    @classmethod
+    def _is_an_index(cls, index: float | None) -> float | None:
+        if index is not None and not 1 < index <= MOST_INDEX:
+            raise GeometryError(f"index is {index:g} but must be above 1 and at most {MOST_INDEX:g}.")
+        return index
+
+    @field_validator("conic")
+    @classmethod
+    def _is_a_conic(cls, conic: float | None) -> float | None:
+        if conic is not None and not abs(conic) <= MOST_CONIC:
+            raise GeometryError(f"conic is {conic:g} but must be from -{MOST_CONIC:g} to {MOST_CONIC:g}.")
+        return conic
+
+    @field_validator("count")
+    @classmethod
+    def _few_enough(cls, count: tuple[int, int]) -> tuple[int, int]:
+        if math.prod(count) > MOST_LENSLETS:
+            raise GeometryError(
+                f"{count[0]} x {count[1]} lenslets are more than {MOST_LENSLETS}, the most that can be "
+                "simulated. Use fewer."
+            )
+        return count
+
+    @model_validator(mode="after")
+    def _fits_its_layout(self) -> "Lenslets":
+        if len(self.focal_length) == 3 and self.layout != "hex":
+            raise GeometryError(
+                "three focal lengths need layout 'hex', in which neighbours never have the same, not "
+                f"{self.layout!r}. Give one focal length or change the layout."
+            )
+        if self.shape not in (None, "round", self.layout):
+            raise GeometryError(
+                f"shape {self.shape!r} does not tile layout {self.layout!r}. "
+                f"Use {self.layout!r} or 'round', or leave it out."
+            )
+        for name, shift, slack in zip("yx", self._turned(*self.offset), self._slack, strict=True):
+            if abs(shift) >= slack:
+                raise GeometryError(
+                    f"offset along {name} is {shift * 1e6:.6g} µm but must stay below {slack * 1e6:.6g} µm. "
+                    "Give what is left after whole lenslets, or change count."
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _glass_is_known(self) -> "Lenslets":
+        for name in ("conic", "abbe"):
+            if getattr(self, name) is not None and self.index is None:
+                raise GeometryError(f"{name} needs the glass' index. Add it, such as index = 1.46.")
+        if self.thickness is not None and self.conic is None:
+            raise GeometryError("thickness is of lenslets with a surface. Add conic, such as conic = 0.")
+        return self
+
+    @model_validator(mode="after")
+    def _singles_have_room(self) -> "Lenslets":
+        if not self.single:
+            return self
+        count = len(self.indices())
+        if (last := max(self.single)) > count:
+            raise GeometryError(f"single has lenslet {last}, but there are {count}. Count them from 1.")
+        width = self.pitch * self.fill_factor
+        if (room := self.spacing) < width * (1 - 1e-9):
+            raise GeometryError(
+                f"two lenslets stand {room * 1e6:.6g} µm from each other but are {width * 1e6:.6g} µm wide. "
+                "Change their offsets, or use a smaller fill_factor."
+            )
+        return self
+
+    def index_at(self, wavelength: float) -> float:
+        """Refractive index at a wavelength [m]; 1 where it is not known."""
+        if self.index is None or self.abbe is None:
+            return self.index or 1.0
+        return index_at(wavelength, self.index, self.abbe)
+
+    def surface(self, wavelength: float) -> Surface | None:
+        """The curved side at a wavelength [m]; None of ideal lenslets.
+
+        Raises
+        ------
+        GeometryError
+            One that glass does not have, or that light does not pass.
+        """
+        if self.conic is None:
+            return None
+        surface = Surface(self.index_at(wavelength), self.conic, self.thickness)
+        for focal_length in self.focal_length:
+            surface.check(self.fill_factor * self.pitch / 2, focal_length)
+        return surface
+
+    @property
+    def row_pitch(self) -> float:
+        """Distance between rows [m]."""
+        return self.pitch * (math.sqrt(3) / 2 if self.layout == "hex" else 1.0)
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Height and width of the rectangle, turned with the array, that holds its lenslets' centres [m]."""
+        ny, nx = self.count
+        # Every second hexagonal row is shifted by half a pitch: the border lies between the rows' ends.
+        inset = 0.5 if self.layout == "hex" and ny % 2 else 0.0
+        return ny * self.row_pitch, (nx - inset) * self.pitch
+
+    @property
+    def _slack(self) -> tuple[float, float]:
+        """Shift (y, x) that brings no lenslet over the border of `extent` [m]."""
+        return self.row_pitch / 2, self.pitch / (4 if self.layout == "hex" else 2)
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Farthest the outermost lenslets extend from the axis (y, x) [m], turned and moved as they are."""
+        sin, cos = abs(math.sin(self.rotation)), abs(math.cos(self.rotation))
+        height, width = self.extent
+        if self.layout == "hex":  # its cells are pointed along y, and the border lies inside the last cells
+            height, width = height + 0.3 * self.pitch, width + 0.5 * self.pitch
+        return (
+            (height * cos + width * sin) / 2 + abs(self.offset[0]),
+            (width * cos + height * sin) / 2 + abs(self.offset[1]),
+        )
+
+    def lattice(self) -> Lattice:
+        """Where the lenslets stand [m]."""
+        if self.layout == "hex":
+            lattice = Lattice.hex(self.pitch, self.rotation, kinds=len(self.focal_length))
+        else:
+            lattice = Lattice.square(self.pitch, self.rotation)
+        half_steps = [0.0 if n % 2 else 0.5 for n in self.count]
+        dy, dx = lattice.position(np.asarray(half_steps))
+        return lattice.moved(float(dy) + self.offset[0], float(dx) + self.offset[1])
+
+    def indices(self) -> np.ndarray:
+        """Index pairs (k, 2) as (i, j) of the lenslets that exist, row by row."""
+        lattice, (reach_y, reach_x) = self.lattice(), self.reach
+        pairs = lattice.indices((-reach_y, reach_y), (-reach_x, reach_x))
+        return pairs[self.holds(lattice.position(pairs))]
+
+    def holds(self, centers: np.ndarray) -> np.ndarray:
+        """Whether the array has lenslets at centres (k, 2) of the lattice: (k,)."""
+        across, along = self._turned(*centers.T)
+        height, width = self.extent
+        return (np.abs(across) <= height / 2) & (np.abs(along) <= width / 2)
+
+    def __hash__(self) -> int:
+        """Of what all lenslets have: numbers by which some differ stand in a dict, which has no hash."""
+        return hash((self.pitch, self.focal_length, self.count, self.layout, self.rotation, self.offset))
+
+    def each(self) -> tuple[np.ndarray, np.ndarray]:
+        """Centres (k, 2) as (y, x) and focal lengths (k,) [m] of the lenslets of one kind, as `indices`."""
+        centers = self.lattice().position(self.indices())
+        focal_lengths = np.full(len(centers), self.focal_length[0])
+        for number, own in self.single.items():
+            centers[number - 1] += own.offset_y, own.offset_x
+            focal_lengths[number - 1] *= 1 + own.focal_change
+        return centers, focal_lengths
+
+    @property
+    def spacing(self) -> float:
+        """How wide lenslets may be before two overlap, at most the pitch [m]."""
+        if not self.single:
+            return self.pitch
+        along = np.stack(self._turned(*self.each()[0].T), -1)
+        apart = np.abs(along[:, None] - along).max(-1)
+        np.fill_diagonal(apart, np.inf)
+        return float(min(apart.min(), self.pitch))
+
+    def _turned(self, y: Any, x: Any) -> tuple[Any, Any]:
+        """Coordinates (y, x) in the frame that turns with the array."""
+        sin, cos = math.sin(self.rotation), math.cos(self.rotation)
+        return y * cos - x * sin, y * sin + x * cos
