@@ -14,11 +14,12 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError, SamplingWarning
 from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera
-from lumigraph.operators import band, cells, kernels, periodic_operator
+from lumigraph.operators import band, cells, kernels, periodic_operator, white
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.point_images import Apart
 from lumigraph.operators.sizes import stream_operations
 from lumigraph.operators.streamed import stream_bytes, streamed
+from lumigraph.operators.wave_image import WaveImage
 from lumigraph.operators.white import endless, white_image
 from lumigraph.scene import targets
 from lumigraph.simulation import Incoherent, Snapshots, simulate
@@ -139,6 +140,18 @@ def test_a_wide_even_slice_has_the_light_of_the_white_image(name):
     middle = tuple(slice(k // 3, -k // 3) for k in image.shape)
     assert image[middle].sum() / white[middle].sum() == pytest.approx(1 - lost, abs=1e-3)
     assert relative(image[middle] / (1 - lost), white[middle]) < 1.5e-3
+
+
+def test_endless_light_is_followed_no_farther_than_memory_reaches(monkeypatch):
+    """At 1e-4, opaque rims asked for the image of one lenslet on 117 GiB."""
+    camera = focused(count=(5, 5), fill_factor=0.9, shape="round")
+    optics = Optics.of(camera, camera.object_distance, 1e-3).bricks
+    sizes = []
+    _one = WaveImage._one
+    monkeypatch.setattr(white, "LARGEST", 1e5)
+    monkeypatch.setattr(WaveImage, "_one", lambda wave, f: sizes.append(_one(wave, f).size) or _one(wave, f))
+    endless(optics)
+    assert 5e4 < max(sizes) < 1e5
 
 
 def test_pictures_of_endless_light_are_in_the_order_of_the_kinds():

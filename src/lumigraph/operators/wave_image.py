@@ -170,8 +170,8 @@ class WaveImage:
 
     @property
     def samples(self) -> int:
-        """Of the wave's image, all in all."""
-        return math.prod(side.length for side in self.sides)
+        """Of the wave's image, or of a lenslet's where that is larger, all in all."""
+        return math.prod(max(side.length, 2 * side.reach + 1) for side in self.sides)
 
     @property
     def through(self) -> float:
