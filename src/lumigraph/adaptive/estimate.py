@@ -32,7 +32,7 @@ TERMS = tuple(range(5, 16))
 ACCURACY = 3e-2
 """Of points' images: their errors are not alike from bead to bead, and less than noise."""
 
-COARSE = 0.1
+COARSE = 0.3
 """Accuracy of their derivatives."""
 
 SAMPLES = 3

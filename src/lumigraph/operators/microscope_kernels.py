@@ -82,7 +82,8 @@ class Demand:
         6e-3 with 2.4, 7e-5 to 5e-4 with 3.2 (1.4e-3 on 16 pixels), 1e-5 to 7e-5 with 4.5. With 3.4 and 4.8
         points at 1e-3 and 1e-4 of 20x/0.5 keep below what is asked for (`benchmarks.accuracy`).
         """
-        return float(np.interp(-math.log10(self.accuracy), (1, 2, 3, 4, 5), (1.8, 2.4, 3.4, 4.8, 8)))
+        digits, most = (0.5, 1, 2, 3, 4, 5), (1.45, 1.8, 2.4, 3.4, 4.8, 8)
+        return float(np.interp(-math.log10(self.accuracy), digits, most))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -141,7 +141,7 @@ class PupilImages:
         for waves, pupil, phases, numbers in self._groups(points, coefficients):
             for p in numbers:
                 place, cell = self._place(points.positions[p])
-                own = _moved(pupil, phases, place)
+                own = _moved(pupil, phases, np.append(coefficients, place))
                 seen = self._cut(plane, cell, len(waves.sampled))
                 fields = waves.fields(own)
                 fields *= waves.spread(seen.astype(np.real(fields).dtype))
@@ -198,7 +198,8 @@ class PupilImages:
             combined = np.tensordot(along, phases, 1) if directions.size else phases[:0]
             for p in numbers:
                 place, cell = self._place(points.positions[p])
-                one = self._one(waves, _moved(pupil, phases, place), combined)
+                own = _moved(pupil, phases, np.append(coefficients, place))
+                one = self._one(waves, own, combined)
                 image, changes = (part * self._unit for part in one)
                 before = found[p]
                 if before is not None:
@@ -222,7 +223,7 @@ class PupilImages:
     def _groups(
         self, points: Points, coefficients: np.ndarray
     ) -> Iterator[tuple[Waves, np.ndarray, np.ndarray, list[int]]]:
-        """Of points whose windows are alike: waves, pupil (modes, rows, nodes), phases that change it."""
+        """Of points whose windows are alike: waves, pupil (modes, rows, nodes) as it is known, phases."""
         c = self._checked("coefficients", coefficients)
         for objective in self.objectives:
             known = dict(objective.aberrations)
@@ -234,15 +235,15 @@ class PupilImages:
                 alike.setdefault(self._size(bent, float(dz)), []).append(p)
             for size, numbers in alike.items():
                 waves = self._waves(objective, *size)
-                pupil = bent.pupil(*waves.q, 0.0) * waves.area
-                yield waves, pupil.astype(waves.across.dtype), self._phases(objective, size), numbers
+                pupil = _pupil(objective, size[2], str(waves.across.dtype))
+                yield waves, pupil, self._phases(objective, size), numbers
 
     def _size(self, objective: Objective, dz: float) -> tuple[int, int, int]:
         """Cells along a window, samples of the light along a lenslet, nodes along the pupil's diameter."""
         limit = math.ceil(1.5 * max(self.layout.cells))
         cells = 2 * reach_of(objective, self.lenslet, dz, Demand(self.accuracy, limit)) + 1
         away = (cells / 2 + guard(objective, self.lenslet)) * self.lenslet.pitch / self.lenslet.magnification
-        nodes = nodes_for(objective.steepest(away * math.sqrt(2), dz))
+        nodes = nodes_for(objective.steepest(away, dz))  # corners are too dark to count: at most .02 of it
         margin = margin_of(objective, self.lenslet, dz, Demand(self.accuracy, 1))
         return cells, fineness(objective, self.lenslet, margin), 24 * math.ceil(nodes / 24)
 
@@ -305,12 +306,25 @@ class PupilImages:
 @remembered
 def _phases(objective: Objective, count: int, terms: tuple[int, ...], dtype: str) -> np.ndarray:
     """Phase [rad] per unit of each term, of y, x and dz (k, rows, nodes)."""
-    y, x, _ = disc(count, count)
-    qy, qx = np.broadcast_to(objective.aperture * y, x.shape), objective.aperture * x
+    qy, qx, _ = _nodes(objective, count)
     rho, angle = np.hypot(qy, qx) / objective.numerical_aperture, np.arctan2(qy, qx)
     k = 2 * np.pi / objective.wavelength
     own = [2 * np.pi * zernike(j, rho, angle) for j in terms]
     return np.stack([*own, -k * qy, -k * qx, k * objective.depth_path(qy, qx)]).astype(dtype)
+
+
+@remembered
+def _pupil(objective: Objective, count: int, dtype: str) -> np.ndarray:
+    """Amplitudes (modes, rows, nodes) of nodes, their areas in them."""
+    qy, qx, area = _nodes(objective, count)
+    return (objective.pupil(qy, qx, 0.0) * area).astype(dtype)
+
+
+def _nodes(objective: Objective, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places n sin θ (rows, nodes) along y and x, and areas."""
+    y, x, area = disc(count, count)
+    a = objective.aperture
+    return np.broadcast_to(a * y, x.shape), a * x, area * a**2
 
 
 def _crossed(fields: np.ndarray, field: np.ndarray) -> np.ndarray:
@@ -320,7 +334,7 @@ def _crossed(fields: np.ndarray, field: np.ndarray) -> np.ndarray:
     return numbers[..., 0::2] + numbers[..., 1::2]
 
 
-def _moved(pupil: np.ndarray, phases: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """The pupil of a point at a place (y, x, dz)."""
-    turn = np.tensordot(place, phases[-PLACES:], 1)
-    return (pupil * np.exp(1j * turn)).astype(pupil.dtype)
+def _moved(pupil: np.ndarray, phases: np.ndarray, by: np.ndarray) -> np.ndarray:
+    """The pupil with so much of the last phases, such as of a point's place (y, x, dz)."""
+    turn = np.tensordot(by.astype(phases.dtype), phases[-len(by) :], 1)
+    return pupil * np.exp(1j * turn)
