@@ -83,8 +83,7 @@ def cells(only: Sequence[str] = EVERY) -> Iterator[Cell]:
                     yield Cell("slices", name, dz, asked)
             if name != "single lens":
                 yield Cell("white image", name, 0.0, asked)
-            if asked > 1e-4:  # the same matrices as those of slices, once more
-                yield Cell("volume", name, 0.0, asked)
+            yield Cell("volume", name, 0.0, asked)
             yield Cell("colours", name, 0.0, asked)
         for name in (name for name in only if name in accuracy_microscope.MICROSCOPES):
             for dz in accuracy_microscope.DEPTHS:
