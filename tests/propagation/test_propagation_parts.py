@@ -19,7 +19,7 @@ from lumigraph.propagation.zoom import Samples, _chirp_z, _fourier_matrix
 @given(n=st.integers(1, 20000), multiple=st.integers(1, 3))
 def test_a_smooth_size_is_quick_close_and_a_multiple(n, multiple):
     size = smooth_size(n, multiple)
-    assert n <= size <= max(1.1 * n, n + 8)
+    assert n <= size <= max(1.1 * n, n + 11)  # 109 to 120, of threes
     assert size % multiple == 0
     rest = size
     for prime in (2, 3, 5, 7, 11):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cameras
-from lumigraph.errors import GeometryError
+from lumigraph.errors import FormatError, GeometryError, SamplingError
 from lumigraph.scene import Scene, Slice, SpectralLine
 from lumigraph.simulation import Incoherent, Spectrum, simulate
 from lumigraph.units import nm, um
@@ -47,7 +47,7 @@ def test_a_lines_error_is_counted_and_told(camera):
     assert known["rms"] == pytest.approx(alike["rms"] + line.error)
     assert (
         known["source"]
-        == f"{alike['source']}; {len(line.wavelengths)} wavelengths of a line to {line.error:.2g}"
+        == f"{alike['source']}; coherence of {len(line.wavelengths)} wavelengths to {line.error:.2g}"
     )
 
 
@@ -101,3 +101,76 @@ def test_what_a_spectrum_cannot_be(camera):
         camera.operator(spectrum=Spectrum.rgb())
     with pytest.raises(GeometryError, match=r"Give spectrum=Spectrum.rgb\(\) for a coloured scene"):
         simulate(camera, picture(camera, 3), ROUGH)
+
+
+CURVES = """# a lamp behind three filters
+wavelength [nm], light, red, green, blue
+420, 0.4, 0, 0, 0.9
+480, 0.7, 0, 0.3, 0.8
+540, 0.9, 0.1, 1, 0.1
+600, 1.0, 0.9, 0.3, 0
+660, 1.0, 0.6, 0, 0
+"""
+
+
+def test_curves_are_their_moments(tmp_path):
+    """Gauss's nodes keep the mean and the variance of a channel's wavelengths."""
+    (tmp_path / "curves.csv").write_text(CURVES)
+    found = Spectrum.load(tmp_path / "curves.csv", 10 * um, bayer="RGGB")
+    assert (found.bayer, len(found.weights[0])) == ("RGGB", 3)
+    assert 0 < found.error <= 1e-2
+    at = np.linspace(420, 660, 24001) * nm
+    values = np.array([row.split(",") for row in CURVES.splitlines()[2:]], float)
+    wavelengths, weights = np.array(found.wavelengths), np.array(found.weights)
+    for k in range(3):
+        light = np.interp(at, values[:, 0] * nm, values[:, 1] * values[:, 2 + k])
+        for power in (1, 2, 3):
+            expected = float((light * at**power).sum() / light.sum())
+            assert weights[:, k] @ wavelengths**power == pytest.approx(expected, rel=1e-4)
+    ways = np.linspace(0, 10 * um, 57)
+    seen = np.exp(2j * np.pi * np.outer(ways, 1 / wavelengths)) @ weights[:, 2]
+    light = np.interp(at, values[:, 0] * nm, values[:, 1] * values[:, 4])
+    whole = np.exp(2j * np.pi * np.outer(ways, 1 / at)) @ light / light.sum()
+    assert np.abs(seen - whole).max() < 1.02 * found.error
+
+
+def test_pictures_through_curves_are_those_of_many_wavelengths(camera):
+    at, response = np.linspace(450, 650, 5) * nm, [0, 0.5, 1, 0.8, 0]
+    scene = picture(camera, 1)
+    few = Spectrum.curves(at, response, camera.path_difference)
+    many = Spectrum.curves(at, response, camera.path_difference, accuracy=1e-6)
+    one = Spectrum((float(np.dot(few.wavelengths, few.weights)[0]),), ((1.0,),))
+    images = [simulate(camera, scene, ROUGH, spectrum=each).data for each in (many, few, one)]
+    off, alone = (np.linalg.norm(image - images[0]) / np.linalg.norm(images[0]) for image in images[1:])
+    assert len(one.wavelengths) < len(few.wavelengths) < len(many.wavelengths)
+    assert off < 5e-3 < alone
+
+
+@pytest.mark.parametrize(
+    ("changes", "match"),
+    [
+        ({"wavelengths": [5e-7, 4e-7]}, "must be finite, above 0 m, and rise"),
+        ({"wavelengths": [-5e-7, 4e-7]}, "above 0 m"),
+        ({"wavelengths": [5e-7]}, "Give two wavelengths at least"),
+        ({"responses": [1, -1]}, "at least 0"),
+        ({"responses": [[1, 0, 0], [1, 0, 1]]}, "above 0 somewhere in each channel"),
+        ({"responses": [1, np.nan]}, "finite"),
+        ({"light": [1, 1, 1]}, r"light \(3,\)"),
+        ({"light": [0, 0]}, "above 0 somewhere"),
+        ({"accuracy": 0}, "between 0 and 1"),
+        ({"path_difference": 1.0}, "40 wavelengths leave"),
+    ],
+)
+def test_wrong_curves_are_refused(changes, match):
+    given = {"wavelengths": [4e-7, 5e-7], "responses": [1, 1], "path_difference": 5e-6} | changes
+    with pytest.raises((GeometryError, SamplingError), match=match):
+        Spectrum.curves(**given)
+
+
+@pytest.mark.parametrize(
+    "titles", ["wavelength, response", "wavelength [nm], red", "response, wavelength [nm]"]
+)
+def test_files_of_curves_name_their_columns(tmp_path, titles):
+    (tmp_path / "curves.csv").write_text(f"{titles}\n400, 1\n500, 1\n")
+    with pytest.raises(FormatError, match="Name them 'wavelength"):
+        Spectrum.load(tmp_path / "curves.csv", 5e-6)

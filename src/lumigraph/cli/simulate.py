@@ -63,6 +63,10 @@ class Light:
         with --colours three are red, green and blue.
     colours
         rgb: a colour raw image; or a Bayer pattern, such as RGGB. The scene's pictures keep their colours.
+    filters
+        Curves in the place of --wavelength: a CSV file with the columns 'wavelength [nm]', 'response' or
+        'red', 'green' and 'blue', and 'light' where that is not even. Each channel takes as many
+        wavelengths as keep its degree of coherence to 0.01.
     """
 
     coherence: Literal["incoherent", "coherent", "snapshots", "tilted", "partial"] = "incoherent"
@@ -71,11 +75,17 @@ class Light:
     na: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
     wavelength: list[str] | None = None
     colours: Literal["rgb", "RGGB", "GRBG", "GBRG", "BGGR"] | None = None
+    filters: Path | None = None
 
-    def spectrum(self) -> Any:
+    def spectrum(self, camera: "Instrument") -> Any:
         """The wavelengths that `lumigraph.simulate` takes, or None for the camera's."""
         from lumigraph.simulation import Spectrum
 
+        if self.filters is not None:
+            if self.wavelength:
+                raise FormatError("--filters and --wavelength both give wavelengths. Leave one out.")
+            bayer = None if self.colours == "rgb" else self.colours
+            return Spectrum.load(self.filters, camera.path_difference, bayer=bayer)
         wavelengths = tuple(length("--wavelength", text) or 0.0 for text in self.wavelength or [])
         if self.colours is None:
             return Spectrum(wavelengths, ((1.0,),) * len(wavelengths)) if wavelengths else None
@@ -312,7 +322,7 @@ def simulate(
     if seed < 0:
         raise FormatError(f"--seed is {seed} but must be at least 0.")
     described = load_camera(camera)
-    coherence, spectrum = light.chosen(seed, described), light.spectrum()
+    coherence, spectrum = light.chosen(seed, described), light.spectrum(described)
     scene, medium = stage.built(described), stage.refracting(described)
     try:
         with progress("simulate") as shown, light.unasked():

@@ -30,8 +30,8 @@ def index_at(wavelength: float, index: float, abbe: float) -> float:
 
     Examples
     --------
-    >>> round(index_at(486.13e-9, 1.5168, 64.17), 4)  # N-BK7: 1.5224
-    1.5222
+    >>> round(index_at(486.13e-9, 1.5168, 64.17), 4)
+    1.5224
     """
     spread = (index - 1) / (abbe * (F_LINE**-2 - C_LINE**-2))
     return index + spread * (wavelength**-2 - D_LINE**-2)

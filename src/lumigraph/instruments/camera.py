@@ -101,6 +101,11 @@ class Camera(Instrument):
         raise NotImplementedError
 
     @property
+    def path_difference(self) -> float:
+        """To ten rings of an Airy disc, 10 λ [m]."""
+        return 10 * self.wavelength
+
+    @property
     def f_number(self) -> float:
         """Of the main lens at its image, z2 / D."""
         return resolution.f_number(self.image_distance, self.pupil_diameter)

@@ -88,6 +88,11 @@ class DescribedMicroscope(Instrument):
         """Lenslets to the plane that the sensor sees, b [m]."""
         return self.sensor_distance or self.lenslets.focal_length[0]
 
+    @property
+    def path_difference(self) -> float:
+        """By both edges of a lenslet to a pitch from its middle, p²/b, or 10 λ [m]."""
+        return max(10 * self.wavelength, self.lenslets.pitch**2 / self.lenslet_distance)
+
     def layout(self) -> MicroscopeLayout:
         """What a ray diagram shows."""
         row = LensletLayout(self.lenslet_distance, self.lenslets.pitch, 0.0, self.lenslets.focal_length)

@@ -221,6 +221,11 @@ class Instrument(Part):
         """Magnifications over which the trade-offs are worth a look."""
         raise NotImplementedError
 
+    @property
+    def path_difference(self) -> float:
+        """The largest between ways that meet in a point of the image and matter, to first order [m]."""
+        raise NotImplementedError
+
     def at_wavelength(self, wavelength: float) -> Self:
         """The same instrument in light of another wavelength [m]."""
         return self.replace(wavelength=wavelength)

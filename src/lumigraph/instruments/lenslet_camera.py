@@ -74,6 +74,11 @@ class LensletCamera(Camera):
     def _described_lenslet_distance(self) -> float:
         raise NotImplementedError
 
+    @property
+    def path_difference(self) -> float:
+        """By both edges of a lenslet to a pitch from its middle, p²/b, or 10 λ [m]."""
+        return max(super().path_difference, self.lenslets.pitch**2 / self.lenslet_distance)
+
     @cached_property
     def lean(self) -> Lean | None:
         """Of array and sensor as built; None where they are square to the axis."""

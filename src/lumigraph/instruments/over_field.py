@@ -1,6 +1,5 @@
 """Table ``[main_lens.over_field]``, or a CSV file: Zernike terms of a main lens by field and wavelength."""
 
-import csv
 import math
 import re
 from collections.abc import Iterable
@@ -14,9 +13,7 @@ from lumigraph.elements import ZernikeMap
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments.part import Part
 from lumigraph.instruments.quantities import angles, noll_index, numbers, wavelengths
-
-MOST_BYTES = 2**22
-"""A table of a thousand fields and 40 terms has some 400 KiB."""
+from lumigraph.io import tables
 
 MOST_VALUES = 2**18
 
@@ -145,32 +142,11 @@ def read(path: Path) -> dict[str, Any]:
     GeometryError
         Fields that are given twice, or not at every wavelength.
     """
-    try:
-        with path.open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
-        text = content.decode("utf-8-sig")
-    except OSError as error:
-        raise FormatError(
-            f"{str(path)!r} cannot be read: {error.strerror}. Check its name and folder."
-        ) from None
-    except UnicodeDecodeError:
-        raise FormatError(f"{str(path)!r} is not text. Give a CSV file.") from None
-    if len(content) > MOST_BYTES:
-        raise FormatError(
-            f"{str(path)!r} is larger than {MOST_BYTES >> 20} MiB, too large for a table of aberrations."
-        )
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    rows = list(csv.reader(lines))
-    if len(rows) < 2:
-        raise FormatError(
-            f"{str(path)!r} has no rows. Give a line of names, such as 'field [deg], Z8 [waves]', and rows."
-        )
-    return _table(str(path), rows[0], rows[1:])
+    return _table(str(path), *tables.read(path, "field [deg], Z8 [waves]"))
 
 
-def _table(path: str, header: list[str], rows: list[list[str]]) -> dict[str, Any]:
+def _table(path: str, header: list[str], numbers: list[list[float]]) -> dict[str, Any]:
     names, written_in, unit = _columns(path, header)
-    numbers = [_row(path, number, row, len(names)) for number, row in enumerate(rows, 1)]
     places = [k for k, name in enumerate(names) if isinstance(name, str)]
     order = [name for name in ("wavelength", "y", "x", "field") if name in names]
     axes = {name: sorted({row[names.index(name)] for row in numbers}) for name in order}
@@ -226,13 +202,3 @@ def _columns(path: str, header: list[str]) -> tuple[list[str | int], list[str], 
             "each column once, and all terms in one unit."
         )
     return names, written_in, found.pop()
-
-
-def _row(path: str, number: int, row: list[str], count: int) -> list[float]:
-    try:
-        found = [float(cell) for cell in row]
-    except ValueError:
-        found = []
-    if len(found) != count or not all(map(math.isfinite, found)):
-        raise FormatError(f"{path!r}, row {number}: {', '.join(row)[:60]!r} is not {count} finite numbers.")
-    return found

@@ -1,4 +1,4 @@
-"""Tables of many rows: CSV, Parquet through pyarrow, and NetCDF with the varied values as axes."""
+"""Tables of many rows: CSV, read as well, Parquet through pyarrow, NetCDF with the varied values as axes."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -13,6 +13,9 @@ from lumigraph.errors import FormatError, LumigraphError
 from lumigraph.store import replacing
 
 ENDINGS = (".csv", ".parquet", ".nc")
+
+MOST_BYTES = 2**22
+"""Of a CSV file that is read: a table of a thousand rows of 40 numbers has some 400 KiB."""
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -65,6 +68,44 @@ def require(path: Path, axes: Axes | None = None) -> None:
         _arrow()
     if path.suffix == ".nc":
         labelled.require()
+
+
+def read(path: Path, such_as: str) -> tuple[list[str], list[list[float]]]:
+    """Titles and numbers of a small CSV file; empty lines and those that begin with # are left out.
+
+    Raises
+    ------
+    FormatError
+        No such file, one that is too large, no text, no rows, whose titles are meant `such_as`, or a row that
+        is not as many finite numbers as there are titles.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+        text = content.decode("utf-8-sig")
+    except OSError as error:
+        raise FormatError(
+            f"{str(path)!r} cannot be read: {error.strerror}. Check its name and folder."
+        ) from None
+    except UnicodeDecodeError:
+        raise FormatError(f"{str(path)!r} is not text. Give a CSV file.") from None
+    if len(content) > MOST_BYTES:
+        raise FormatError(f"{str(path)!r} is larger than {MOST_BYTES >> 20} MiB, too large for a table.")
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    titles, *rows = csv.reader(lines) if lines else [[]]
+    if not rows:
+        raise FormatError(f"{str(path)!r} has no rows. Give a line of names, such as {such_as!r}, and rows.")
+    return titles, [_numbers(str(path), number, row, len(titles)) for number, row in enumerate(rows, 1)]
+
+
+def _numbers(path: str, number: int, row: list[str], count: int) -> list[float]:
+    try:
+        found = [float(cell) for cell in row]
+    except ValueError:
+        found = []
+    if len(found) != count or not np.isfinite(found).all():
+        raise FormatError(f"{path!r}, row {number}: {', '.join(row)[:60]!r} is not {count} finite numbers.")
+    return found
 
 
 def names(rows: Rows) -> list[str]:

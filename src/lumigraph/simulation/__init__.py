@@ -6,6 +6,7 @@
 - `light`: what arrives on the sensor, and the raw image of it
 - `microscope_scene`: scenes before a light-field microscope
 - `spectrum`: `Spectrum`, light of several wavelengths, colour sensors
+- `curves`: spectra and filters as curves, by few wavelengths
 - `coherence`: `Incoherent`, `Coherent`, `PartiallyCoherent`, `Snapshots`, `TiltedWaves`: how light interferes
 - `known_planes`: `plane_views`, textured planes at known depths
 - `directions`: quasi-random directions of tilted waves, more of them where more light comes from

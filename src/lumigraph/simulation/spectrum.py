@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
@@ -11,6 +12,7 @@ from lumigraph.core.raw import BAYER_PATTERNS, RawImage
 from lumigraph.errors import GeometryError
 from lumigraph.scene import Scene, Slice, SpectralLine
 from lumigraph.sensor import mosaic
+from lumigraph.simulation import curves
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +20,8 @@ class Spectrum:
     """Wavelengths, and how much of each the sensor's channels see.
 
     Thin lenses are free of dispersion: what differs between the wavelengths is diffraction. A main lens of a
-    prescription has the colours of its glass, focused at the camera's own wavelength.
+    prescription, and lenslets with an Abbe number, have the colours of their glass, focused at the camera's
+    own wavelength.
 
     Parameters
     ----------
@@ -30,7 +33,7 @@ class Spectrum:
     bayer
         Pattern of a colour filter, such as "RGGB": the raw image is (ny, nx). None keeps (ny, nx, 3).
     error
-        What few wavelengths leave of a line's degree of coherence; raw images count it in their error.
+        What few wavelengths leave of the degree of coherence; raw images count it in their error.
 
     Raises
     ------
@@ -80,6 +83,75 @@ class Spectrum:
         checks.instance("line", line, SpectralLine)
         wavelengths, weights, error = line.nodes(path_difference, accuracy)
         return cls(tuple(wavelengths.tolist()), tuple((w,) for w in weights.tolist()), error=error)
+
+    @classmethod
+    def curves(
+        cls,
+        wavelengths: Sequence[float] | np.ndarray,
+        responses: Sequence[float] | np.ndarray,
+        path_difference: float,
+        *,
+        light: Sequence[float] | np.ndarray | None = None,
+        accuracy: float = 1e-2,
+        bayer: str | None = None,
+    ) -> "Spectrum":
+        """Of a light, filters and pixels that are known as curves, linear between their wavelengths.
+
+        Each channel has wavelengths of its own, Gauss's nodes of its light: as few as keep its degree of
+        coherence to an accuracy over the largest path difference, such as a `camera.path_difference`.
+
+        Parameters
+        ----------
+        wavelengths
+            (n,) of the curves, rising [m].
+        responses
+            (n,) or (n, 3): how much of the light filters pass and pixels count, in any unit.
+        path_difference
+            The largest between ways that meet in a point of the image [m].
+        light
+            (n,) per wavelength, in any unit, such as of a lamp; None for an even one.
+        accuracy
+            Of the degree of coherence.
+        bayer
+            As of a `Spectrum`.
+
+        Raises
+        ------
+        GeometryError
+            Curves of other lengths, that do not rise, below 0, or dark.
+        SamplingError
+            More than 40 wavelengths a channel.
+        """
+        at, values = curves.checked(wavelengths, responses, light)
+        channels = [curves.few(at, each, path_difference, accuracy) for each in values.T]
+        rows = [
+            [w if k == channel else 0.0 for k in range(len(channels))]
+            for channel, (_, weights, _) in enumerate(channels)
+            for w in weights.tolist()
+        ]
+        found = np.concatenate([nodes for nodes, _, _ in channels]).tolist()
+        return cls(tuple(found), tuple(map(tuple, rows)), bayer, max(off for _, _, off in channels))
+
+    @classmethod
+    def load(
+        cls, path: str | Path, path_difference: float, *, accuracy: float = 1e-2, bayer: str | None = None
+    ) -> "Spectrum":
+        """`curves` of a CSV file, whose first line names its columns.
+
+        These are "wavelength [nm]" (or um, m), "response" or "red", "green" and "blue", and, if there is one,
+        "light".
+
+        Raises
+        ------
+        FormatError
+            No such file, no table, or other columns.
+        GeometryError, SamplingError
+            As `curves`.
+        """
+        wavelengths, responses, light = curves.read(Path(path))
+        return cls.curves(
+            wavelengths, responses, path_difference, light=light, accuracy=accuracy, bayer=bayer
+        )
 
     @classmethod
     def rgb(
@@ -152,6 +224,6 @@ def by_wavelength(
         worst = max((raw.metadata["error"] for raw in raws), key=lambda one: one["rms"])
         known["error"] = worst | {"rms": worst["rms"] + spectrum.error}
         if spectrum.error:
-            known["error"]["source"] += f"; {len(raws)} wavelengths of a line to {spectrum.error:.2g}"
+            known["error"]["source"] += f"; coherence of {len(raws)} wavelengths to {spectrum.error:.2g}"
     data = spectrum.seen([raw.data for raw in raws])
     return replace(raws[0], data=data, bayer=spectrum.bayer, metadata=known)
