@@ -139,6 +139,7 @@ def _look(key: int) -> None:
 
 def _user(folder: Path, seed: float) -> int:
     """A process that uses the cache until it is killed."""
+    time.sleep(0.05)  # threads that SciPy's FFTs begin after a fork can miss that the next fork ends them
     if pid := os.fork():
         return pid
     code = 70
