@@ -79,6 +79,11 @@ def test_glass_that_cannot_be_is_refused(lenslets, message):
         camera(**lenslets)
 
 
+def test_an_abbe_number_leaves_glass_at_every_wavelength():
+    with pytest.raises(GeometryError, match=r"by abbe = 1 the index at 5000 nm is .* but it must be above 1"):
+        camera(index=1.5, abbe=1.0).at_wavelength(5e-6)
+
+
 def test_glass_ends_before_the_sensor():
     with pytest.raises(GeometryError, match=r"over their index is 533\.33 µm, but the sensor is only 500 µm"):
         camera(index=1.5, conic=0, thickness="800 um").replace(built={"lenslet_distance": "500 um"})

@@ -134,6 +134,12 @@ def test_curves_are_their_moments(tmp_path):
     assert np.abs(seen - whole).max() < 1.02 * found.error
 
 
+def test_a_thin_line_of_a_curve_is_not_passed_over():
+    """Of 0.01 nm, where curves are followed in steps of 0.1 nm."""
+    line = Spectrum.curves([4e-7, 5.4999e-7, 5.5e-7, 5.5001e-7, 8e-7], [0, 0, 1, 0, 0], 10 * um)
+    assert line.wavelengths == pytest.approx([5.5e-7])
+
+
 def test_pictures_through_curves_are_those_of_many_wavelengths(camera):
     at, response = np.linspace(450, 650, 5) * nm, [0, 0.5, 1, 0.8, 0]
     scene = picture(camera, 1)

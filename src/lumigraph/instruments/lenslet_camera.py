@@ -202,9 +202,9 @@ class LensletCamera(Camera):
     def _in_light_of(self, wavelength: float) -> Self:
         """Also with the focal length that lenslets of glass have, behind the same main lens and pixels."""
         parts, same = self.lenslets, super()._in_light_of(wavelength)
-        weaker = (parts.index_at(self.wavelength) - 1) / max(parts.index_at(wavelength) - 1, 1e-9)
-        if parts.abbe is None or weaker == 1:
+        if parts.abbe is None:
             return same
+        weaker = (parts.index_at(self.wavelength) - 1) / (parts.index_at(wavelength) - 1)
         return same.replace(
             lenslets={"focal_length": tuple(f * weaker for f in parts.focal_length)},
             built={"separation": self.separation, "lenslet_distance": self.lenslet_distance},

@@ -196,10 +196,22 @@ class Lenslets(Part):
         return self
 
     def index_at(self, wavelength: float) -> float:
-        """Refractive index at a wavelength [m]; 1 where it is not known."""
+        """Refractive index at a wavelength [m]; 1 where it is not known.
+
+        Raises
+        ------
+        GeometryError
+            An Abbe number by which no glass is left at the wavelength.
+        """
         if self.index is None or self.abbe is None:
             return self.index or 1.0
-        return index_at(wavelength, self.index, self.abbe)
+        found = index_at(wavelength, self.index, self.abbe)
+        if not 1 < found <= MOST_INDEX:
+            raise GeometryError(
+                f"by abbe = {self.abbe:g} the index at {wavelength * 1e9:.4g} nm is {found:.4g}, but it must "
+                f"be above 1 and at most {MOST_INDEX:g}. Use a larger Abbe number, or leave it out."
+            )
+        return found
 
     def surface(self, wavelength: float) -> Surface | None:
         """The curved side at a wavelength [m]; None of ideal lenslets.

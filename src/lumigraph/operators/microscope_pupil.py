@@ -243,7 +243,7 @@ class PupilImages:
         limit = math.ceil(1.5 * max(self.layout.cells))
         cells = 2 * reach_of(objective, self.lenslet, dz, Demand(self.accuracy, limit)) + 1
         away = (cells / 2 + guard(objective, self.lenslet)) * self.lenslet.pitch / self.lenslet.magnification
-        nodes = nodes_for(objective.steepest(away, dz))  # corners are too dark to count: at most .02 of it
+        nodes = nodes_for(objective.steepest(away, dz))  # corners are too dark to count
         margin = margin_of(objective, self.lenslet, dz, Demand(self.accuracy, 1))
         return cells, fineness(objective, self.lenslet, margin), 24 * math.ceil(nodes / 24)
 

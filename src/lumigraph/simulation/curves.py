@@ -15,7 +15,7 @@ MOST = 40
 """Wavelengths that are tried."""
 
 FINE = 4000
-"""Places on a curve that stand for all of it."""
+"""Places on a curve, beside its own, that stand for all of it."""
 
 CHANNELS = (("response",), ("red", "green", "blue"))
 """Columns of a file, beside the wavelength and the light."""
@@ -81,8 +81,9 @@ def few(
     longest = abs(checks.finite("path_difference", path_difference))
     if not 0 < checks.finite("accuracy", accuracy, "1") < 1:
         raise GeometryError(f"accuracy is {accuracy:g} but must lie between 0 and 1.")
-    at = np.linspace(wavelengths[0], wavelengths[-1], FINE)
-    share = np.interp(at, wavelengths, light)
+    at = np.union1d(np.linspace(wavelengths[0], wavelengths[-1], FINE), wavelengths)
+    steps = np.diff(at)
+    share = np.interp(at, wavelengths, light) * (np.append(steps, 0) + np.append(0, steps))
     share /= share.sum()
     turns = longest * (1 / at[0] - 1 / at[-1])
     ways, off = np.linspace(0, longest, 101 + int(min(8 * turns, 1e4))), np.inf
