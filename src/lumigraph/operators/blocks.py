@@ -15,6 +15,7 @@ computed once.
 """
 
 import math
+from collections import ChainMap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -47,7 +48,7 @@ Means = dict[Offset, np.ndarray]
 SHARE = 2.0
 """How much more of a row's blocks factors may leave out than of those inside."""
 
-BORDER = 3.0
+BORDER = 4.0
 """How much stronger than elsewhere factors are that are looked at in the border's blocks."""
 
 CHOSEN = 5.0
@@ -118,6 +119,7 @@ def build(optics: Optics, progress: Progress | None = None) -> Built:
     groups = [([place for place in inside(optics) if place.kind == k], found[k]) for k in range(len(found))]
     whole = (part for mine, blocks in groups for part in _parts(optics.cells, mine, blocks))
     ranks, border = builder.border()
+    builder.forget()
     return Built(sum(map(_ranks, found)) + ranks, chain(whole, border), means)
 
 
@@ -178,30 +180,30 @@ class Builder:
         blocks, means = zip(*found, strict=True)
         return list(blocks), list(means)
 
-    def _inside(self, state: State) -> tuple[dict[Offset, Found], float]:
-        """Factors of all offsets, more than needed, and the blocks' squared norm."""
+    def _inside(self, state: State) -> tuple[dict[Offset, Found], Means, float]:
+        """Factors of all offsets, more than needed, mean images, and the blocks' squared norm."""
         reach = self.optics.reach
         images, (up, left) = self.images([state], reach, folded=True)[state], self.even
         if not self.least:
             own = images.line(0)(0)
             self.least = 0.02 * self.optics.fineness.rank * float(np.linalg.norm(own))
 
-        def piece(job: Job) -> tuple[float, dict[Offset, Found]]:
-            (dy, across), found, norm = job, {}, 0.0
+        def piece(job: Job) -> tuple[float, dict[Offset, Found], Means]:
+            (dy, across), found, means, norm = job, {}, {}, 0.0
             line = images.line(dy)
             for dx in across if left else self.signed(dy, across):
                 block, copies = line(dx), 2 if up and dy else 1
                 copies *= 2 if left and self.optics.cells.mirrored(dy, dx) != dx else 1
                 norm += copies * float(np.linalg.norm(block)) ** 2
                 found[dy, dx] = self._factored(block, copies)
+                means[dy, dx] = block.mean(0, dtype=np.float64)
                 if self.apart is not None:
                     self._choose(state.kind, (dy, dx), block)
-            return norm, found
+            return norm, found, means
 
-        pieces = list(each(piece, self.jobs(up, reach), self.workers))
-        norm = sum(norm for norm, _ in pieces)
-        self.norm += norm / self.optics.cells.kinds
-        return {key: f for _, part in pieces for key, f in part.items()}, norm
+        norms, found, means = zip(*each(piece, self.jobs(up, reach), self.workers), strict=True)
+        self.norm += sum(norms) / self.optics.cells.kinds
+        return dict(ChainMap(*found)), dict(ChainMap(*means)), sum(norms)
 
     def _choose(self, kind: int, offset: Offset, block: np.ndarray) -> None:
         """Points for the border, of a cell and those that it mirrors."""
@@ -240,12 +242,12 @@ class Builder:
         blocks = {key: (none, mean[None]) for key, mean in means.items()}
         return {key: mean[0] for key, (_, mean) in self._unfolded(blocks, self.even).items()}
 
-    def _completed(self, found: dict[Offset, Found], norm: float) -> tuple[Blocks, Means]:
+    def _completed(self, found: dict[Offset, Found], some: Means, norm: float) -> tuple[Blocks, Means]:
         """The factors that are strong enough, and the light of what is left out."""
         least = weakest(found.values(), self.optics.fineness.rank**2 * norm)
         even = np.ones((math.prod(self.optics.cells.points), 1), np.float32)
         blocks = self._unfolded({key: f.cut(least) for key, f in found.items()}, self.even)
-        means = self._unfolded_means({key: f.mean for key, f in found.items()})
+        means = self._unfolded_means(some)
         for key, (left, right) in blocks.items():
             left_out = means[key] - left.mean(0, keepdims=True) @ right.astype(np.float32, copy=False)
             rest = narrowed(even, left_out, self.optics.precision)
@@ -269,6 +271,11 @@ class Builder:
                         yield from _parts(self.optics.cells, [place], self._copied(found, *turn))
 
         return ranks, parts()
+
+    def forget(self) -> None:
+        """Let go what only computing needs."""
+        self.apart, self.chosen = None, {}
+        memory.give_back()
 
     def _border_blocks(self, wanted: Sequence[Place]) -> dict[Place, Blocks]:
         """Of some places: row after row of cells, so that what they share is computed once."""
@@ -415,5 +422,4 @@ class Builder:
 
     def _factored(self, block: np.ndarray, copies: int, coarser: float = 1.0) -> Found:
         left, right, strength = factors(block, coarser * self.least)
-        mean = block.mean(0, dtype=np.float64)
-        return Found(left, right, strength, copies, mean).narrowed(self.optics.precision)
+        return Found(left, right, strength, copies).narrowed(self.optics.precision)

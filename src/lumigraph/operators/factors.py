@@ -9,6 +9,10 @@ import numpy as np
 _BLOCK = 2**21
 """Numbers worked on at a time."""
 
+_LOST = 32 * float(np.finfo(np.float32).eps)
+"""Part of a squared norm that sums of products in single precision may be off by."""
+_FAINT = 1000.0
+"""Norm of a block over the faintest strength that counts from which a fifth of its points tell too little."""
 
 Factors = tuple[np.ndarray, np.ndarray]
 """Left (points, r) and right (r, samples)."""
@@ -27,8 +31,6 @@ class Found:
         (n, r), (r, samples) and the norm of each product (r,).
     copies
         How many blocks they are of.
-    mean
-        Of the block's rows (samples,).
     basis
         (points, n) that the left factors are to be taken through; None where they are of all points.
     """
@@ -37,7 +39,6 @@ class Found:
     right: np.ndarray
     strength: np.ndarray
     copies: int
-    mean: np.ndarray
     basis: np.ndarray | None = None
 
     def cut(self, least: float) -> Factors:
@@ -64,22 +65,22 @@ def narrowed(left: np.ndarray, right: np.ndarray, precision: type[np.floating]) 
 def factors(block: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """``block ≈ left @ right``, (points, r) and (r, samples), and their strengths above `least`.
 
-    Most blocks have few: a sketch of a fifth of the points finds them, or finds that it needs them all.
+    Faint blocks have few: a sketch of a fifth of the points finds them, or finds that it needs them all.
     """
-    points = block.shape[0]
-    if np.linalg.norm(block) <= least:
+    points, norm = block.shape[0], float(np.linalg.norm(block))
+    if norm <= least:
         return np.zeros((points, 0)), np.zeros((0, block.shape[1])), np.zeros(0)
-    sketch = np.random.default_rng(0).standard_normal((points, math.ceil(points / 5)), np.float32)
-    for basis in (np.linalg.qr(block @ (block.T @ sketch))[0], None):
-        seen = block if basis is None else basis.T @ block
-        left, right, strength, weakest = _strongest(seen, least)
+    if norm < _FAINT * least:
+        sketch = np.random.default_rng(0).standard_normal((points, math.ceil(points / 5)), np.float32)
+        basis = np.linalg.qr(block @ (block.T @ sketch))[0]
+        left, right, strength, weakest = _strongest(basis.T @ block, least)
         if weakest < least / 2:
-            break
-    return left if basis is None else basis @ left, right, strength
+            return basis @ left, right, strength
+    return strongest(block, None, least)
 
 
 def strongest(
-    rows: np.ndarray, weights: np.ndarray, least: float
+    rows: np.ndarray, weights: np.ndarray | None, least: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """As `factors`, of ``weights @ rows``, few rows that need no sketch."""
     return _strongest(rows, least, weights)[:3]
@@ -89,7 +90,7 @@ def _strongest(
     rows: np.ndarray, least: float, weights: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Orthonormal left factors, right ones, their strengths above `least`, and the weakest of all."""
-    products = _products(rows)
+    products = _products(rows, least)
     if weights is not None:
         products = weights @ products @ weights.T
     strength, vectors = np.linalg.eigh(products)
@@ -100,8 +101,10 @@ def _strongest(
     return left, across @ rows, strength[kept], float(strength[0])
 
 
-def _products(rows: np.ndarray) -> np.ndarray:
-    """``rows @ rows.T`` in double precision, from some columns at a time."""
+def _products(rows: np.ndarray, least: float) -> np.ndarray:
+    """``rows @ rows.T``, in double precision where single would hide strengths of `least`."""
+    if least**2 > _LOST * float(np.linalg.norm(rows)) ** 2:
+        return rows @ rows.T
     parts = np.array_split(rows, math.ceil(rows.size / _BLOCK), axis=1)
     return np.sum([part @ part.T for part in (p.astype(np.float64) for p in parts)], axis=0)
 

@@ -6,6 +6,7 @@ light there has patterns: over a hundred in front of a lenslet, one or two far f
 
 import math
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from lumigraph import store
 from lumigraph.core import memory
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.progress import Progress
+from lumigraph.core.threads import each
 from lumigraph.errors import SamplingError, SamplingWarning
 from lumigraph.operators.blocks import Part, build
 from lumigraph.operators.glare import Glare, aside, glare
@@ -167,16 +169,24 @@ def _build(optics: Optics, progress: Progress | None = None) -> dict[str, np.nda
     rest = glare(found.means, per, even - sent)
     left = np.empty((found.ranks, math.prod(per.points)), np.float32)
     right = np.empty((found.ranks, math.prod(per.samples)), optics.precision)
-    places, offsets, mine, last = [], [], slice(0, 0), None
-    for part in found.parts:
-        if part.right is not last:
-            mine, last = slice(mine.stop, mine.stop + len(part.right)), part.right
-            left[mine], right[mine] = part.factor.T, part.right
-        ranges = (part.rows, part.columns)
-        places.append(
-            [n for r in ranges for n in (r.start, r.stop, r.step)] + [len(part.offsets), mine.start]
-        )
-        offsets += part.offsets
+    places, offsets = [], []
+
+    def put(job: tuple[slice, Part]) -> None:
+        mine, part = job
+        left[mine], right[mine] = part.factor.T, part.right
+
+    def pieces() -> Iterator[tuple[slice, Part]]:
+        mine, last = slice(0, 0), None
+        for part in found.parts:
+            if part.right is not last:
+                mine, last = slice(mine.stop, mine.stop + len(part.right)), part.right
+                yield mine, part
+            ranges = [n for r in (part.rows, part.columns) for n in (r.start, r.stop, r.step)]
+            places.append([*ranges, len(part.offsets), mine.start])
+            offsets.extend(part.offsets)
+
+    for _ in each(put, pieces()):
+        pass
     return {
         "places": np.array(places),
         "offsets": np.array(offsets),

@@ -12,11 +12,12 @@ of those that are added up.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from lumigraph.core.threads import each
 from lumigraph.operators.cell_response import STEP, Axis, Lenslets, legendre, nodes
 from lumigraph.operators.point_images import Wave, through
 
@@ -25,7 +26,7 @@ Pair = tuple[float, float]
 Row = tuple[float, Sequence[Pair]]
 """Lenslets that stand in a row: their y from a cell's centre [m], and their x and focal length."""
 
-FAINTEST = 1e-2
+FAINTEST = 0.3
 """Part of the accuracy that a lenslet's few numbers may leave out of its light's amplitude."""
 
 AROUND = 6.0, 5.0
@@ -60,6 +61,7 @@ class LensletLight:
         bent = lenslets.pixels is not None
         self.modes = [_modes(a, h, self.squared, self.faintest, bent=bent) for a, h in halves]
         self._known: dict[tuple[float, float, float], np.ndarray] = {}
+        self._nodes: dict[tuple[int, float, int, float], _Behind] = {}
         self._carriers: dict[tuple[int, float], np.ndarray] = {}
         self.light, self.widest = light, widest
 
@@ -77,34 +79,52 @@ class LensletLight:
         return vectors[:, strength > self.faintest**2 * strength[-1]].astype(np.float32)
 
     @cached_property
+    def around(self) -> np.ndarray:
+        """Whether points light a lenslet (rows, columns), as the table has them: within a circle."""
+        at = [
+            ((np.arange(-n, n + axis.points) + 0.5) / axis.points - 0.5) * axis.size
+            for n, axis in zip(self._counts, self.axes, strict=True)
+        ]
+        return np.hypot(at[0][:, None], at[1]) <= self.widest + min(axis.size for axis in self.axes) / 2
+
+    @property
+    def _counts(self) -> list[int]:
+        """Points along y and x as far as lenslets are lit."""
+        return [math.ceil(self.widest * axis.points / axis.size) for axis in self.axes]
+
+    @cached_property
     def table(self) -> tuple[np.ndarray, tuple[int, int]]:
         """Light (rows, columns, q) in a lenslet, by the point's number from there, and the first number."""
         y, x = self.window
-        counts = [math.ceil(self.widest * axis.points / axis.size) for axis in (y, x)]
+        counts = self._counts
         down, across = (coefficients.astype(np.complex64) for coefficients, _ in self.bases)
         numbers = [np.arange(-n, n + axis.points) for n, axis in zip(counts, (y, x), strict=True)]
         behind = through(self.light, across, x, numbers[1])
-        table = np.empty((len(numbers[0]), len(numbers[1]), self.kept.shape[1]), np.complex64)
-        for row, number in zip(table, numbers[0], strict=True):
-            top = -y.margin - number - self.light.first[0]
+        kept = self.kept
+        table = np.empty((len(numbers[0]), len(numbers[1]), kept.shape[1]), np.complex64)
+
+        def fill(number: int) -> None:
+            top, row = -y.margin - number - self.light.first[0], table[number + counts[0]]
             part = behind[top : top + STEP * down.shape[1] : STEP].reshape(down.shape[1], -1)
             part = (down @ part).reshape(len(down), len(row), -1).transpose(1, 0, 2)
-            row[:] = part.reshape(len(row), -1) @ self.kept
+            row[:] = _times(part.reshape(len(row), -1), kept)
+
+        for _ in each(fill, numbers[0].tolist()):
+            pass
         return table, (-counts[0], -counts[1])
 
-    def lit(self, numbers: np.ndarray, y: float, x: float) -> np.ndarray | None:
-        """Light (n, q) of points (n, 2) in a lenslet at (y, x) from the cell; None where all is faint."""
+    def lit(self, numbers: np.ndarray, y: float, x: float) -> tuple[np.ndarray, np.ndarray]:
+        """Which of the points (n, 2) light a lenslet at (y, x) from the cell, and their light (m, q)."""
         table, first = self.table
-        from_lens = [
+        rows, columns = (
             numbers[:, k] - round(at * axis.points / axis.size) - first[k]
             for k, (at, axis) in enumerate(zip((y, x), self.axes, strict=True))
-        ]
-        inside = [(n >= 0) & (n < size) for n, size in zip(from_lens, table.shape[:2], strict=True)]
-        if not (seen := inside[0] & inside[1]).any():
-            return None
-        found = table[from_lens[0] * seen, from_lens[1] * seen]
-        found[~seen] = 0
-        return found
+        )
+        near = np.flatnonzero(
+            (rows >= 0) & (rows < table.shape[0]) & (columns >= 0) & (columns < table.shape[1])
+        )
+        which = near[self.around[rows[near], columns[near]]]
+        return which, table[rows[which], columns[which]]
 
     def amplitudes(self, numbers: np.ndarray, rows: Sequence[Row]) -> np.ndarray:
         """(n, samples) of points (n, 2), summed over the lenslets of some rows."""
@@ -116,13 +136,17 @@ class LensletLight:
 
     def across(self, numbers: np.ndarray, row: Row) -> np.ndarray | None:
         """Amplitudes (n, modes along y, samples along x) behind a row; None where all of it is dark."""
-        (y, members), total = row, None
+        y, members = row
         n, m = (modes.shape[1] for modes in self.modes)
-        for x, focal_length in members:
-            if (lit := self.lit(numbers, y, x)) is not None:
-                few = (lit @ self.matrix(y, x, focal_length)).reshape(-1, m) @ self.carried(1, x).T
-                total = few if total is None else np.add(total, few, out=total)
-        return None if total is None else total.reshape(len(numbers), n, -1)
+        behind = [(x, f, *self.lit(numbers, y, x)) for x, f in members]
+        behind = [one for one in behind if len(one[2])]
+        if not behind:
+            return None
+        few = np.zeros((len(numbers), n, len(behind), m), np.complex64)
+        for k, (x, focal_length, which, lit) in enumerate(behind):
+            few[which, :, k] = (lit @ self.matrix(y, x, focal_length)).reshape(-1, n, m)
+        carried = np.hstack([self.carried(1, x) for x, *_ in behind])
+        return few.reshape(len(numbers), n, -1) @ carried.T
 
     def carried(self, which: int, place: float) -> np.ndarray:
         """Amplitudes (samples, modes) along y (0) or x (1) of the few numbers of a lenslet at a place."""
@@ -138,35 +162,69 @@ class LensletLight:
         return self._known[key]
 
     def _quadrature(self, y: float, x: float, focal_length: float) -> np.ndarray:
-        (_, down), (_, across) = self.bases
         wavelength = self.lenslets.optics[0]
         pitch, (lines, weight, chords) = self.lenslets.array.lattice.pitch, self.lenslets.lines
         bend = -1 / (wavelength * focal_length) + 1 / self.squared
-        turn = np.exp(1j * np.pi * (bend * lines**2 + (2 * lines * y + y**2) / self.squared))
-        seen = self._seen(0, lines, y) * (turn * weight * self.axes[0].fade(y + lines, pitch))
-        along_y = (seen[:, None, :] * down(lines).T).reshape(-1, len(lines))
+
+        def turn(at: np.ndarray, place: float) -> np.ndarray:
+            return np.exp(1j * np.pi * (bend * at**2 + (2 * at * place + place**2) / self.squared))
+
+        behind = self._behind(0, lines, y)
+        seen = behind.seen * (turn(lines, y) * weight * self.axes[0].fade(y + lines, pitch))
+        along_y = (seen[:, None, :] * behind.light.T).reshape(-1, len(lines))
         chords, like = np.unique(chords.round(12), return_inverse=True)
         along_x = []
         for chord in chords.tolist():
             at, share = legendre(
                 -chord, chord, nodes(chord, focal_length, self.axes[1], self.lenslets.optics)
             )
-            turn = np.exp(1j * np.pi * (bend * at**2 + (2 * at * x + x**2) / self.squared))
-            seen = self._seen(1, at, x) * (turn * share * self.axes[1].fade(x + at, pitch))
-            along_x.append((seen @ across(at)).ravel())
+            behind = self._behind(1, at, x)
+            seen = behind.seen * (turn(at, x) * share * self.axes[1].fade(x + at, pitch))
+            along_x.append((seen @ behind.light).ravel())
         both = along_y.astype(np.complex64) @ np.array(along_x, np.complex64)[like]
         (n, a), (m, b) = (
             (len(seen.T), base[0].shape[0]) for seen, base in zip(self.modes, self.bases, strict=True)
         )
         both = both.reshape(n, a, m, b).transpose(0, 2, 1, 3).reshape(n * m, a * b)
-        return np.ascontiguousarray((both @ self.kept).T)
+        return np.ascontiguousarray(_times(both, self.kept).T)
 
-    def _seen(self, which: int, at: np.ndarray, place: float) -> np.ndarray:
-        """Few numbers (modes, nodes) of what nodes of a lenslet, counted from its middle, bring to a cell."""
-        turn = np.exp(-2j * np.pi / self.squared * self.axes[which].image[:, None] * at)
-        if self.lenslets.pixels is not None:
-            turn *= self.lenslets.accepted(self.axes[which].image[:, None] - (place + at))
-        return self.modes[which].conj().T @ turn / math.sqrt(self.squared)
+    def _behind(self, which: int, at: np.ndarray, place: float) -> "_Behind":
+        """Nodes of a lenslet at a place, counted from its middle."""
+        pixels = self.lenslets.pixels is not None
+        key = which, float(at[-1]), len(at), place if pixels else 0.0
+        if key not in self._nodes:
+            image = self.axes[which].image[:, None]
+            turn = np.exp(-2j * np.pi / self.squared * image * at)
+            if pixels:
+                turn *= self.lenslets.accepted(image - (place + at))
+            seen = self.modes[which].conj().T @ turn / math.sqrt(self.squared)
+            found = _Behind(seen, self.bases[which][1](at))
+            if pixels:
+                return found
+            self._nodes[key] = found
+        return self._nodes[key]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Behind:
+    """Nodes of a quadrature along a lenslet.
+
+    Parameters
+    ----------
+    seen
+        Few numbers (modes, nodes) of what they bring to a cell.
+    light
+        Their values (nodes, m) of band-limited light.
+    """
+
+    seen: np.ndarray
+    light: np.ndarray
+
+
+def _times(rows: np.ndarray, real: np.ndarray) -> np.ndarray:
+    """Complex rows (n, k) times a real matrix, as two real products."""
+    parts = np.stack([np.real(rows), np.imag(rows)]) @ real
+    return parts[0] + 1j * parts[1]
 
 
 def windows(lenslets: Lenslets, accuracy: float) -> tuple[Axis, Axis]:

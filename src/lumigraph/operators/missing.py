@@ -157,8 +157,7 @@ class Missing:
             for state, sign in others:
                 (np.add if sign > 0 else np.subtract)(rows, images[state][mine], out=rows)
             left, right, strength = strongest(rows, triangle, least)
-            mean = self.chosen[offset].weights.mean(0, dtype=np.float64) @ rows
-            return Found(left, right, strength, 1, mean, basis)
+            return Found(left, right, strength, 1, basis)
 
         return found
 

@@ -13,7 +13,7 @@ from lumigraph.operators.cell_response import SLACK, Axis
 from lumigraph.operators.cells import Cells
 from lumigraph.operators.fineness import Fineness
 
-VERSION = 18
+VERSION = 19
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 
@@ -123,7 +123,7 @@ class Optics:
     @property
     def lit(self) -> float:
         """How far from a point's image lenslets are lit [m]: as far as their light is followed."""
-        return self.fineness.reach(*self._spread) + 2 * self.array.lattice.pitch
+        return self.fineness.reach(*self._spread) + self.array.lattice.pitch
 
     @property
     def near(self) -> tuple[int, int]:

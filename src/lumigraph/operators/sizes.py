@@ -15,7 +15,7 @@ from lumigraph.operators.missing import AT_A_TIME, HELD
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.places import INSIDE, Place, State, alike, flipped, places, terms
 
-MORE = 1.8
+MORE = 1.4
 """Factors that are found at first, of those that are kept in the end."""
 
 LEAST = 12 * 2.0**20
@@ -32,17 +32,21 @@ def build_bytes(optics: Optics, workers: int = 1) -> float:
     points, samples = math.prod(cells.points), math.prod(cells.samples)
     block, factor = 4.0 * points * samples, 4.0 * points + np.dtype(optics.precision).itemsize * samples
     inside, border = factors.inside * factor, factors.border * factor
-    kept = inside * cells.kinds + factors.all * factor
+    # What computing takes is let go before all factors are put side by side.
+    put = inside * cells.kinds + border + inside * cells.kinds + factors.all * factor
     if optics.straight:
         states = {INSIDE} | states_of(wanted(optics))
         light = len({state.x for state in states}) * optics.images_bytes(optics.near) * terms_of(optics)
         shared = 1 + sum(INFINITE in state for state in states)
-        light += workers * (2 * shared + 4) * block
-        return light + MORE * (inside + border) + kept + glare_bytes(optics) + LEAST
-    few = Few.of(optics)
-    begun = few.table + few.fields + workers * (few.line + 5 * block) + MORE * inside
-    begun = max(begun, few.table + few.images + workers * few.stacks + MORE * border)
-    return begun + kept + glare_bytes(optics) + LEAST
+        computed = light + workers * (2 * shared + 4) * block + MORE * (inside + border)
+    else:
+        few = Few.of(optics)
+        computed = few.table + few.matrices + MORE * inside * cells.kinds
+        computed += max(
+            few.fields + workers * (few.line + 5 * block),
+            few.images + workers * few.stacks + MORE * border,
+        )
+    return max(computed, put) + glare_bytes(optics) + LEAST
 
 
 def glare_bytes(optics: Optics, more: tuple[int, int] = (0, 0)) -> float:
@@ -84,8 +88,13 @@ class Factors:
         """Of one depth."""
         usual = math.prod(optics.cells.points) ** 0.85
         inside, border = (0.45, 0.08) if optics.straight else (0.55, 0.16)
-        rims = {"meet": 1.0, "straight": 1.75, "other": 1.3}[_cells.edges(optics.array)]
-        border *= min(1.0, (1e-3 / optics.fineness.accuracy) ** 0.25)
+        edges = _cells.edges(optics.array)
+        rims = {"meet": 1.0, "straight": 1.75, "other": 1.3}[edges]
+        finer = 1e-3 / optics.fineness.accuracy
+        if optics.straight and finer > 1:
+            inside, border = (n * finer ** (0.23 if edges == "straight" else 0) for n in (inside, border))
+        else:
+            border *= finer ** (0.4 if finer > 1 else 0.25)
         border *= tail(_cells.fresnel_number(optics.camera))
         near = rims * border * usual * math.prod(2 * n + 1 for n in optics.near)
         return cls(
@@ -103,6 +112,8 @@ class Few:
     ----------
     table
         Light in a lenslet, of all points around it [bytes].
+    matrices
+        From there to the few numbers on a cell, of all lenslets that are followed [bytes].
     fields, line
         Fields of the few points, and of all of one row of cells [bytes].
     chosen
@@ -116,6 +127,7 @@ class Few:
     """
 
     table: float
+    matrices: float
     fields: float
     line: float
     chosen: float
@@ -129,9 +141,10 @@ class Few:
         cells, axes, kinds = optics.cells, optics.axes, optics.cells.kinds
         samples, pitch = math.prod(cells.samples), optics.array.lattice.pitch
         squared = optics.camera.wavelength * _cells.telecentric_distance(optics.camera)
-        light = math.prod(2 * axis.band * pitch + 10 for axis in axes)
-        modes = [pitch * axis.size / squared + 9 for axis in axes]
+        light = math.prod(2 * axis.band * pitch + 7 for axis in axes)
+        modes = [pitch * axis.size / squared + 8 for axis in axes]
         points = math.prod((2 * optics.lit / axis.size + 1) * axis.points for axis in axes)
+        followed = math.prod(2 * axis.neighbourhood / axis.size + 1 for axis in axes)
         folded = 2.0 if _cells.mirrored(optics.camera) else 1.0
         few, near = math.prod(optics.few(optics.reach)) / folded, math.prod(optics.few(optics.near))
         lit = math.pi * optics.lit**2 / math.prod(cells.size)
@@ -147,6 +160,7 @@ class Few:
         images = 4.0 * len(states) / kinds * samples * chosen
         return cls(
             8.0 * light * points,
+            8.0 * light * math.prod(modes) * kinds * followed,
             8.0 * samples * few,
             8.0 * samples * axes[0].points * optics.few(optics.reach)[1],
             chosen,

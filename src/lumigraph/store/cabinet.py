@@ -66,7 +66,7 @@ def kept(
         found = _own(build())
         if path is not None and where is not None:
             sealed.write(path, found)
-            found = sealed.read(path, mapped=True)
+            found = sealed.read(path, mapped=True, written=True)
         elif path is not None and sum(array.nbytes for array in found.values()) <= LIMIT:
             found = _keep(path, found) or found
     return found
@@ -92,7 +92,7 @@ def _keep(path: Path, arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]
         path.parent.mkdir(parents=True, exist_ok=True)
         sealed.write(path, arrays)
         _tidy(path.parent)
-        return sealed.read(path, mapped=True)
+        return sealed.read(path, mapped=True, written=True)
     return None
 
 

@@ -8,10 +8,11 @@ import os
 import struct
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from io import BytesIO
+from io import BytesIO, RawIOBase
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 
@@ -58,13 +59,15 @@ def write(path: str | os.PathLike[str], arrays: Mapping[str, np.ndarray]) -> Non
             for name, array in arrays.items():
                 _add(archive, f"{name}.npy", np.asarray(array))
             archive.comment = _WORD + b"0" * _DIGITS
-        with temporary.open("r+b") as file:
-            checksum = _checksum(np.memmap(file, mode="r")[:-_DIGITS])
+        with temporary.open("r+b", buffering=0) as file:
+            checksum = _checksum_of(file, file.seek(-_DIGITS, os.SEEK_END))
             file.seek(-_DIGITS, os.SEEK_END)
             file.write(b"%08x" % checksum)
 
 
-def read(path: str | os.PathLike[str], *, mapped: bool = False) -> dict[str, np.ndarray]:
+def read(
+    path: str | os.PathLike[str], *, mapped: bool = False, written: bool = False
+) -> dict[str, np.ndarray]:
     """The arrays of a sealed file, compared with its checksum first.
 
     Parameters
@@ -73,6 +76,8 @@ def read(path: str | os.PathLike[str], *, mapped: bool = False) -> dict[str, np.
         Of the file.
     mapped
         Whether the arrays are read-only memory maps; else they are copies.
+    written
+        Whether this process has just written it: then the checksum is not computed once more.
 
     Raises
     ------
@@ -88,7 +93,7 @@ def read(path: str | os.PathLike[str], *, mapped: bool = False) -> dict[str, np.
     with path.open("rb") as file:
         whole = np.memmap(file, mode="r") if path.stat().st_size else np.empty(0, np.uint8)
         end = bytes(whole[-len(_WORD) - _DIGITS :])
-        if end != _WORD + b"%08x" % _checksum(whole[:-_DIGITS]):
+        if not written and end != _WORD + b"%08x" % _checksum(whole[:-_DIGITS]):
             if end.startswith(_WORD) or _WORD in bytes(whole[:256]):  # one damage spares one of the two
                 raise DamagedError(f"{path} is damaged: its checksum does not match. Remove it.")
             raise FormatError(f"{path} is not a sealed file of arrays. Give another name.")
@@ -133,10 +138,26 @@ def _array(whole: np.ndarray, entry: zipfile.ZipInfo) -> np.ndarray:
 
 def _checksum(data: np.ndarray) -> int:
     """CRC-32 of the CRC-32 of each piece: pieces are summed side by side, at 3 GB/s each."""
-    pieces = [data[start : start + _PIECE].data for start in range(0, len(data), _PIECE)]
-    if len(pieces) > 1:
+    return _sealing(len(data), lambda start: data[start : start + _PIECE].data)
+
+
+def _checksum_of(file: RawIOBase, size: int) -> int:
+    """The same of the first bytes of a file, which are not mapped: a process is said to hold what it maps."""
+
+    def piece(start: int) -> bytes:
+        with lock:
+            file.seek(start)
+            return file.read(min(_PIECE, size - start)) or b""
+
+    lock = Lock()
+    return _sealing(size, piece)
+
+
+def _sealing(size: int, piece: Callable[[int], bytes | memoryview]) -> int:
+    starts = range(0, size, _PIECE)
+    if len(starts) > 1:
         with ThreadPoolExecutor(WORKERS) as pool:
-            sums = list(pool.map(zlib.crc32, pieces))
+            sums = list(pool.map(lambda start: zlib.crc32(piece(start)), starts))
     else:
-        sums = [zlib.crc32(piece) for piece in pieces]
+        sums = [zlib.crc32(piece(start)) for start in starts]
     return zlib.crc32(struct.pack(f"<{len(sums)}I", *sums))
