@@ -175,6 +175,18 @@ def test_few_factors_give_the_block_back(rng):
     assert np.linalg.norm(found_left @ found_right - dense) < 1.1e-4
 
 
+@pytest.mark.parametrize(("least", "count"), [(5e-3, 3), (3e-6, 6)])
+def test_products_are_as_precise_as_the_faintest_strength_needs(rng, least, count):
+    """In single precision strengths of 1e-5 beside 1 would drown, and those of 1e-2 do not."""
+    left, right = (np.linalg.qr(rng.standard_normal((n, 30)))[0] for n in (200, 90))
+    dense = ((left * 10.0 ** -np.arange(30)[:]) @ right.T).astype(np.float32)
+    products = factors._products(dense, least)
+    assert products.dtype == (np.float32 if least > 1e-3 else np.float64)
+    found_left, found_right, kept = factors.strongest(dense, None, least)
+    np.testing.assert_allclose(kept[::-1], 10.0 ** -np.arange(count), rtol=2e-2)
+    assert np.linalg.norm(found_left @ found_right - dense) < 1.2 * 10.0**-count
+
+
 @pytest.mark.parametrize("points", [60, 4])
 def test_a_block_of_many_patterns_is_not_cut_short(rng, points):
     """Few points stand in a cell where the main lens is small."""

@@ -11,6 +11,7 @@ _BLOCK = 2**21
 
 _LOST = 32 * float(np.finfo(np.float32).eps)
 """Part of a squared norm that sums of products in single precision may be off by."""
+
 _FAINT = 1000.0
 """Norm of a block over the faintest strength that counts from which a fifth of its points tell too little."""
 
