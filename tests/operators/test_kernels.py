@@ -175,6 +175,15 @@ def test_few_factors_give_the_block_back(rng):
     assert np.linalg.norm(found_left @ found_right - dense) < 1.1e-4
 
 
+def test_points_are_chosen_whatever_their_number_and_wherever_their_light_stands(rng):
+    """150 patterns of 200 points, all in a twentieth of the samples, as light at the edge of a cell."""
+    block = np.zeros((200, 4000), np.float32)
+    block[:, 100:300] = rng.standard_normal((200, 150)) @ rng.standard_normal((150, 200))
+    found = few_points.chosen(block, 1e-3)
+    assert len(found.numbers) == 150
+    assert np.linalg.norm(found.weights @ block[found.numbers] - block) < 1e-4 * np.linalg.norm(block)
+
+
 @pytest.mark.parametrize(("least", "count"), [(5e-3, 3), (3e-6, 6)])
 def test_products_are_as_precise_as_the_faintest_strength_needs(rng, least, count):
     """In single precision strengths of 1e-5 beside 1 would drown, and those of 1e-2 do not."""

@@ -51,8 +51,8 @@ SHARE = 2.0
 BORDER = 4.0
 """How much stronger than elsewhere factors are that are looked at in the border's blocks."""
 
-CHOSEN = 5.0
-"""The same of what the points that are chosen for the border leave out."""
+CHOSEN = 3.0, 8.0
+"""The same of what the points that are chosen for the border leave out: at 1e-2, and from 1e-3 on."""
 
 Job = tuple[int, tuple[int, ...]]
 
@@ -207,7 +207,9 @@ class Builder:
 
     def _choose(self, kind: int, offset: Offset, block: np.ndarray) -> None:
         """Points for the border, of a cell and those that it mirrors."""
-        found, (dy, dx), shape = chosen(block, CHOSEN * self.least), offset, self.optics.cells.points
+        coarse, fine = CHOSEN
+        least = min(fine, coarse * (1e-2 / self.optics.fineness.accuracy) ** 0.43) * self.least
+        found, (dy, dx), shape = chosen(block, least), offset, self.optics.cells.points
         for up in {False, self.even[0]}:
             for left in {False, self.even[1]}:
                 side = self.optics.cells.mirrored(dy, dx) if left else dx

@@ -4,6 +4,7 @@ A field is band-limited in the point's place too, so that those of some points g
 faint besides, as where lenslets are missing, follows from the intensities of fewer points still (`Chosen`).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -18,6 +19,12 @@ from lumigraph.operators.point_images import Line, intensity, mirrored
 
 AT_A_TIME = 2**20
 """Numbers worked on at a time."""
+
+TOLD = 0.7
+"""Of the numbers of a sketch, as many points as they can choose."""
+
+FOLDS = 4
+"""Numbers of a sketch that each sample is in."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,16 +128,39 @@ class Chosen:
 
 
 def chosen(block: np.ndarray, least: float) -> Chosen:
-    """Points of a block (points, samples) that give the others but for `least`, by some of its samples.
+    """Points of a block (points, samples) that give the others but for `least`.
 
-    A pivoted QR decomposition takes point after point that those before tell least of.
+    A pivoted QR decomposition of a sketch takes point after point that those before tell least of. So many
+    points need a sketch of more numbers than there are of them.
     """
     points, samples = block.shape
-    some = np.random.default_rng(0).permutation(samples)[: max(64, points // 2)]
-    found = scipy.linalg.qr(block[:, np.sort(some)].T, mode="r", pivoting=True)
-    triangle, order = np.asarray(found[0]), np.asarray(found[-1])
-    rank = int((np.abs(np.diag(triangle)) * np.sqrt(samples / len(some)) > least).sum())
+    count = max(64, points // 2)
+    while True:
+        seen = _folded(block, count)
+        found = scipy.linalg.qr(seen.T, mode="r", pivoting=True)
+        triangle, order = np.asarray(found[0]), np.asarray(found[-1])
+        rank = int((np.abs(np.diag(triangle)) > least).sum())
+        if rank <= TOLD * count or count >= samples:
+            break
+        count *= 2
     weights = np.empty((points, rank), np.float32)
     if rank:
         weights[order] = scipy.linalg.solve_triangular(triangle[:rank, :rank], triangle[:rank]).T
     return Chosen(order[:rank], weights)
+
+
+def _folded(block: np.ndarray, count: int) -> np.ndarray:
+    """Sums (points, count) of a block's samples, each sample in `FOLDS` of them with a sign by chance.
+
+    A choice of samples would miss what stands at the edge of a cell.
+    """
+    points, samples = block.shape
+    if count >= samples:
+        return block
+    rng, times = np.random.default_rng(0), math.ceil(samples / count)
+    sums, shuffled = np.zeros((points, count), np.float32), np.zeros((points, times * count), np.float32)
+    for _ in range(FOLDS):
+        signs = rng.choice((-1, 1), samples).astype(np.float32)
+        np.multiply(block[:, rng.permutation(samples)], signs, out=shuffled[:, :samples])
+        sums += shuffled.reshape(points, times, count).sum(1)
+    return sums / math.sqrt(FOLDS)

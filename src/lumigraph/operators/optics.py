@@ -13,7 +13,7 @@ from lumigraph.operators.cell_response import SLACK, Axis
 from lumigraph.operators.cells import Cells
 from lumigraph.operators.fineness import Fineness
 
-VERSION = 19
+VERSION = 20
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 
