@@ -159,7 +159,7 @@ def test_what_makes_building_larger_is_told():
         return build_bytes(Optics.of(camera, 122 * mm, 3e-3, camera.object_distance))
 
     faint = 1e-3  # it hardly blurs, and is odd all the same
-    # As many factors are kept in the end: those found at first make the difference.
+    # As many factors are kept in the end: what mirrors nothing is held beside them until they are put.
     assert needed(aberrations={8: faint}) > 1.25 * needed(aberrations={11: faint})
     assert needed(fill_factor=0.4) > 1.8 * needed()
 

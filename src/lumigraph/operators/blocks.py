@@ -29,7 +29,7 @@ from lumigraph.core.threads import each
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.cell_response import INFINITE, Limits
 from lumigraph.operators.exact import lenslets_of
-from lumigraph.operators.factors import Factors, Found, factors, narrowed, weakest
+from lumigraph.operators.factors import Factors, Found, factors, narrowed, together, weakest
 from lumigraph.operators.few_points import Chosen, Few, chosen, few
 from lumigraph.operators.lenslet_light import LensletLight, windows
 from lumigraph.operators.missing import Missing
@@ -125,15 +125,6 @@ def build(optics: Optics, progress: Progress | None = None) -> Built:
 
 def _ranks(blocks: Blocks) -> int:
     return sum(left.shape[1] for left, _ in blocks.values())
-
-
-def _together(blocks: Blocks) -> Blocks:
-    """The same in one piece of memory, which the system takes back when it is let go."""
-    ends = np.cumsum([left.shape[1] for left, _ in blocks.values()])[:-1]
-    left = np.concatenate([left.T for left, _ in blocks.values()])
-    right = np.concatenate([right for _, right in blocks.values()])
-    pairs = zip(np.split(left, ends), np.split(right, ends), strict=True)
-    return {key: (mine.T, other) for key, (mine, other) in zip(blocks, pairs, strict=True)}
 
 
 def _parts(cells: _cells.Cells, mine: Iterable[Place], blocks: Blocks) -> Iterator[Part]:
@@ -287,7 +278,7 @@ class Builder:
         for place, blocks in pieces(wanted):
             least = weakest(blocks.values(), budget)
             cut = {key: f.cut(least) for key, f in blocks.items()}
-            result[place] = _together(self._unfolded(cut, self._folds(place)))
+            result[place] = together(self._unfolded(cut, self._folds(place)))
         return result
 
     def _row_by_row(self, wanted: Sequence[Place]) -> Iterator[tuple[Place, dict[Offset, Found]]]:

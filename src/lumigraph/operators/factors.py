@@ -1,8 +1,9 @@
 """Blocks of a matrix in factors: as many as the light there has patterns, the strongest of all blocks."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,6 +15,8 @@ _LOST = 32 * float(np.finfo(np.float32).eps)
 
 _FAINT = 1000.0
 """Norm of a block over the faintest strength that counts from which a fifth of its points tell too little."""
+
+Key = TypeVar("Key")
 
 Factors = tuple[np.ndarray, np.ndarray]
 """Left (points, r) and right (r, samples)."""
@@ -118,3 +121,12 @@ def weakest(found: Iterable[Found], budget: float) -> float:
     spent = np.cumsum(copies[order] * strengths[order] ** 2)
     k = int(np.searchsorted(spent, budget))
     return float(strengths[order[k - 1]]) if k else 0.0
+
+
+def together(blocks: Mapping[Key, Factors]) -> dict[Key, Factors]:
+    """The same in one piece of memory, which the system takes back when it is let go."""
+    ends = np.cumsum([left.shape[1] for left, _ in blocks.values()])[:-1]
+    left = np.concatenate([left.T for left, _ in blocks.values()])
+    right = np.concatenate([right for _, right in blocks.values()])
+    pairs = zip(np.split(left, ends), np.split(right, ends), strict=True)
+    return {key: (mine.T, other) for key, (mine, other) in zip(blocks, pairs, strict=True)}
