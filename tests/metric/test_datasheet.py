@@ -9,10 +9,16 @@ import pytest
 
 import lumigraph as lg
 from calibration_drawing import white as drawn_white
+from lumigraph.calibration import calibrate
 from lumigraph.cli import main
-from lumigraph.errors import FormatError, GeometryError
-from lumigraph.metric import planes
-from lumigraph.metric.charts import check_camera, usual_depths
+from lumigraph.core.depth_map import DepthMap
+from lumigraph.core.raw import RawImage
+from lumigraph.errors import CalibrationError, FormatError, GeometryError
+from lumigraph.metric import steady
+from lumigraph.metric.charts import check_camera
+from lumigraph.metric.exposures import Drawn, Files, mean_image
+from lumigraph.metric.lights import usual_depths
+from lumigraph.metric.places import places, residual
 from lumigraph.samples.files import camera_file
 
 SIMULATES = pytest.mark.long  # 5 s: a camera's operator
@@ -28,17 +34,26 @@ def camera():
 
 @pytest.fixture(scope="module")
 def charts(camera):
-    return lg.metric.simulate_charts(camera, [0.0], name="small", rng=np.random.default_rng(5))
+    rng = np.random.default_rng(5)
+    return lg.metric.simulate_charts(camera, [0.0], name="small", rng=rng, exposures=3)
 
 
 @pytest.fixture(scope="module")
-def drawn():
-    """Two white images and one dark of 20 x 22 lenslets, with the noise of 2 electrons per count."""
-    lattice, rng = lg.Lattice.square(15.3, 0.004, origin=(8, 8)), np.random.default_rng(2)
-    light = drawn_white(lattice, (306, 340), fill=0.85)[0]
+def light():
+    """Of a white image of 20 x 22 lenslets."""
+    return drawn_white(lg.Lattice.square(15.3, 0.004, origin=(8, 8)), (306, 340), fill=0.85)[0]
+
+
+def exposed(light, count, reference=1.0):
+    """White images with the noise of 2 electrons per count."""
     sensor = lg.Sensor(light.shape, 5e-6, full_well=8000, bits=12, black_level=95)
-    whites = tuple(sensor.expose(light, fill=0.8, rng=rng) for _ in range(2))
-    return lg.metric.Charts("drawn", whites, (sensor.expose(0 * light, rng=rng),))
+    return Drawn(light, sensor, reference, 0.8, tuple(range(count)))
+
+
+@pytest.fixture(scope="module")
+def drawn(light):
+    """Two white images and one dark."""
+    return lg.metric.Charts("drawn", exposed(light, 2)[:], exposed(0 * light, 1)[:])
 
 
 @pytest.fixture(scope="module")
@@ -98,6 +113,27 @@ def test_a_white_image_alone_tells_the_lattice_and_why_the_rest_is_missing(drawn
     assert found["refocus_range"].value is None
 
 
+@SIMULATES
+def test_a_scene_is_shown_and_its_depth_is_in_metres_of_a_camera_file(sheet, charts, tmp_path, capsys):
+    scene = charts.boards[0].textures[0]
+    lg.metric.save_charts(replace(charts, boards=(), flats=(), scenes=(scene,)), tmp_path / "a")
+    assert main(["datasheet", str(tmp_path / "a"), "-o", str(tmp_path / "a.html"), "--json"]) == 0
+    rows = {row["name"]: row for row in json.loads(capsys.readouterr().out)["entries"]}
+    assert rows["depth_noise_of_scene_1_in_metres"]["unit"] == "m"
+    low, high = rows["depths_of_scene_1"]["value"]
+    assert -5e-3 < low < sheet.planes[0]["depth"].value < high < 5e-3  # of 200 mm
+    assert rows["best_mtf50_middle"]["how"] == "not measured: there is no picture of a chart"
+    page = (tmp_path / "a.html").read_text()
+    assert "Scene 1, in focus at its median depth." in page
+    assert "best MTF50 middle" in page
+    assert 'width="287"' in page  # 41 lenslets, 7 px each
+
+
+def test_a_white_image_in_the_place_of_the_dark_one_is_refused(light, drawn):
+    with pytest.raises(CalibrationError, match="no brighter than the dark image"):
+        lg.metric.datasheet(replace(drawn, darks=exposed(1.1 * light, 1)[:]))
+
+
 def test_snr_is_that_of_the_electrons(drawn):
     """0.8 of a full well of 8000 is 6400 electrons: 80, less what darker pixels have."""
     found = lg.metric.datasheet(drawn)["snr_of_pixels"]
@@ -114,6 +150,7 @@ def test_snr_is_that_of_the_electrons(drawn):
         (8123.4, "electrons", (6000.0, 10246.8), "8100 electrons (6000 to 10200)"),
         (3.0, "px", (3.0, 3.0), "3.000000 px (3.000000 to 3.000000)"),
         (0.51234567, "%", None, "0.51235 %"),
+        ((-0.00231432, 0.0112081), "px/view", None, "-0.00231 to 0.0112 px/view"),
         (None, "px", None, "not measured"),
     ],
 )
@@ -128,12 +165,125 @@ def test_noise_of_depth_is_that_of_the_places_and_its_interval_holds_it():
     for _ in range(200):
         values = rng.normal(7.0, 0.1, (23, 25))
         values[rng.random(values.shape) < 0.02] = 9.0
-        found.append(planes._scatter(values))
+        found.append(steady.scatter([values]))
     noise = np.array([one for one, _ in found])
     assert noise.mean() == pytest.approx(0.1, rel=0.01)
     assert noise.std() < 0.0035  # 0.003 of 575 places; of the median deviation it is 0.005
     inside = [low <= 0.1 <= high for _, (low, high) in found]
     assert 0.9 <= np.mean(inside) <= 0.99
+
+
+def noisy(rng, count, fixed=0.1, noise=0.05):
+    """Maps of one plane whose places are off alike in each, and by noise."""
+    alike = rng.normal(3.0, fixed, (30, 30))
+    return [
+        DepthMap(alike + rng.normal(0, noise, alike.shape), np.ones_like(alike), "patch")
+        for _ in range(count)
+    ]
+
+
+def test_noise_of_several_exposures_is_that_of_one():
+    """Of their mean it would be 0.1 and a bit."""
+    value, noise = steady.steady(noisy(np.random.default_rng(1), 12), "patch", "px")
+    assert noise.value == pytest.approx(np.hypot(0.1, 0.05), rel=0.03)
+    low, high = noise.quantity.interval
+    assert low < np.hypot(0.1, 0.05) < high
+    assert value.value == pytest.approx(3.0, abs=0.02)  # 576 places of 0.1, medians of 16 parts
+
+
+def test_sets_of_exposures_differ_by_what_the_sheet_says():
+    """Of 120 pairs of sets of six, in 95 of 100 cases; one set alone says nothing."""
+    rng = np.random.default_rng(2)
+    alike, within = noisy(rng, 1, noise=0.0)[0].values, {"patch": [], "patch_noise": []}
+    for _ in range(120):
+        maps = [alike + rng.normal(0, 0.05, alike.shape) for _ in range(12)]
+        sets = [DepthMap(one, np.ones_like(one), "patch") for one in maps]
+        for one, other in zip(
+            *(steady.steady(part, "patch", "px") for part in (sets[:6], sets[6:])), strict=True
+        ):
+            within[one.quantity.name].append(abs(one.value - other.value) < one.repeats)
+    assert 0.9 < np.mean(within["patch"]) < 0.99
+    assert 0.9 < np.mean(within["patch_noise"]) < 0.99
+    alone = steady.steady(sets[:1], "patch", "px")[1]
+    assert alone.repeats is None
+    assert "nobody knows how well it repeats" in alone.how
+
+
+def test_the_sheet_says_how_many_exposures_two_per_cent_take():
+    said = steady._repeats(5.0, 16, "%")
+    assert said == "16 exposures, two such sets differ by 5 % at most (100 exposures: 2 %)"
+    assert "(" not in steady._repeats(1.9, 16, "%")
+
+
+def test_pieces_of_the_field_that_some_exposure_does_not_know_count_in_none():
+    maps = noisy(np.random.default_rng(4), 3)
+    values = np.array(maps[1].values)
+    values[:10, :10] = np.nan
+    told = steady.steady([maps[0], DepthMap(values, np.ones_like(values), "patch"), maps[2]], "patch", "px")[
+        0
+    ]
+    assert "mean of 15 parts of the field" in told.how
+
+
+@pytest.fixture(scope="module")
+def of_few_and_many(light, drawn):
+    """Sheets of two and of eight white images."""
+    return [lg.metric.datasheet(replace(drawn, whites=exposed(light, count))) for count in (2, 8)]
+
+
+def test_the_residual_of_several_white_images_holds_no_noise(light, drawn, of_few_and_many):
+    """Discs drawn on pixels are 2.3e-3 px off the lattice without noise, 4e-3 px with that of one image."""
+    clean, _ = residual([places(light, calibrate(RawImage(light)))])
+    alone = lg.metric.datasheet(replace(drawn, whites=drawn.whites[:1]))["residual_px"]
+    many = of_few_and_many[1]["residual_px"]
+    assert many.interval[0] < clean < many.interval[1]
+    assert many.interval[1] < alone.interval[0]
+
+
+@pytest.mark.parametrize("name", ["snr_of_pixels", "snr_of_picture"])
+def test_noise_of_pixels_is_that_of_all_pairs(of_few_and_many, name):
+    """The interval of four pairs is half as wide."""
+    few, many = (sheet[name] for sheet in of_few_and_many)
+    assert np.ptp(many.interval) == pytest.approx(np.ptp(few.interval) / 2, rel=0.1)
+    assert few.interval[0] < many.value < few.interval[1]
+
+
+def test_exposures_are_drawn_alike_and_their_mean_is_that_of_all():
+    light = np.full((40, 50), 0.5)
+    many = Drawn(light, lg.Sensor(light.shape, 5e-6, full_well=8000), 1.0, 0.8, tuple(range(20)))
+    assert len(many) == 20
+    assert np.array_equal(many[3].data, many[3].data)
+    assert not np.array_equal(many[3].data, many[4].data)
+    assert [one.data.sum() for one in many[-2:]] == [many[18].data.sum(), many[19].data.sum()]
+    mean = np.asarray(mean_image(many).data, float)
+    assert mean.std() == pytest.approx(np.asarray(many[0].data, float).std() / np.sqrt(20), rel=0.1)
+    assert mean_image(many[:1]).data is not None
+
+
+def test_exposures_of_several_sizes_have_no_mean():
+    sizes = [RawImage(np.ones(shape, np.uint8)) for shape in ((20, 30), (20, 31))]
+    with pytest.raises(FormatError, match="20 x 30 and 20 x 31 px"):
+        mean_image(sizes)
+    with pytest.raises(FormatError, match="no exposure"):
+        mean_image([])
+
+
+def test_a_folder_holds_several_exposures_of_a_chart(tmp_path, drawn):
+    seen = lg.metric.Seen(drawn.whites, drawn.darks, 5e-3)
+    lg.metric.save_charts(replace(drawn, boards=(seen,)), tmp_path)
+    read = lg.metric.read_charts(tmp_path).boards[0]
+    assert isinstance(read.boards, Files)
+    assert [len(read.boards), len(read.textures), read.depth] == [2, 1, 5e-3]
+    assert np.array_equal(read.boards[1].data, drawn.whites[1].data)
+    text = (tmp_path / "charts.toml").read_text()
+    assert 'board = ["board-1-1.tiff", "board-1-2.tiff"]' in text
+    (tmp_path / "charts.toml").write_text(text.replace('["texture-1-1.tiff"]', '"texture-1-1.tiff"'))
+    assert len(lg.metric.read_charts(tmp_path).boards[0].textures) == 1
+
+
+def test_simulated_charts_have_one_exposure_or_more(camera):
+    with pytest.raises(GeometryError, match="exposures is 0 but must be a whole number of at least 1"):
+        lg.metric.simulate_charts(camera, [0.0], exposures=0)
 
 
 def test_two_cameras_stand_side_by_side(drawn, tmp_path, capsys):
@@ -160,6 +310,7 @@ def test_two_cameras_stand_side_by_side(drawn, tmp_path, capsys):
         ('white = "w.tiff"', "must be a list"),
         ("white = [3]", "names 3, which is no file"),
         ('white = []\ncharts = [{depth = "5 mm"}]', "must be board"),
+        ("white = []\ncharts = [{board = []}]", "has no picture of a board"),
         ("white = []", "has no white image"),
         ('white = []\nspacing = "5"', "unit"),
     ],

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from lumigraph.core.progress import Progress
     from lumigraph.metric import Charts, Entry, Plane, Sheet
 
+_WIDTH = 320  # px of the page that a picture takes
 _MOST = 3  # cameras side by side
 _NONE = "not measured"
 
@@ -28,6 +29,7 @@ def datasheet(
     *,
     camera: str | None = None,
     depths: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
+    exposures: int = 16,
     seed: int = 1,
     accuracy: float = 1e-2,
     charts: Path | None = None,
@@ -37,8 +39,9 @@ def datasheet(
     """Write the data sheet of a plenoptic camera: resolution, directions, depth, light and geometry.
 
     SOURCES are folders of raw images, or camera files, whose charts are simulated by wave optics and measured
-    in the same way; several stand side by side. A folder has a charts.toml that names its pictures (see the
-    page on metric cameras), or white images and scenes told apart by "white" and "dark" in their names.
+    in the same way; several stand side by side. A folder has a charts.toml that names its pictures, several
+    exposures of each chart (see the page on metric cameras), or white images and scenes told apart by "white"
+    and "dark" in their names.
 
     Example: `lumigraph datasheet camera.toml -o sheet.html`
 
@@ -55,6 +58,9 @@ def datasheet(
     depths
         Where simulated charts stand, from the plane in focus, such as --depths '-5 mm' --depths '0 mm'; five
         distances over what the camera refocuses if left out.
+    exposures
+        Of each simulated chart, white and dark image. The sheet says how far two such sets
+        differ, and how many exposures it takes to 2 %.
     seed
         Of the simulated sensor's noise.
     accuracy
@@ -77,7 +83,7 @@ def datasheet(
 
     for source in sources:
         with progress(f"data sheet of {source}") as tell:
-            found = _charts(source, camera, (planes, accuracy), seed, tell)
+            found = _charts(source, camera, (planes, accuracy, exposures), seed, tell)
             if charts is not None:
                 written += metric.save_charts(found, charts)
             sheets.append(metric.datasheet(found))
@@ -89,7 +95,11 @@ def datasheet(
 
 
 def _charts(
-    source: str, camera: str | None, how: tuple[list[float] | None, float], seed: int, tell: "Progress"
+    source: str,
+    camera: str | None,
+    how: tuple[list[float] | None, float, int],
+    seed: int,
+    tell: "Progress",
 ) -> "Charts":
     import numpy as np
 
@@ -101,8 +111,10 @@ def _charts(
         return metric.read_charts(source, None if camera is None else check_camera(load_camera(camera)))
     rng, name = np.random.default_rng(seed), Path(source).stem
     one = check_camera(load_camera(source))
-    depths, accuracy = how
-    return metric.simulate_charts(one, depths, name=name, rng=rng, accuracy=accuracy, progress=tell)
+    depths, accuracy, exposures = how
+    return metric.simulate_charts(
+        one, depths, name=name, rng=rng, exposures=exposures, accuracy=accuracy, progress=tell
+    )
 
 
 def _distinct(sheets: "Sequence[Sheet]") -> "list[Sheet]":
@@ -133,7 +145,7 @@ def _lines(sheets: "list[Sheet]") -> Iterator[str]:
         yield sheet.name
         for one in sheet.entries:
             text = one.text if one.value is not None else one.how
-            yield f"  {one.section:<16} {one.quantity.label:<26} {text}"
+            yield f"  {one.section:<16} {one.label:<26} {text}"
 
 
 def _figures(sheets: "list[Sheet]") -> Iterable[Figure]:
@@ -156,6 +168,10 @@ def _figures(sheets: "list[Sheet]") -> Iterable[Figure]:
         if sheet.planes:
             yield Figure(_planes(sheet.planes), section=f"Charts of {sheet.name}")
             yield from _pictures(sheet)
+        for k, picture in enumerate(sheet.scenes, 1):
+            if picture is not None:
+                caption = f"Scene {k}, in focus at its median depth."
+                yield Figure(picture, caption, f"Scenes of {sheet.name}", _zoom(picture))
         if sheet.limits:
             rows = [["limit", "value", "by"], *map(list, sheet.limits)]
             yield Figure(rows, section=f"Limits of {sheet.name}, by ray and wave optics")
@@ -168,7 +184,7 @@ def _table(sheets: "list[Sheet]", section: str) -> list[list[str]]:
     rows = [["quantity", *(sheet.name for sheet in sheets), "how"]]
     for name in names:
         found = [one.get(name) for one in entries]
-        label = next(one.quantity.label for one in found if one is not None)
+        label = next(one.label for one in found if one is not None)
         rows.append([label, *(_NONE if one is None else one.text for one in found), _how(sheets, found)])
     return rows
 
@@ -216,4 +232,9 @@ def _pictures(sheet: "Sheet") -> Iterator[Figure]:
     shown = [plane for plane in sheet.planes if plane.picture is not None]
     for plane in shown[:: max(1, len(shown) // 3)]:
         caption = f"The chart at {plane.label} from the focus, as it was measured."
-        yield Figure(plane.picture, caption, f"Charts of {sheet.name}")
+        yield Figure(plane.picture, caption, f"Charts of {sheet.name}", _zoom(plane.picture))
+
+
+def _zoom(picture: Any) -> dict[str, Any]:
+    """Pictures of few lenslets are stamps: each sample as a square that can be seen."""
+    return {"zoom": max(1, _WIDTH // max(picture.shape))}

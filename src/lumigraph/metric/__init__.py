@@ -22,12 +22,13 @@ IJCV 130 (2022), calibrate multi-focus cameras from such boards.
 
 from lumigraph.metric.calibration import Measured, Pose, board
 from lumigraph.metric.camera import MetricCamera, Nominal
-from lumigraph.metric.charts import Charts, Seen, read_charts, save_charts, simulate_charts
+from lumigraph.metric.charts import Charts, Seen, read_charts, save_charts
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.metric.datasheet import datasheet
 from lumigraph.metric.exchange import load_camera, save_camera
 from lumigraph.metric.files import is_measured, load, load_compote, load_corners, save, save_corners
 from lumigraph.metric.finding import find_corners
+from lumigraph.metric.lights import simulate_charts
 from lumigraph.metric.planning import Plan, plan
 from lumigraph.metric.printed import chart
 from lumigraph.metric.sheet import Entry, Plane, Sheet

@@ -1,15 +1,16 @@
 """`datasheet`: what a plenoptic camera does, measured on its white images and on charts."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import Any
 
 import numpy as np
 
 from lumigraph.analysis import PupilEdge, photon_transfer, pupil_edge
 from lumigraph.calibration import calibrate
+from lumigraph.calibration.fitting import Fitted
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.prepared import PreparedImage
@@ -18,10 +19,11 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.result import Quantity
 from lumigraph.errors import CalibrationError, LumigraphError
 from lumigraph.instruments import LensletCamera
-from lumigraph.metric import planes
+from lumigraph.metric import planes, steady
 from lumigraph.metric.charts import Charts, Seen
-from lumigraph.metric.places import pitch_and_rotation, places
-from lumigraph.metric.planes import is_rendered
+from lumigraph.metric.exposures import mean_image
+from lumigraph.metric.places import pitch_and_rotation, places, residual
+from lumigraph.metric.planes import is_rendered, scene
 from lumigraph.metric.sheet import Entry, Plane, Sheet
 from lumigraph.preparation import decode, prepare, render
 from lumigraph.rendering import refocus
@@ -37,6 +39,11 @@ LIMITS = (
     "refocus range", "cross-talk",
 )  # fmt: skip
 """Rows of a camera's `quantities` that bound what can be measured."""
+
+NO_CHART = "there is no picture of a chart"
+
+_PAIRS = 8
+"""Pairs of white images whose noise is measured."""
 
 _KEPT = 0.5
 """Part of the best MTF50 that the ends of the refocus range keep."""
@@ -58,7 +65,7 @@ def datasheet(charts: Charts, *, progress: Progress = silent) -> Sheet:
     Raises
     ------
     CalibrationError
-        The white image shows no lattice.
+        The white image shows no lattice, or no more light than the dark one.
 
     References
     ----------
@@ -66,19 +73,21 @@ def datasheet(charts: Charts, *, progress: Progress = silent) -> Sheet:
     part 2, for depth: a plane at several distances, its mean error and the scatter about it.
     """
     white, dark = mean_image(charts.whites), mean_image(charts.darks) if charts.darks else None
+    bare = np.asarray(to_numpy(white.data), float) - (0.0 if dark is None else np.asarray(dark.data))
+    if bare.mean() <= 0:
+        raise CalibrationError("the white image is no brighter than the dark image. Check which is which.")
     camera = charts.camera
-    lattice, grid = _grid(white, _lattice(white, camera))
+    lattice, grid = _grid(white, _lattice(white, camera), charts.whites)
     steps = len(charts.boards) + len(charts.scenes) + 2
     progress(1 / steps)
 
     def ready(raw: RawImage) -> PreparedImage:
         return prepare(raw, lattice, white=white, dark=dark, camera=camera)
 
-    first = next((one.raw for one in charts.boards), next(iter(charts.scenes), None))
+    first = next((one.boards[0] for one in charts.boards), next(iter(charts.scenes), None))
     rendered = is_rendered(camera, ready(first)) if first is not None else camera is not None and is_rendered(
         camera, ready(white)
     )  # fmt: skip
-    bare = np.asarray(to_numpy(white.data), float) - (0.0 if dark is None else np.asarray(dark.data))
     edge, edge_entries = _edges(bare, lattice)
     entries = [*grid, *_vignetting(lattice), *_light(charts), *edge_entries]
     found: list[Plane] = []
@@ -86,16 +95,17 @@ def datasheet(charts: Charts, *, progress: Progress = silent) -> Sheet:
         found.append(_plane(seen, ready, camera, charts.spacing, rendered=rendered))
         progress(k / steps)
     found.sort(key=lambda one: math.inf if one.depth is None else one.depth)
-    for k, raw in enumerate(charts.scenes, 2 + len(found)):
-        entries += _scene(ready(raw), k - 1 - len(found), rendered=rendered)
-        progress(k / steps)
+    scenes = []
+    for k, raw in enumerate(charts.scenes, 1):
+        told, picture = scene(ready(raw), k, camera, rendered=rendered)
+        entries += [Entry(DEPTH, one.quantity, one.how) for one in told]
+        scenes.append(picture)
+        progress((1 + len(found) + k) / steps)
     entries += [*_resolution(found), *_of_depth(found), *_geometry(found)]
     if rendered:
         entries += _times_seen(found, lattice)
-    if len(charts.whites) > 1:
-        entries += _picture_noise(
-            charts, [ready(one) for one in charts.whites[:2]], camera, rendered=rendered
-        )
+    pairs = ((ready(one), ready(other)) for one, other in _pairs(charts.whites))
+    entries += _picture_noise(pairs, camera, rendered=rendered)
     profile = None if edge is None else (edge.position, edge.profile)
     limits = () if camera is None else tuple(_limits(camera))
     notes = [f"lattice: {note}" for note in lattice.notes]
@@ -105,7 +115,7 @@ def datasheet(charts: Charts, *, progress: Progress = silent) -> Sheet:
         )
     if charts.boards and charts.spacing is None:
         notes.append("the chart's spacing is not known: resolution is in cycles per sample of the picture")
-    return Sheet(charts.name, tuple(entries), tuple(found), limits, profile, tuple(notes))
+    return Sheet(charts.name, tuple(entries), tuple(found), limits, profile, tuple(notes), tuple(scenes))
 
 
 def _lattice(white: RawImage, camera: LensletCamera | None) -> Calibration:
@@ -118,15 +128,6 @@ def _lattice(white: RawImage, camera: LensletCamera | None) -> Calibration:
         return calibrate(white, layout=camera.lenslets.layout, pitch=camera.calibration.lattice.pitch)
 
 
-def mean_image(images: Sequence[RawImage]) -> RawImage:
-    """Of several raw images of one light."""
-    first = images[0]
-    if len(images) == 1:
-        return first
-    data = np.mean([np.asarray(to_numpy(one.data), float) for one in images], 0).astype(np.float32)
-    return replace(first, data=data, metadata={})
-
-
 def _entry(section: str, name: str, value: Any, unit: str, how: str, half: float | None = None) -> Entry:
     interval = None if half is None else (value - half, value + half)
     return Entry(section, Quantity(name, value, unit, interval), how)
@@ -136,27 +137,39 @@ def _missing(section: str, name: str, why: Exception | str) -> Entry:
     return Entry(section, Quantity(name, None), f"not measured: {why}")
 
 
-def _grid(white: RawImage, lattice: Calibration) -> tuple[Calibration, list[Entry]]:
-    """The lattice through the lenslets well inside the array, its pitch and its rotation."""
-    residual = _entry(
-        GRID, "residual_px", lattice.residual_px, "px", "rms distance of the centres from the lattice"
-    )
+def _grid(
+    white: RawImage, lattice: Calibration, whites: Sequence[RawImage]
+) -> tuple[Calibration, list[Entry]]:
+    """The lattice through the lenslets well inside the array, its pitch, its rotation and what is off it."""
+
+    def placed(image: RawImage) -> Fitted:
+        return places(np.asarray(to_numpy(image.data)), lattice)
+
     try:
-        found = places(np.asarray(to_numpy(white.data)), lattice)
+        found = placed(white)
+        halves = [found]
+        if len(whites) > 1:
+            halves = [placed(mean_image(islice(whites, first, None, 2))) for first in (0, 1)]
     except CalibrationError as error:
         how = f"lattice of the white image; no interval: {error}"
         return lattice, [
             _entry(GRID, "pitch_px", lattice.lattice.pitch, "px", how),
             _entry(GRID, "rotation", 1e3 * lattice.lattice.rotation, "mrad", how),
-            residual,
+            _entry(
+                GRID, "residual_px", lattice.residual_px, "px", "rms distance of the centres from the lattice"
+            ),
         ]
     (pitch, half), (turn, wide) = pitch_and_rotation(found)
+    off, ends = residual(halves)
+    noise = "noise is in it" if len(halves) == 1 else "noise, by two halves of the exposures, is not in it"
     count = len(found.spots.indices)
     how = f"straight lines through the phases of {count} micro-images well inside the white image"
     return replace(lattice, lattice=found.lattice, warp=found.warp), [
         _entry(GRID, "pitch_px", pitch, "px", how, 1.96 * half),
         _entry(GRID, "rotation", 1e3 * turn, "mrad", how, 1.96e3 * wide),
-        residual,
+        Entry(
+            GRID, Quantity("residual_px", off, "px", ends), f"rms of what phases are off the lattice; {noise}"
+        ),
     ]
 
 
@@ -181,18 +194,21 @@ def _vignetting(lattice: Calibration) -> Iterator[Entry]:
 
 def _light(charts: Charts) -> Iterator[Entry]:
     """Noise of pixels: photon transfer where flats and darks allow, and the white images' own."""
-    if len(charts.whites) > 1:
-        a, b = (np.asarray(to_numpy(one.data), float) for one in charts.whites[:2])
+    pairs = _pairs(charts.whites)
+    if pairs:
         dark = float(np.mean(np.asarray(charts.darks[0].data))) if charts.darks else 0.0
-        level = (a + b) / 2 - dark
-        bright = level > np.median(level[level > level.max() / 2]) / 2
-        off, mean = (a - b)[bright], float(level[bright].mean())
-        square = (off - off.mean()) ** 2 / 2
+        means, squares = [], []
+        for a, b in ((np.asarray(to_numpy(one.data), float) for one in pair) for pair in pairs):
+            level = (a + b) / 2 - dark
+            bright = level > np.median(level[level > level.max() / 2]) / 2
+            means.append(float(level[bright].mean()))
+            squares.append(_squared((a - b)[bright]))
+        square, mean = np.concatenate(squares), float(np.mean(means))
         if square.any():
             snr = mean / math.sqrt(square.mean())
             # Half the relative error of the variance, of pixels that are not equally bright.
             part = float(square.std() / square.mean()) / math.sqrt(4 * square.size)
-            how = f"two white images, pixels above half of the bright ones, {mean:.4g} counts in the mean"
+            how = f"{_of(len(pairs))}, pixels above half of the bright ones, {mean:.4g} counts in the mean"
             yield _entry(LIGHT, "snr_of_pixels", snr, "", how, 1.96 * snr * part)
     else:
         yield _missing(LIGHT, "snr_of_pixels", "there is one white image; two of the same light are needed")
@@ -200,6 +216,21 @@ def _light(charts: Charts) -> Iterator[Entry]:
         yield from _transfer(charts)
     except LumigraphError as error:
         yield _missing(LIGHT, "gain", error)
+
+
+def _pairs(whites: Sequence[RawImage]) -> list[tuple[RawImage, RawImage]]:
+    """Of white images, one after the other: what the lamp changes between them is little."""
+    some = whites[: 2 * _PAIRS]
+    return list(zip(some[::2], some[1::2], strict=False))
+
+
+def _of(pairs: int) -> str:
+    return "two white images" if pairs == 1 else f"{pairs} pairs of white images"
+
+
+def _squared(difference: np.ndarray) -> np.ndarray:
+    """Variance of one image by each pixel of two images' difference."""
+    return (difference - difference.mean()) ** 2 / 2
 
 
 def _transfer(charts: Charts) -> Iterator[Entry]:
@@ -259,24 +290,6 @@ def _plane(
         return Plane(seen.depth, (_missing("", "picture", error),), None)
 
 
-def _scene(ready: PreparedImage, number: int, *, rendered: bool) -> Iterator[Entry]:
-    """How sure depth is of a scene that nobody knows."""
-    name = f"depth_noise_of_scene_{number}"
-    found = planes.measured(ready, rendered=rendered).depth
-    trust = np.asarray(to_numpy(found.confidence)) >= planes.TRUSTED
-    if found.error is None or not trust.any():
-        yield _missing(DEPTH, name, "no place has a depth to trust, or the method does not tell its error")
-        return
-    error = float(np.median(np.asarray(to_numpy(found.error))[trust]))
-    how = f"median of the errors that the depth map expects, {trust.mean():.0%} of the places trusted"
-    yield _entry(DEPTH, name, error, "px/view", how)
-    low, high = (float(v) for v in found.quantiles(0.05, 0.95))
-    yield Entry(
-        DEPTH, Quantity(f"disparities_of_scene_{number}", (low, high), "px/view"),
-        "5 % and 95 % of the places, by their confidence",
-    )  # fmt: skip
-
-
 def _with(found: Sequence[Plane], name: str) -> list[tuple[Plane, Quantity, str]]:
     """Planes that have a value, it, and how it was measured."""
     hits = ((p, e) for p in found for e in p.entries if e.quantity.name == name and e.value is not None)
@@ -289,7 +302,8 @@ def _resolution(found: Sequence[Plane]) -> Iterator[Entry]:
             name = f"mtf{percent}_{zone}"
             known = _with(found, name)
             if not known:
-                yield _missing(RESOLUTION, f"best_{name}", "no picture of the chart shows enough edges")
+                why = "no picture of the chart shows enough edges" if found else NO_CHART
+                yield _missing(RESOLUTION, f"best_{name}", why)
                 continue
             plane, q, how = max(known, key=lambda one: one[1].value)
             yield Entry(
@@ -303,7 +317,8 @@ def _refocus_range(found: Sequence[Plane]) -> Entry:
     name = "refocus_range"
     known = [(p.depth, q.value) for p, q, _ in _with(found, "mtf50_middle") if p.depth is not None]
     if len(known) < 3:
-        return _missing(RESOLUTION, name, f"{len(known)} charts of known depth show edges; 3 are needed")
+        why = f"{len(known)} charts of known depth show edges; 3 are needed" if found else NO_CHART
+        return _missing(RESOLUTION, name, why)
     depths, sharp = np.array([d for d, _ in known], float), np.array([v for _, v in known], float)
     least, kept = _KEPT * sharp.max(), sharp >= _KEPT * sharp.max()
     ends = [depths[kept].min(), depths[kept].max()]
@@ -326,21 +341,23 @@ def _of_depth(found: Sequence[Plane]) -> Iterator[Entry]:
             yield Entry(
                 DEPTH, replace(q, name=f"least_{name}_noise"), f"chart at {plane.label} from the focus; {how}"
             )
-        errors = [q.value for _, q, _ in _with(found, f"{name}_error")]
-        if errors:
-            unit = _with(found, f"{name}_error")[0][1].unit
-            rms = float(np.sqrt(np.mean(np.square(errors))))
+        if errors := [q for _, q, _ in _with(found, f"{name}_error")]:
+            off = np.array([q.value for q in errors])
+            rms = float(np.sqrt(np.mean(off**2)))
             how = f"root mean square of the planes' mean errors, {len(errors)} charts, no correction"
-            yield _entry(DEPTH, f"{name}_error", rms, unit, how)
+            halves = [(q.interval[1] - q.interval[0]) / 2 for q in errors if q.interval is not None]
+            half = (
+                float(np.hypot.reduce(off * halves)) / (len(off) * rms) if len(halves) == len(off) else None
+            )
+            yield _entry(DEPTH, f"{name}_error", rms, errors[0].unit, how, half)
 
 
 def _geometry(found: Sequence[Plane]) -> Iterator[Entry]:
     for name in ("distortion", "sample_on_chart"):
         known = _with(found, name)
         if not known:
-            yield _missing(
-                GEOMETRY, name, "no picture shows enough of the chart, or its spacing is not known"
-            )
+            why = "no picture shows enough of the chart, or its spacing is not known" if found else NO_CHART
+            yield _missing(GEOMETRY, name, why)
             continue
         plane, q, how = min(known, key=lambda one: abs(one[0].depth or 0.0))
         yield Entry(GEOMETRY, q, f"chart at {plane.label} from the focus; {how}")
@@ -358,26 +375,30 @@ def _times_seen(found: Sequence[Plane], lattice: Calibration) -> Iterator[Entry]
 
 
 def _picture_noise(
-    charts: Charts, whites: list[PreparedImage], camera: LensletCamera | None, *, rendered: bool
+    pairs: Iterable[tuple[PreparedImage, PreparedImage]], camera: LensletCamera | None, *, rendered: bool
 ) -> Iterator[Entry]:
     """SNR of a picture of an even scene, as bright as the white images."""
-    pictures = []
-    for ready in whites:
+
+    def picture(ready: PreparedImage) -> np.ndarray:
         assert ready.calibration is not None  # prepared with a white image
         if rendered:
-            patch = (
-                camera.patch if camera is not None and camera.patch else ready.calibration.lattice.pitch / 3
-            )
-            picture = render(ready, ready.calibration, patch)
+            known = camera is not None and camera.patch
+            patch = camera.patch if camera is not None and known else ready.calibration.lattice.pitch / 3
+            found = render(ready, ready.calibration, patch)
         else:
-            picture = refocus(decode(ready, ready.calibration), 1.0)
-        pictures.append(planes.inner(np.asarray(to_numpy(picture), float)))
-    noise = float(np.std(pictures[0] - pictures[1])) / math.sqrt(2)
+            found = refocus(decode(ready, ready.calibration), 1.0)
+        return steady.inner(np.asarray(to_numpy(found), float))
+
+    levels, squares = [], []
+    for one, other in ((picture(one), picture(other)) for one, other in pairs):
+        levels.append((one.mean() + other.mean()) / 2)
+        squares.append(_squared(one - other))
+    noise = math.sqrt(np.mean(squares)) if squares else 0.0
     if noise > 0:
-        snr, n = float(np.mean(pictures)) / noise, pictures[0].size
+        snr, n = float(np.mean(levels)) / noise, squares[0].size
         what = "rendered" if rendered else "all views in focus"
-        how = f"two white images made into pictures, {what}, even light; {n} samples"
-        yield _entry(LIGHT, "snr_of_picture", snr, "", how, 1.96 * snr / math.sqrt(2 * n))
+        how = f"{_of(len(squares))} made into pictures, {what}, even light; {n} samples"
+        yield _entry(LIGHT, "snr_of_picture", snr, "", how, 1.96 * snr / math.sqrt(2 * n * len(squares)))
 
 
 def _limits(camera: LensletCamera) -> Iterator[tuple[str, str, str]]:

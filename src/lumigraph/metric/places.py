@@ -19,6 +19,7 @@ not hold what aliasing does to the pitch (sharp discs of 12.02 px: 8e-4 px).
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -78,11 +79,16 @@ def _traced(data: np.ndarray, model: Calibration, calibration: Calibration) -> F
     return fit(spots, model)
 
 
+def _rest(fitted: Fitted) -> np.ndarray:
+    """From the lattice and its warp to where lenslets stand (n, 2) [px]."""
+    points = fitted.lattice.position(fitted.spots.indices)
+    return fitted.spots.centers - (points if fitted.warp is None else fitted.warp.applied(points))
+
+
 def _covariance(fitted: Fitted) -> np.ndarray:
     """Of the vectors (y, x) to the next row and to the next lenslet (4, 4) [px²], with the warp's in it."""
     index, points = fitted.spots.indices, fitted.lattice.position(fitted.spots.indices)
-    ends = points if fitted.warp is None else fitted.warp.applied(points)
-    rest = fitted.spots.centers - ends
+    rest = _rest(fitted)
     flat, none = np.column_stack([np.ones(len(index)), index - index.mean(0)]), np.zeros((len(index), 3))
     design = np.concatenate([np.hstack([flat, none]), np.hstack([none, flat])])
     if (warp := fitted.warp) is not None:
@@ -111,3 +117,20 @@ def pitch_and_rotation(fitted: Fitted) -> tuple[tuple[float, float], tuple[float
     )
     pitch, turn = np.sqrt(np.einsum("ka,ab,kb->k", slopes, spread, slopes))
     return (lattice.pitch, float(pitch)), (lattice.rotation, float(turn))
+
+
+def residual(fits: Sequence[Fitted]) -> tuple[float, tuple[float, float]]:
+    """Rms distance [px] from the lattice of what `places` found on one white image or two, and its interval.
+
+    Noise is in it of one image; of two of the same light it is not, for products of what both find are
+    averaged. Lenslets err together by `TOGETHER`.
+    """
+    rests = [
+        {tuple(index): off for index, off in zip(one.spots.indices.tolist(), _rest(one), strict=True)}
+        for one in fits
+    ]
+    both = [(off, rests[-1][index]) for index, off in rests[0].items() if index in rests[-1]]
+    squares = np.array([one @ other for one, other in both])
+    mean, half = squares.mean(), 1.96 * float(squares.std()) * math.sqrt(TOGETHER / len(squares))
+    low, value, high = (math.sqrt(max(0.0, one)) for one in (mean - half, mean, mean + half))
+    return value, (low, high)

@@ -1,9 +1,10 @@
 """What a picture of the chart tells: sharpness, size, distortion and depth of its plane."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -23,16 +24,12 @@ from lumigraph.errors import LumigraphError, SamplingError
 from lumigraph.instruments import LensletCamera
 from lumigraph.instruments.capabilities import Rendered
 from lumigraph.metric.charts import Seen
+from lumigraph.metric.exposures import mean_image
 from lumigraph.metric.sheet import Entry, Plane
+from lumigraph.metric.steady import TRUSTED, mean_within, steady, trusted_median
 from lumigraph.preparation import decode, render
 from lumigraph.rendering import refocus
 from lumigraph.rendering.kind_check import focused_shift
-
-TRUSTED = 0.5
-"""Confidence from which on a place counts for depth."""
-
-_BLOCKS = 4
-"""Pieces of the field along each axis: places closer together do not err independently."""
 
 _MIDDLE = 0.5  # part of the way to the corner up to which the field is called its middle
 _LEAST_EDGES = 2
@@ -41,8 +38,6 @@ _HIGH = 0.7
 """Over the length of an edge in samples, the part by which MTF50 and MTF10 may read high: the line spread's
 tails lie outside. `benchmarks.edges` finds 0.46 ± 0.24."""
 _WHOLE = 0.8  # of the corners of the picture that shows most
-_STRAY = 4.0  # standard deviations from which on a place does not count for noise
-_TO_SIGMA = 1.4826  # of a normal distribution, over the median distance from its middle
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,31 +152,6 @@ def _one(value: float, quantity: str) -> DepthMap:
     return DepthMap(np.array([[value]]), np.ones((1, 1)), quantity)
 
 
-def trusted_median(found: DepthMap) -> float:
-    """Median of the values that are trusted.
-
-    Raises
-    ------
-    SamplingError
-        None is.
-    """
-    values = _trusted(found)
-    known = values[np.isfinite(values)]
-    if not known.size:
-        raise SamplingError("no place of the picture has a depth to trust. Use a chart with more contrast.")
-    return float(np.median(known))
-
-
-def _trusted(found: DepthMap) -> np.ndarray:
-    """Inner values (y, x); NaN of those that are not trusted."""
-    return inner(np.asarray(to_numpy(found.trusted(TRUSTED)), float))
-
-
-def inner(values: np.ndarray) -> np.ndarray:
-    """Without the outermost tenth of the field."""
-    return values[tuple(slice(n // 10, n - n // 10) for n in values.shape)]
-
-
 def plane(
     seen: Seen,
     ready: Callable[[RawImage], PreparedImage],
@@ -195,7 +165,7 @@ def plane(
     Parameters
     ----------
     seen
-        The charts.
+        The charts: the mean of the board's exposures is measured, and the depth of each exposure.
     ready
         Prepares a raw image.
     camera, spacing
@@ -203,13 +173,11 @@ def plane(
     rendered
         Whether the raw images are of a camera 2.0.
     """
-    board = ready(seen.raw)
-    textured = board if seen.texture is None else ready(seen.texture)
-    found = measured(textured, rendered=rendered)
-    views, value = found.views, trusted_median(found.depth)
-    if seen.texture is not None and not rendered:
-        views = decode(board, found.calibration)
-    entries = _depths(found, seen.depth, camera)
+    board, images = ready(mean_image(seen.boards)), seen.textures or seen.boards
+    found = measured(ready(images[0]), rendered=rendered)
+    maps = [found.depth, *(measured(ready(one), rendered=rendered).depth for one in islice(images, 1, None))]
+    views, value = None if rendered else decode(board, found.calibration), trusted_median(maps)
+    entries = _depths(found, maps, seen.depth, camera)
     try:
         if views is None:
             tried = straightest(board, value, camera)
@@ -220,6 +188,59 @@ def plane(
         return Plane(seen.depth, (*entries, _not("mtf50_middle", error)), picture)
     found_on = (*_sharpness(tried.chart, spacing), *_shape(tried, spacing))
     return Plane(seen.depth, (*found_on, *entries), tried.chart.picture)
+
+
+def scene(
+    ready: PreparedImage, number: int, camera: LensletCamera | None, *, rendered: bool
+) -> tuple[list[Entry], np.ndarray | None]:
+    """How sure depth is of a scene that nobody knows, and its picture (y, x) in focus at the median depth.
+
+    Parameters
+    ----------
+    ready
+        The raw image.
+    number
+        Of the scene, for names.
+    camera
+        For metres; None where it is not known.
+    rendered
+        Whether it is of a camera 2.0.
+    """
+    found, name = measured(ready, rendered=rendered), f"depth_noise_of_scene_{number}"
+    try:
+        value = trusted_median([found.depth])
+    except SamplingError as error:
+        return [_not(name, error)], None
+    picture = rendered_at(ready, value, camera) if found.views is None else _pictured(found.views, value)
+    entries = list(_expected(found.depth, name, f"disparities_of_scene_{number}", "px/view"))
+    if camera is not None:
+        try:
+            metres = _metres(found, [found.depth], camera)[0]
+        except LumigraphError as error:
+            return [*entries, _not(f"{name}_in_metres", error)], picture
+        names = (f"{name}_in_metres", f"depths_of_scene_{number}")
+        entries += _expected(metres, *names, "m")
+    return entries, picture
+
+
+def _expected(found: DepthMap, name: str, of_values: str, unit: str) -> Iterator[Entry]:
+    """The median of the errors that a map expects, and the range of its values."""
+    trust = np.asarray(to_numpy(found.confidence)) >= TRUSTED
+    if found.error is None:
+        yield _not(name, "the method does not tell its error")
+    else:
+        error = float(np.nanmedian(np.asarray(to_numpy(found.error))[trust]))
+        how = f"median of the errors that the depth map expects, {trust.mean():.0%} of the places trusted"
+        yield Entry("", Quantity(name, error, unit), how)
+    low, high = (float(v) for v in found.quantiles(0.05, 0.95))
+    yield Entry("", Quantity(of_values, (low, high), unit), "5 % and 95 % of the places, by their confidence")
+
+
+def _metres(got: Found, maps: Sequence[DepthMap], camera: LensletCamera) -> list[DepthMap]:
+    """Depths [m] from the plane in focus."""
+    f, focused = camera.main_lens.focal_length, camera.object_distance
+    source = got.calibration if got.views is None else got.views
+    return [depth.metric(one, source, focal_length=f, object_distance=focused) for one in maps]
 
 
 def _not(name: str, error: Exception | str) -> Entry:
@@ -292,11 +313,13 @@ def _half(error: float, freedom: int, sway: float) -> float:
     return math.hypot(float(student.ppf(0.975, max(freedom, 1))) * error, 1.96 * sway)
 
 
-def _depths(got: Found, true: float | None, camera: LensletCamera | None) -> list[Entry]:
+def _depths(
+    got: Found, maps: Sequence[DepthMap], true: float | None, camera: LensletCamera | None
+) -> list[Entry]:
     """Virtual depth and metres: what was found, its error and its noise."""
     name = "disparity" if got.views is not None else "patch"
     unit = "px/view" if name == "disparity" else "px"
-    entries = _steady(got.depth, name, unit)
+    entries = steady(maps, name, unit)
     if camera is None:
         return entries
     if true is not None and isinstance(camera, Rendered):
@@ -309,15 +332,11 @@ def _depths(got: Found, true: float | None, camera: LensletCamera | None) -> lis
     if not math.isnan(expected):
         how = f"{name} measured less that of the camera file at the chart's depth"
         entries.append(_less(entries[0], f"{name}_error", expected, how))
-    source = got.calibration if got.views is None else got.views
     try:
-        metres = depth.metric(
-            got.depth, source, focal_length=camera.main_lens.focal_length,
-            object_distance=camera.object_distance,
-        )  # fmt: skip
+        metres = _metres(got, maps, camera)
     except LumigraphError as error:
         return [*entries, _not("depth", error)]
-    found = _steady(metres, "depth", "m")
+    found = steady(metres, "depth", "m")
     if true is not None and found[0].value is not None:
         how = "depth by the camera file's lengths, less where the chart stood"
         found.append(_less(found[0], "depth_error", true, how))
@@ -329,56 +348,7 @@ def _less(entry: Entry, name: str, reference: float, how: str) -> Entry:
     if q.value is None:
         return _not(name, entry.how)
     ends = None if q.interval is None else (q.interval[0] - reference, q.interval[1] - reference)
-    return Entry("", Quantity(name, q.value - reference, q.unit, ends), how)
-
-
-def _steady(found: DepthMap, name: str, unit: str) -> list[Entry]:
-    """The plane's value over the field, and how much single places scatter about it."""
-    values = _trusted(found)
-    known = values[np.isfinite(values)]
-    if known.size < _BLOCKS**2:
-        return [_not(name, f"{known.size} places with a confidence above {TRUSTED:g}")]
-    value, interval = mean_within([float(np.median(part)) for part in _blocks(values)])
-    noise, ends = _scatter(values)
-    part = f"{known.size / values.size:.0%} of the places, those with a confidence above {TRUSTED:g}"
-    mean = f"mean of {len(_blocks(values))} parts of the field; {part}"
-    spread = f"standard deviation of the places, strays beyond {_STRAY:g} of them left out; {part}"
-    return [
-        Entry("", Quantity(name, value, unit, interval), mean),
-        Entry("", Quantity(f"{name}_noise", noise, unit, ends), spread),
-    ]
-
-
-def _blocks(values: np.ndarray) -> list[np.ndarray]:
-    """Known values of the pieces of the field that have three or more."""
-    pieces = [
-        part[np.isfinite(part)]
-        for rows in np.array_split(values, _BLOCKS, axis=0)
-        for part in np.array_split(rows, _BLOCKS, axis=1)
-    ]
-    return [part for part in pieces if part.size >= 3]
-
-
-def _scatter(values: np.ndarray) -> tuple[float, tuple[float, float] | None]:
-    """Standard deviation of values without strays, and its interval by how pieces of the field differ."""
-    middle = np.nanmedian(values)
-    typical = _TO_SIGMA * np.nanmedian(np.abs(values - middle))
-    near = np.where(np.abs(values - middle) <= _STRAY * typical, values - middle, np.nan)
-    squares = [float(np.mean(part**2)) for part in _blocks(near)]
-    noise, (_, interval) = float(np.nanstd(near)), mean_within(squares)
-    if interval is None:
-        return noise, None
-    low, high = (math.sqrt(max(0.0, end)) for end in interval)
-    return noise, (min(low, noise), max(high, noise))
-
-
-def mean_within(values: Sequence[float]) -> tuple[float, tuple[float, float] | None]:
-    """Mean and its 95 % interval, by Student's t; None of a single value."""
-    n, mean = len(values), float(np.mean(values))
-    if n < 2:
-        return mean, None
-    half = float(student.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
-    return mean, (mean - half, mean + half)
+    return Entry("", Quantity(name, q.value - reference, q.unit, ends), how, entry.repeats)
 
 
 def is_rendered(camera: LensletCamera | None, ready: PreparedImage) -> bool:

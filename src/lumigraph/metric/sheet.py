@@ -8,6 +8,7 @@ from typing import Any
 from lumigraph.core.brief import brief
 from lumigraph.core.result import Quantity
 
+_WRITTEN = (("mtf", "MTF"), ("snr", "SNR"), ("micro image", "micro-image"), ("cross talk", "cross-talk"))
 _PREFIXES = ((1.0, "m"), (1e3, "mm"), (1e6, "µm"), (1e9, "nm"))
 
 
@@ -23,11 +24,15 @@ class Entry:
         Name, value, unit and 95 % interval; a value of None was not measured.
     how
         How it was measured, or why it could not be.
+    repeats
+        How far two sets of as many exposures differ at most, in 95 of 100 cases, in the value's unit; None
+        where it was not measured.
     """
 
     section: str
     quantity: Quantity
     how: str
+    repeats: float | None = None
 
     @property
     def value(self) -> Any:
@@ -35,12 +40,24 @@ class Entry:
         return self.quantity.value
 
     @property
+    def label(self) -> str:
+        """The name as people read it."""
+        words = self.quantity.label
+        for plain, written in _WRITTEN:
+            words = words.replace(plain, written)
+        return words
+
+    @property
     def text(self) -> str:
         """The value as people read it."""
         if self.value is None:
             return "not measured"
         q = _on_chart(self.quantity) if self.quantity.unit == "1/m" else self.quantity
-        return str(q) if q.interval is None else _to_interval(q)
+        if q.interval is not None:
+            return _to_interval(q)
+        if isinstance(q.value, tuple) and q.unit != "m":
+            return f"{' to '.join(f'{one:.3g}' for one in q.value)} {q.unit}".rstrip()
+        return str(q)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,6 +107,8 @@ class Sheet:
         Positions [px] from the middle of a micro-image to the next, and the mean light there.
     notes
         What to know, one sentence each.
+    scenes
+        Pictures (y, x) of scenes, in focus at their median depth; None of one without any depth.
     """
 
     name: str
@@ -98,6 +117,7 @@ class Sheet:
     limits: tuple[tuple[str, str, str], ...]
     profile: tuple[Any, Any] | None
     notes: tuple[str, ...]
+    scenes: tuple[Any, ...] = ()
 
     __repr__ = brief
 
@@ -116,7 +136,8 @@ class Sheet:
                 q = one.quantity
                 yield {
                     "camera": self.name, "section": one.section or "Planes", "name": q.name, "value": q.value,
-                    "unit": q.unit, "interval": q.interval, "chart_depth": depth, "how": one.how,
+                    "unit": q.unit, "interval": q.interval, "repeats": one.repeats, "chart_depth": depth,
+                    "how": one.how,
                 }  # fmt: skip
 
 

@@ -12,8 +12,8 @@ from lumigraph.errors import GeometryError
 from lumigraph.instruments import LensletCamera
 from lumigraph.instruments.capabilities import Rendered
 from lumigraph.metric import planes
-from lumigraph.metric.charts import check_camera, simulate_charts
-from lumigraph.metric.datasheet import mean_image
+from lumigraph.metric.exposures import mean_image
+from lumigraph.metric.lights import Lights
 from lumigraph.preparation import decode, prepare
 from lumigraph.rendering import refocus
 
@@ -60,11 +60,12 @@ def simulated(
     for name in names:
         if not is_measure(name):
             raise GeometryError(f"{name!r} is not measured. Give {', '.join(MEASURES)} or mtf@10/mm.")
-    charts = simulate_charts(check_camera(camera), (0.0,), rng=rng, textured=False, accuracy=_ACCURACY)
+    lights = Lights.of(camera, (0.0,), textured=False, accuracy=_ACCURACY)
+    charts = lights.exposed(np.random.default_rng(0) if rng is None else rng, exposures=1)
     assert charts.spacing is not None  # it is simulated
     white, dark = mean_image(charts.whites), mean_image(charts.darks)
     lattice = calibrate(white)
-    ready = prepare(charts.boards[0].raw, lattice, white=white, dark=dark, camera=camera)
+    ready = prepare(charts.boards[0].boards[0], lattice, white=white, dark=dark, camera=camera)
     if isinstance(camera, Rendered) and planes.is_rendered(camera, ready):
         tried = planes.straightest(ready, camera.patch_at(0.0), camera)
     else:
