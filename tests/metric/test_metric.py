@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import lumigraph as lg
 from data_folder import DATA
-from lumigraph.metric import Board, Corners, MetricCamera, Nominal, board, geometry, triangulate
+from lumigraph.metric import Board, Corners, MetricCamera, Nominal, board, calibration, geometry, triangulate
 from lumigraph.metric.noise import Noise
 
 from .scenes import BOARD, CAMERA, NOMINAL, corners
@@ -81,6 +81,16 @@ def test_a_drawn_camera_comes_back_within_its_intervals(measured: lg.metric.Meas
     names = {(one, other) for one, other, _ in measured.tied()}
     assert ("f", "L") in names
     assert any("f and L change the pictures alike" in note for note in measured.notes)
+
+
+def test_lengths_that_are_not_known_to_one_per_cent_are_named(measured: lg.metric.Measured) -> None:
+    """f, and L and distances with it, rest on the 2 % of a data sheet."""
+    note = next(one for one in measured.notes if one.startswith("not known to 1%"))
+    half = 196 * measured.errors[0] / measured.camera.focal_length
+    assert f"f ± {half:.2g} %, L ± " in note
+    assert "the board's distance ± " in note
+    sure = dataclasses.replace(measured, covariance=1e-6 * measured.covariance, poses=())
+    assert not list(calibration._unsure(sure))
 
 
 def test_noise_that_lenslets_share_widens_the_intervals(measured: lg.metric.Measured) -> None:

@@ -50,6 +50,14 @@ def test_every_picture_of_a_plan_tells_more_and_tilted_ones_come_first(plan) -> 
     assert sum(best.errors / plan.camera.numbers[:3]) < sum(only.errors / plan.camera.numbers[:3])
 
 
+def test_a_plan_says_how_many_pictures_tell_a_length(plan) -> None:
+    """f stays at the 2 % of its prior; b gets better with each."""
+    part = 1.96 * plan.steps[3].errors[2] / plan.camera.numbers[2]
+    assert plan.enough(1.0001 * part)[2] == 4
+    assert plan.enough(0.9999 * part)[2] == 5
+    assert plan.enough(0.01)[0] is None
+
+
 def test_the_ideal_camera_of_a_file_has_its_patches() -> None:
     camera = lg.FocusedPlenopticCamera.from_catalogue("thesis-plenoptic-2-m050")
     ideal = metric.MetricCamera.of(camera)

@@ -121,6 +121,10 @@ class Known:
         return lenslets, seen
 
 
+_WELL = 0.01
+"""Half an interval over a length, up to which it is called known."""
+
+
 def board(
     sources: Annotated[tuple[Path, ...], Parameter(negative="")],
     /,
@@ -265,8 +269,22 @@ def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int)
     lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in table]
     return Result(
         "Plan", f"{pictures} pictures of a board to take, the most telling first.", found, tuple(lines),
-        found.quantities(), lambda: iter((Figure(table, section="Pictures"),)), _hardly_told(found, nominal),
+        found.quantities(), lambda: iter((Figure(table, section="Pictures"),)),
+        (_enough(found), *_hardly_told(found, nominal)),
     )  # fmt: skip
+
+
+def _enough(found: "Plan") -> str:
+    """From which picture on lengths are known to 1 %, and how well the others are with all."""
+    lengths, errors = found.camera.numbers, found.steps[-1].errors
+    well, badly = [], []
+    for name, count, length, error in zip("fLb", found.enough(_WELL), lengths, errors, strict=False):
+        if count is None:
+            badly.append(f"{name} (± {196 * error / length:.2g} %)")
+        else:
+            well.append(f"{name} from picture {count} on")
+    told = f"known to {_WELL:.0%}, in 95 of 100 cases: {', '.join(well) or 'no length'}"
+    return told + (f"; not with all {len(found.steps)} pictures: {', '.join(badly)}" if badly else "")
 
 
 def _hardly_told(found: "Plan", nominal: "Nominal") -> tuple[str, ...]:

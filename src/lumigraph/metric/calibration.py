@@ -30,6 +30,9 @@ _BENT = 5e-4
 
 _LENGTHS = ("f", "L", "b")
 
+_WELL = 0.01
+"""Half a 95 % interval over a length, beyond which a note names it."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
@@ -247,7 +250,8 @@ def _measured(found: Adjusted, corners: Corners, board: Board, nominal: Nominal,
         expected = math.sqrt(float(np.mean(found.own[mine] ** 2)) + found.noise.shared**2)
         pose = found.poses[k]
         poses.append(Pose(frame, pose[:3], pose[3:], found.covariance[rows, rows], off, expected))
-    return replace(result, poses=tuple(poses), notes=tuple(_notes(result, nominal, unused)))
+    result = replace(result, poses=tuple(poses))
+    return replace(result, notes=tuple(_notes(result, nominal, unused)))
 
 
 def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
@@ -262,6 +266,11 @@ def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
             f"the pictures hardly tell the focal length: {f * 1e3:.2f} mm rests on the {given * 1e3:.2g} mm "
             "to which it was known, and distances with it. While the exit pupil is free, other poses of the "
             "board hardly change that; a focal length that was measured does"
+        )
+    if unsure := ", ".join(_unsure(result)):
+        yield (
+            f"not known to {_WELL:.0%}, in 95 of 100 cases: {unsure}. `lumigraph board plan` says which "
+            "pictures tell more, and what none tells"
         )
     for one, other, how in result.tied():
         if one in _LENGTHS or other in _LENGTHS:
@@ -278,6 +287,16 @@ def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
         )
     if result.left_out:
         yield f"{result.left_out} places fit no corner and were left out"
+
+
+def _unsure(result: Measured) -> Iterator[str]:
+    """Lengths whose 95 % intervals are wide, and by how much."""
+    known = list(zip(_LENGTHS, result.camera.numbers.tolist(), result.errors.tolist(), strict=False))
+    far = [(pose.shift[0], math.sqrt(pose.covariance[3, 3])) for pose in result.poses]
+    worst = max(far, key=lambda one: one[1] / one[0], default=(1.0, 0.0))
+    for name, length, error in (*known, ("the board's distance", *worst)):
+        if 1.96 * error > _WELL * abs(length):
+            yield f"{name} ± {196 * error / abs(length):.2g} %"
 
 
 def _check(corners: Corners, board: Board) -> None:
