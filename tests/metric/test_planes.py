@@ -1,5 +1,8 @@
 """What pictures of a chart tell."""
 
+from types import SimpleNamespace
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 
@@ -75,3 +78,32 @@ def test_short_edges_read_high_within_their_interval(cut):
     assert low < true < high
     assert low < true < 2 * found.value - high  # below what the scatter holds
     assert found.value - low < 0.06 * true
+
+
+class Edge(NamedTuple):
+    """An edge that half contrast, or a tenth of it, is known of."""
+
+    half: float
+    mtf: np.ndarray = np.linspace(1, 0, 20)
+
+    def at(self, contrast):
+        return self.half if contrast == 0.5 else 2 * self.half
+
+
+def test_edges_that_noise_spoils_are_left_out():
+    """One of 16 reads six times as high: their mean would be a third too high."""
+    rng = np.random.default_rng(1)
+    halves = [*rng.normal(0.3, 0.01, 15), 1.8]
+    chart = SimpleNamespace(
+        picture=np.zeros((100, 100)), spacing=22.0, edge_length=17,
+        edges=lambda: ((np.array([50.0, 50.0]), Edge(half)) for half in halves),
+    )  # fmt: skip
+    entries = {one.quantity.name: one for one in planes._sharpness(chart, None)}
+    assert entries["mtf50_middle"].value == pytest.approx(0.3, abs=0.01)
+    assert "mean over 15 slanted edges" in entries["mtf50_middle"].how
+    assert "1 far off the others left out" in entries["mtf50_middle"].how
+    halves[7:] = []  # too few to tell a stray
+    assert (
+        "mean over 7"
+        in {one.quantity.name: one for one in planes._sharpness(chart, None)}["mtf10_middle"].how
+    )

@@ -278,9 +278,9 @@ def _enough(found: "Plan") -> str:
     """From which picture on lengths are known to 1 %, and how well the others are with all."""
     lengths, errors = found.camera.numbers, found.steps[-1].errors
     well, badly = [], []
-    for name, count, length, error in zip("fLb", found.enough(_WELL), lengths, errors, strict=False):
+    for name, count, value, error in zip("fLb", found.enough(_WELL), lengths, errors, strict=False):
         if count is None:
-            badly.append(f"{name} (± {196 * error / length:.2g} %)")
+            badly.append(f"{name} (± {196 * error / value:.2g} %)")
         else:
             well.append(f"{name} from picture {count} on")
     told = f"known to {_WELL:.0%}, in 95 of 100 cases: {', '.join(well) or 'no length'}"

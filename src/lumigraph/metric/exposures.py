@@ -1,5 +1,6 @@
 """Several exposures of one light, read or drawn only when they are asked for, and their mean."""
 
+from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,9 +22,9 @@ class Exposures(Sequence[RawImage]):
     A child says how many there are, and gives each.
     """
 
+    @abstractmethod
     def one(self, number: int) -> RawImage:
         """The raw image of a number from 0."""
-        raise NotImplementedError
 
     @overload
     def __getitem__(self, index: int) -> RawImage: ...

@@ -26,7 +26,7 @@ from lumigraph.instruments.capabilities import Rendered
 from lumigraph.metric.charts import Seen
 from lumigraph.metric.exposures import mean_image
 from lumigraph.metric.sheet import Entry, Plane
-from lumigraph.metric.steady import TRUSTED, mean_within, steady, trusted_median
+from lumigraph.metric.steady import TRUSTED, mean_within, steady, trusted_median, without_strays
 from lumigraph.preparation import decode, render
 from lumigraph.rendering import refocus
 from lumigraph.rendering.kind_check import focused_shift
@@ -274,13 +274,16 @@ def _sharpness(chart: Chart, spacing: float | None) -> list[Entry]:
             width = f"squares are {chart.spacing:.3g} samples wide"
             entries.append(_not(name, f"{len(values)} edges there, {_LEAST_EDGES} are needed; {width}"))
             continue
-        value, interval = mean_within(values)
+        near = without_strays(values)
+        value, interval = mean_within(near)
         if interval is not None:
             interval = (interval[0] - _HIGH / chart.edge_length * value, interval[1])
         how = (
-            f"mean over {len(values)} slanted edges of the chart, {chart.edge_length} samples long, "
+            f"mean over {len(near)} slanted edges of the chart, {chart.edge_length} samples long, "
             "ISO 12233, pixels' blur included"
         )
+        if strays := len(values) - len(near):
+            how += f"; {strays} far off the others left out"
         entries.append(Entry("", Quantity(name, value, unit, interval), how))
     return entries
 

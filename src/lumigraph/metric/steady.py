@@ -26,7 +26,8 @@ REPEATED = 2.0
 _BLOCKS = 4
 """Pieces of the field along each axis: places closer together do not err independently."""
 
-_STRAY = 4.0  # standard deviations from which on a place does not count for noise
+_SEVERAL = 8  # values from which strays can be told
+_STRAY = 4.0  # standard deviations from which on a value does not count
 _TO_SIGMA = 1.4826  # of a normal distribution, over the median distance from its middle
 
 
@@ -62,6 +63,14 @@ def mean_within(values: Sequence[float] | np.ndarray) -> tuple[float, tuple[floa
         return mean, None
     half = float(student.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
     return mean, (mean - half, mean + half)
+
+
+def without_strays(values: Sequence[float]) -> list[float]:
+    """Those nearer to the median than `_STRAY` standard deviations, told by the others; all of a few."""
+    known = np.array(values, float)
+    away = np.abs(known - np.median(known))
+    near = away <= _STRAY * _TO_SIGMA * np.median(away)
+    return known[near].tolist() if len(known) >= _SEVERAL else known.tolist()
 
 
 def steady(found: Sequence[DepthMap], name: str, unit: str) -> list[Entry]:
