@@ -212,7 +212,8 @@ def scene(
     except SamplingError as error:
         return [_not(name, error)], None
     picture = rendered_at(ready, value, camera) if found.views is None else _pictured(found.views, value)
-    entries = list(_expected(found.depth, name, f"disparities_of_scene_{number}", "px/view"))
+    values, unit = ("patches", "px") if rendered else ("disparities", "px/view")
+    entries = list(_expected(found.depth, name, f"{values}_of_scene_{number}", unit))
     if camera is not None:
         try:
             metres = _metres(found, [found.depth], camera)[0]
