@@ -17,7 +17,7 @@ from lumigraph.errors import CalibrationError, FormatError, GeometryError
 from lumigraph.metric import steady
 from lumigraph.metric.charts import check_camera
 from lumigraph.metric.exposures import Drawn, Files, mean_image
-from lumigraph.metric.lights import usual_depths
+from lumigraph.metric.lights import usual_depths, usual_exposures
 from lumigraph.metric.places import places, residual
 from lumigraph.samples.files import camera_file
 
@@ -279,6 +279,11 @@ def test_a_folder_holds_several_exposures_of_a_chart(tmp_path, drawn):
     assert 'board = ["board-1-1.tiff", "board-1-2.tiff"]' in text
     (tmp_path / "charts.toml").write_text(text.replace('["texture-1-1.tiff"]', '"texture-1-1.tiff"'))
     assert len(lg.metric.read_charts(tmp_path).boards[0].textures) == 1
+
+
+@pytest.mark.parametrize(("side", "count"), [(800, 16), (3157, 4), (9000, 2)])
+def test_large_sensors_are_exposed_less_often(camera, side, count):
+    assert usual_exposures(camera.replace(sensor={"shape": (side, side)})) == count
 
 
 def test_simulated_charts_have_one_exposure_or_more(camera):

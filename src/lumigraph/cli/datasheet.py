@@ -29,7 +29,7 @@ def datasheet(
     *,
     camera: str | None = None,
     depths: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
-    exposures: int = 16,
+    exposures: int | None = None,
     seed: int = 1,
     accuracy: float = 1e-2,
     charts: Path | None = None,
@@ -59,8 +59,8 @@ def datasheet(
         Where simulated charts stand, from the plane in focus, such as --depths '-5 mm' --depths '0 mm'; five
         distances over what the camera refocuses if left out.
     exposures
-        Of each simulated chart, white and dark image. The sheet says how far two such sets
-        differ, and how many exposures it takes to 2 %.
+        Of each simulated chart, white and dark image; 16, or fewer of a large sensor, if left out. The sheet
+        says how far two such sets differ, and how many exposures it takes to 2 %.
     seed
         Of the simulated sensor's noise.
     accuracy
@@ -97,7 +97,7 @@ def datasheet(
 def _charts(
     source: str,
     camera: str | None,
-    how: tuple[list[float] | None, float, int],
+    how: tuple[list[float] | None, float, int | None],
     seed: int,
     tell: "Progress",
 ) -> "Charts":
@@ -208,8 +208,8 @@ def _planes(planes: "Sequence[Plane]") -> list[list[str]]:
     rows = [["chart at", *(plane.label for plane in planes)]]
     for name in _COLUMNS:
         found = [next((e for e in plane.entries if e.quantity.name == name), None) for plane in planes]
-        if any(one is not None and one.value is not None for one in found):
-            rows.append([name.replace("_", " "), *(_NONE if one is None else one.text for one in found)])
+        if known := [one for one in found if one is not None and one.value is not None]:
+            rows.append([known[0].label, *(_NONE if one is None else one.text for one in found)])
     return rows
 
 

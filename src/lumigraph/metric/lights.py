@@ -26,7 +26,10 @@ ACCURACY = 1e-2
 """Of simulated charts, as good as their noise: at 1e-3 an image out of focus may take minutes."""
 
 EXPOSURES = 16
-"""Of each light. What noise of depth needs more for, the sheet says."""
+"""Of each light, of small sensors. What noise of depth needs more for, the sheet says."""
+
+_PIXELS = 40e6
+"""Of all exposures of a light together: the sheet of five planes then takes some minutes."""
 
 _FLATS = (0.1, 0.25, 0.45, 0.65)  # the same of further white images, for photon transfer
 _CELL = 22.0  # samples of the picture to a square, of the farthest chart
@@ -52,13 +55,19 @@ def usual_depths(camera: LensletCamera) -> tuple[float, ...]:
     return tuple(sorted(set(found)))
 
 
+def usual_exposures(camera: LensletCamera) -> int:
+    """Of each light: fewer of a large sensor, whose many places make up for it."""
+    rows, columns = camera.sensor.shape
+    return int(np.clip(_PIXELS / (rows * columns), 2, EXPOSURES))
+
+
 def simulate_charts(
     camera: LensletCamera,
     depths: Sequence[float] | None = None,
     *,
     name: str = "camera",
     rng: np.random.Generator | None = None,
-    exposures: int = EXPOSURES,
+    exposures: int | None = None,
     accuracy: float = ACCURACY,
     progress: Progress = silent,
 ) -> Charts:
@@ -75,7 +84,7 @@ def simulate_charts(
     rng
         Random numbers of the noise.
     exposures
-        Of each chart, of the white and of the dark image.
+        Of each chart, of the white and of the dark image; None for `usual_exposures`.
     accuracy
         Of the charts' pictures, relative rms; the white image's is 1e-3.
     progress
@@ -87,7 +96,9 @@ def simulate_charts(
         Another kind of camera, or a depth inside the focal length.
     """
     rng = np.random.default_rng(0) if rng is None else rng
-    count = checks.whole("exposures", exposures)
+    count = (
+        usual_exposures(check_camera(camera)) if exposures is None else checks.whole("exposures", exposures)
+    )
     lights = Lights.of(camera, depths, accuracy=accuracy, progress=progress)
     return lights.exposed(rng, name, exposures=count)
 
