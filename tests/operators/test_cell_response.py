@@ -108,8 +108,8 @@ def one_by_one(lenslets, center, limits):
         for x, focal_length in members:
             at = [c + p + a.window for c, p, a in zip(center, (place, x), one.window, strict=True)]
             around = (down @ light(at[0][:, None], at[1]) @ across.T).ravel()
-            few = (around @ one.kept @ one.matrix(place, x, focal_length)).reshape(one.modes[0].shape[1], -1)
-            field += one.carried(0, place) @ few @ one.carried(1, x).T
+            few = np.linalg.multi_dot([around, one.kept, *one.matrices(place, x, focal_length)])
+            field += one.carried(0, place) @ few.reshape(one.modes[0].shape[1], -1) @ one.carried(1, x).T
     phase = (np.exp(1j * np.pi * a.image**2 / (WAVELENGTH * DISTANCE)) for a in axes)
     return field * np.outer(*phase)
 

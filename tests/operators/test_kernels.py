@@ -196,6 +196,17 @@ def test_products_are_as_precise_as_the_faintest_strength_needs(rng, least, coun
     assert np.linalg.norm(found_left @ found_right - dense) < 1.2 * 10.0**-count
 
 
+def test_factors_leave_out_hardly_more_than_the_fewest_that_there_are(rng):
+    """Strengths that fall by a tenth from one to the next: what is left out, beside singular values."""
+    left, right = (np.linalg.qr(rng.standard_normal((n, 90)))[0] for n in (90, 300))
+    dense = ((left * 0.9 ** np.arange(90)) @ right.T).astype(np.float32)
+    found_left, found_right, kept = factors.strongest(dense, None, 1.5e-2)
+    fewest = np.linalg.svd(dense, compute_uv=False)[len(kept) :]
+    assert len(kept) == 40
+    np.testing.assert_allclose(found_left.T @ found_left, np.eye(len(kept)), atol=1e-5)
+    assert np.linalg.norm(found_left @ found_right - dense) < 1.03 * np.linalg.norm(fewest)
+
+
 @pytest.mark.parametrize("points", [60, 4])
 def test_a_block_of_many_patterns_is_not_cut_short(rng, points):
     """Few points stand in a cell where the main lens is small."""
@@ -301,6 +312,20 @@ def test_factors_of_half_precision_give_the_block_back(rng):
     for k in range(6):
         found = np.outer(wide[:, k], narrow[k].astype(np.float32))
         assert np.linalg.norm(found - np.outer(left[:, k], right[k])) < 3e-4 * np.linalg.norm(found)
+
+
+def test_light_of_a_far_lenslet_comes_by_way_of_few_numbers():
+    """But for as little as is left out of it anyway; that of a near one comes as it is."""
+    camera = cameras.focused(shape="round", pitch=200 * um, pixel_pitch=9 * um)
+    builder = blocks.Builder(Optics.of(camera, 122 * mm, 1e-3), lambda _: None, 1)
+    light, (focal_length,) = builder.apart, {builder.optics.array.focal_length}
+    assert len(light.matrices(0.0, 0.0, focal_length)) == 1
+    for pitches, most in ((2, 30), (4, 10)):
+        at = 0.0, pitches * builder.optics.array.lattice.pitch, focal_length
+        first, rest = light.matrices(*at)
+        assert 0 < first.shape[1] < most
+        left_out = np.linalg.norm(first @ rest - light._quadrature(*at), 2)
+        assert left_out < 1.2 * light.faintest * np.linalg.norm(light._quadrature(0.0, 0.0, focal_length), 2)
 
 
 @pytest.mark.parametrize("layout", ["hex", "round"])

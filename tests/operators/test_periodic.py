@@ -366,7 +366,7 @@ def test_what_takes_too_long_to_build_is_refused_at_once(monkeypatch):
 
     monkeypatch.setattr(memory, "available", lambda: 2**40)
     camera = FocusedPlenopticCamera.from_catalogue("multi-focus-hex")
-    refusal = r"3e\+15 operations to build, .* An accuracy of 0\.0001 fits \(\S+ GiB, some \S+ min"
+    refusal = r"2e\+15 operations to build, .* An accuracy of 0\.0001 fits \(\S+ GiB, some \S+ min"
     with pytest.raises(SamplingError, match=refusal):
         periodic_operator(camera, Grid((4, 4), 30 * um), accuracy=1e-5)
 

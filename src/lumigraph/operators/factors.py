@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
+from scipy.linalg import get_lapack_funcs
 
 _BLOCK = 2**21
 """Numbers worked on at a time."""
@@ -15,6 +16,11 @@ _LOST = 32 * float(np.finfo(np.float32).eps)
 
 _FAINT = 1000.0
 """Norm of a block over the faintest strength that counts from which a fifth of its points tell too little."""
+
+(_pivoted_cholesky,) = get_lapack_funcs(("pstrf",), dtype=np.float64)
+
+LEFT = 0.3
+"""Part of the faintest strength that counts which rows may keep when no more of them are taken."""
 
 Key = TypeVar("Key")
 
@@ -77,8 +83,8 @@ def factors(block: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np
     if norm < _FAINT * least:
         sketch = np.random.default_rng(0).standard_normal((points, math.ceil(points / 5)), np.float32)
         basis = np.linalg.qr(block @ (block.T @ sketch))[0]
-        left, right, strength, weakest = _strongest(basis.T @ block, least)
-        if weakest < least / 2:
+        left, right, strength, all_told = _strongest(basis.T @ block, least)
+        if all_told:
             return basis @ left, right, strength
     return strongest(block, None, least)
 
@@ -92,17 +98,31 @@ def strongest(
 
 def _strongest(
     rows: np.ndarray, least: float, weights: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Orthonormal left factors, right ones, their strengths above `least`, and the weakest of all."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+    """Orthonormal left factors, right ones, strengths above `least`, and whether so few tell all."""
     products = _products(rows, least)
     if weights is not None:
         products = weights @ products @ weights.T
-    strength, vectors = np.linalg.eigh(products)
-    strength = np.sqrt(np.maximum(strength, 0))
-    kept = strength > least
-    left = vectors[:, kept].astype(np.float32)
+    vectors, strength, all_told = _patterns(products, least)
+    left = vectors.astype(np.float32)
     across = left.T if weights is None else left.T @ weights
-    return left, across @ rows, strength[kept], float(strength[0])
+    return left, across @ rows, strength, all_told
+
+
+def _patterns(products: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Eigenvectors (n, r) of rows' products and their strengths above `least`, and whether so few tell all.
+
+    A pivoted Cholesky decomposition takes row after row until none has more than `LEFT` of that strength
+    left, which is about as many as there are patterns; only those need an eigenvalue decomposition.
+    """
+    triangle, order, rank, _ = _pivoted_cholesky(products, tol=(LEFT * least) ** 2, lower=1)
+    lower = np.tril(triangle)[:, :rank]
+    squared, turn = np.linalg.eigh(lower.T @ lower)
+    kept = squared > least**2
+    strength = np.sqrt(squared[kept])
+    vectors = np.empty((len(products), len(strength)))
+    vectors[order - 1] = lower @ (turn[:, kept] / strength)
+    return vectors, strength, rank < len(products)
 
 
 def _products(rows: np.ndarray, least: float) -> np.ndarray:

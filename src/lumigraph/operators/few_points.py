@@ -75,7 +75,7 @@ def few(
     samples = light.axes[0].samples * light.axes[1].samples
     fields = np.empty((len(rows), len(columns), samples), np.complex64)
 
-    _ = light.table  # computed once, not by each thread
+    light.prepare(lenslets, workers)
     step = max(1, AT_A_TIME // (len(columns) * samples))
 
     def fill(first: int) -> None:
@@ -152,15 +152,18 @@ def chosen(block: np.ndarray, least: float) -> Chosen:
 def _folded(block: np.ndarray, count: int) -> np.ndarray:
     """Sums (points, count) of a block's samples, each sample in `FOLDS` of them with a sign by chance.
 
-    A choice of samples would miss what stands at the edge of a cell.
+    A choice of samples would miss what stands at the edge of a cell. Samples keep their neighbours, so that
+    they are read in order; of `count` that follow one another no two are in one sum.
     """
     points, samples = block.shape
     if count >= samples:
         return block
-    rng, times = np.random.default_rng(0), math.ceil(samples / count)
-    sums, shuffled = np.zeros((points, count), np.float32), np.zeros((points, times * count), np.float32)
-    for _ in range(FOLDS):
-        signs = rng.choice((-1, 1), samples).astype(np.float32)
-        np.multiply(block[:, rng.permutation(samples)], signs, out=shuffled[:, :samples])
-        sums += shuffled.reshape(points, times, count).sum(1)
+    rng, sums = np.random.default_rng(0), np.zeros((points, count), np.float32)
+    for first in range(0, samples, count):
+        part = block[:, first : first + count]
+        for _ in range(FOLDS):
+            signs, start = rng.choice((-1, 1), part.shape[1]).astype(np.float32), int(rng.integers(count))
+            signed, end = part * signs, count - start
+            sums[:, start : start + signed.shape[1]] += signed[:, :end]
+            sums[:, : max(0, signed.shape[1] - end)] += signed[:, end:]
     return sums / math.sqrt(FOLDS)

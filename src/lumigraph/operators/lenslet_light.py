@@ -11,14 +11,14 @@ of those that are added up.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from lumigraph.core.threads import each
-from lumigraph.operators.cell_response import STEP, Axis, Lenslets, legendre, nodes
+from lumigraph.operators.cell_response import STEP, Axis, Lenslets, focal_lengths, legendre, nodes
 from lumigraph.operators.point_images import Wave, through
 
 Pair = tuple[float, float]
@@ -27,7 +27,11 @@ Row = tuple[float, Sequence[Pair]]
 """Lenslets that stand in a row: their y from a cell's centre [m], and their x and focal length."""
 
 FAINTEST = 0.3
-"""Part of the accuracy that a lenslet's few numbers may leave out of its light's amplitude."""
+"""Part of the accuracy that a lenslet's few numbers may leave out of its light's amplitude, and they again of
+what they bring to a cell."""
+
+FEWER = 32
+"""Numbers that light may go through on its way from a lenslet to a cell, at first, and four times as many."""
 
 AROUND = 6.0, 5.0
 """How far beyond a lenslet's edge light is sampled [periods of the band]: to 1e-3, and more for each tenth.
@@ -60,7 +64,7 @@ class LensletLight:
         halves = zip(self.axes, _half(lenslets), strict=True)
         bent = lenslets.pixels is not None
         self.modes = [_modes(a, h, self.squared, self.faintest, bent=bent) for a, h in halves]
-        self._known: dict[tuple[float, float, float], np.ndarray] = {}
+        self._known: dict[tuple[float, float, float], tuple[np.ndarray, ...]] = {}
         self._nodes: dict[tuple[int, float, int, float], _Behind] = {}
         self._carriers: dict[tuple[int, float], np.ndarray] = {}
         self.light, self.widest = light, widest
@@ -113,6 +117,13 @@ class LensletLight:
             pass
         return table, (-counts[0], -counts[1])
 
+    def prepare(self, rows: Iterable[Row], workers: int) -> None:
+        """Compute what the lenslets of some rows share, once, not in each thread that needs it."""
+        _ = self.table
+        wanted = {(y, x, f) for y, members in rows for x, f in members} - self._known.keys()
+        for _ in each(lambda key: self.matrices(*key), sorted(wanted), workers):
+            pass
+
     def lit(self, numbers: np.ndarray, y: float, x: float) -> tuple[np.ndarray, np.ndarray]:
         """Which of the points (n, 2) light a lenslet at (y, x) from the cell, and their light (m, q)."""
         table, first = self.table
@@ -144,7 +155,9 @@ class LensletLight:
             return None
         few = np.zeros((len(numbers), n, len(behind), m), np.complex64)
         for k, (x, focal_length, which, lit) in enumerate(behind):
-            few[which, :, k] = (lit @ self.matrix(y, x, focal_length)).reshape(-1, n, m)
+            for matrix in self.matrices(y, x, focal_length):
+                lit = lit @ matrix
+            few[which, :, k] = lit.reshape(-1, n, m)
         carried = np.hstack([self.carried(1, x) for x, *_ in behind])
         return few.reshape(len(numbers), n, -1) @ carried.T
 
@@ -155,11 +168,21 @@ class LensletLight:
             self._carriers[key] = (turn[:, None] * self.modes[which]).astype(np.complex64)
         return self._carriers[key]
 
-    def matrix(self, y: float, x: float, focal_length: float) -> np.ndarray:
-        """From light in a lenslet at (y, x) to the few numbers on a cell: (q, numbers)."""
+    def matrices(self, y: float, x: float, focal_length: float) -> tuple[np.ndarray, ...]:
+        """From light in a lenslet at (y, x) to the few numbers on a cell: (q, numbers), or by way of fewer.
+
+        The farther a lenslet is from the cell, the less of what it sees comes there.
+        """
         if (key := (y, x, focal_length)) not in self._known:
-            self._known[key] = self._quadrature(y, x, focal_length)
+            matrix = self._quadrature(y, x, focal_length)
+            self._known[key] = _by_way(matrix, self.faintest * self._own)
         return self._known[key]
+
+    @cached_property
+    def _own(self) -> float:
+        """How much a lenslet before the middle of a cell brings there of its light, at the least."""
+        matrix = self._quadrature(0.0, 0.0, focal_lengths(self.lenslets.array)[0])
+        return float(np.linalg.norm(matrix)) / math.sqrt(min(matrix.shape))
 
     def _quadrature(self, y: float, x: float, focal_length: float) -> np.ndarray:
         wavelength = self.lenslets.optics[0]
@@ -225,6 +248,25 @@ def _times(rows: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Complex rows (n, k) times a real matrix, as two real products."""
     parts = np.stack([np.real(rows), np.imag(rows)]) @ real
     return parts[0] + 1j * parts[1]
+
+
+def _by_way(matrix: np.ndarray, least: float) -> tuple[np.ndarray, ...]:
+    """A matrix (q, n) in two factors that leave out singular values below some, or itself where it has many.
+
+    The part of it that few numbers see is found by a product with so many columns by chance.
+    """
+    rng = np.random.default_rng(0)
+    for count in (FEWER, 4 * FEWER):
+        if 2 * count > min(matrix.shape):
+            break
+        seen = matrix @ rng.standard_normal((matrix.shape[1], count), np.float32)
+        basis = np.linalg.qr(seen)[0]
+        across = basis.conj().T @ matrix
+        if np.linalg.norm(matrix - basis @ across) < least:
+            turn, strength, rest = np.linalg.svd(across, full_matrices=False)
+            kept = strength > least
+            return basis @ (turn[:, kept] * strength[kept]), rest[kept]
+    return (matrix,)
 
 
 def windows(lenslets: Lenslets, accuracy: float) -> tuple[Axis, Axis]:

@@ -62,6 +62,7 @@ class Missing:
         self.slack = 1e-9 * lenslets.array.lattice.pitch
         self.rows = list(lenslets.rows(cells.middle(self.states[0].kind), (INFINITE, INFINITE)))
         self.samples = math.prod(axis.samples for axis in light.axes)
+        light.prepare(self.rows, workers)
 
     def groups(self) -> Iterator[list[Offset]]:
         """Offsets whose images are held at a time."""

@@ -13,7 +13,7 @@ from lumigraph.operators.exact import terms_of
 from lumigraph.operators.fineness import tail
 from lumigraph.operators.missing import AT_A_TIME, HELD
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.places import INSIDE, Place, State, alike, flipped, places, terms
+from lumigraph.operators.places import INSIDE, Band, Place, State, alike, flipped, places, terms
 
 MORE = 1.4
 """Factors that are found at first, of those that are kept in the end."""
@@ -69,7 +69,8 @@ def wanted(optics: Optics) -> list[Place]:
 class Factors:
     """How many factors blocks have: a power of the points, as `benchmarks.memory --count` counts them.
 
-    Opaque rims make more of them; those at the border are fewer where only strong ones count.
+    Opaque rims make more of them; those at the border are fewer where only strong ones count, and the farther
+    a row is from it.
 
     Parameters
     ----------
@@ -86,22 +87,37 @@ class Factors:
     @classmethod
     def of(cls, optics: Optics) -> "Factors":
         """Of one depth."""
-        usual = math.prod(optics.cells.points) ** 0.85
-        inside, border = (0.45, 0.08) if optics.straight else (0.55, 0.16)
-        edges = _cells.edges(optics.array)
-        rims = {"meet": 1.0, "straight": 1.75, "other": 1.3}[edges]
-        finer = 1e-3 / optics.fineness.accuracy
-        if optics.straight and finer > 1:
-            inside, border = (n * finer ** (0.23 if edges == "straight" else 0) for n in (inside, border))
-        else:
-            border *= finer ** (0.4 if finer > 1 else 0.25)
-        border *= tail(_cells.fresnel_number(optics.camera))
-        near = rims * border * usual * math.prod(2 * n + 1 for n in optics.near)
+        cells, edges, finer = optics.cells, _cells.edges(optics.array), 1e-3 / optics.fineness.accuracy
+        aside = tail(_cells.fresnel_number(optics.camera))
+        # Of one cell, and of as many of them as there are in a square of so many pitches.
+        usual = math.prod(cells.points) ** 0.85 * optics.array.lattice.pitch**2 / math.prod(cells.size)
+        usual *= {"meet": 1.0, "straight": 1.75, "other": 1.3}[edges]
+        inside, border = (0.45, 0.26) if optics.straight else (0.55, 0.75)
+        coarse, fine = (0.27, 0.05) if optics.straight else (0.4, 0.26)
+        inside *= math.sqrt(aside) * finer ** (0.1 if edges == "straight" and finer > 1 else -0.11)
+        border *= aside**1.25 * finer ** (fine if finer > 1 else coarse)
+        border *= 1.25 if edges == "straight" else 1.5 if cells.kinds > 1 else 1.0
+        near, reach = (usual * (2 * pitches + 1) ** 2 for pitches in (optics.missed, optics.followed))
         return cls(
-            rims * inside * usual * math.prod(2 * n + 1 for n in optics.reach),
-            near * len(wanted(optics)),
-            near * len(places(optics)),
+            inside * reach,
+            border * near * sum(_share(optics, place) for place in wanted(optics)),
+            border * near * sum(_share(optics, place) for place in places(optics)),
         )
+
+
+def _share(optics: Optics, place: Place) -> float:
+    """Factors of a place's blocks over those of the array's outermost row."""
+    y, x = (_nearness(optics, band) for band in (place.y, place.x))
+    return 0.55 * (y * x) ** 1.2 if y and x else y + x
+
+
+def _nearness(optics: Optics, band: Band) -> float:
+    """Of rows that lack lenslets on either side, over the outermost row; 0 where none is missed."""
+    pitch = optics.array.lattice.pitch
+    farthest = optics.fineness.border(_cells.fresnel_number(optics.camera), optics.blur) + 1
+    rows = [max(0.0, abs(limit) / pitch - 0.5) for limit in band.limits if math.isfinite(limit)]
+    sides = [max(0.03, 1 - row / farthest) / math.sqrt(1 + row) for row in rows]
+    return math.hypot(*sides) * (0.37 if band.ring else 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,8 +165,11 @@ class Few:
         few, near = math.prod(optics.few(optics.reach)) / folded, math.prod(optics.few(optics.near))
         lit = math.pi * optics.lit**2 / math.prod(cells.size)
         rows = 2 * optics.lit / axes[0].size
-        # To the few numbers behind each lenslet and along x, then along y: 8 for a complex product and sum.
-        along_x = lit * (light * math.prod(modes) + math.prod(modes) * axes[1].samples)
+        # To the few numbers behind each lenslet, by way of some thirty from those that are not near, and along
+        # x, then along y: 8 for a complex product and sum.
+        numbers = math.prod(modes)
+        through = min(lit, 3) * light * numbers + lit * min(30, light / 2) * (light + numbers)
+        along_x = through + lit * numbers * axes[1].samples
         along_y = rows * modes[0] * samples
         states = states_of(wanted(optics))
         turns = len({state.x for state in states})
