@@ -142,9 +142,12 @@ class Optics:
         A lenslet farther behind straight opaque rims: the image of a point on them is half as bright as
         others, and they send light along two lines. Two at least: with one, cameras 1.0 and Galilean ones
         were off by 2e-2 and 5e-3, at 3e-3, two lenslets inside. Three from 2e-3 on: with two, a camera 1.0 in
-        focus was off by 3e-3 at 1e-3.
+        focus was off by 3e-3 at 1e-3. Four below 5e-4: an array ends in straight rims, and beyond them three
+        left out 3e-4 of a point's image.
         """
-        y, x = self._cells(max(2 if self.fineness.accuracy > 2e-3 else 3, math.ceil(self.missed)))
+        accuracy = self.fineness.accuracy
+        least = 2 + (accuracy <= 2e-3) + (accuracy < 5e-4)
+        y, x = self._cells(max(least, math.ceil(self.missed)))
         return min(y, self.reach[0]), min(x, self.reach[1])
 
     @property

@@ -165,7 +165,7 @@ class Few:
         few, near = math.prod(optics.few(optics.reach)) / folded, math.prod(optics.few(optics.near))
         lit = math.pi * optics.lit**2 / math.prod(cells.size)
         rows = 2 * optics.lit / axes[0].size
-        # To the few numbers behind each lenslet, by way of some thirty from those that are not near, and along
+        # To the few numbers behind each lenslet, by way of some thirty from most of them, and along
         # x, then along y: 8 for a complex product and sum.
         numbers = math.prod(modes)
         through = min(lit, 3) * light * numbers + lit * min(30, light / 2) * (light + numbers)
