@@ -51,7 +51,7 @@ SHARE = 2.0
 BORDER = 4.0
 """How much stronger than elsewhere factors are that are looked at in the border's blocks."""
 
-CHOSEN = 3.0, 8.0
+CHOSEN = 3.0, 10.0
 """The same of what the points that are chosen for the border leave out: at 1e-2, and from 1e-3 on."""
 
 Job = tuple[int, tuple[int, ...]]
@@ -199,7 +199,7 @@ class Builder:
     def _choose(self, kind: int, offset: Offset, block: np.ndarray) -> None:
         """Points for the border, of a cell and those that it mirrors."""
         coarse, fine = CHOSEN
-        least = min(fine, coarse * (1e-2 / self.optics.fineness.accuracy) ** 0.43) * self.least
+        least = min(fine, coarse * (1e-2 / self.optics.fineness.accuracy) ** 0.52) * self.least
         found, (dy, dx), shape = chosen(block, least), offset, self.optics.cells.points
         for up in {False, self.even[0]}:
             for left in {False, self.even[1]}:
@@ -277,8 +277,9 @@ class Builder:
         result, pieces = {}, self._row_by_row if self.apart is None else self._kind_by_kind
         for place, blocks in pieces(wanted):
             least = weakest(blocks.values(), budget)
-            cut = {key: f.cut(least) for key, f in blocks.items()}
-            result[place] = together(self._unfolded(cut, self._folds(place)))
+            cut = each(lambda found, least=least: found.cut(least), blocks.values(), self.workers)
+            mine = dict(zip(blocks, cut, strict=True))
+            result[place] = together(self._unfolded(mine, self._folds(place)))
         return result
 
     def _row_by_row(self, wanted: Sequence[Place]) -> Iterator[tuple[Place, dict[Offset, Found]]]:

@@ -149,7 +149,8 @@ class Missing:
             for offset, end in zip(offsets, ends.tolist(), strict=True)
         }
         # Weights of the chosen points as an orthonormal matrix (points, n) and a triangle (n, n).
-        bases = {offset: np.linalg.qr(self.chosen[offset].weights) for offset in offsets}
+        weights = [self.chosen[offset].weights for offset in offsets]
+        bases = dict(zip(offsets, each(np.linalg.qr, weights, self.workers), strict=True))
 
         def found(signs: dict[State, int], offset: Offset) -> Found:
             mine, (basis, triangle) = places[offset], bases[offset]

@@ -162,7 +162,7 @@ class Few:
         points = math.prod((2 * optics.lit / axis.size + 1) * axis.points for axis in axes)
         followed = math.prod(2 * axis.neighbourhood / axis.size + 1 for axis in axes)
         folded = 2.0 if _cells.mirrored(optics.camera) else 1.0
-        few, near = math.prod(optics.few(optics.reach)) / folded, math.prod(optics.few(optics.near))
+        few = math.prod(optics.few(optics.reach)) / folded
         lit = math.pi * optics.lit**2 / math.prod(cells.size)
         rows = 2 * optics.lit / axes[0].size
         # To the few numbers behind each lenslet, by way of some thirty from most of them, and along
@@ -173,7 +173,7 @@ class Few:
         along_y = rows * modes[0] * samples
         states = states_of(wanted(optics))
         turns = len({state.x for state in states})
-        chosen = near / 2
+        chosen = math.prod((2 * optics.missed + 1) * pitch * 2 * axis.band + 12 for axis in axes) / 2
         # Amplitudes up to each limit, of rows and of samples; the largest block's images are held at least.
         stacks = 8.0 * AT_A_TIME * ((turns + 1) * rows * modes[0] * axes[1].samples + turns * samples)
         images = 4.0 * len(states) / kinds * samples * chosen
