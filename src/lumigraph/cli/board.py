@@ -121,10 +121,6 @@ class Known:
         return lenslets, seen
 
 
-_WELL = 0.01
-"""Half an interval over a length, up to which it is called known."""
-
-
 def board(
     sources: Annotated[tuple[Path, ...], Parameter(negative="")],
     /,
@@ -276,14 +272,16 @@ def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int)
 
 def _enough(found: "Plan") -> str:
     """From which picture on lengths are known to 1 %, and how well the others are with all."""
+    from lumigraph.metric.calibration import WELL
+
     lengths, errors = found.camera.numbers, found.steps[-1].errors
     well, badly = [], []
-    for name, count, value, error in zip("fLb", found.enough(_WELL), lengths, errors, strict=False):
+    for name, count, value, error in zip("fLb", found.enough(WELL), lengths, errors, strict=False):
         if count is None:
             badly.append(f"{name} (± {196 * error / value:.2g} %)")
         else:
             well.append(f"{name} from picture {count} on")
-    told = f"known to {_WELL:.0%}, in 95 of 100 cases: {', '.join(well) or 'no length'}"
+    told = f"known to {WELL:.0%}, in 95 of 100 cases: {', '.join(well) or 'no length'}"
     return told + (f"; not with all {len(found.steps)} pictures: {', '.join(badly)}" if badly else "")
 
 

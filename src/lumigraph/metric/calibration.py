@@ -30,7 +30,7 @@ _BENT = 5e-4
 
 _LENGTHS = ("f", "L", "b")
 
-_WELL = 0.01
+WELL = 0.01
 """Half a 95 % interval over a length, beyond which a note names it."""
 
 
@@ -269,7 +269,7 @@ def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
         )
     if unsure := ", ".join(_unsure(result)):
         yield (
-            f"not known to {_WELL:.0%}, in 95 of 100 cases: {unsure}. `lumigraph board plan` says which "
+            f"not known to {WELL:.0%}, in 95 of 100 cases: {unsure}. `lumigraph board plan` says which "
             "pictures tell more, and what none tells"
         )
     for one, other, how in result.tied():
@@ -295,7 +295,7 @@ def _unsure(result: Measured) -> Iterator[str]:
     far = [(pose.shift[0], math.sqrt(pose.covariance[3, 3])) for pose in result.poses]
     worst = max(far, key=lambda one: one[1] / one[0], default=(1.0, 0.0))
     for name, length, error in (*known, ("the board's distance", *worst)):
-        if 1.96 * error > _WELL * abs(length):
+        if 1.96 * error > WELL * abs(length):
             yield f"{name} ± {196 * error / abs(length):.2g} %"
 
 
