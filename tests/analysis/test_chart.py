@@ -113,3 +113,17 @@ def test_micro_images_without_a_border_are_refused():
     white, calibration = stops(17.37, 17.37, 0.5)
     with pytest.raises(CalibrationError, match="Stop the main lens down"):
         pupil_edge(np.ones_like(white), calibration)
+
+
+@pytest.mark.parametrize(("shrunk", "skew"), [(0.75, 0.0), (0.7, 0.25), (0.6, -0.1)])
+def test_a_board_that_leans_is_found_whole(shrunk, skew):
+    """Squares of 12 samples are so much narrower, and their sides so far from a right angle."""
+    y, x = np.mgrid[:600, :900] / 6 - np.array([50, 75])[:, None, None]
+    rows, columns = (np.floor(one / 12 + 0.5) for one in (y - skew * x, x / shrunk))
+    inside = (np.abs(rows) <= 2) & (np.abs(columns) <= 3)
+    fine = np.where(inside, (rows + columns) % 2, 1.0)
+    picture = gaussian_filter(fine, 6).reshape(100, 6, 150, 6).mean((1, 3))
+    found = find_chart(picture)
+    assert sorted(np.ptp(found.indices, axis=0) + 1) == [4, 6]
+    assert len(found) == 24
+    assert np.linalg.det(found._squares()[0]) > 0  # it is not mirrored

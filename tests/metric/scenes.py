@@ -60,15 +60,16 @@ def in_views(camera: MetricCamera, point: np.ndarray, way: np.ndarray) -> np.nda
 
 
 def corners_in_views(
-    rng: np.random.Generator, *, frames: int = 8, views: int = 5, noise: float = 0.4, shared: float = 0.3
-) -> Corners:
+    rng: np.random.Generator, *, frames: int = 8, views: int = 5, noise: float = 0.4, shared: float = 0.3,
+    board: Board = BOARD,
+) -> Corners:  # fmt: skip
     """Of boards at 0.3 to 0.6 m that lean, in views of a camera 1.0; some are in its lenslets' image."""
     way = np.stack(np.meshgrid(*2 * [np.linspace(-6.5, 6.5, views)]), -1).reshape(-1, 2)
     rows = []
     for frame in range(frames):
         turn = np.array([rng.uniform(-0.1, 0.1), *rng.uniform(-0.7, 0.7, 2)])
         shift = np.array([rng.uniform(0.3, 0.6), -0.02, -0.03]) + rng.uniform(-0.01, 0.01, 3)
-        points = geometry.moved(BOARD.points(), np.concatenate([turn, shift]))
+        points = geometry.moved(board.points(), np.concatenate([turn, shift]))
         for corner, point in enumerate(points):
             center = in_views(VIEWS_CAMERA, point, way)
             center = center + rng.normal(0, noise, way.shape) + rng.normal(0, shared, 2)

@@ -127,6 +127,17 @@ def test_what_views_of_a_corner_share_by_their_way_is_found_and_taken_out() -> N
     np.testing.assert_allclose(found.whitened(derivatives, sight, own, way)[..., 2], alone)
 
 
+def test_noise_that_a_camera_and_poses_follow_is_in_the_estimate() -> None:
+    """Of 12 corners on each of 4 pictures they follow more than half of it."""
+    board, found = metric.Board((3, 4), 15e-3), []
+    for seed in range(5):
+        rng = np.random.default_rng([3, seed])
+        seen = scenes.corners_in_views(rng, frames=4, views=3, noise=0.2, shared=0.15, board=board)
+        found.append(metric.board(seen, board, scenes.NOMINAL).noise)
+    assert np.sqrt(np.mean([one.shared**2 for one in found])) == pytest.approx(0.15, rel=0.15)
+    assert np.sqrt(np.mean([one.own[0] ** 2 for one in found])) == pytest.approx(0.2, rel=0.05)
+
+
 def test_corners_in_views_survive_their_table(tmp_path) -> None:
     seen = scenes.corners_in_views(np.random.default_rng(1), frames=1, views=3)
     metric.save_corners(seen, tmp_path / "corners.csv")

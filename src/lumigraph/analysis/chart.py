@@ -22,6 +22,7 @@ LEAST_CELL = 20.0
 _SCALES = (1.0, 1.5, 2.5, 4.0, 6.0)  # samples of blur at which corners are looked for
 _FAINT = 0.35  # of the strength of the strongest tenth of corners
 _FITS = 0.2  # of a square's width: how far a corner may be from where its neighbour expects it
+_ASKEW = 0.5  # sine of the least angle between the sides of a square that is seen askew
 _PART = 0.8  # of a square's edge, far enough from its corners
 _LONGEST = 48  # samples of an edge that are taken
 LEAST_BENT = 12
@@ -190,7 +191,13 @@ def _saddles(data: np.ndarray, scale: float) -> tuple[np.ndarray, float]:
     places = places[power > _FAINT * np.quantile(power, 0.9)]
     smooth = spline_filter(gaussian_filter(data, scale / 2), 3)
     at, found = settle(smooth, places.astype(float), max(2, round(1.5 * scale)), stray=2 * scale + 1)
-    return at[found], scale
+    return _once(at[found], scale), scale
+
+
+def _once(places: np.ndarray, scale: float) -> np.ndarray:
+    """Places without those that are nearer than a blur to one before: equal samples beside a saddle."""
+    pairs = KDTree(places).query_pairs(scale, output_type="ndarray") if len(places) else np.zeros((0, 2), int)
+    return np.delete(places, pairs.max(1), axis=0)
 
 
 def _derived(data: np.ndarray, scale: float, order: tuple[int, int]) -> np.ndarray:
@@ -210,22 +217,38 @@ def _followed(places: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]
     basis = width * np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     if width < 3 * scale:
         return places[:0], np.zeros((0, 2), int)
-    sets = [_grown(places, tree, basis, int(k)) for k in _starts(places)]
+    starts = _starts(places)
+    bases = [(k, one) for k in starts for one in (basis, _leaning(places, tree, k)) if one is not None]
+    sets = [_grown(places, tree, one, k) for k, one in bases]
     return max(sets, key=lambda one: len(one[0]))
 
 
-def _starts(places: np.ndarray) -> np.ndarray:
+def _leaning(places: np.ndarray, tree: KDTree, k: int) -> np.ndarray | None:
+    """Ways (2, 2) from a place to its nearest neighbours on two lines: sides of a square seen askew, if any."""
+    around = np.asarray(tree.query(places[k], min(9, len(places)))[1])[1:]
+    ways = places[around] - places[k]
+    length = np.hypot(*ways.T)
+    across = np.abs(ways[:, 0] * ways[0, 1] - ways[:, 1] * ways[0, 0]) > _ASKEW * length * length[0]
+    if not across.any():
+        return None
+    sides = np.stack(sorted((ways[0], ways[across][0]), key=lambda way: -abs(way[0])))
+    sides[0] *= np.copysign(1, sides[0, 0])  # downwards, and the other to its left-hand side
+    sides[1] *= np.copysign(1, np.linalg.det(sides))
+    return sides
+
+
+def _starts(places: np.ndarray) -> list[int]:
     """The places nearest to the middle of them all."""
-    return np.argsort(np.hypot(*(places - np.median(places, axis=0)).T))[:5]
+    return np.argsort(np.hypot(*(places - np.median(places, axis=0)).T))[:5].tolist()
 
 
 def _grown(places: np.ndarray, tree: KDTree, basis: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
     index, taken, todo = {first: (0, 0)}, {(0, 0)}, deque([(first, basis)])
     while todo:
         k, local = todo.popleft()
-        width = float(np.hypot(*local[0]))
         for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1)):
             distance, other = tree.query(places[k] + sign * local[axis])
+            width = float(np.hypot(*local[axis]))
             i, j = index[k]
             at = (i + sign, j) if axis == 0 else (i, j + sign)
             if distance > _FITS * width or at in taken or other in index:

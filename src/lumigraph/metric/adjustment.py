@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
 from lumigraph.core import memory
@@ -17,6 +18,9 @@ from lumigraph.metric.noise import Noise
 
 _ROUNDS = 3
 """Adjustments, each with the noise of the one before."""
+
+_STEPS, _STEADY = 40, 3e-3
+"""Of the noise in a round, at most, and the part of it by which the last one may change it."""
 
 _WILD = 6.0
 """Standard deviations beyond which a place is another corner's."""
@@ -188,9 +192,10 @@ class Problem:
         apart = [] if self.apart is None else (geometry.pitch_ratio(numbers) - self.apart[0]) / self.apart[1]
         return np.concatenate([self._white(self.misfit(unknowns)).ravel(), known, apart, even])
 
-    def jacobian(self, unknowns: np.ndarray) -> np.ndarray:
-        """Derivatives of `residual`."""
-        slopes = self._white(self.slopes(unknowns)).reshape(-1, len(unknowns))
+    def jacobian(self, unknowns: np.ndarray, slopes: np.ndarray | None = None) -> np.ndarray:
+        """Derivatives of `residual`, by `slopes` if they are known."""
+        slopes = self._white(self.slopes(unknowns) if slopes is None else slopes)
+        slopes = slopes.reshape(-1, len(unknowns))
         known = np.zeros((len(self.priors), len(unknowns)))
         for row, (k, _, error) in zip(known, self.priors, strict=True):
             row[: self.free.shape[1]] = self.free[k] / error
@@ -338,30 +343,55 @@ def _again(first: Problem, unknowns: np.ndarray) -> tuple[Problem, np.ndarray]:
         np.median(np.abs(misfit[kind == k])) if np.any(kind == k) else 1.0 for k in range(int(kind.max()) + 1)
     ])  # fmt: skip
     kept = np.abs(misfit).max(axis=1) < _WILD * 1.48 * typical[kind]
-    corners = first.corners[kept]
-    if len(np.unique(first.frame[kept])) != first.frames:
+    corners, frame = first.corners[kept], first.frame[kept]
+    if len(np.unique(frame)) != first.frames:
         raise CalibrationError(
             "the corners of a picture fit no position of the board. Leave it out, or number them again."
         )
-    sight, blur = corners.sights(), None if blur is None else blur[kept]
-    noise = Noise.of(misfit[kept], sight, corners.kind, corners.way, blur)
-    own = noise.each(corners.kind, blur)
-    frame = first.frame[kept]
-    return replace(first, corners=corners, frame=frame, noise=noise, sight=sight, own=own), kept
+    sight = corners.sights()
+    chosen = replace(first, corners=corners, frame=frame, sight=sight, own=first.own[kept])
+    return _noisy(chosen, unknowns, None if blur is None else blur[kept]), kept
 
 
-def _covariance(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
-    """Of the camera's numbers and the poses."""
-    camera, poses = problem.free.shape[1], problem.free.shape[1] + problem.heights
-    jacobian = problem.jacobian(unknowns)
+def _noisy(problem: Problem, unknowns: np.ndarray, blur: np.ndarray | None) -> Problem:
+    """The problem with the noise that explains what is left over, and what the unknowns took out of it.
+
+    A camera and poses that are adjusted follow the noise, the more so the fewer the corners: what is left
+    over is less than the noise, by the covariance of computed places (expectation-maximisation).
+    """
+    corners, sight, misfit, slopes = problem.corners, problem.sight, problem.misfit(unknowns), None
+    columns = misfit[..., None]
+    for _ in range(_STEPS):
+        noise = Noise.of(columns, sight, corners.kind, corners.way, blur)
+        before, problem = problem, replace(problem, noise=noise, own=noise.each(corners.kind, blur))
+        if slopes is not None and problem.noise.is_like(before.noise, _STEADY):
+            break
+        slopes = problem.slopes(unknowns) if slopes is None else slopes
+        jacobian = problem.jacobian(unknowns, slopes)
+        step, root = _solved(jacobian, problem.residual(unknowns))
+        hidden = solve_triangular(root, slopes.reshape(-1, len(unknowns)).T, trans=1).T
+        left = misfit - slopes @ step
+        columns = np.concatenate([left[..., None], hidden.reshape(slopes.shape)], -1)
+    return problem
+
+
+def _solved(jacobian: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unknowns that explain a residual best, and R (n, n): their covariance is the inverse of R' R."""
     scale = np.linalg.norm(jacobian, axis=0)
     if not scale.all():
         raise CalibrationError(
             "one of the camera's numbers has no effect on these corners. Use more pictures."
         )
-    inner = np.linalg.inv((jacobian / scale).T @ (jacobian / scale))
-    inner /= np.outer(scale, scale)
+    q, root = np.linalg.qr(jacobian / scale)
+    return solve_triangular(root, q.T @ residual) / scale, root * scale
+
+
+def _covariance(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
+    """Of the camera's numbers and the poses."""
+    camera, poses = problem.free.shape[1], problem.free.shape[1] + problem.heights
+    _, root = _solved(problem.jacobian(unknowns), problem.residual(unknowns))
     out = np.zeros((len(problem.camera.numbers) + len(unknowns) - poses, len(unknowns)))
     out[: len(problem.camera.numbers), :camera] = problem.free
     out[len(problem.camera.numbers) :, poses:] = np.eye(len(unknowns) - poses)
-    return out @ inner @ out.T
+    half = solve_triangular(root, out.T, trans=1)
+    return half.T @ half

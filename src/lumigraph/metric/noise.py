@@ -56,21 +56,30 @@ class Noise:
         low, middle, high = self.seen
         return own * (np.clip(np.abs(magnification), low, high) / middle) ** (self.trend[kind] / 2)
 
+    def is_like(self, other: "Noise", part: float) -> bool:
+        """Whether variances differ by no more than a part of a place's own."""
+        mine, others = (np.append(one.own, (one.shared, one.sway)) ** 2 for one in (self, other))
+        scale = np.append(self.own, (self.own.min(), self.sway)) ** 2
+        return bool((np.abs(mine - others) <= part * scale).all())
+
     @classmethod
     def of(
         cls, residual: np.ndarray, sight: np.ndarray, kind: np.ndarray, way: np.ndarray | None = None,
         magnification: np.ndarray | None = None,
     ) -> "Noise":  # fmt: skip
-        """Estimated from residuals (n, 2) [px], by the moments of corners with two places or more.
+        """Estimated from residuals (n, 2) or (n, 2, k) [px], by the moments of corners with two places or more.
 
         `way` (n, 2) [px], from centres to places, are given for corners in views; the lenslets'
-        `magnification` (n,) for others, if noise may change with it.
+        `magnification` (n,) for others, if noise may change with it. Of residuals (n, 2, k) squares are
+        summed over k: the first are those left over, the others' outer products are the covariance of what
+        an adjustment took out of the noise. Without them noise of few corners is taken for too small.
         """
+        columns = residual.reshape(*residual.shape[:2], -1)
         count, kinds = np.bincount(sight), int(kind.max()) + 1
-        mean, many, rest = _means(residual, sight), count > 1, 0.0
+        mean, many, rest = _means(columns, sight), count > 1, 0.0
         trend, seen, part = None, (0.0, 0.0, 0.0), np.ones(len(kind))
         if way is None:
-            inner = np.mean((residual - mean[sight]) ** 2, axis=1)
+            inner = _square(columns - mean[sight])
             if magnification is not None:
                 low, middle, high = np.quantile(np.abs(magnification), (0, 0.5, 1)).tolist()
                 seen, away = (low, middle, high), np.log(np.abs(magnification) / middle)
@@ -79,14 +88,14 @@ class Noise:
             own = _own(inner, sight, kind, part)
         else:
             ways, spread = _centred(way, sight)
-            sway = np.bincount(sight, np.sum(ways * residual, axis=1)) / spread
-            inner = np.mean((residual - mean[sight] - sway[sight, None] * ways) ** 2, axis=1)
+            sway = _sums(np.einsum("na,nak->nk", ways, columns), sight) / spread[:, None]
+            inner = _square(columns - mean[sight] - sway[sight, None] * ways[..., None])
             # Slopes and means are taken out of the 2 n numbers of a corner.
             own = np.full(kinds, 2 * inner[many[sight]].sum() / max(np.sum(2 * count[many] - 3), 1))
-            rest = np.mean(sway[many] ** 2 - own[0] / spread[many]) if many.any() else 0.0
+            rest = np.mean((sway[many] ** 2).sum(1) - own[0] / spread[many]) if many.any() else 0.0
         own = np.sqrt(np.maximum(own, LEAST_NOISE**2))
         expected = np.bincount(sight, own[kind] ** 2 * part) / count**2
-        shared = np.mean(mean[many] ** 2) - np.mean(expected[many]) if many.any() else 0.0
+        shared = np.mean(_square(mean[many]) - expected[many]) if many.any() else 0.0
         return cls(own, float(np.sqrt(max(shared, 0.0))), float(np.sqrt(max(rest, 0.0))), trend, seen)
 
     def whitened(
@@ -152,11 +161,15 @@ def _trend(inner: np.ndarray, sight: np.ndarray, kind: np.ndarray, away: np.ndar
     return trends
 
 
+def _square(values: np.ndarray) -> np.ndarray:
+    """(n,) Mean over both axes of squares of (n, 2, k), summed over k."""
+    return np.einsum("nak,nak->n", values, values) / 2
+
+
 def _sums(values: np.ndarray, sight: np.ndarray) -> np.ndarray:
     """Sums (sights, ...) of (n, ...)."""
-    total = np.zeros((int(sight.max()) + 1, *values.shape[1:]))
-    np.add.at(total, sight, values)
-    return total
+    together = csr_array((np.ones(len(sight)), (sight, np.arange(len(sight)))))
+    return (together @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
 
 
 def _centred(way: np.ndarray, sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -166,6 +179,5 @@ def _centred(way: np.ndarray, sight: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _means(values: np.ndarray, sight: np.ndarray) -> np.ndarray:
-    """(sights, 2) of (n, 2)."""
-    count = np.bincount(sight)
-    return np.stack([np.bincount(sight, column) / count for column in values.T], axis=1)
+    """(sights, ...) of (n, ...)."""
+    return _sums(values, sight) / np.bincount(sight).reshape(-1, *[1] * (values.ndim - 1))
