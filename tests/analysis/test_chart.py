@@ -4,10 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, spline_filter
 
 from lumigraph.analysis.chart import Chart, find_chart
+from lumigraph.analysis.crossings import crossed
 from lumigraph.analysis.pupil_edge import pupil_edge
+from lumigraph.analysis.saddles import settle
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import CalibrationError, SamplingError
@@ -127,3 +129,40 @@ def test_a_board_that_leans_is_found_whole(shrunk, skew):
     assert sorted(np.ptp(found.indices, axis=0) + 1) == [4, 6]
     assert len(found) == 24
     assert np.linalg.det(found._squares()[0]) > 0  # it is not mirrored
+
+
+def saddles(turn, blur, *, finer=40):
+    """Of edges that cross at eleven places in a pixel: saddles and crossings less the truth [samples]."""
+    rows = []
+    for phase in np.linspace(0, 1, 11):
+        true = np.array([9.33, 9 + phase])
+        y, x = np.mgrid[: 20 * finer, : 20 * finer] / finer + 0.5 / finer - 0.5 - true[:, None, None]
+        rows_, columns = math.cos(turn) * y + math.sin(turn) * x, math.cos(turn) * x - math.sin(turn) * y
+        fine = gaussian_filter(
+            np.sign(np.sin(np.pi * rows_ / 8.3) * np.sin(np.pi * columns / 7)), blur * finer
+        )
+        picture = fine.reshape(20, finer, 20, finer).mean((1, 3))
+        soft = spline_filter(gaussian_filter(picture, 1.0), 3)
+        at, kept = settle(soft, true[None] + 0.05, 2, stray=1.5)
+        assert kept.all()
+        rows.append([at[0] - true, crossed(picture, at, 2)[0] - true])
+    return np.moveaxis(np.array(rows), 1, 0)
+
+
+@pytest.mark.parametrize("turn", [0.03, 0.1, 0.2])
+def test_samples_pull_at_saddles_and_not_at_crossings(turn):
+    """0.01 of a sample or more, and less than half of it: edges as sharp as pixels."""
+    pulled, free = (np.sqrt((one**2).mean()) for one in saddles(turn, 0.0))
+    assert pulled > 0.008
+    assert free < 0.0055
+    assert free < 0.55 * pulled
+
+
+def test_crossings_of_blurred_edges_are_exact():
+    assert np.abs(saddles(0.2, 0.5)[1]).max() < 2e-3
+
+
+def test_saddles_too_blurred_for_edges_or_at_the_rim_stay():
+    flat = np.zeros((9, 9))
+    at = np.array([[4.2, 4.1], [0.3, 4.0]])
+    np.testing.assert_allclose(crossed(flat, at, 2), at, atol=1e-6)

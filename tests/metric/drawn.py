@@ -1,8 +1,11 @@
 """Raw images of boards, drawn by rays through a known camera."""
 
+from itertools import product
+
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.spatial import KDTree
+from scipy.stats import norm
 
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
@@ -11,6 +14,7 @@ from lumigraph.metric import Board, MetricCamera, geometry
 BOARD = Board((4, 5), 2.8e-3)
 SHAPE, PITCH, PIXEL = (420, 500), 24.3, 5.5e-6
 LIT = 0.94
+BLUR, STEP = 0.7, 0.5  # px: blur before the pixels, and steps in which it is drawn; wider ones alias
 
 
 def camera(side: float, kinds: int = 1) -> MetricCamera:
@@ -42,24 +46,40 @@ def raw(
     seen_by: MetricCamera,
     where: np.ndarray,
     kinds: int = 1,
-    blur: float = 0.7,
     board: Board = BOARD,
     rng: np.random.Generator | None = None,
 ) -> np.ndarray:
-    """Raw image (y, x) of an evenly lit board, with 1 % of noise."""
+    """Raw image (y, x) of an evenly lit board, blurred before pixels take their mean, with 1 % of noise."""
     place, center, kind = _pixels(kinds)
-    at, scale = _on_board(seen_by, where, place, center, kind)
-    lit = _lit(place, center)
+    at, pixel = _on_board(seen_by, where, place, center, kind)
+    size = np.sqrt(np.abs(np.linalg.det(pixel)))
+    seen = painted(at, 4 * size, board)
+    lit = white(kinds).ravel()
+    near = (lit > 0) & (np.abs(np.abs(seen - 0.5) - 0.4) > 1e-3)  # other pixels see one brightness alone
+    light = lit * seen
+    light[near] = 0
+    for step, part in _spread():
+        here = painted(at[near] + pixel[near] @ step, STEP * size[near], board)
+        light[near] += part * _lit(place[near] + step, center[near]) * here
     noise = (rng or np.random.default_rng(0)).normal(0, 0.01, SHAPE)
-    return (gaussian_filter((lit * painted(at, scale, board)).reshape(SHAPE), blur) + noise).astype(
-        np.float32
-    )
+    return (light.reshape(SHAPE) + noise).astype(np.float32)
 
 
-def white(kinds: int = 1, blur: float = 0.7) -> np.ndarray:
+def white(kinds: int = 1) -> np.ndarray:
     """White image (y, x)."""
     place, center, _ = _pixels(kinds)
-    return gaussian_filter(_lit(place, center).reshape(SHAPE), blur).astype(np.float32)
+    light = sum(part * _lit(place + step, center) for step, part in _spread())
+    return np.asarray(light).reshape(SHAPE).astype(np.float32)
+
+
+def _spread() -> list[tuple[np.ndarray, float]]:
+    """Ways (2,) [px] to what a pixel sees of a blurred image, and their parts."""
+    ways = STEP * np.arange(-3, 4)
+    parts = norm.cdf((ways + 0.5) / BLUR) - norm.cdf((ways - 0.5) / BLUR)
+    parts /= parts.sum()
+    return [(np.array(way), float(np.prod(part))) for way, part in zip(
+        product(ways, ways), product(parts, parts), strict=True
+    )]  # fmt: skip
 
 
 def _pixels(kinds: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -77,7 +97,7 @@ def _lit(place: np.ndarray, center: np.ndarray) -> np.ndarray:
 def _on_board(
     seen_by: MetricCamera, where: np.ndarray, pixel: np.ndarray, center: np.ndarray, kind: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points of the board (n, 2) [m] that pixels see, by Newton's method, and metres a pixel (n,)."""
+    """Points of the board (n, 2) [m] that pixels see, by Newton's method; pixels' sides there [m]."""
     at, slope = np.full((len(pixel), 2), 8e-3), np.zeros((len(pixel), 2, 2))
     for k in range(5):
         here = _seen(seen_by, where, at, center, kind)
@@ -85,7 +105,7 @@ def _on_board(
             ends = (_seen(seen_by, where, at + step, center, kind) for step in ((1e-6, 0), (0, 1e-6)))
             slope = np.stack([one - here for one in ends], -1) / 1e-6
         at = at - np.clip(np.linalg.solve(slope, (here - pixel)[..., None])[..., 0], -0.02, 0.02)
-    return at, 1 / np.sqrt(np.abs(np.linalg.det(slope)))
+    return at, np.linalg.inv(slope)
 
 
 def _seen(

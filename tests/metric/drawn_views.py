@@ -15,6 +15,9 @@ CAMERA = MetricCamera(
 )
 """In focus at 0.41 m."""
 
+PARTS = 5
+"""Of a lenslet along its sides, each of which sees its own place on the board."""
+
 
 def calibration() -> Calibration:
     """Of its square array, turned a little."""
@@ -35,9 +38,10 @@ def raw(
     center = known.position(np.stack(known.index(*place.T), -1))
     lit = _lit(place - center)
     seen, bright = np.zeros(len(place)), lit > 0
-    seen[bright] = drawn.painted(
-        *_on_board(where, place[bright] - center[bright], center[bright], seen_by), board
-    )
+    at, lenslet = _on_board(where, place[bright] - center[bright], center[bright], seen_by)
+    finest = np.sqrt(np.abs(np.linalg.det(lenslet))) / PARTS
+    steps = np.stack(np.meshgrid(*2 * [(np.arange(PARTS) + 0.5) / PARTS - 0.5]), -1).reshape(-1, 2)
+    seen[bright] = sum(drawn.painted(at + lenslet @ step, finest, board) for step in steps) / len(steps)
     return (lit * seen + rng.normal(0, noise, len(seen))).reshape(SHAPE).astype(np.float32)
 
 
@@ -56,7 +60,7 @@ def _lit(way: np.ndarray) -> np.ndarray:
 def _on_board(
     where: np.ndarray, way: np.ndarray, center: np.ndarray, seen_by: MetricCamera
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points of the board (n, 2) [m] that ways from centres see, by Newton's method; a lenslet there (n,)."""
+    """Points of the board (n, 2) [m] that ways from centres see, by Newton's method; lenslets there."""
     at, kind = np.zeros((len(way), 2)) + 4e-3, np.zeros(len(way), int)
 
     def shown(at: np.ndarray) -> np.ndarray:
@@ -69,4 +73,4 @@ def _on_board(
         if k < 2:  # it hardly changes afterwards
             slope = np.stack([shown(at + step) - here for step in ((1e-6, 0), (0, 1e-6))], -1) / 1e-6
         at = at - np.clip(np.linalg.solve(slope, (here - center)[..., None])[..., 0], -0.05, 0.05)
-    return at, PITCH / np.sqrt(np.abs(np.linalg.det(slope)))
+    return at, PITCH * np.linalg.inv(slope)

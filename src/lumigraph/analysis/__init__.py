@@ -5,6 +5,7 @@
 - `transfer`: `mtf` of a point image, and its `cutoff`
 - `slanted_edge`: the MTF across an edge in a picture, as ISO 12233 measures it
 - `chart`: corners, edges and distortion of a chessboard on a picture, by `saddles` of the brightness
+- `crossings`: where the edges of saddles cross, which samples do not pull
 - `pupil_edge`: how many directions lenslets tell apart, from the edges of micro-images
 - `photon_transfer`: gain, noise, dark signal and full well of a sensor, by EMVA 1288
 - `beams`: `beam_width`, `divergence`, `beam_quality` and degrees of coherence of light on a plane

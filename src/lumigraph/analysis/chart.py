@@ -224,15 +224,16 @@ def _followed(places: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def _leaning(places: np.ndarray, tree: KDTree, k: int) -> np.ndarray | None:
-    """Ways (2, 2) from a place to its nearest neighbours on two lines: sides of a square seen askew, if any."""
+    """Ways (2, 2) from a place to its nearest neighbours on two lines: sides of a square seen askew."""
     around = np.asarray(tree.query(places[k], min(9, len(places)))[1])[1:]
     ways = places[around] - places[k]
     length = np.hypot(*ways.T)
     across = np.abs(ways[:, 0] * ways[0, 1] - ways[:, 1] * ways[0, 0]) > _ASKEW * length * length[0]
     if not across.any():
         return None
-    sides = np.stack(sorted((ways[0], ways[across][0]), key=lambda way: -abs(way[0])))
-    sides[0] *= np.copysign(1, sides[0, 0])  # downwards, and the other to its left-hand side
+    sides = np.stack([ways[0], ways[across][0]])
+    sides = sides[np.argsort(-np.abs(sides[:, 0]))]  # downwards first, and not mirrored
+    sides[0] *= np.copysign(1, sides[0, 0])
     sides[1] *= np.copysign(1, np.linalg.det(sides))
     return sides
 

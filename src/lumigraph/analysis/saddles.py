@@ -35,8 +35,8 @@ def settle(
         Places (n, 2), and true or false (n,): one that holds still, near its start, and alike on
         opposite sides.
     """
-    y, x = _disc(radius)
-    solve, at = _quadratic(y, x, radius / 2), start
+    y, x = disc(radius)
+    solve, at = quadratic(y, x, radius / 2), start
 
     def step(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return _towards_rest(_windows(splines, at, y, x) @ solve, dots)
@@ -54,7 +54,7 @@ def _windows(splines: np.ndarray, at: np.ndarray, y: np.ndarray, x: np.ndarray) 
     return map_coordinates(splines, places, order=3, mode="nearest", prefilter=False)
 
 
-def _disc(radius: int) -> np.ndarray:
+def disc(radius: int) -> np.ndarray:
     """Ways (2, k) from the middle of a round window to its pixels."""
     ways = np.mgrid[-radius : radius + 1, -radius : radius + 1].reshape(2, -1).astype(np.float64)
     return ways[:, np.hypot(*ways) <= radius + 0.5]
@@ -66,7 +66,7 @@ def _odd(values: np.ndarray) -> np.ndarray:
     return ((values - values[:, ::-1]) ** 2).sum(1) / np.maximum(4 * (values**2).sum(1), 1e-30)
 
 
-def _quadratic(y: np.ndarray, x: np.ndarray, width: float) -> np.ndarray:
+def quadratic(y: np.ndarray, x: np.ndarray, width: float) -> np.ndarray:
     """From values (n, k) to the terms (n, 6) of the quadratic 1, y, x, y²/2, yx, x²/2 that fits them best."""
     weight = np.exp(-(y**2 + x**2) / (4 * width**2))  # its square is a Gaussian of `width`
     terms = np.stack([np.ones_like(y), y, x, y * y / 2, y * x, x * x / 2], 1)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from scipy.ndimage import spline_filter
 
+from lumigraph.analysis.crossings import crossed
 from lumigraph.analysis.saddles import settle
 from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
@@ -230,13 +231,14 @@ def _line(flat: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, float, np.ndar
 class _Search:
     """A raw image in which saddles of the brightness, or dots, are looked for in windows of a radius [px]."""
 
+    image: np.ndarray
     splines: np.ndarray
     radius: int
     dots: bool
 
     @classmethod
     def of(cls, image: np.ndarray, radius: int, *, dots: bool) -> "_Search":
-        return cls(spline_filter(image.astype(np.float64), 3), radius, dots)
+        return cls(image.astype(np.float64), spline_filter(image.astype(np.float64), 3), radius, dots)
 
     def found(self, lines: _Lines, calibration: Calibration) -> tuple[_Lines, _Sights]:
         """Corners where lines expect them, and the lines that they are on."""
@@ -246,4 +248,5 @@ class _Search:
         """The sights of saddles or dots near the expected places, moved there."""
         start = sights.center + sights.way
         at, kept = settle(self.splines, start, self.radius, stray=_STRAY, dots=self.dots)
+        at = at if self.dots else crossed(self.image, at, self.radius)
         return replace(sights, way=at - sights.center)[kept]

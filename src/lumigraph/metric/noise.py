@@ -67,7 +67,7 @@ class Noise:
         cls, residual: np.ndarray, sight: np.ndarray, kind: np.ndarray, way: np.ndarray | None = None,
         magnification: np.ndarray | None = None,
     ) -> "Noise":  # fmt: skip
-        """Estimated from residuals (n, 2) or (n, 2, k) [px], by the moments of corners with two places or more.
+        """Estimated from residuals (n, 2) or (n, 2, k) [px], by moments of corners with two places or more.
 
         `way` (n, 2) [px], from centres to places, are given for corners in views; the lenslets'
         `magnification` (n,) for others, if noise may change with it. Of residuals (n, 2, k) squares are

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter, spline_filter
 
+from lumigraph.analysis.crossings import crossed
 from lumigraph.analysis.saddles import settle
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
@@ -101,6 +102,7 @@ class _Track:
         start = middle + slope[:, None] * way[k]
         splines = spline_filter(gaussian_filter(view, _SOFT), 3)
         at, kept = settle(splines, start, self.radius, stray=_STRAY, dots=self.dots)
+        at = at if self.dots else crossed(view, at, self.radius)
         inside = ((at >= self.radius) & (at <= np.array(view.shape) - 1 - self.radius)).all(1)
         self.places[kept & inside, k] = at[kept & inside]
 
