@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
+from lumigraph.calibration.centres import Spots
+from lumigraph.calibration.fitting import fit
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.warp import Warp
 from lumigraph.errors import CalibrationError
-from lumigraph.metric.places import pitch_and_rotation, places
+from lumigraph.metric.places import WIDTH, pitch_and_rotation, places
 
 SHAPE = (230, 250)
 
@@ -54,6 +56,23 @@ def test_pitch_and_rotation_are_right_within_their_errors():
             lattice = lg.Lattice.square(pitch, turn, tuple(rng.uniform(112, 125, 2)))
             found.append(scores(lattice, rng))
     assert np.sqrt(np.mean(np.square(found))) < 1.6  # 12 of them: 1 ± 0.2
+
+
+@pytest.mark.parametrize("layout", ["square", "hex"])
+def test_errors_are_those_of_lenslets_with_neighbours_that_err_as_one(layout):
+    """Of 13 x 13 lenslets; errors of lines through all of them are 1.4 times too small."""
+    rng, index = np.random.default_rng(5), np.stack(np.mgrid[:13, :13], -1).reshape(-1, 2)
+    lattice = getattr(lg.Lattice, layout)(14.0, 0.0, (20.0, 20.0))
+    points = lattice.position(index)
+    away = ((points[:, None] - points) ** 2).sum(-1) / lattice.pitch**2
+    mixed = np.linalg.cholesky(np.exp(-away / (4 * WIDTH**2)) + 1e-9 * np.eye(169))
+    model, found = Calibration(lattice, SHAPE, index, points, 0.0), []
+    for _ in range(150):
+        spots = Spots(index, points + 1e-3 * mixed @ rng.normal(0, 1, points.shape), np.ones(169))
+        parts = pitch_and_rotation(fit(spots, model, warped=False))
+        found.append([(parts[0][0] - 14.0) / parts[0][1], parts[1][0] / parts[1][1]])
+    rms = np.sqrt(np.mean(np.square(found), axis=0))
+    assert rms == pytest.approx([1, 1], abs=0.15)  # 1 ± 0.06
 
 
 def test_a_distortion_is_taken_out():

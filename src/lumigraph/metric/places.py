@@ -22,10 +22,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy import ndimage
 
 from lumigraph.calibration.centres import Spots, traced
-from lumigraph.calibration.fitting import Fitted, fit
+from lumigraph.calibration.fitting import Fitted, fit, surrounded
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.lattice import Lattice
 from lumigraph.errors import CalibrationError
 
 WIDTH = 0.7
@@ -34,6 +36,7 @@ WIDTH = 0.7
 TOGETHER = 4 * math.pi * WIDTH**2
 """Lenslets whose places err as one."""
 
+_FAR = 4  # lenslets that err as one at most
 _REACH = 4.0  # standard deviations at which the window ends
 _MARGIN = 3.0  # pitches from the array's border, and the picture's, within which windows reach beyond it
 _LEAST = 12
@@ -87,8 +90,9 @@ def _rest(fitted: Fitted) -> np.ndarray:
 
 def _covariance(fitted: Fitted) -> np.ndarray:
     """Of the vectors (y, x) to the next row and to the next lenslet (4, 4) [px²], with the warp's in it."""
-    index, points = fitted.spots.indices, fitted.lattice.position(fitted.spots.indices)
-    rest = _rest(fitted)
+    inner = surrounded(fitted.spots.indices)  # which alone `fit` lays the lattice through
+    index, rest = fitted.spots.indices[inner], _rest(fitted)[inner]
+    points = fitted.lattice.position(index)
     flat, none = np.column_stack([np.ones(len(index)), index - index.mean(0)]), np.zeros((len(index), 3))
     design = np.concatenate([np.hstack([flat, none]), np.hstack([none, flat])])
     if (warp := fitted.warp) is not None:
@@ -97,11 +101,25 @@ def _covariance(fitted: Fitted) -> np.ndarray:
         columns = [one.T.ravel() for one, part in zip(changes, bent, strict=True) if part]
         design = np.column_stack([design, *columns])
     scale = np.sqrt((design**2).sum(0))
-    freedom = max(rest.size - TOGETHER * design.shape[1], 1.0)
-    spread = np.linalg.inv((design / scale).T @ (design / scale)) * TOGETHER * (rest**2).sum() / freedom
-    spread /= np.outer(scale, scale)
+    design = design / scale
+    alike = np.concatenate([_together(index, fitted.lattice, one) for one in np.split(design, 2)])
+    back = np.linalg.inv(design.T @ design)
+    spread = back @ (design.T @ alike) @ back  # of least squares whose errors are not independent
+    freedom = max(rest.size - float(np.trace(back @ (design.T @ alike))), 1.0)
+    spread *= (rest**2).sum() / freedom / np.outer(scale, scale)
     vectors = [1, 4, 2, 5]  # (y, x) of a step in i, then in j
     return spread[np.ix_(vectors, vectors)]
+
+
+def _together(index: np.ndarray, lattice: Lattice, columns: np.ndarray) -> np.ndarray:
+    """Columns (n, k) of lenslets, each summed over those around it by how much they err as one."""
+    step = np.arange(-_FAR, _FAR + 1)
+    ways = np.stack(np.meshgrid(step, step, indexing="ij"), -1) @ lattice.matrix.T
+    alike = np.exp(-((ways / lattice.pitch) ** 2).sum(-1) / (4 * WIDTH**2))
+    i, j = (index - index.min(0)).T
+    table = np.zeros((i.max() + 1, j.max() + 1, columns.shape[1]))
+    table[i, j] = columns
+    return ndimage.convolve(table, alike[..., None], mode="constant")[i, j]
 
 
 def pitch_and_rotation(fitted: Fitted) -> tuple[tuple[float, float], tuple[float, float]]:
