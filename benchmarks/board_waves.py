@@ -1,0 +1,186 @@
+"""Cameras 1.0, 2.0 and of three kinds, measured by the command from pictures of boards by wave optics.
+
+``python -m benchmarks.board_waves views | focused | kinds [--runs 3] [--first 0] [--pictures 20]``: each run
+draws a camera, simulates its white image and boards at the poses of `lg.metric.plan` through wave optics,
+exposes them with the sensor's noise, and runs ``lumigraph board`` on the files, told a focal length
+that is off by 2 % and the lenslets' pitch off by 1e-4 (one standard deviation). Boards lean, so that each is
+shared out to slices `STEP` apart by its own distance. Printed are how far corners are from where rays put
+them, the lengths' and a point's errors over the truth (over what is said), and CPU seconds.
+"""
+
+import argparse
+import contextlib
+import io
+import json
+import sys
+import tempfile
+import time
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import lumigraph as lg
+from benchmarks.boards import NAMES, planned_poses, sighted
+from lumigraph.cli import main as command
+from lumigraph.metric import geometry
+
+STEP = {"views": 4e-3, "focused": 3e-3, "kinds": 3e-3}
+"""Between slices [m]: from one to the next, views of a corner move by 0.1 of a sample, places by 0.1 px."""
+
+BOARDS = {"views": "4 x 3 corners, 3.3 mm", "focused": "5 x 4 corners, 2.4 mm"}
+KNOWN, PITCH = 0.02, 1e-4
+ACCURACY = 1e-2
+
+
+def camera(rng, what):
+    """A camera of few lenslets."""
+    f = 50e-3 * rng.uniform(0.95, 1.05)
+    sensor = {"pixel_pitch": 5.5e-6, "black_level": 64.0, "full_well": 12000.0, "read_noise": 6.0}
+    common = {"wavelength": 550e-9, "main_lens": {"focal_length": f}, "sensor": sensor}
+    if what == "views":
+        own = {"pitch": 62e-6, "focal_length": 0.9e-3 * rng.uniform(0.9, 1.1), "count": (47, 47)}
+        return lg.PlenopticCamera(**common, object_distance=8.2 * f * rng.uniform(0.98, 1.02), lenslets=own)
+    focal = 1.9e-3 * rng.uniform(0.95, 1.05)
+    lengths = (focal, 1.04 * focal, 0.96 * focal) if what == "kinds" else focal
+    own = {
+        "pitch": 120e-6, "focal_length": lengths, "count": (25, 22), "layout": "hex", "magnification": 0.3
+    }  # fmt: skip
+    return lg.FocusedPlenopticCamera(**common, object_distance=9 * f, lenslets=own)
+
+
+def on_board(pose, grid):
+    """Places on a board (y, x, 2) that a grid's samples are before [m], and their distances (y, x) [m]."""
+    corner, down, across = geometry.moved(np.concatenate([np.zeros((1, 3)), np.eye(3)[1:]]), pose)
+    down, across = down - corner, across - corner
+    y, x = np.meshgrid(grid.y, grid.x, indexing="ij")
+    sides = np.stack([down[1:], across[1:]], -1)
+    at = np.stack([y - corner[1], x - corner[2]], -1) @ np.linalg.inv(sides).T
+    return at, corner[0] + at @ np.array([down[0], across[0]])
+
+
+def raws(camera, board, poses, step):
+    """Light (y, x) on the sensor of each pose's board."""
+    from metric import drawn
+
+    grid = camera.operator_grid()
+    seen, lit = [], [0.0] * len(poses)
+    for pose in poses:
+        at, distance = on_board(pose, grid)
+        soft = np.full(at.shape[:2], max(grid.pitch)).ravel()
+        bright = drawn.painted(at.reshape(-1, 2), soft, board).reshape(at.shape[:2])
+        reach = geometry.moved(board.points(), pose)[:, 0]
+        away = np.clip(distance, reach.min() - 2 * step, reach.max() + 2 * step) - camera.object_distance
+        seen.append((bright.astype(np.float32), away / step))
+    low = int(min(np.floor(away.min()) for _, away in seen))
+    high = int(max(np.ceil(away.max()) for _, away in seen))
+    for k in range(low, high + 1):
+        parts = [np.maximum(1 - np.abs(away - k), 0).astype(np.float32) for _, away in seen]
+        if not any(part.any() for part in parts):
+            continue
+        operator = camera.operator([k * step], accuracy=ACCURACY)
+        for n, (part, (bright, _)) in enumerate(zip(parts, seen, strict=True)):
+            if part.any():
+                lit[n] = lit[n] + operator.forward((part * bright)[None])
+    return [np.maximum(one, 0) for one in lit]
+
+
+def saved(true, board, poses, rng, what, folder):
+    """Names of the raw images on which the board is found, the white one's, and corners off (n, 2) [px]."""
+    sensor = true.sensor
+    white = np.asarray(lg.simulate(true, lg.scene.targets.white()).data)
+    exposed = [
+        sensor.expose(one, reference=white.max(), fill=0.8, rng=rng)
+        for one in (white, *raws(true, board, poses, STEP[what]))
+    ]
+    dark = sensor.expose(0 * white, reference=1, rng=rng)
+    names = [folder / f"{n}.tif" for n in range(len(exposed))]
+    lg.io.save(dark, folder / "dark.tif")
+    for name, raw in zip(names, exposed, strict=True):
+        lg.io.save(raw, name)
+    found, off, kept = lg.calibrate(np.asarray(exposed[0].data) - np.asarray(dark.data)), [], []
+    for name, raw, pose in zip(names[1:], exposed[1:], poses, strict=True):
+        ready = lg.prepare(raw, found, white=exposed[0], dark=dark)
+        with contextlib.suppress(lg.LumigraphError):
+            corners = lg.metric.find_corners([ready], board, in_views=what == "views")
+            off.append(away(true, board, corners, pose))
+            kept.append(name)
+    return kept, names[0], np.concatenate(off), found
+
+
+def away(true, board, corners, pose):
+    """Corners less where rays put them (n, 2) [px], from either end of the board."""
+    ideal, points = lg.metric.MetricCamera.of(true), geometry.moved(board.points(), pose)
+    ideal, both = replace(ideal, gains=(1.0,)), []
+    for each in (points[corners.corner], points[::-1][corners.corner]):
+        kind = 0 * corners.kind
+        if corners.in_views:
+            seen = corners.place, corners.center
+            both.append(corners.center - geometry.centers(ideal.numbers, each, seen, kind, ideal.pixel_pitch))
+        else:
+            both.append(corners.place - ideal.project(each, corners.center, kind))
+    return min(both, key=lambda one: float(np.abs(one).mean()))
+
+
+def run(rng, what, pictures):
+    """Errors of `NAMES` over the truth, and over what is said; corners off, rms [px]; pictures used."""
+    true, written = camera(rng, what), BOARDS["views" if what == "views" else "focused"]
+    board = lg.metric.Board.from_text(written)
+    ideal = lg.metric.MetricCamera.of(true)
+    told, pitch = (1 + rng.normal(0, part) for part in (KNOWN, PITCH))
+    nominal = lg.metric.Nominal(
+        told * ideal.focal_length, ideal.pixel_pitch, true.sensor.shape, pitch_ratio_error=PITCH,
+        pitch_ratio=1 + ideal.lenslet_distance / ideal.separation,
+    )  # fmt: skip
+    poses = [draw() for draw in planned_poses(rng, (ideal, true.calibration), board, nominal, pictures)]
+    with tempfile.TemporaryDirectory() as folder:
+        kept, white, off, found = saved(true, board, poses, rng, what, Path(folder))
+        lenslets = pitch * true.lenslets.pitch
+        sure = f"{1e6 * PITCH * lenslets} um"
+        options = {
+            "--board": written, "--focal-length": f"{1e3 * nominal.focal_length} mm",
+            "--white": white, "--dark": Path(folder) / "dark.tif", "--pixel-pitch": "5.5 um",
+            "--lenslet-pitch": f"{1e6 * lenslets} um", "--lenslet-pitch-error": sure,
+            "-o": Path(folder) / "camera.json",
+        }  # fmt: skip
+        words = [str(word) for pair in options.items() for word in pair]
+        views = ["--views"] if what == "views" else []
+        with contextlib.redirect_stdout(io.StringIO()) as out:
+            if command(["board", *map(str, kept), *words, *views, "--json"]):
+                raise lg.LumigraphError(out.getvalue())
+        said, measured = json.loads(out.getvalue()), lg.metric.load(Path(folder) / "camera.json")
+    point = np.array([true.object_distance * rng.uniform(0.95, 1.05), *rng.uniform(-3e-3, 3e-3, 2)])
+    place, center = sighted(replace(ideal, gains=(1.0,)), point, found, what == "views")
+    place = place + rng.normal(0, said["residual_px"], place.shape)
+    seen = lg.metric.triangulate(measured, place, center, in_views=what == "views")
+    errors = np.append(measured.camera.numbers[:3] - ideal.numbers[:3], seen.position[0] - point[0])
+    truth, sure = np.append(ideal.numbers[:3], point[0]), np.append(measured.errors[:3], seen.errors[0])
+    unit = found.lattice.pitch if what == "views" else 1.0
+    return errors / truth, errors / sure, float(np.sqrt((off**2).mean())) / unit, len(kept)
+
+
+def main():
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=tuple(STEP))
+    for name, usual in (("runs", 3), ("first", 0), ("pictures", 20), ("seed", 0)):
+        parser.add_argument(f"--{name}", type=int, default=usual)
+    given = parser.parse_args()
+    sys.path.insert(0, "tests")
+    warnings.simplefilter("ignore")
+    unit = "lenslets" if given.what == "views" else "px"
+    for k in range(given.first, given.first + given.runs):
+        started = time.process_time()
+        try:
+            one = run(np.random.default_rng([given.seed, k]), given.what, given.pictures)
+        except lg.LumigraphError as error:
+            print(f"run {k}: {error}", flush=True)
+            continue
+        told = (f"{n} {a:+.3%} ({b:+.2f})" for n, a, b in zip(NAMES, *one[:2], strict=True))
+        spent = time.process_time() - started
+        print(k, f"corners {one[2]:.4f} {unit}, {one[3]} pictures;", *told, f"{spent:.0f} CPU s", flush=True)
+
+
+if __name__ == "__main__":
+    main()
