@@ -122,6 +122,7 @@ def test_a_plan_for_views_says_what_boards_in_views_will_tell() -> None:
     assert errors[-1, :2] == pytest.approx(0.02, rel=0.1)
     assert errors[-1, 2] < min(0.0055, 0.5 * errors[0, 2])
     assert any(max(np.abs(step.turn)) > 0.6 for step in found.steps)
+    assert {step.turn[0] for step in found.steps} == {0.2}  # no edge runs along rows of lenslets
     own, shared = 0.02 * scenes.PITCH, 0.01 * scenes.PITCH
     before = planning._Before(camera, calibration, scenes.BOARD, metric.noise.Noise(np.ones(1), 0.0), True)
     rng, rows = np.random.default_rng(5), []

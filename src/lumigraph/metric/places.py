@@ -11,7 +11,8 @@ with u the place in the lattice. What noise adds to it is shared by windows that
 
 .. math:: \sum_d e^{-d^2 / 4 \sigma^2} = 4 \pi \sigma^2
 
-lenslets err as one, `TOGETHER`, and errors of sums grow by the root of that.
+lenslets err as one, `TOGETHER`, and errors of sums grow by the root of that. Pitch and rotation have the
+errors of least squares through lenslets with neighbours on all sides, which err alike by the sum's terms.
 
 Pixels that are too coarse for the light alias it into the phase: none where the lenslets' f-number is above
 the pixels' width over the wavelength. Beyond, with pitches of nearly a whole number of pixels, the errors do

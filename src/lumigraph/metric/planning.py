@@ -26,6 +26,9 @@ Turn = tuple[float, float, float]
 
 _TILTS = (0.0, 0.35, -0.35, 0.7, -0.7)  # rad: beyond, the squares are too narrow
 _STEEPEST = 0.8  # rad, about both axes together
+_ROLLED = 0.2
+"""Turn about the line of sight in views [rad]: edges along rows may be anywhere between two lenslets."""
+
 _RATIOS = (0.08, 0.6)  # how far a corner moves against a lenslet, as `depth.correlation` looks for it
 _DISTANCES, _DISTANCES_IN_VIEWS = 12, 6
 _FARTHEST = 200.0  # focal lengths
@@ -52,8 +55,8 @@ class Step:
     distance
         Of the board's middle, on the axis, from the main lens [m].
     turn
-        Rotation vector (z, y, x) [rad], as that of `Pose`: y turns the board about its vertical, x about
-        its horizontal middle line.
+        Rotation vector (z, y, x) [rad], as that of `Pose`: z turns the board about the line of sight, y
+        about its vertical, x about its horizontal middle line.
     places
         Of corners behind lenslets that it gives.
     errors
@@ -110,9 +113,10 @@ class Plan:
 
     def table(self) -> list[list[str]]:
         """The pictures as rows of text, their header first."""
-        rows = [["picture", "distance", "tilt (vertical)", "tilt (horizontal)", "places", "f", "L", "b"]]
+        turns = ["turn (sight)", "tilt (vertical)", "tilt (horizontal)"]
+        rows = [["picture", "distance", *turns, "places", "f", "L", "b"]]
         for number, step in enumerate(self.steps, 1):
-            tilts = [f"{math.degrees(angle):+.0f}°" for angle in step.turn[1:]]
+            tilts = [f"{math.degrees(angle):+.0f}°" for angle in step.turn]
             errors = [f"± {1.96 * error * 1e3:.3g} mm" for error in step.errors]
             rows.append([str(number), f"{step.distance * 1e3:.4g} mm", *tilts, str(step.places), *errors])
         return rows
@@ -131,7 +135,8 @@ def plan(
     """Poses of a board, one after the other those that tell f, L and b best together.
 
     Boards stand on the axis where three lenslets or more show each corner, straight or tilted; before a
-    camera 1.0, where views over the stop move no corner by more than three lenslets. What a picture tells of
+    camera 1.0, where views over the stop move no corner by more than three lenslets, turned by 11° about the
+    line of sight where they fit so. What a picture tells of
     the camera is known before it is taken: its Fisher information, less what its own pose takes. Each picture
     is the one that makes the sum of the relative variances of f, L and b least.
 
@@ -164,9 +169,8 @@ def plan(
     own, shared = (checks.positive("noise_px", one, "px") for one in noise_px or usual)
     before = _Before(camera, calibration, board, Noise(np.full(len(camera.gains), own), shared), in_views)
     distances = _in_views(camera, pitch) if in_views else _distances(camera)
-    turns = [(0.0, y, x) for y, x in product(_TILTS, _TILTS) if math.hypot(y, x) <= _STEEPEST]
-    shots = [before.shot(*place) for place in product(distances, turns)]
-    useful = [shot for shot in shots if shot is not None]
+    useful = before.shots(distances, _ROLLED) if in_views else []
+    useful = useful or before.shots(distances, 0.0)
     if not useful:
         seen = "in squares 6 samples of a view wide" if in_views else (
             f"and {LEAST_SEEN} lenslets show each corner, in squares {LEAST_SQUARE:.2g} px wide"
@@ -230,6 +234,12 @@ class _Before:
     board: Board
     noise: Noise
     in_views: bool
+
+    def shots(self, distances: list[float], roll: float) -> list[_Shot]:
+        """Of boards straight and tilted, turned about the line of sight, where all corners can be used."""
+        turns = [(roll, y, x) for y, x in product(_TILTS, _TILTS) if math.hypot(y, x) <= _STEEPEST]
+        every = (self.shot(*place) for place in product(distances, turns))
+        return [shot for shot in every if shot is not None]
 
     def shot(self, distance: float, turn: Turn) -> _Shot | None:
         """A board at a distance; None where not all of its corners can be used."""
