@@ -32,7 +32,7 @@ _LENGTHS = ("f", "L", "b")
 
 _CROSSTALK = (
     "light that lenslets spill into their neighbours' micro-images by diffraction moves corners in views, "
-    "which b's interval does not show: b is 4 to 6 % too long behind lenslets of 62 µm at f/14 in green light"
+    "which b's interval does not show: b is up to 6 % too long behind lenslets of 62 µm at f/14 in green"
 )
 
 WELL = 0.01
