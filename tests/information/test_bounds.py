@@ -9,6 +9,7 @@ from scipy.stats import norm, poisson
 import lumigraph as lg
 from lumigraph.errors import GeometryError, SamplingWarning
 from lumigraph.information import Light, bounds, pixel_information, trials
+from lumigraph.information.bounds import Seen, expected, fisher, reading
 from lumigraph.information.points import source, spread
 
 UM = 1e-6
@@ -151,3 +152,12 @@ def test_nonsense_is_refused_and_full_pixels_are_warned_of():
         bounds(plain(), [-0.07])
     with pytest.warns(SamplingWarning, match="full"):
         bounds(scope, [0.0], Light(1e9), places=1)
+
+
+@pytest.mark.parametrize("background", [0.0, 3.0])
+def test_pixels_that_a_points_light_does_not_reach_tell_the_background_alone(background):
+    """All pixels one by one give the same information as those with light and the number of the others."""
+    lit, sensor, light = np.zeros((4, 30, 30)), fourier().sensor, Light(1000, background)
+    lit[:, 10:14, 9:13] = np.random.default_rng(1).random((4, 4, 4)) / 16
+    each = fisher(*expected(sensor, light, lit), reading(sensor))
+    np.testing.assert_allclose(Seen.of(sensor, light, lit).fisher, each, rtol=1e-12)

@@ -88,3 +88,14 @@ def test_what_cannot_be_is_refused(lenslets, said):
 def test_other_instruments_have_no_single_lenslets(name, said):
     with pytest.raises(GeometryError, match=said):
         lg.load_camera(name).replace(lenslets={"single": {1: {}}})
+
+
+def test_a_sensor_holds_the_images_of_lenslets_that_left_the_lattice():
+    """One row, of which two lenslets stand a pitch above and below it: their images were cut off."""
+    single = {1: {"offset_y": "-1.4 mm"}, 3: {"offset_y": "1.4 mm"}}
+    row = {"count": (1, 3), "pitch": "1.2 mm", "single": single}
+    scope = lg.load_camera("lfm-fourier").replace(lenslets=row)
+    assert len(scope.calibration.centers) == 3
+    assert scope.point_image(0.0, 0.0, 0.0).sum() == pytest.approx(
+        scope.replace(sensor={"shape": (901, 901)}).point_image(0.0, 0.0, 0.0).sum(), rel=1e-3
+    )

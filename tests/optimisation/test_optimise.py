@@ -16,6 +16,7 @@ from lumigraph.information.points import collected
 from lumigraph.optimisation import Goal, Optimum
 from lumigraph.optimisation.front import front, trace
 from lumigraph.optimisation.goals import Judged
+from lumigraph.optimisation.gradient import downhill
 from lumigraph.optimisation.optimise import _warn_of_luck
 from lumigraph.optimisation.search import grid, refined
 from lumigraph.optimisation.space import Space
@@ -308,3 +309,63 @@ def test_the_verb_writes_a_camera_and_says_before_and_after(tmp_path, capsys):
     assert camera.fourier_lens == pytest.approx(lg.units.parse(told["best"]["fourier_lens"]), rel=1e-9)
     assert main(["optimise", SCOPE, "--vary", "fourier_lens=60:90", "-o", str(best)]) == 1
     assert capsys.readouterr().err.startswith("lumigraph: error: ")
+
+
+def test_gradients_move_single_lenslets_where_a_simplex_stalls():
+    """Twelve keys, 14 cameras: lenslets leave the lattice, and the bound falls as slopes say."""
+    start = lg.load_camera(SCOPE).replace(
+        fourier_lens="76 mm",
+        lenslets={
+            "count": (2, 2), "pitch": "1.8 mm", "focal_length": "16 mm", "fill_factor": 0.95,
+            "single": {n: {"focal_change": c, "offset_y": 1e-6, "offset_x": 1e-6}
+                       for n, c in enumerate((0.01, -0.01, -0.01, 0.01), 1)},
+        },
+    )  # fmt: skip
+    vary = {f"lenslets.single.{n}.focal_change": "-0.05:0.05:1" for n in (1, 2, 3, 4)}
+    for n in (1, 2, 3, 4):
+        vary |= {f"lenslets.single.{n}.offset_{axis}": "-200 um:200 um:1" for axis in "yx"}
+    goal = Goal("depth", depths=(-24e-6, 24e-6), light=Light(5000), places=2)
+    found = lg.optimise(start, vary, goal, search="gradient", evaluations=12)
+    simplex = lg.optimise(start, vary, goal, search="local", evaluations=12)
+    assert len(found.rows) <= 14
+    assert found.gain(found.start) > 0.2
+    assert found.best["depth"] < 0.9 * simplex.best["depth"]
+    assert len({found.best[f"lenslets.single.{n}.offset_y"] for n in (1, 2, 3, 4)}) == 4
+
+
+def test_gradients_stay_within_ranges_and_around_what_cannot_be():
+    """A valley beyond the range and beside a wall: its lowest point within is found, from a bend of 100."""
+
+    def cost(at):
+        if at[0] + at[1] > 1.5:
+            return math.inf
+        return (at[0] - 0.7) ** 2 + 100 * (at[1] - 0.3) ** 2 + (at[2] - 2) ** 2
+
+    def slopes(at):
+        return np.array([2 * (at[0] - 0.7), 200 * (at[1] - 0.3), 2 * (at[2] - 2)])
+
+    seen = []
+
+    def noted(at):
+        seen.append((cost(at), at.copy()))
+        return seen[-1][0]
+
+    downhill(noted, slopes, np.array([0.1, 0.9, 0.4]))
+    _, best = min(seen, key=lambda one: one[0])
+    assert all((at >= 0).all() and (at <= 1).all() for _, at in seen)
+    assert best == pytest.approx([0.7, 0.3, 1.0], abs=0.01)
+    assert len(seen) < 60
+
+
+@pytest.mark.parametrize(
+    ("camera", "words", "match"),
+    [
+        (CAMERA, {}, "are of Fourier microscopes"),
+        (SCOPE, {"goal": "largest light caught"}, "search 'gradient' is for depth, lateral, brightness"),
+        (SCOPE, {"against": "lateral"}, "search 'gradient' is for one goal"),
+    ],
+)
+def test_what_has_no_gradients_is_refused(camera, words, match):
+    vary = VARY if camera == SCOPE else {"lenslets.magnification": "0.3:0.6:3"}
+    with pytest.raises(GeometryError, match=match):
+        lg.optimise(camera, vary, depths=DEPTHS, search="gradient", **words)

@@ -71,14 +71,15 @@ class How:
     ----------
     search
         local: downhill from the best of the first values. global: over all of the ranges, by differential
-        evolution. grid: the first values alone.
+        evolution. gradient: along derivatives, for bounds of Fourier microscopes; each step takes the time of
+        some five cameras, however many keys vary. grid: the first values alone.
     evaluations
         Cameras at most, beyond the first values.
     seed
         Of --search global.
     """
 
-    search: Literal["local", "global", "grid"] = "local"
+    search: Literal["local", "global", "gradient", "grid"] = "local"
     evaluations: Annotated[int, Parameter(allow_leading_hyphen=True)] = 200
     seed: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0
 

@@ -1,6 +1,7 @@
 """What a raw image tells of points of light: Fisher information, and the least errors of any estimate.
 
 - `bounds`: `bounds`, errors of place, depth and light over a volume; `Bounds`, the result
+- `slopes`: `slopes`, how a bound changes with the parts of a Fourier microscope
 - `points`: images of points and their derivatives by place, of any instrument
 - `noise`: information of a pixel with photon and read noise
 - `trials`: `trials`, errors of the most likely places in drawn noise, to set beside the bounds
@@ -8,6 +9,7 @@
 
 from lumigraph.information.bounds import Bounds, Light, bounds
 from lumigraph.information.noise import pixel_information
+from lumigraph.information.slopes import slopes
 from lumigraph.information.trials import Trials, trials
 
-__all__ = ["Bounds", "Light", "Trials", "bounds", "pixel_information", "trials"]
+__all__ = ["Bounds", "Light", "Trials", "bounds", "pixel_information", "slopes", "trials"]

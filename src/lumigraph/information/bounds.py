@@ -316,9 +316,39 @@ class _Spot:
     @classmethod
     def of(cls, points: Source, sensor: Sensor, light: Light, place: np.ndarray, checked: bool) -> "_Spot":
         lit, errors = points.lit(place, checked=checked)
-        mean, changes = expected(sensor, light, lit)
-        told = deviations(fisher(mean, changes, reading(sensor)))
-        return cls(told, float(lit[0].sum()), errors, float(mean.max()))
+        seen = Seen.of(sensor, light, lit)
+        return cls(deviations(seen.fisher), float(lit[0].sum()), errors, float(seen.mean.max()))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What pixels tell of a point.
+
+    Parameters
+    ----------
+    lit
+        (ny, nx), those that its light reaches.
+    mean, changes
+        (k,), (n, k): electrons of these, as `expected`.
+    fisher
+        (n, n), information of all pixels.
+    """
+
+    lit: np.ndarray
+    mean: np.ndarray
+    changes: np.ndarray
+    fisher: np.ndarray
+
+    @classmethod
+    def of(cls, sensor: Sensor, light: Light, lit: np.ndarray) -> "Seen":
+        """Of parts of a point's light and their derivatives (4, ny, nx)."""
+        some, noise = np.any(lit, axis=0), reading(sensor)
+        mean, changes = expected(sensor, light, lit[:, some])
+        found = fisher(mean, changes, noise)
+        if light.background:  # it is all that the other pixels tell
+            even = expected(sensor, light, np.zeros((4, 1)))
+            found += fisher(*even, noise) * (some.size - np.count_nonzero(some))
+        return cls(some, mean, changes, found)
 
 
 def fisher(mean: np.ndarray, changes: np.ndarray, read_noise: float) -> np.ndarray:

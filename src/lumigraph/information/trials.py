@@ -6,7 +6,7 @@ import numpy as np
 
 from lumigraph.core import checks, memory
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.information.bounds import Light, deviations, expected, fisher, reading
+from lumigraph.information.bounds import Light, Seen, deviations, expected, reading
 from lumigraph.information.noise import pixel_information
 from lumigraph.information.points import Source, source
 from lumigraph.instruments.instrument import Instrument
@@ -92,7 +92,7 @@ def trials(
         raise GeometryError(f"place is {place} and draws {draws}; give (y, x, dz) and at most 1000000 draws.")
     points, sensor = source(instrument, at[2:], accuracy), instrument.sensor
     first = points.lit(at, checked=True)[0]
-    told = deviations(fisher(*expected(sensor, light, first), reading(sensor)))
+    told = deviations(Seen.of(sensor, light, first).fisher)
     if not np.isfinite(told).all():
         raise GeometryError(f"a raw image does not tell where a point at {place} is. Use more photons.")
     between = _Between.of(points, at, told[:3])

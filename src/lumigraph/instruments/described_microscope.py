@@ -154,8 +154,16 @@ class DescribedMicroscope(Instrument):
         """The pixels; without a shape given, as many as all micro-images need."""
         given = self.pixels
         size = self.relay_magnification / given.pixel_pitch
-        shape = given.shape or tuple(2 * math.ceil(reach * size - 0.5) + 1 for reach in self.lenslets.reach)
+        shape = given.shape or tuple(2 * math.ceil(reach * size - 0.5) + 1 for reach in self._reach)
         return given.sensor((shape[0], shape[1]))
+
+    @property
+    def _reach(self) -> tuple[float, float]:
+        """Farthest that micro-images, a pitch wide, extend from the axis (y, x) [m]."""
+        if not self.lenslets.single:
+            return self.lenslets.reach
+        y, x = np.abs(self.lenslets.each()[0]).max(0) + self.lenslets.pitch / 2
+        return max(float(y), self.lenslets.reach[0]), max(float(x), self.lenslets.reach[1])
 
     @property
     def in_pupil(self) -> bool:

@@ -16,6 +16,7 @@ C. Guo et al., "Fourier light-field microscopy", Opt. Express 27, 25573 (2019).
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -29,6 +30,8 @@ from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError, SamplingError
 
 Window = tuple[slice, slice]
+Fine = tuple[int, int]
+"""Samples across a lenslet, nodes across a pixel."""
 
 TAIL = 4.0
 """Half width of the window of a point's image beyond its displacement, in λ f_µ/d."""
@@ -67,6 +70,10 @@ class Mosaic:
     pixel_pitch: float
     shape: tuple[int, int]
     pitch: float
+
+    def of(self, lenslets: np.ndarray) -> "Mosaic":
+        """With some of the lenslets (k,)."""
+        return replace(self, centers=self.centers[lenslets], focal_lengths=self.focal_lengths[lenslets])
 
     @property
     def total_magnification(self) -> float:
@@ -225,6 +232,11 @@ def fourier_operator(
 
 def lit_lenslets(objective: Objective, mosaic: Mosaic) -> Mosaic:
     """Those lenslets that the pupil lights at least in part."""
+    return mosaic.of(lit_ones(objective, mosaic))
+
+
+def lit_ones(objective: Objective, mosaic: Mosaic) -> np.ndarray:
+    """Which lenslets the pupil lights at least in part, (k,)."""
     radius = mosaic.fourier_lens * objective.aperture / mosaic.magnification
     nearest = np.maximum(np.abs(mosaic.centers) - mosaic.width / 2, 0)
     lit = np.hypot(*nearest.T) < radius
@@ -233,7 +245,7 @@ def lit_lenslets(objective: Objective, mosaic: Mosaic) -> Mosaic:
             f"no lenslet stands in the pupil, which is {2 * radius * 1e3:.4g} mm wide. "
             "Check fourier_lens and count."
         )
-    return replace(mosaic, centers=mosaic.centers[lit], focal_lengths=mosaic.focal_lengths[lit])
+    return lit
 
 
 def half_window(objective: Objective, mosaic: Mosaic, depths: Sequence[float]) -> int:
@@ -274,11 +286,19 @@ class View:
     scale: float
 
     @classmethod
-    def of(cls, objective: Objective, mosaic: Mosaic, lenslet: int, half: int) -> "View":
-        """That of the lenslet of a number."""
+    def of(
+        cls,
+        objective: Objective,
+        mosaic: Mosaic,
+        lenslet: int,
+        half: int,
+        fine: tuple[int, int] | None = None,
+    ) -> "View":
+        """That of the lenslet of a number, by as many samples and nodes as are needed, or as are given."""
         wave, f, width = objective.wavelength, mosaic.distance, mosaic.width
         center, bend = mosaic.centers[lenslet], np.pi * mosaic.defocus[lenslet] / wave
-        n = math.ceil(2.2 * (2 * half + 1) * mosaic.pixel_pitch * width / (wave * f)) + 8
+        per_pixel = 2.2 * mosaic.pixel_pitch * width / (wave * f)
+        n, over = fine or (math.ceil((2 * half + 1) * per_pixel) + 8, 1 + math.ceil(per_pixel))
         u = ((np.arange(n) - (n - 1) / 2) / n) * width
         # The pupil's image is upside down.
         step = mosaic.magnification / mosaic.fourier_lens
@@ -287,7 +307,6 @@ class View:
         inside = np.clip((objective.aperture - q) / (width / n * step) + 0.5, 0, 1)
         within = np.minimum(1, objective.aperture / np.maximum(q, 1e-300))
         cosine = np.sqrt(1 - (q * within / objective.medium) ** 2)
-        over = 1 + math.ceil(2.2 * mosaic.pixel_pitch * width / (wave * f))
         amplitude = inside / np.sqrt(cosine) * np.exp(1j * bend * (u[:, None] ** 2 + u**2))
         scale = (mosaic.pixel_pitch * width / (2 * wave * f * n**2)) ** 2
         turn = 2 * np.pi * mosaic.pixel_pitch / (wave * f)
@@ -295,15 +314,21 @@ class View:
 
     def waves(self, middle: float) -> np.ndarray:
         """From the samples to the nodes of the pixels (pixels · over, n) around a place near a pixel [px]."""
-        nodes = np.polynomial.legendre.leggauss(self.over)[0] / 2
+        nodes = legendre(self.over)[0] / 2
         fine = np.arange(-self.half, self.half + 1)[:, None] + nodes
         return np.exp(-1j * self.turn * np.outer(fine.ravel() - middle, self.u))
 
     def pixels(self, light: np.ndarray) -> np.ndarray:
         """Of intensities on the pixels' nodes."""
-        count, weights = 2 * self.half + 1, np.polynomial.legendre.leggauss(self.over)[1]
+        count, weights = 2 * self.half + 1, legendre(self.over)[1]
         parts = light.reshape(count, self.over, count, self.over)
         return np.einsum("yixj,i,j->yx", parts, weights, weights, optimize=True) * self.scale
+
+
+@lru_cache(maxsize=64)
+def legendre(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights of Gauss and Legendre from -1 to 1."""
+    return np.polynomial.legendre.leggauss(count)
 
 
 def image_behind(view: View, objective: Objective, rest: np.ndarray, dz: float) -> np.ndarray:

@@ -5,6 +5,7 @@
 - `space`: what may change, and which cameras that gives
 - `evaluations`: each camera once, noted in a ledger, so that a search goes on after a kill
 - `search`: a grid, then downhill from its best, or over all of the ranges
+- `gradient`: downhill by derivatives, of what has some
 - `front`: the cameras that no other beats in both of two goals
 - `mask`: `depth_mask`, a phase in the pupil that leaves detail alike over a range of defocus
 """

@@ -2,18 +2,24 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from lumigraph.cluster.ledger import Entry, Ledger
 from lumigraph.errors import LumigraphError, SamplingWarning
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.varied import changed
-from lumigraph.optimisation.goals import Goal
+from lumigraph.optimisation.goals import PLACES, Goal
+from lumigraph.optimisation.space import Space
 
 ERROR = "error"
+
+APART = 1e-4
+"""Part of a range to either side, where a camera differs by a little."""
 
 
 @dataclass(eq=False)
@@ -68,6 +74,27 @@ class Evaluations:
     def cost(self, item: Mapping[str, Any]) -> float:
         """Of an item, as `Goal.cost`."""
         return self.goal.cost(self.row(item))
+
+    def slopes(self, item: Mapping[str, Any], space: Space) -> np.ndarray:
+        """Of the cost by the parts of the ranges (n,), from cameras a little to either side that can be."""
+        parts, sides = np.array(space.parts(item)), np.eye(len(space.ranges)) * APART
+        pairs, widths = [], []
+        for side in sides:
+            ends = [self._near(space, item, parts, one) for one in (-side, side)]
+            pairs.append((ends[0][0], ends[1][0]))
+            widths.append(ends[1][1] - ends[0][1])
+        camera = changed(self.start, item)
+        found = self.goal.slopes(camera, pairs, self.first, int(self.row(item)[PLACES]))
+        return np.divide(found, widths, out=np.zeros(len(found)), where=np.array(widths) > 0)
+
+    def _near(
+        self, space: Space, item: Mapping[str, Any], parts: np.ndarray, side: np.ndarray
+    ) -> tuple[Instrument, float]:
+        """A camera to a side, and how far; the item's own where there is none."""
+        there = np.clip(parts + side, 0, 1)
+        with suppress(LumigraphError):
+            return changed(self.start, space.moved(item, there.tolist())), float((there - parts).sum())
+        return changed(self.start, item), 0.0
 
     def _computed(self, item: Mapping[str, Any]) -> tuple[dict[str, Any], float]:
         began = time.perf_counter()

@@ -4,7 +4,7 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from lumigraph.errors import FormatError, GeometryError, SamplingWarning
 from lumigraph.information import Bounds, Light, bounds
 from lumigraph.information.bounds import checked_depths, checked_places
 from lumigraph.information.points import collected
+from lumigraph.information.slopes import Bound, require_slopes, slopes
+from lumigraph.instruments import LightFieldMicroscope
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.metric.charts import check_camera
 
@@ -156,6 +158,32 @@ class Goal:
             found = metric.simulated(check_camera(instrument), [self.name], rng=rng)[self.name].value
             return {self.name: math.nan if found is None else float(found)}
         return {row.name: float(row.value) for row in instrument.quantities() if row.name == self.name}
+
+    def slopes(self, instrument: Instrument, pairs: Sequence[Any], first: float, places: int) -> np.ndarray:
+        """Changes (n,) of a bound from the first to the last of each pair of cameras around one."""
+        light = self._light(instrument, first)
+        return slopes(
+            cast(LightFieldMicroscope, instrument),
+            pairs,
+            self.depths,
+            light,
+            name=cast(Bound, self.name),
+            places=places,
+        ).changes
+
+    def check_slopes(self, instrument: Instrument) -> None:
+        """Refuse what has no derivatives by the camera's keys.
+
+        Raises
+        ------
+        GeometryError
+            No bound, or no Fourier microscope.
+        """
+        if self.name not in BOUNDS:
+            raise GeometryError(
+                f"search 'gradient' is for {', '.join(BOUNDS)}, not {self.name!r}. Use 'local'."
+            )
+        require_slopes(instrument)
 
     def checked(self, instrument: Instrument, first: float, rough: Mapping[str, Any]) -> Judged:
         """A bound at other places, by derivatives of two steps.

@@ -4,6 +4,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any, get_args
@@ -107,7 +108,9 @@ def optimise(
 
     All combinations of the first values are computed. From the best of them a simplex goes downhill
     ("local"), and from the camera as given where it lies within the ranges; or a population by differential
-    evolution looks over all of the ranges ("global"). Values of a stock stay as the combination has them.
+    evolution looks over all of the ranges ("global"). Bounds of Fourier microscopes have gradients
+    ("gradient"): each step takes the time of some five cameras, however many keys vary, such as the places
+    of single lenslets. Values of a stock stay as the combination has them.
     What no camera can be is left out, with its reason. Bounds are judged at other places than those of the
     search, for where pixels are coarse a search finds the places' luck.
 
@@ -127,7 +130,7 @@ def optimise(
         A second goal: after the search for the first, others look for the best of it and between the two,
         with as many evaluations again. See `Optimum.front`; its bounds are not judged at other places.
     search
-        "local", "global", or "grid" for none but the first values.
+        "local", "global", "gradient", or "grid" for none but the first values.
     evaluations
         Cameras at most, beyond the grid.
     seed
@@ -145,7 +148,8 @@ def optimise(
     FormatError
         An unknown key or number, a range that does not go up, an output of another search.
     GeometryError
-        A goal that the instrument has not, or none of the first values gives a camera.
+        A goal that the instrument has not, or none of the first values gives a camera. Gradients of another
+        instrument or goal than bounds of a Fourier microscope, by its sensor, or with a second goal.
 
     Warns
     -----
@@ -174,6 +178,10 @@ def optimise(
     aim.check(start)
     if other is not None:
         other.check(start)
+    if search == "gradient":
+        aim.check_slopes(start)
+        if other is not None:
+            raise GeometryError("search 'gradient' is for one goal. Use 'local' with against.")
     beyond = most if space.ranges and search != "grid" else 0
     total = 1 + len(items) + beyond * (1 if other is None else 2)
     what = {
@@ -224,10 +232,10 @@ def _refined(
         starts = sorted([swept, own], key=cameras.cost)
     if search == "global":  # goes everywhere from one
         starts = starts[:1]
-    found = []
+    found, slopes = [], partial(cameras.slopes, space=space) if search == "gradient" else None
     for k, item in enumerate(starts):
         left = most - (len(cameras.rows) - begun)
-        found.append(refined(cameras, space, item, (search, left // (len(starts) - k), seed)))
+        found.append(refined(cameras, space, item, (search, left // (len(starts) - k), seed), slopes))
     return min(found, key=cameras.cost)
 
 

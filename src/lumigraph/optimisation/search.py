@@ -7,15 +7,15 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from scipy import optimize
 
+from lumigraph.optimisation.gradient import SPREAD, downhill
 from lumigraph.optimisation.space import Space
 
-Search = Literal["grid", "local", "global"]
-
-SPREAD = 0.15
-"""Of a simplex at first, as a part of each range."""
+Search = Literal["grid", "local", "global", "gradient"]
 
 FINE = 1e-3
 """Of a simplex at last, and of its costs."""
+
+Slopes = Callable[[Mapping[str, Any]], np.ndarray]
 
 MANY = 10**6
 """Evaluations that no search reaches: its own limit is another."""
@@ -50,7 +50,11 @@ def grid(cameras: Costs, space: Space) -> dict[str, Any] | None:
 
 
 def refined(
-    cameras: Costs, space: Space, item: Mapping[str, Any], how: tuple[Search, int, int]
+    cameras: Costs,
+    space: Space,
+    item: Mapping[str, Any],
+    how: tuple[Search, int, int],
+    slopes: Slopes | None = None,
 ) -> dict[str, Any]:
     """A better item than one given, its stock values kept.
 
@@ -62,6 +66,8 @@ def refined(
         Where to begin.
     how
         The search, evaluations at most, seed.
+    slopes
+        Of an item's cost, by the parts of the ranges; of search "gradient" alone.
     """
     search, most, seed = how
     if search == "grid" or not space.ranges or most < 1:
@@ -79,12 +85,16 @@ def refined(
             best = found, here
         return found / size if np.isfinite(found) else IMPOSSIBLE
 
+    start = np.array(space.parts(item))
     with suppress(_Enough):
-        (_downhill if search == "local" else _everywhere)(cost, np.array(space.parts(item)), seed)
+        if slopes is not None:
+            downhill(cost, lambda at: slopes(space.moved(item, at.tolist())) / size, start)
+        else:
+            (_by_simplex if search == "local" else _everywhere)(cost, start, seed)
     return best[1]
 
 
-def _downhill(cost: Callable[[np.ndarray], float], start: np.ndarray, seed: int) -> None:
+def _by_simplex(cost: Callable[[np.ndarray], float], start: np.ndarray, seed: int) -> None:
     """Nelder and Mead's simplex, again from where it ended."""
     for spread in (SPREAD, SPREAD / 3):
         steps = np.where(start + spread <= 1, spread, -spread)
