@@ -24,6 +24,7 @@ from lumigraph.information.bounds import (
 from lumigraph.information.noise import pixel_information
 from lumigraph.information.points import collected, source, spread
 from lumigraph.instruments import LightFieldMicroscope
+from lumigraph.instruments.capabilities import WithObjective
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.operators.fourier_changes import Behind, Pupil, Slopes, pupils
 from lumigraph.operators.fourier_microscope import Window, lit_ones, overlap
@@ -61,7 +62,7 @@ def require_slopes(instrument: Instrument) -> None:
     GeometryError
         Another one than a Fourier microscope.
     """
-    if not (isinstance(instrument, LightFieldMicroscope) and instrument.configuration == "fourier"):
+    if not (isinstance(instrument, WithObjective) and instrument.in_pupil):
         raise GeometryError(
             "derivatives of bounds by an instrument's parts are of Fourier microscopes. For others, use "
             "search 'local'."
