@@ -34,7 +34,8 @@ EVALUATIONS, DRAWS, OTHERS = 30, 200, range(3, 11)
 
 PITCHES = {2: "1.5 mm:2.3 mm:3", 3: "1.1 mm:2.3 mm:3", 4: "0.8 mm:1.5 mm:3", 5: "0.6 mm:1.1 mm:3"}
 """Of n × n lenslets."""
-LENGTHS = {"fourier_lens": "60 mm:120 mm:3", "lenslets.focal_length": "5 mm:25 mm:3"}
+# The relay, the pitch and the lenslets' focal length scaled together give the same images, farther apart.
+LENGTHS = {"fourier_lens": "65 mm:95 mm:2", "lenslets.focal_length": "5 mm:25 mm:3"}
 MIDDLE = {"fourier_lens": "65 mm:95 mm:1", "lenslets.focal_length": "8 mm:24 mm:1"}
 
 NEAR, FAR, EVEN = -0.035, 0.035, 0.003
