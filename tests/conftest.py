@@ -10,8 +10,14 @@ import numpy as np
 import pytest
 
 
+def pytest_addoption(parser):
+    parser.addoption("--device", default="cpu", help="where PyTorch's arrays stand, such as cuda")
+
+
 def pytest_configure(config):
     """What operators keep on disk goes to a folder of this run, which its workers share."""
+    if config.getoption("--device") != "cpu":
+        importlib.import_module("torch").set_default_device(config.getoption("--device"))
     if not hasattr(config, "workerinput"):
         config.kept = tempfile.mkdtemp(prefix="lumigraph-tests-")
         os.environ["LUMIGRAPH_CACHE"] = config.kept

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.linear import Linear
@@ -86,7 +87,7 @@ def test_single_precision_stays_and_equals_double(operator, xp, rng):
     single = operator.forward(xp.asarray(volume.astype(np.float32)))
     assert single.dtype == xp.float32
     assert operator.adjoint(single).dtype == xp.float32
-    np.testing.assert_allclose(np.asarray(single), operator.forward(volume), rtol=1e-4)
+    np.testing.assert_allclose(to_numpy(single), operator.forward(volume), rtol=1e-4)
 
 
 def test_it_is_what_a_deconvolution_asks_for(operator):
@@ -174,7 +175,7 @@ def test_turned_pixels_see_a_turned_picture(xp):
     smooth = lambda a, b: 2 + np.sin(2.1 * a) * np.cos(1.7 * b)  # noqa: E731
     # B-splines of samples average over two more of them: 1/3 of the second derivatives of 2.1² and 1.7².
     plane = xp.asarray(smooth(v, u))
-    found = np.asarray(placed.forward(plane))[6:-6, 6:-6]
+    found = to_numpy(placed.forward(plane))[6:-6, 6:-6]
     np.testing.assert_allclose(found, smooth(exact[..., 0], exact[..., 1])[6:-6, 6:-6], atol=6e-3)
     assert placed.matrix.data.min() >= 0
     raw = xp.asarray(np.random.default_rng(1).random((60, 64)))

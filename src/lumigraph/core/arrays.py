@@ -6,6 +6,7 @@ computed by NumPy in float64 and cast last, by `like`.
 """
 
 import os
+import weakref
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -43,6 +44,9 @@ WORKERS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 
 PART = 2**15
 """Values that are treated at a time, one operation after the other: they stay in a processor's own cache."""
 
+_HELD: dict[tuple, Array] = {}
+"""What `held` has copied to other devices."""
+
 _SINGLE = ("float32", "complex64", "float16")
 
 
@@ -70,7 +74,7 @@ def as_numpy(array: Array, dtype: "DTypeLike | None" = None, copy: bool | None =
     ValueError
         `copy` is false but the type asks for one, or the array stands on a GPU.
     """
-    if copy is False and not is_numpy_array(array) and "cpu" not in str(device(array)).lower():
+    if copy is False and not is_here(array):
         raise ValueError(f"an array on {device(array)} needs a copy. Leave copy=False out.")
     return np.array(to_numpy(array), dtype=dtype, copy=copy)
 
@@ -112,6 +116,25 @@ def like(values: np.ndarray, array: Array) -> Array:
     # PyTorch warns of arrays that cannot be written to, as those mapped from files.
     values = np.require(values, requirements=("C", "W"))
     return namespace(array).asarray(values, device=device(array))
+
+
+def is_here(array: Array) -> bool:
+    """Whether the array stands in the processor's memory."""
+    return is_numpy_array(array) or "cpu" in str(device(array)).lower()
+
+
+def held(values: np.ndarray, array: Array, *chosen: int | slice) -> Array:
+    """`like` of ``values[*chosen, ...]``, for values that never change and are used again.
+
+    Another device than the processor is sent all of the values once, and keeps them for as long as they live.
+    """
+    if is_here(array):
+        return like(values[*chosen, ...], array)
+    key = id(values), *placement(array)
+    if key not in _HELD:
+        _HELD[key] = like(values, array)
+        weakref.finalize(values, _HELD.pop, key, None)
+    return _HELD[key][*chosen, ...]
 
 
 def is_parameter(value: Any) -> bool:

@@ -1,18 +1,19 @@
 """Matrices whose rows see few columns each, in blocks."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 
-_ROWS = 64
-"""Of a block."""
+_ROWS, _JOINED = 64, 8
+"""Rows of a block, and blocks that another device than the processor takes as one: it starts few products."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Banded:
     """Matrix (rows, columns) of blocks of rows that see few columns each.
 
@@ -40,9 +41,15 @@ class Banded:
     def _parts(self, like: Array) -> Iterator[tuple[slice, slice, Array]]:
         """Rows, columns and matrix of each block."""
         row = 0
-        for first, m in self.blocks:
-            yield slice(row, row + len(m)), slice(first, first + m.shape[1]), arrays.like(m, like)
+        for first, m in self.blocks if arrays.is_here(like) else self._tall:
+            yield slice(row, row + len(m)), slice(first, first + m.shape[1]), arrays.held(m, like)
             row += len(m)
+
+    @cached_property
+    def _tall(self) -> tuple[tuple[int, np.ndarray], ...]:
+        """The blocks, some after the other as one, with zeros between."""
+        starts = range(0, len(self.blocks), _JOINED)
+        return tuple(_joined(self.blocks[start : start + _JOINED]) for start in starts)
 
     def down(self, plane: Array) -> Array:
         """``matrix @ plane``: (columns, n) to (rows, n)."""
@@ -71,6 +78,16 @@ class Banded:
         for rows, columns, m in self._parts(plane):
             result[:, columns] += plane[:, rows] @ m
         return result
+
+
+def _joined(blocks: Sequence[tuple[int, np.ndarray]]) -> tuple[int, np.ndarray]:
+    first = min(start for start, _ in blocks)
+    last = max(start + m.shape[1] for start, m in blocks)
+    row, whole = 0, np.zeros((sum(len(m) for _, m in blocks), last - first), blocks[0][1].dtype)
+    for start, m in blocks:
+        whole[row : row + len(m), start - first : start - first + m.shape[1]] = m
+        row += len(m)
+    return first, whole
 
 
 def banded(

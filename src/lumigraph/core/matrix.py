@@ -73,7 +73,8 @@ class Matrix(Linear):
             matrix = self.matrix.T if back else self.matrix
             return (matrix @ flat).astype(values.dtype, copy=False)
         if isinstance(self.matrix, np.ndarray):
-            return arrays.like(self.matrix.T if back else self.matrix, values) @ flat
+            matrix = arrays.held(self.matrix, values)
+            return (xp.matrix_transpose(matrix) if back else matrix) @ flat
         index, weight = self._table(values, back)
         gathered = xp.reshape(xp.take(flat, xp.reshape(index, (-1,)), axis=0), weight.shape)
         return xp.sum(gathered * weight, axis=1)

@@ -47,7 +47,7 @@ class Glare:
     def forward(self, cells: Array) -> Array:
         """Light of the object's cells (rows, columns), to the image's (rows, columns, samples)."""
         xp = arrays.namespace(cells)
-        spectra = arrays.like(self.spectra, arrays.as_complex(cells))
+        spectra = arrays.held(self.spectra, arrays.as_complex(cells))
         if not self.everywhere:
             cells = self._in_array(cells, self.margin)
         window = arrays.framed(self._apart(cells, self.margin), (0, 0), self._window)
@@ -55,12 +55,12 @@ class Glare:
         inside = self._inside()
         parts = xp.permute_dims(xp.real(spread)[:, inside[0], inside[1]], (1, 2, 0))
         if not self.cells.staggered:
-            image = parts @ arrays.like(self.pictures[0], cells)
+            image = parts @ arrays.held(self.pictures, cells, 0)
         else:
             size = (*self.cells.image, self.pictures.shape[2])
             image = xp.zeros(size, dtype=parts.dtype, device=arrays.device(parts))
-            for rows, columns, seen, pictures in self._alike():
-                image[rows, columns, :] = parts[rows, seen, :] @ arrays.like(pictures, cells)
+            for rows, columns, seen, kind in self._alike():
+                image[rows, columns, :] = parts[rows, seen, :] @ arrays.held(self.pictures, cells, kind)
         return self._in_array(image) if self.everywhere else image
 
     def adjoint(self, image: Array) -> Array:
@@ -68,7 +68,7 @@ class Glare:
         xp = arrays.namespace(image)
         parts = self._parts(self._in_array(image) if self.everywhere else image)
         parts = arrays.framed(xp.permute_dims(parts, (2, 0, 1)), self._before, self._window)
-        spectra = arrays.like(np.conj(self.spectra), arrays.as_complex(parts))
+        spectra = xp.conj(arrays.held(self.spectra, arrays.as_complex(parts)))
         spread = xp.sum(arrays.fft2(arrays.as_complex(parts)) * spectra, axis=0)
         rows, columns = (n + 2 * m for n, m in zip(self.cells.image, self.margin, strict=True))
         cells = self._together(xp.real(arrays.ifft2(spread)), (rows, columns))
@@ -93,22 +93,23 @@ class Glare:
         """The transpose of what `forward` does with the pictures: (rows, places along x, q)."""
         xp = arrays.namespace(image)
         if not self.cells.staggered:
-            return image @ xp.matrix_transpose(arrays.like(self.pictures[0], image))
+            return image @ xp.matrix_transpose(arrays.held(self.pictures, image, 0))
         size = (self.cells.image[0], 2 * self.cells.image[1] + 1, self.pictures.shape[1])
         parts = xp.zeros(size, dtype=image.dtype, device=arrays.device(image))
-        for rows, columns, seen, pictures in self._alike():
-            parts[rows, seen, :] = image[rows, columns, :] @ xp.matrix_transpose(arrays.like(pictures, image))
+        for rows, columns, seen, kind in self._alike():
+            pictures = arrays.held(self.pictures, image, kind)
+            parts[rows, seen, :] = image[rows, columns, :] @ xp.matrix_transpose(pictures)
         return parts
 
-    def _alike(self) -> Iterator[tuple[slice, slice, slice, np.ndarray]]:
-        """Rows and columns of the image's cells of a parity and a kind, their places, and their pictures."""
+    def _alike(self) -> Iterator[tuple[slice, slice, slice, int]]:
+        """Rows and columns of the image's cells of a parity and a kind, their places, and the kind."""
         height, width = self.cells.image
         for parity in self.cells.parities:
             rows = self.cells.rows(0, height, parity)
-            for kind, pictures in enumerate(self.pictures):
+            for kind in range(len(self.pictures)):
                 columns = self.cells.columns(0, width, parity, kind)
                 seen = slice(2 * columns.start + parity, 2 * width + parity, 2 * columns.step)
-                yield slice(rows.start, None, 2), slice(columns.start, None, columns.step), seen, pictures
+                yield slice(rows.start, None, 2), slice(columns.start, None, columns.step), seen, kind
 
     def _apart(self, cells: Array, margin: Offset) -> Array:
         """Staggered cells at their places along x, half a cell apart, between zeros."""

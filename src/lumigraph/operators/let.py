@@ -24,7 +24,7 @@ class Let(Linear):
         return self.through.shape, self.through.shape
 
     def _forward(self, intensity: Array) -> Array:
-        return intensity * arrays.like(self.through, intensity)
+        return intensity * arrays.held(self.through, intensity)
 
     def _adjoint(self, raw: Array) -> Array:
         return self._forward(raw)

@@ -45,7 +45,7 @@ class Weighed(Linear):
 
     def _weighed(self, raw: Array) -> Array:
         for factor in self.factors:
-            raw = raw * arrays.like(factor, raw)
+            raw = raw * arrays.held(factor, raw)
         return raw
 
     def _forward(self, intensity: Array) -> Array:

@@ -51,8 +51,8 @@ from lumigraph.operators.seen import Fields, seen_plane
 from lumigraph.operators.streamed import Streamed
 from lumigraph.operators.tiles import as_plane, by_cell, readout, spread
 
-PIECE = 600
-"""Cells of the image that are computed at a time."""
+PIECE, PIECE_ELSEWHERE = 600, 100_000
+"""Cells of the image that are computed at a time: in a processor's cache, and on another device."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,10 +120,10 @@ class PeriodicOperator(Linear):
             points = by_cell(
                 plane.spread.forward(layers[k, ...]), self.cells, self.cells.points, plane.matrix.margin[0]
             )
-            for part in _pieces(plane.matrix.parts):
+            for part in _pieces(plane.matrix.parts, points):
                 mine = (_slice(part.rows), _slice(part.columns), slice(None))
                 for group in _groups(part, plane.matrix.margin):
-                    image[mine] += group.seen(points) @ arrays.like(group.right, image)
+                    image[mine] += group.seen(points) @ group.right(image)
             light = xp.sum(points, axis=2)
             for glare in plane.matrix.glare:
                 image += glare.forward(light)
@@ -142,10 +142,10 @@ class PeriodicOperator(Linear):
         shape = [n + 2 * m for n, m in zip(self.cells.image, margin, strict=True)]
         size = (*shape, math.prod(self.cells.points))
         points = xp.zeros(size, dtype=image.dtype, device=image.device)
-        for part in _pieces(plane.matrix.parts):
+        for part in _pieces(plane.matrix.parts, image):
             mine = image[_slice(part.rows), _slice(part.columns), :]
             for group in _groups(part, margin):
-                group.return_to(points, mine @ xp.matrix_transpose(arrays.like(group.right, image)))
+                group.return_to(points, mine @ xp.matrix_transpose(group.right(image)))
         for glare in plane.matrix.glare:
             points += xp.expand_dims(glare.adjoint(image), axis=2)
         layer = plane.spread.adjoint(as_plane(points, self.cells, self.cells.points, margin[0]))
@@ -167,14 +167,15 @@ class PeriodicOperator(Linear):
         return self.accuracy
 
 
-def _slice(numbers: range) -> slice:
-    return slice(numbers.start, numbers.stop, numbers.step)
+def _slice(numbers: range, farther: int = 0) -> slice:
+    return slice(numbers[0] + farther, numbers[-1] + farther + 1, numbers.step)
 
 
-def _pieces(parts: Iterable[Part]) -> Iterator[Part]:
-    """The parts, those of many cells in rows that stay in the processor's cache."""
+def _pieces(parts: Iterable[Part], like: Array) -> Iterator[Part]:
+    """The parts, those of many cells in rows that stay in the processor's cache, or are few elsewhere."""
+    cells = PIECE if arrays.is_here(like) else PIECE_ELSEWHERE
     for part in parts:
-        step = max(1, PIECE // len(part.columns))
+        step = max(1, cells // len(part.columns))
         for row in range(0, len(part.rows), step):
             yield replace(part, rows=part.rows[row : row + step])
 
@@ -186,22 +187,29 @@ def _groups(part: Part, margin: tuple[int, int]) -> "Iterator[_Group]":
         across = tuple((dx, rank) for _, dx, rank in offsets)
         ranks = slice(start, start + sum(rank for _, rank in across))
         start = ranks.stop
-        rows = slice(part.rows.start + margin[0] + dy, part.rows.stop + margin[0] + dy, part.rows.step)
+        rows = _slice(part.rows, margin[0] + dy)
         first = part.columns.start + margin[1]
         columns = range(first, first + len(part.columns) * apart, apart)
-        left = None if part.left is None else part.left[:, ranks]
-        yield _Group(rows, columns, across, left, part.right[ranks])
+        yield _Group(rows, columns, across, ranks, part)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Group:
-    """Offsets of one part in one row: (dx, rank) for each, and the columns that dx = 0 takes."""
+    """Offsets of one part in one row: (dx, rank) for each, the columns that dx = 0 takes, the factors'."""
 
     rows: slice
     columns: range
     across: tuple[tuple[int, int], ...]
-    left: np.ndarray | None
-    right: np.ndarray
+    ranks: slice
+    part: Part
+
+    def _left(self, like: Array) -> Array | None:
+        left = self.part.left
+        return None if left is None else arrays.held(left, like, slice(None), self.ranks)
+
+    def right(self, like: Array) -> Array:
+        """The right factor (ranks, samples) in the library, precision and place of an array."""
+        return arrays.held(self.part.right, like, self.ranks)
 
     def _span(self) -> range:
         columns = self.columns
@@ -222,24 +230,24 @@ class _Group:
 
     def seen(self, points: Array) -> Array:
         """Points (rows, columns, points) through the left factors: (rows, columns, ranks)."""
-        xp = arrays.namespace(points)
+        xp, left = arrays.namespace(points), self._left(points)
         wide = points[self._seen]
-        if self.left is None:
+        if left is None:
             return wide
-        wide = wide @ arrays.like(self.left, points)
+        wide = wide @ left
         return xp.concat([wide[:, cells, ranks] for cells, ranks in self._places()], axis=2)
 
     def return_to(self, points: Array, seen: Array) -> None:
         """The transpose of `seen`, added to points."""
-        xp = arrays.namespace(seen)
-        if self.left is None:
+        xp, left = arrays.namespace(seen), self._left(seen)
+        if left is None:
             points[self._seen] += seen
             return
         shape = (seen.shape[0], len(self._span()), seen.shape[2])
         wide = xp.zeros(shape, dtype=seen.dtype, device=seen.device)
         for cells, ranks in self._places():
             wide[:, cells, ranks] = seen[:, :, ranks]
-        points[self._seen] += wide @ xp.matrix_transpose(arrays.like(self.left, seen))
+        points[self._seen] += wide @ xp.matrix_transpose(left)
 
 
 def periodic_operator(

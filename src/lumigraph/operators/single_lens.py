@@ -104,7 +104,7 @@ class Convolution(Linear):
         return self.seen, self.samples
 
     def _forward(self, intensity: Array) -> Array:
-        spectrum = arrays.rfft2(intensity, self.window) * arrays.like(self.transfer, intensity)
+        spectrum = arrays.rfft2(intensity, self.window) * arrays.held(self.transfer, intensity)
         image = arrays.irfft2(spectrum, self.window)
         rows, columns = (slice(n - 1, n - 1 + m) for n, m in zip(self.samples, self.seen, strict=True))
         return image[rows, columns]
@@ -112,7 +112,7 @@ class Convolution(Linear):
     def _adjoint(self, raw: Array) -> Array:
         xp, (rows, columns) = arrays.namespace(raw), self.samples
         spectrum = arrays.rfft2(arrays.framed(raw, (rows - 1, columns - 1), self.window), self.window)
-        spectrum = spectrum * xp.conj(arrays.like(self.transfer, raw))
+        spectrum = spectrum * xp.conj(arrays.held(self.transfer, raw))
         return arrays.irfft2(spectrum, self.window)[:rows, :columns]
 
     @property
