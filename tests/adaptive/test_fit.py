@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
+from lumigraph.adaptive import fit
 from lumigraph.adaptive.field import Nodes
 from lumigraph.adaptive.fit import Fit, Model
 from lumigraph.adaptive.star import Alone
@@ -87,3 +88,21 @@ def test_pictures_that_are_judged_are_not_coarse(model):
     coarse = Spots()
     replace(model, coarse=coarse).improved(Fit(bead(LIGHT), np.zeros((1, 1))), np.ones(1, bool), 3)
     assert coarse.calls["forward"] == coarse.calls["lit"]  # each derivative makes its own
+
+
+def test_short_steps_go_on_the_way_of_the_last_two(model, monkeypatch):
+    found, asked = [], []
+    for least in (fit.CURVED, np.inf):
+        monkeypatch.setattr(fit, "CURVED", least)
+        steep = Spots(5.0)  # steps are a fifth of what they should be
+        start = Fit(bead(LIGHT), np.zeros((1, 1)))
+        found.append(replace(model, coarse=steep).improved(start, np.ones(1, bool), 60))
+        asked.append(steep.calls["lit"])
+    assert asked[0] < 0.7 * asked[1]
+    assert found[0].objective < found[1].objective + 2 * fit.GAIN
+
+
+def test_what_a_fit_leaves_over_noise_is_one_at_the_truth_and_more_beside_it(model):
+    exact, beside = (model.judged(Fit(bead(LIGHT), np.full((1, 1), c))) for c in (MOVED, MOVED + 0.5))
+    assert model.pearson(exact) == pytest.approx(1, abs=0.25)  # 3 deviations of 441 pixels
+    assert model.pearson(beside) > 2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
-from lumigraph.operators.microscope_pupil import PLACES
+from lumigraph.operators.microscope_pupil import PLACES, PupilImages
 
 TERMS = tuple(range(4, 16))
 SCOPE = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
@@ -42,6 +42,23 @@ def test_images_of_an_aberrated_point_are_those_of_the_simulation():
     true = bent.point_image(*one[0], accuracy=3e-2)
     found = images(terms=(7, 9), accuracy=3e-2).forward(lg.Points(one, np.ones(1)), np.array([0.2, -0.1]))
     assert off(found, true) < 4e-2
+
+
+@pytest.mark.parametrize(("waves", "dz"), [(0.0, 7e-6), (1.0, -6e-6), (2.5, 0.0)])
+def test_the_pupils_nodes_are_as_many_as_images_need(waves, dz, monkeypatch):
+    """Twice as many change an image by little of its accuracy; half of them repeat it within the window."""
+    model, own = images(double=False, accuracy=3e-2), PupilImages._size
+    point = lg.Points(np.array([[2e-6, -1e-6, dz]]), np.ones(1))
+
+    def image(times):
+        monkeypatch.setattr(
+            PupilImages, "_size", lambda *given: (*own(*given)[:2], round(times * own(*given)[2]))
+        )
+        return model.forward(point, waves * SOME)
+
+    true = image(2)
+    assert off(image(1), true) < 0.05 * model.accuracy
+    assert off(image(0.5), true) > 0.1 * model.accuracy
 
 
 def test_known_aberrations_and_coefficients_add_up():

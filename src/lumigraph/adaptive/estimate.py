@@ -11,7 +11,7 @@ import numpy as np
 from lumigraph.adaptive.beads import brightest
 from lumigraph.adaptive.checked import BEADS, asked_for, bent
 from lumigraph.adaptive.field import PRIOR, Nodes
-from lumigraph.adaptive.fit import OWN, PLACES, Around, Fit, Model, solved
+from lumigraph.adaptive.fit import OWN, PLACES, Fit, Model, solved
 from lumigraph.adaptive.of_volume import of_volume
 from lumigraph.adaptive.wavefront import Wavefront
 from lumigraph.adaptive.worth import UNKNOWN, worth
@@ -146,20 +146,19 @@ def estimate(
     every = np.ones(len(given.terms), bool)
     plain = model.improved(first, ~every, STEPS["places"])
     fit, rounds = _fitted(given, model, plain, every)
-    around = model.around(fit)
-    covariance = covariance_of(model, around)[-fit.coefficients.size :, -fit.coefficients.size :]
+    covariance = covariance_of(model, fit)[-fit.coefficients.size :, -fit.coefficients.size :]
     free = worth(covariance, fit.coefficients, model.counted)
     if not free.all():
         fit = model.improved(fit.changed(coefficients=fit.coefficients * free), free, STEPS["all"])
-        around = model.around(fit)
-    warn_of_misfit(around.pearson, f"{len(fit.points.intensities)} beads leave")
+    pearson = model.pearson(fit)
+    warn_of_misfit(pearson, f"{len(fit.points.intensities)} beads leave")
     shape = (len(model.nodes.y), len(model.nodes.x), len(given.terms))
     deviations = np.sqrt(np.diag(covariance)).reshape(shape)
     unknown = {j: UNKNOWN for j, d in zip(given.terms, deviations.max((0, 1)), strict=True) if d > PRIOR / 2}
     found = fit.coefficients.reshape(shape)
     return Wavefront(
         given.terms, found, deviations, (model.nodes.y, model.nodes.x), given.untold | unknown, fit.points,
-        (model.deviance(plain), model.deviance(fit)), around.pearson, rounds, fit.steps,
+        (model.deviance(plain), model.deviance(fit)), pearson, rounds, fit.steps,
         bent(microscope, given.terms, found.mean((0, 1))), covariance,
     )  # fmt: skip
 
@@ -273,7 +272,8 @@ def _parts(points: Points) -> tuple[np.ndarray, np.ndarray]:
 
 def _without_faint(model: Model, fit: Fit, free: np.ndarray) -> Fit:
     """The fit without beads whose light is not known well enough to be there."""
-    covariance = covariance_of(model, model.around(fit))
+    fit = replace(fit, around=model.around(fit))
+    covariance = covariance_of(model, fit)
     light = np.diag(covariance)[PLACES : OWN * len(fit.points.intensities) : OWN]
     kept = light < 1 / (OWN * math.log(model.counted))
     if kept.all():
@@ -284,9 +284,10 @@ def _without_faint(model: Model, fit: Fit, free: np.ndarray) -> Fit:
     return model.improved(fit.changed(points=points), free, STEPS["all"])
 
 
-def covariance_of(model: Model, around: Around) -> np.ndarray:
+def covariance_of(model: Model, fit: Fit) -> np.ndarray:
     """Of all unknowns; larger where the beads do not explain the raw image."""
-    whole, n = around.information / max(around.pearson, 1.0), len(model.nodes.information)
+    whole = model.around(fit).information / max(model.pearson(fit), 1.0)
+    n = len(model.nodes.information)
     whole[-n:, -n:] += model.nodes.information
     return solved(whole, np.eye(len(whole)))
 

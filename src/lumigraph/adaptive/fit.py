@@ -29,11 +29,16 @@ LONGEST = (1.5e-6, 1.5e-6, 3e-6, 1.0, 0.25)
 TRIES = 5
 """Steps, each shorter than the one before, of which one must be likelier."""
 
-GAIN = 0.5
-"""Log-likelihood that a step must gain for another one to follow."""
+GAIN = 1.0
+"""Log-likelihood that a step must gain for another one to follow: what noise gives each unknown."""
 
 SHORT = 1.2
 """Gain over the promised one above which a step was too short, as along a curved valley."""
+
+CURVED = 10.0
+"""Log-likelihood gained by a step above which a fit may go on the way of its last two steps: along a curved
+valley each step is short.
+"""
 
 USUAL = 10
 """Steps after which progress is said to be half: how many there will be is not known."""
@@ -106,13 +111,10 @@ class Around:
         F (n, n), without the prior.
     slope
         Of the log-likelihood (n,), without the prior.
-    pearson
-        Mean of (r - m)²/m over the pixels that count: 1 where only noise is left.
     """
 
     information: np.ndarray
     slope: np.ndarray
-    pearson: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -187,6 +189,13 @@ class Model:
         x = fit.coefficients.ravel()
         return float(x @ self.nodes.information @ x)
 
+    def pearson(self, fit: Fit) -> float:
+        """Mean of (r - m)²/m over the pixels that count, of a judged fit: 1 where only noise is left."""
+        assert fit.light is not None  # it was judged
+        shown = self.expected(fit.light)
+        away = arrays.to_numpy(self.problem.data) - shown
+        return float((self.weights * away**2 / shown).sum() / self.counted)
+
     def around(self, fit: Fit) -> Around:
         """Information and slope at a fit."""
         if fit.around is not None:
@@ -208,8 +217,7 @@ class Model:
         flat, away = columns.reshape(len(columns), -1), data / shown - 1
         weighted = flat * (weights / shown).ravel().astype(np.float32)
         slope = flat @ (weights * away).ravel()
-        pearson = float((weights * away**2 * shown).sum() / self.counted)
-        return Around((weighted @ flat.T).astype(np.float64), slope.astype(np.float64), pearson)
+        return Around((weighted @ flat.T).astype(np.float64), slope.astype(np.float64))
 
     def _columns(self, point: Points, c: np.ndarray) -> np.ndarray:
         """Changes (OWN + terms, ny, nx) by a bead's place and light, and by its coefficients."""
@@ -220,35 +228,42 @@ class Model:
 
     def improved(self, fit: Fit, free: np.ndarray, steps: int) -> Fit:
         """The fit after at most some steps, with those coefficients free that are marked (terms,)."""
-        damping, fit = 1e-2, self.judged(fit)
+        damping, fit, before = 1e-2, self.judged(fit), None
         for _ in range(steps):
-            around, found = self.around(fit), None
-            for _ in range(TRIES):
-                step = self._step(around, fit, free, damping)
-                tried = self.judged(self._moved(fit, step))
-                if tried.objective < fit.objective:
-                    found = tried
-                    if fit.objective - tried.objective > SHORT * 2 * _promised(around, step):
-                        found = self._farther(fit, step, tried)
-                    damping = max(damping / 10, 1e-7)
-                    break
-                damping *= 10
+            around = self.around(fit)
+            found, damping = self._likelier(around, fit, free, damping)
             if found is None:
                 return replace(fit, around=around)
-            gained, fit = (fit.objective - found.objective) / 2, replace(found, steps=fit.steps + 1)
+            if before is not None and fit.objective - found.objective > 2 * CURVED:
+                found = self._farther(found, _way(before, found) / 2)
+            gained = (fit.objective - found.objective) / 2
+            before, fit = fit, replace(found, steps=fit.steps + 1)
             stepped(self.progress, fit.steps)
             if gained < GAIN:
                 return fit
         return fit
 
-    def _farther(self, fit: Fit, step: np.ndarray, found: Fit) -> Fit:
-        """The best along a step that is doubled as long as the fit gets likelier."""
+    def _likelier(
+        self, around: Around, fit: Fit, free: np.ndarray, damping: float
+    ) -> tuple[Fit | None, float]:
+        """What a step leads to and the next one's damping; None where no step is likelier."""
+        for _ in range(TRIES):
+            step = self._step(around, fit, free, damping)
+            found = self.judged(self._moved(fit, step))
+            if found.objective < fit.objective:
+                if fit.objective - found.objective > SHORT * 2 * _promised(around, step):
+                    found = self._farther(found, step)
+                return found, max(damping / 10, 1e-7)
+            damping *= 10
+        return None, damping
+
+    def _farther(self, found: Fit, step: np.ndarray) -> Fit:
+        """The likeliest after a step more, and after steps each twice as long as the one before."""
         while True:
-            step = 2 * step
-            tried = self.judged(self._moved(fit, step))
+            tried = self.judged(self._moved(found, step))
             if not tried.objective < found.objective:
                 return found
-            found = tried
+            found, step = tried, 2 * step
 
     def _step(self, around: Around, fit: Fit, free: np.ndarray, damping: float) -> np.ndarray:
         c = fit.coefficients
@@ -286,6 +301,13 @@ def solved(matrix: np.ndarray, right: np.ndarray, damping: float = 0.0) -> np.nd
 def _promised(around: Around, step: np.ndarray) -> float:
     """Log-likelihood that a step gains if derivatives stay as they are."""
     return float(around.slope @ step - step @ around.information @ step / 2)
+
+
+def _way(before: Fit, after: Fit) -> np.ndarray:
+    """The step from one fit to another of as many beads."""
+    light = np.log(after.points.intensities / before.points.intensities)
+    own = np.column_stack([after.points.positions - before.points.positions, light])
+    return np.append(own, after.coefficients - before.coefficients)
 
 
 def _one(points: Points, p: int) -> Points:

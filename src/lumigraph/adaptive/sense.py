@@ -102,14 +102,14 @@ def sense(
     every = np.ones(len(modes), bool)
     plain = model.improved(first, ~every, STEPS)
     fit = model.improved(plain, every, STEPS)
-    around = model.around(fit)
-    warn_of_misfit(around.pearson, "a point with these modes leaves")
-    covariance = covariance_of(model, around)[-len(modes) :, -len(modes) :]
+    pearson = model.pearson(fit)
+    warn_of_misfit(pearson, "a point with these modes leaves")
+    covariance = covariance_of(model, fit)[-len(modes) :, -len(modes) :]
     deviations = np.sqrt(np.diag(covariance))
     unknown = {j: UNKNOWN for j, d in zip(modes, deviations, strict=True) if d > PRIOR / 2}
     return Wavefront(
         modes, fit.coefficients[None], deviations[None, None], (model.nodes.y, model.nodes.x),
-        untold | unknown, fit.points, (model.deviance(plain), model.deviance(fit)), around.pearson, 1,
+        untold | unknown, fit.points, (model.deviance(plain), model.deviance(fit)), pearson, 1,
         fit.steps, bent(camera, modes, fit.coefficients[0]), covariance,
     )  # fmt: skip
 

@@ -176,14 +176,14 @@ class Objective:
         k = 2 * np.pi / self.wavelength
         return plane(self.pupil(qy, qx, dz) * area * self.aperture, (k * qy, k * qx), y, x)
 
-    def steepest(self, radius: float, dz: float) -> float:
+    def steepest(self, radius: float, dz: float, part: float = 1.0) -> float:
         """Bound of how much the pupil's phase and the wave to a point within `radius` [m] change per pupil's
-        radius [rad].
+        radius [rad]; where aberrations bend the wave less, for this part of the pupil's area.
         """
         k, ray = 2 * math.pi / self.wavelength, self.aperture / math.sqrt(self.medium**2 - self.aperture**2)
         q = np.linspace(0, self.aperture, 64)
         extra = np.abs(np.gradient(_extra_path(self, q), q)).max()
-        return k * self.aperture * (radius + abs(dz) * ray + float(extra)) + self.spread() * k * self.aperture
+        return k * self.aperture * (radius + abs(dz) * ray + float(extra) + self.spread(part))
 
     def spread(self, part: float = 1.0) -> float:
         """How far aberrations move this part of the rays at most, in object space [m]."""

@@ -178,7 +178,8 @@ def reach_of(objective: Objective, lenslet: Lenslet, dz: float, demand: Demand) 
     Beyond what rays light, the part of a point's light that is farther than R falls as 1/R. A lenslet there
     makes a small spot of it, where one that the whole aperture lights spreads its own over all directions.
     """
-    size, rays = lenslet.pitch / lenslet.magnification, _ray_radius(objective, dz)
+    size = lenslet.pitch / lenslet.magnification
+    rays = _ray_radius(objective, dz, min(RAYS, 1 - demand.accuracy**2))
     if objective.model == "rays":
         return max(1, math.ceil(rays / size))
     nearest = objective.wavelength / objective.numerical_aperture
@@ -210,11 +211,11 @@ def _lit(objective: Objective, lenslet: Lenslet, dz: float) -> float:
     return _ray_radius(objective, dz) * lenslet.magnification / lenslet.pitch
 
 
-def _ray_radius(objective: Objective, dz: float) -> float:
-    """Of what rays light, in object space [m]."""
+def _ray_radius(objective: Objective, dz: float, part: float = RAYS) -> float:
+    """Of what rays light, this part of those that aberrations bend, in object space [m]."""
     spread = objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
     straight = abs(dz) * spread + abs(objective.image_defocus) * objective.numerical_aperture
-    return straight + objective.spread(RAYS)
+    return straight + objective.spread(part)
 
 
 @single_products()

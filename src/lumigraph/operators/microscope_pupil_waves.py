@@ -19,6 +19,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from lumigraph.core.cache import remembered
+from lumigraph.core.mirrored import Mirrored
 from lumigraph.elements.disc import disc
 from lumigraph.elements.objective import Objective
 from lumigraph.operators.microscope_bench import guard, responses
@@ -48,7 +49,7 @@ class Waves:
     onto
         From the nodes of all rows to an even grid of each, (rows grid, rows nodes).
     down, across
-        Bloch waves (samples, rows) and (grid, samples).
+        Bloch waves (samples, rows) and (samples, grid), alike from both ends as the window and the nodes are.
     sampled
         From the fine grid to samples of the image (count, samples), along an axis.
     """
@@ -56,9 +57,9 @@ class Waves:
     q: tuple[np.ndarray, np.ndarray]
     area: np.ndarray
     onto: csr_array
-    down: np.ndarray
-    across: np.ndarray
-    sampled: np.ndarray
+    down: Mirrored
+    across: Mirrored
+    sampled: Mirrored
 
     @property
     def nbytes(self) -> int:
@@ -70,21 +71,23 @@ class Waves:
 
     def fields(self, pupils: np.ndarray) -> np.ndarray:
         """On the fine grid (k, n, n), of pupils (k, rows, nodes)."""
-        even = _of_each(self.onto, pupils, len(self.across))
-        return self.down @ (even @ self.across)
+        even = _of_each(self.onto, pupils, self.across.shape[1])
+        return self.down.down(self.across.right(even))
 
     def back(self, fields: np.ndarray) -> np.ndarray:
         """Conjugate transpose of `fields`."""
-        rows = self.down.T @ fields.conj()  # the waves are large: not they are conjugated
-        return _of_each(self.onto.T, rows @ self.across.T, self.area.shape[1]).conj()
+        down, across = Mirrored.of(self.down.whole.T), Mirrored.of(self.across.whole.T)
+        rows = across.right(down.down(fields.conj()))  # the waves are large: not they are conjugated
+        return _of_each(self.onto.T, rows, self.area.shape[1]).conj()
 
     def samples(self, light: np.ndarray) -> np.ndarray:
         """Of intensities (..., n, n) on the fine grid: (..., count, count)."""
-        return self.sampled @ light @ self.sampled.T
+        return self.sampled.right(self.sampled.down(light))
 
     def spread(self, samples: np.ndarray) -> np.ndarray:
         """Transpose of `samples`."""
-        return self.sampled.T @ samples @ self.sampled
+        back = Mirrored.of(self.sampled.whole.T)
+        return back.right(back.down(samples))
 
 
 def _of_each(matrix: csr_array, planes: np.ndarray, columns: int) -> np.ndarray:
@@ -116,8 +119,8 @@ def waves_of(
     places = np.broadcast_to(a * qy, qx.shape), a * qx
     return Waves(
         (places[0], places[1]), area * a**2, csr_array(onto, dtype=real),
-        np.ascontiguousarray(waves(turns * qy[:, 0]).T), waves(grid),
-        _sampling(cells, fine, sampling).astype(real),
+        Mirrored.of(waves(turns * qy[:, 0]).T), Mirrored.of(waves(grid).T),
+        Mirrored.of(_sampling(cells, fine, sampling).astype(real)),
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lumigraph.core import arrays
+from lumigraph.core.mirrored import by_halves
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,13 +58,13 @@ class Halves:
     def down(self, data: np.ndarray) -> np.ndarray:
         """The kernel along the last axis but one of (..., n, k): (..., m, k)."""
         data = np.multiply(data, self.before[:, None], order="C")
-        n, m = len(self.before), len(self.after)
-        upper, lower = data[..., n // 2 :, :], data[..., : n - n // 2, :][..., ::-1, :]
-        even, odd = _real(self.cosine, upper + lower), _real(self.sine, upper - lower)
-        odd *= -1j
-        found = np.empty((*data.shape[:-2], m, data.shape[-1]), data.dtype)
-        np.add(even, odd, out=found[..., m // 2 :, :])
-        np.subtract(even[..., m % 2 :, :], odd[..., m % 2 :, :], out=found[..., : m // 2, :][..., ::-1, :])
+        found = by_halves(
+            data,
+            len(self.after),
+            lambda half: _real(self.cosine, half),
+            lambda half: -1j * _real(self.sine, half),
+            axis=-2,
+        )
         found *= self.after[:, None]
         return found
 
