@@ -30,9 +30,10 @@ _BENT = 5e-4
 
 _LENGTHS = ("f", "L", "b")
 
-_CROSSTALK = (
-    "light that lenslets spill into their neighbours' micro-images by diffraction moves corners in views, "
-    "which b's interval does not show: b is up to 6 % too long behind lenslets of 62 µm at f/14 in green"
+_IN_VIEWS = (
+    "corners in views off the middle are seen moved, likely by light that diffraction spills into "
+    "neighbours' micro-images: b came out up to 6 % too long behind lenslets of 62 µm at f/14, which its "
+    "interval does not show"
 )
 
 WELL = 0.01
@@ -256,7 +257,7 @@ def _measured(found: Adjusted, corners: Corners, board: Board, nominal: Nominal,
         pose = found.poses[k]
         poses.append(Pose(frame, pose[:3], pose[3:], found.covariance[rows, rows], off, expected))
     result = replace(result, poses=tuple(poses))
-    notes = (*_notes(result, nominal, unused), *([_CROSSTALK] if corners.in_views else []))
+    notes = (*_notes(result, nominal, unused), *([_IN_VIEWS] if corners.in_views else []))
     return replace(result, notes=notes)
 
 

@@ -109,10 +109,8 @@ class PeriodicOperator(Linear):
         return self.readout.shape[0], (*volume, *self.planes[0].spread.shape[1])
 
     def _forward(self, intensity: Array) -> Array:
-        xp, layers = (
-            arrays.namespace(intensity),
-            intensity if self.depths is not None else intensity[None, ...],
-        )
+        xp = arrays.namespace(intensity)
+        layers = intensity if self.depths is not None else intensity[None, ...]
         rows, columns = self.cells.image
         like = {"dtype": intensity.dtype, "device": intensity.device}
         image = xp.zeros((rows, columns, math.prod(self.cells.samples)), **like)
@@ -195,7 +193,7 @@ def _groups(part: Part, margin: tuple[int, int]) -> "Iterator[_Group]":
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Group:
-    """Offsets of one part in one row: (dx, rank) for each, the columns that dx = 0 takes, the factors'."""
+    """Offsets of one part in one row: (dx, rank) for each, columns that dx = 0 takes, and the factors'."""
 
     rows: slice
     columns: range
