@@ -108,7 +108,7 @@ def slopes(
     >>> scope = lg.load_camera("lfm-fourier")
     >>> pair = scope.replace(fourier_lens="74.99 mm"), scope.replace(fourier_lens="75.01 mm")
     >>> bound, changes = slopes(scope, [pair], [-10e-6, 10e-6], places=1)
-    >>> float(changes[0]) > 0  # a shorter lens would be better
+    >>> float(changes[0]) < 0  # a longer lens would be better
     True
     """
     require_slopes(scope)
