@@ -102,7 +102,7 @@ def pictures(rng, true, white, found, poses):
             )
             ready = lg.prepare(lg.RawImage(raw), found, white=white)
             try:
-                one = lg.metric.find_corners([ready], board, found, in_views=views)
+                one = lg.metric.find_corners([ready], board, found, in_views=views, wavelength=None)
                 break
             except lg.LumigraphError:
                 again += 1

@@ -52,6 +52,9 @@ class Known:
         How well that is known, such as '0.01 um'; 0.03 % if left out. With it, the pitch of --camera is used.
     micro_image_pitch
         Pixels between micro-images, for a table of corners; of raw images it is measured.
+    wavelength
+        Of the light, such as '532 nm', for raw images of a camera 1.0: what its lenslets spill into their
+        neighbours' micro-images is allowed for. That of --camera, or 550 nm, if left out.
     """
 
     focal_length: str | None = None
@@ -63,6 +66,7 @@ class Known:
     lenslet_pitch: str | None = None
     lenslet_pitch_error: str | None = None
     micro_image_pitch: float | None = None
+    wavelength: str | None = None
 
     def nominal(self, given: dict[str, Any]) -> "Nominal":
         """Of the options, which come before what files say."""
@@ -183,7 +187,9 @@ def board(
     target = None if board is None else metric.Board.from_text(board)
     if sources == (Path("plan"),):
         return _planned(origin, target, known, pictures)
-    seen, target, given, told = _read(sources, target, origin, views)
+    seen, target, given, told = _read(
+        sources, target, origin, views, length("--wavelength", known.wavelength)
+    )
     found = metric.board(seen, target, known.nominal(given))
     written = [path for path in (output, table) if path is not None]
     if output is not None:
@@ -203,7 +209,7 @@ def board(
 
 
 def _read(
-    sources: tuple[Path, ...], board: "Board | None", origin: Origin, views: bool
+    sources: tuple[Path, ...], board: "Board | None", origin: Origin, views: bool, wavelength: float | None
 ) -> "tuple[Corners, Board, dict[str, Any], tuple[str, ...]]":
     """Corners, their board, what the files say of the camera, and what was done to raw images."""
     from lumigraph import metric
@@ -217,22 +223,24 @@ def _read(
         raise FormatError("give --board, such as '9 x 5 corners, 10 mm'.")
     if alone and first.suffix.lower() == ".csv":
         return metric.load_corners(first), board, {}, ()
-    return _found(sources, board, origin, views)
+    return _found(sources, board, origin, views, wavelength)
 
 
 def _found(
-    sources: tuple[Path, ...], board: "Board", origin: Origin, views: bool
+    sources: tuple[Path, ...], board: "Board", origin: Origin, views: bool, wavelength: float | None
 ) -> "tuple[Corners, Board, dict[str, Any], tuple[str, ...]]":
     """Of raw images."""
     from lumigraph import metric
     from lumigraph.instruments import LensletCamera
     from lumigraph.instruments.capabilities import Rendered, WithMainLens
+    from lumigraph.metric.spill import GREEN
 
     camera = origin.described("decode" if views else None)
     in_views = views or (camera is not None and not isinstance(camera, Rendered))
     ready = [origin.prepared(origin.read(path)) for path in sources]
     with progress("board") as tell:
-        seen = metric.find_corners(ready, board, in_views=in_views, progress=tell)
+        light = wavelength or (GREEN if camera is None else camera.wavelength)
+        seen = metric.find_corners(ready, board, in_views=in_views, wavelength=light, progress=tell)
     told = {"shape": ready[0].shape, "pixel_pitch": ready[0].pixel_pitch}
     if ready[0].calibration is not None and (origin.white or origin.calibration):
         told["micro_images"] = ready[0].calibration.lattice.pitch

@@ -2,14 +2,19 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.core.brief import brief
 from lumigraph.errors import CalibrationError, FormatError
+from lumigraph.metric.spill import Spill
 from lumigraph.units import parse
+
+if TYPE_CHECKING:
+    from lumigraph.metric.camera import MetricCamera
 
 _BOARD = re.compile(r"(\d{1,4})\s*[x×]\s*(\d{1,4})\s*(corners|dots|asymmetric dots|charuco|)")
 _PART = re.compile(r"(dots|markers)\s+(.+)|(DICT_\w+)")
@@ -211,6 +216,9 @@ class Corners:
     in_views
         Whether they were found in views of a camera 1.0: then place less centre is the view, which is exact,
         and the centre is what was measured, that of a micro-image between those of two lenslets.
+    spill
+        Of corners in views, what lenslets spill into their neighbours' micro-images; None if it is not known
+        or taken out.
 
     Raises
     ------
@@ -226,6 +234,7 @@ class Corners:
     center: np.ndarray
     kind: np.ndarray
     in_views: bool = False
+    spill: Spill | None = None
 
     __repr__ = brief
 
@@ -259,7 +268,29 @@ class Corners:
 
     def __getitem__(self, chosen: np.ndarray) -> "Corners":
         """Some of the rows, by a mask or indices."""
-        return Corners(*(getattr(self, name)[chosen] for name in _COLUMNS), in_views=self.in_views)
+        columns = (getattr(self, name)[chosen] for name in _COLUMNS)
+        return Corners(*columns, in_views=self.in_views, spill=self.spill)
+
+    def cleared(self, camera: "MetricCamera") -> "Corners":
+        """Where corners would be if this camera's lenslets spilt no light into other micro-images."""
+        if self.spill is None or self.way is None:
+            return self
+        apart = self.spill.lattice.pitch * camera.pixel_pitch
+        lenslets = apart / (1 + camera.lenslet_distance / camera.exit_pupil)
+        width = self.spill.wavelength * camera.lenslet_distance / lenslets / apart
+        aside = self.spill.aside(self.way, self._slopes(self.way), width)
+        return replace(self, place=self.place - aside, center=self.center - aside, spill=None)
+
+    def _slopes(self, way: np.ndarray) -> np.ndarray:
+        """(n,) How far each one's corner moves from view to view, over the way."""
+        sight = self.sights()
+        count = np.bincount(sight)[:, None]
+        off, moved = (
+            one - np.stack([np.bincount(sight, c) for c in one.T], 1)[sight] / count[sight]
+            for one in (way, self.center)
+        )
+        spread = np.bincount(sight, (off**2).sum(1))
+        return (np.bincount(sight, (off * moved).sum(1)) / np.where(spread > 0, spread, 1))[sight]
 
     @property
     def way(self) -> np.ndarray | None:

@@ -16,6 +16,7 @@ from lumigraph.depth.correlation import of_signs
 from lumigraph.errors import CalibrationError
 from lumigraph.metric import chessboard, views, windows
 from lumigraph.metric.corners import Board, Corners
+from lumigraph.metric.spill import GREEN, Spill
 from lumigraph.preparation import of_raw
 from lumigraph.rendering import render
 from lumigraph.rendering.interpolate import as_float
@@ -38,6 +39,7 @@ def find_corners(
     calibration: Calibration | None = None,
     *,
     in_views: bool = False,
+    wavelength: float | None = GREEN,
     progress: Progress = silent,
 ) -> Corners:
     """Where lenslets or views show the corners or dots of a board, on raw images of a plenoptic camera.
@@ -63,6 +65,9 @@ def find_corners(
         Of raw images that were not prepared.
     in_views
         Whether the raw images are of a camera 1.0.
+    wavelength
+        Of the light [m]: how much lenslets of a camera 1.0 spill into their neighbours' micro-images, which
+        `board` allows for; None for pictures that rays drew.
     progress
         Called as ``progress(fraction)``.
 
@@ -85,7 +90,12 @@ def find_corners(
         progress((frame + 1) / len(raws))
     if not found:
         raise CalibrationError("there are no raw images. Give three or more of the board.")
-    return Corners(*(np.concatenate(column) for column in zip(*found, strict=True)), in_views=in_views)
+    spill = None
+    if in_views and wavelength is not None:
+        known = calibration or getattr(raws[0], "calibration", None)
+        spill = None if known is None else Spill(known.lattice, known.fill or 1.0, wavelength)
+    columns = (np.concatenate(column) for column in zip(*found, strict=True))
+    return Corners(*columns, in_views=in_views, spill=spill)
 
 
 @of_raw
