@@ -57,7 +57,8 @@ def triangulate(
     kind
         Of the lenslets, (n,) or one for all.
     in_views
-        Whether the point was found in views of a camera 1.0: see `Corners`.
+        Whether the point was found in views of a camera 1.0: see `Corners`. Light that lenslets spill is not
+        allowed for here: give places as `Corners.cleared` leaves them.
 
     Raises
     ------
