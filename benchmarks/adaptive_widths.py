@@ -32,7 +32,7 @@ def width(line: np.ndarray, top: int, step: float) -> float:
 
 
 def widths(volume: np.ndarray, axes: tuple[np.ndarray, ...]) -> np.ndarray:
-    """Across and along the axis of each bead [um] (beads, 2), and how far its top is from the bead [um]."""
+    """Across and along the axis of each bead, how far its top is across and along it (beads, 4) [um]."""
     found = []
     for y, x, z in BEADS:
         away = [np.abs(axis - at) < 1e-6 * NEAR for axis, at in zip(axes, (z, y, x), strict=True)]
