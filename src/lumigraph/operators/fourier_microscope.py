@@ -292,7 +292,7 @@ class View:
         mosaic: Mosaic,
         lenslet: int,
         half: int,
-        fine: tuple[int, int] | None = None,
+        fine: Fine | None = None,
     ) -> "View":
         """That of the lenslet of a number, by as many samples and nodes as are needed, or as are given."""
         wave, f, width = objective.wavelength, mosaic.distance, mosaic.width
