@@ -1,33 +1,42 @@
 """Cameras 1.0, 2.0 and of three kinds, measured by the command from pictures of boards by wave optics.
 
-``python -m benchmarks.board_waves views | focused | kinds [--runs 3] [--first 0] [--pictures 20]``: each run
-draws a camera, simulates its white image and boards at the poses of `lg.metric.plan` through wave optics,
-exposes them with the sensor's noise, and runs ``lumigraph board`` on the files, told a focal length
-that is off by 2 % and the lenslets' pitch off by 1e-4 (one standard deviation). Boards lean, so that each is
-shared out to slices `STEP` apart by its own distance. Printed are how far corners are from where rays put
-them, the lengths' and a point's errors over the truth (over what is said), and CPU seconds.
+``python -m benchmarks.board_waves views | focused | kinds [--runs 3] [--first 0] [--pictures 20] [--each 6]
+[--workers 1] [--minutes 60]``: each run simulates a white image and boards at the poses of `lg.metric.plan`
+through wave optics, exposes them with the sensor's noise, and runs ``lumigraph board`` on the files, told a
+focal length that is off by 2 % and the lenslets' pitch off by 1e-4 (one standard deviation). Poses, noise,
+what is told, and the point are drawn anew in each run; the camera serves ``--each`` runs, which is what makes
+many affordable: lenslets' matrices are computed once for it. Boards lean, so that each is shared out to
+slices by its own distance. Printed are how far corners are from where rays put them, the lengths' and a
+point's errors over the truth (over what is said), and CPU seconds; at the end how many intervals hold.
+
+Runs are the same whatever the number of processes, and each is printed once it is finished. After
+``--minutes`` none begins.
 """
 
 import argparse
 import contextlib
 import io
 import json
+import multiprocessing
+import os
+import queue
 import sys
 import tempfile
 import time
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 import lumigraph as lg
-from benchmarks.boards import NAMES, planned_poses, sighted
+from benchmarks.boards import NAMES, planned_poses, sighted, summary
 from lumigraph.cli import main as command
 from lumigraph.metric import geometry
 
-STEP = {"views": 4e-3, "focused": 3e-3, "kinds": 3e-3}
-"""Between slices [m]: from one to the next, views of a corner move by 0.1 of a sample, places by 0.1 px."""
+STEP = {"views": 6e-3, "focused": 6e-3, "kinds": 6e-3}
+"""Between slices near the focus [m]: from one to the next, views of a corner move by 0.15 of a sample, places
+by 0.2 px."""
 
 BOARDS = {"views": "4 x 3 corners, 3.3 mm", "focused": "5 x 4 corners, 2.4 mm"}
 KNOWN, PITCH = 0.02, 1e-4
@@ -60,40 +69,55 @@ def on_board(pose, grid):
     return at, corner[0] + at @ np.array([down[0], across[0]])
 
 
-def raws(camera, board, poses, step):
-    """Light (y, x) on the sensor of each pose's board."""
-    from metric import drawn
+@dataclass
+class Bench:
+    """A camera, and what its slices and its white image take to compute, once for all of its runs."""
 
-    grid = camera.operator_grid()
-    seen, lit = [], [0.0] * len(poses)
-    for pose in poses:
+    camera: lg.PlenopticCamera | lg.FocusedPlenopticCamera
+    step: float
+    made: dict = field(default_factory=dict)
+
+    def number(self, distance):
+        """Of slices at distances [m], 0 in focus, as evenly apart in the picture as they can be."""
+        return self.camera.object_distance * (1 - self.camera.object_distance / distance) / self.step
+
+    def slice(self, k):
+        """The operator of one slice."""
+        if k not in self.made:
+            distance = self.camera.object_distance / (1 - k * self.step / self.camera.object_distance)
+            away = distance - self.camera.object_distance
+            self.made[k] = self.camera.operator([away], accuracy=ACCURACY)
+        return self.made[k]
+
+    def white(self):
+        """Light (y, x) of a white image."""
+        if "white" not in self.made:
+            self.made["white"] = np.asarray(lg.simulate(self.camera, lg.scene.targets.white()).data)
+        return self.made["white"]
+
+    def board(self, board, pose):
+        """Light (y, x) on the sensor of a board at a pose."""
+        from metric import drawn
+
+        grid = self.camera.operator_grid()
         at, distance = on_board(pose, grid)
         soft = np.full(at.shape[:2], max(grid.pitch)).ravel()
-        bright = drawn.painted(at.reshape(-1, 2), soft, board).reshape(at.shape[:2])
-        reach = geometry.moved(board.points(), pose)[:, 0]
-        away = np.clip(distance, reach.min() - 2 * step, reach.max() + 2 * step) - camera.object_distance
-        seen.append((bright.astype(np.float32), away / step))
-    low = int(min(np.floor(away.min()) for _, away in seen))
-    high = int(max(np.ceil(away.max()) for _, away in seen))
-    for k in range(low, high + 1):
-        parts = [np.maximum(1 - np.abs(away - k), 0).astype(np.float32) for _, away in seen]
-        if not any(part.any() for part in parts):
-            continue
-        operator = camera.operator([k * step], accuracy=ACCURACY)
-        for n, (part, (bright, _)) in enumerate(zip(parts, seen, strict=True)):
+        bright = drawn.painted(at.reshape(-1, 2), soft, board).reshape(at.shape[:2]).astype(np.float32)
+        reach = self.number(geometry.moved(board.points(), pose)[:, 0])
+        near = np.clip(self.number(np.maximum(distance, 0.1)), reach.min() - 1, reach.max() + 1)
+        lit = 0.0
+        for k in range(int(np.floor(near.min())), int(np.ceil(near.max())) + 1):
+            part = np.maximum(1 - np.abs(near - k), 0).astype(np.float32)
             if part.any():
-                lit[n] = lit[n] + operator.forward((part * bright)[None])
-    return [np.maximum(one, 0) for one in lit]
+                lit = lit + self.slice(k).forward((part * bright)[None])
+        return np.maximum(lit, 0)
 
 
-def saved(true, board, poses, rng, what, folder):
+def saved(bench, board, poses, rng, what, folder):
     """Names of the raw images on which the board is found, the white one's, and corners off (n, 2) [px]."""
-    sensor = true.sensor
-    white = np.asarray(lg.simulate(true, lg.scene.targets.white()).data)
-    exposed = [
-        sensor.expose(one, reference=white.max(), fill=0.8, rng=rng)
-        for one in (white, *raws(true, board, poses, STEP[what]))
-    ]
+    true, white = bench.camera, bench.white()
+    sensor, lights = true.sensor, [white, *(bench.board(board, pose) for pose in poses)]
+    exposed = [sensor.expose(one, reference=white.max(), fill=0.8, rng=rng) for one in lights]
     dark = sensor.expose(0 * white, reference=1, rng=rng)
     names = [folder / f"{n}.tif" for n in range(len(exposed))]
     lg.io.save(dark, folder / "dark.tif")
@@ -123,9 +147,9 @@ def away(true, board, corners, pose):
     return min(both, key=lambda one: float(np.abs(one).mean()))
 
 
-def run(rng, what, pictures):
+def run(bench, rng, what, pictures):
     """Errors of `NAMES` over the truth, and over what is said; corners off, rms [px]; pictures used."""
-    true, written = camera(rng, what), BOARDS["views" if what == "views" else "focused"]
+    true, written = bench.camera, BOARDS["views" if what == "views" else "focused"]
     board = lg.metric.Board.from_text(written)
     ideal = lg.metric.MetricCamera.of(true)
     told, pitch = (1 + rng.normal(0, part) for part in (KNOWN, PITCH))
@@ -135,7 +159,7 @@ def run(rng, what, pictures):
     )  # fmt: skip
     poses = [draw() for draw in planned_poses(rng, (ideal, true.calibration), board, nominal, pictures)]
     with tempfile.TemporaryDirectory() as folder:
-        kept, white, off, found = saved(true, board, poses, rng, what, Path(folder))
+        kept, white, off, found = saved(bench, board, poses, rng, what, Path(folder))
         lenslets = pitch * true.lenslets.pitch
         sure = f"{1e6 * PITCH * lenslets} um"
         options = {
@@ -160,26 +184,95 @@ def run(rng, what, pictures):
     return errors / truth, errors / sure, float(np.sqrt((off**2).mean())) / unit, len(kept)
 
 
-def main():
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=tuple(STEP))
-    for name, usual in (("runs", 3), ("first", 0), ("pictures", 20), ("seed", 0)):
-        parser.add_argument(f"--{name}", type=int, default=usual)
-    given = parser.parse_args()
+def work(given, todo, done):
+    """Runs of cameras, until there are none left or the time is over; each outcome is put into `done`."""
     sys.path.insert(0, "tests")
     warnings.simplefilter("ignore")
-    unit = "lenslets" if given.what == "views" else "px"
-    for k in range(given.first, given.first + given.runs):
-        started = time.process_time()
+    while (which := todo.get()) is not None:
+        bench = None
+        for k in range(max(which * given.each, given.first), min((which + 1) * given.each, given.last)):
+            if time.time() > given.until:
+                break
+            started = time.process_time()
+            try:
+                if bench is None:
+                    rng = np.random.default_rng([given.seed, 0, which])
+                    bench = Bench(camera(rng, given.what), STEP[given.what])
+                one = run(bench, np.random.default_rng([given.seed, 1, k]), given.what, given.pictures)
+            except Exception as error:  # whatever it is, other runs go on, and it is printed and counted
+                one = f"{type(error).__name__}: {error}"
+            done.put((k, one, time.process_time() - started))
+    done.put(None)
+
+
+def outcomes(given):
+    """Those of all runs, as they come, from processes that have some processors each."""
+    spawned = multiprocessing.get_context("spawn")
+    todo, done = spawned.Queue(), spawned.Queue()
+    for which in range(given.first // given.each, -(-given.last // given.each)):
+        todo.put(which)
+    for _ in range(given.workers):
+        todo.put(None)
+    processes = [spawned.Process(target=work, args=(given, todo, done)) for _ in range(given.workers)]
+    all_of_them = sorted(os.sched_getaffinity(0))
+    for k, process in enumerate(processes):
+        os.sched_setaffinity(0, all_of_them[k :: given.workers] or all_of_them)
+        process.start()
+    os.sched_setaffinity(0, all_of_them)
+    working = given.workers
+    while working:
         try:
-            one = run(np.random.default_rng([given.seed, k]), given.what, given.pictures)
-        except lg.LumigraphError as error:
-            print(f"run {k}: {error}", flush=True)
+            one = done.get(timeout=10)
+        except queue.Empty:
+            if not any(process.is_alive() for process in processes):
+                print(f"{working} processes ended early", flush=True)
+                return
             continue
-        told = (f"{n} {a:+.3%} ({b:+.2f})" for n, a, b in zip(NAMES, *one[:2], strict=True))
-        spent = time.process_time() - started
-        print(k, f"corners {one[2]:.4f} {unit}, {one[3]} pictures;", *told, f"{spent:.0f} CPU s", flush=True)
+        working -= one is None
+        if one is not None:
+            yield one
+
+
+def told(given):
+    """What is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=tuple(STEP))
+    usual = {"runs": 3, "first": 0, "pictures": 20, "seed": 0, "each": 6, "workers": 1}
+    for name, value in usual.items():
+        parser.add_argument(f"--{name}", type=int, default=value)
+    parser.add_argument("--minutes", type=float, default=60.0)
+    given = parser.parse_args(given)
+    given.last, given.until = given.first + given.runs, time.time() + 60 * given.minutes
+    return given
+
+
+def main():
+    """Print the table."""
+    given = told(None)
+    unit = "lenslets" if given.what == "views" else "px"
+    good, spent = [], 0.0
+    for k, one, seconds in outcomes(given):
+        spent += seconds
+        if isinstance(one, str):
+            print(f"run {k}: {one}; {seconds:.0f} CPU s", flush=True)
+            continue
+        good.append(one)
+        numbers = (f"{n} {a:+.3%} ({b:+.2f})" for n, a, b in zip(NAMES, *one[:2], strict=True))
+        print(
+            k,
+            f"corners {one[2]:.4f} {unit}, {one[3]} pictures;",
+            *numbers,
+            f"{seconds:.0f} CPU s",
+            flush=True,
+        )
+    if good:
+        part, sure, off, _ = zip(*good, strict=True)
+        print(summary(np.array(part), np.array(sure)))
+        print(
+            f"corners off {np.sqrt(np.mean(np.square(off))):.4f} {unit} rms, {max(off):.4f} at worst; ",
+            end="",
+        )
+    print(f"{len(good)} of {given.runs} runs; {spent:.0f} CPU s")
 
 
 if __name__ == "__main__":

@@ -24,6 +24,8 @@ TRIES = 10
 """Until a pose where no board is found is left out."""
 
 NAMES = ("focal_length", "separation", "lenslet_distance", "distance of a point")
+ENOUGH = (1e-2, 1e-2, 1e-2, 3e-3)
+"""Errors over the truth that are asked for."""
 
 
 def camera_2_0(rng, kinds):
@@ -165,6 +167,22 @@ def sighted(true, point, found, views):
     return place[shown], center[shown]
 
 
+def summary(part, sure):
+    """Lines on errors (runs, `NAMES`), over the truth and over what is said."""
+    lines = []
+    for k, name in enumerate(NAMES):
+        worst, enough = np.abs(part[:, k]).max(), ENOUGH[k]
+        rms, of_said = (np.sqrt((one[:, k] ** 2).mean()) for one in (part, sure))
+        inside, exact = (
+            int((np.abs(one) < limit).sum()) for one, limit in ((sure[:, k], 1.96), (part[:, k], enough))
+        )
+        lines.append(
+            f"{name:20s} mean {part[:, k].mean():+.3%}, rms {rms:.3%}, worst {worst:.3%}, to {enough:.1%} in "
+            f"{exact}; {of_said:.2f} of what is said; in the interval {inside} of {len(part)}"
+        )
+    return "\n".join(lines)
+
+
 def main():
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -193,14 +211,7 @@ def main():
         px.append(one[2])
         again += one[3]
         print(k, *(f"{100 * a:+.3f} % ({b:+.2f})" for a, b in zip(*one[:2], strict=True)), flush=True)
-    part, sure = np.array(part), np.abs(sure)
-    for k, name in enumerate(NAMES):
-        inside, worst = int((sure[:, k] < 1.96).sum()), np.abs(part[:, k]).max()
-        rms, of_said = (np.sqrt((one[:, k] ** 2).mean()) for one in (part, sure))
-        print(
-            f"{name:20s} rms {rms:.3%}, worst {worst:.3%}; {of_said:.2f} of what is said; in the interval "
-            f"{inside} of {len(part)}"
-        )
+    print(summary(np.array(part), np.array(sure)))
     cost = (time.process_time() - started) / given.runs
     print(
         f"residual {np.median(px):.3f} px in the median; {again} pictures taken again, {refused} runs "
