@@ -177,6 +177,7 @@ def run(bench, rng, what, pictures):
     point = np.array([true.object_distance * rng.uniform(0.95, 1.05), *rng.uniform(-3e-3, 3e-3, 2)])
     place, center = sighted(replace(ideal, gains=(1.0,)), point, found, what == "views")
     place = place + rng.normal(0, said["residual_px"], place.shape)
+    measured = replace(measured, spill=None)  # rays that show the point spill nothing
     seen = lg.metric.triangulate(measured, place, center, in_views=what == "views")
     errors = np.append(measured.camera.numbers[:3] - ideal.numbers[:3], seen.position[0] - point[0])
     truth, sure = np.append(ideal.numbers[:3], point[0]), np.append(measured.errors[:3], seen.errors[0])

@@ -10,10 +10,12 @@ import lumigraph as lg
 from lumigraph import io, metric
 from lumigraph.cli import main
 from lumigraph.core.grid import Grid
+from lumigraph.core.lattice import Lattice
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError, FormatError
 from lumigraph.metric import geometry
 from lumigraph.metric.noise import Noise
+from lumigraph.metric.spill import Spill
 from lumigraph.scene import targets
 from metric import drawn, drawn_views, scenes
 
@@ -99,7 +101,7 @@ def test_a_camera_1_0_comes_back_within_its_intervals(measured) -> None:
     b = scenes.VIEWS_CAMERA.lenslet_distance
     assert measured.errors[2] < 0.02 * b  # the prior does not know it at all
     assert "f and L change the pictures alike" in " ".join(measured.notes)
-    assert "a table of corners does not tell by how much" in measured.notes[-1]
+    assert "this table of corners does not tell by how much" in measured.notes[-1]
 
 
 @pytest.mark.parametrize("distance", [0.3, 0.4075, 0.55])
@@ -157,6 +159,42 @@ def test_corners_in_views_survive_their_table(tmp_path) -> None:
     with pytest.raises(FormatError, match=r"column in_views of .* must hold 0 in all rows, or 1 in all"):
         metric.load_corners(tmp_path / "corners.csv")
     assert not replace(seen, in_views=False)[:3].in_views
+
+
+def test_tables_of_corners_in_views_tell_what_lenslets_spill(tmp_path) -> None:
+    seen = scenes.corners_in_views(np.random.default_rng(1), frames=1, views=3)
+    for lattice in (Lattice.square(20.0, 0.1), Lattice.hex(20.0, -0.02)):
+        metric.save_corners(replace(seen, spill=Spill(lattice, 0.9, 532e-9)), tmp_path / "corners.csv")
+        again = metric.load_corners(tmp_path / "corners.csv").spill
+        assert (again.wavelength, again.fill, again.lattice.layout) == (532e-9, 0.9, lattice.layout)
+        np.testing.assert_allclose(again.lattice.basis, lattice.basis, atol=1e-12)
+    text = (tmp_path / "corners.csv").read_text()
+    (tmp_path / "corners.csv").write_text(text.rstrip()[:-1] + "0\n")
+    with pytest.raises(FormatError, match="column hexagonal must hold the same number in all rows"):
+        metric.load_corners(tmp_path / "corners.csv")
+
+
+def test_a_point_in_views_is_triangulated_without_what_lenslets_spill(
+    measured, tmp_path, monkeypatch
+) -> None:
+    """Spilt light moves it by several percent, and the camera's file tells of it."""
+    camera, true = scenes.VIEWS_CAMERA, np.array([0.5, 0.01, -0.005])
+    way = np.stack(np.meshgrid(*2 * [np.linspace(-6.5, 6.5, 7)]), -1).reshape(-1, 2)
+    known = replace(measured, camera=camera, spill=Spill(Lattice.square(20.0), 1.0, 550e-9))
+    metric.save(known, tmp_path / "camera.json")
+    known, rays, aside = metric.load(tmp_path / "camera.json"), scenes.in_views(camera, true, way), 0.0
+    for _ in range(4):
+        one = metric.Corners(
+            *2 * [np.zeros(49, int)], rays + aside + way, rays + aside, np.zeros(49, int), True, known.spill
+        )
+        aside = aside + rays - one.cleared(camera).center
+    found = metric.triangulate(known, rays + aside + way, rays + aside, in_views=True)
+    without = metric.triangulate(replace(known, spill=None), rays + aside + way, rays + aside, in_views=True)
+    assert found.position == pytest.approx(true, rel=1e-3)
+    assert abs(without.position[0] - true[0]) > 0.005 * true[0]
+    monkeypatch.setattr("lumigraph.metric.triangulation.UNSURE", 0.0)
+    surer = metric.triangulate(known, rays + aside + way, rays + aside, in_views=True)
+    assert found.errors[0] > 1.001 * surer.errors[0]
 
 
 @pytest.mark.long  # simulates a board by wave optics

@@ -16,7 +16,7 @@ from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.metric.known import disagreement
 from lumigraph.metric.noise import Noise
-from lumigraph.metric.spill import UNSURE
+from lumigraph.metric.spill import UNSURE, Spill
 from lumigraph.metric.start import LEAST_CORNERS, search
 from lumigraph.metric.twofold import turned_over
 
@@ -91,6 +91,8 @@ class Measured:
         Corners that fit nothing and did not take part.
     notes
         What to know, one sentence each.
+    spill
+        Of corners in views, the light that was allowed for; `triangulate` allows for it, too.
     """
 
     camera: MetricCamera
@@ -101,6 +103,7 @@ class Measured:
     residual_px: float
     left_out: int
     notes: tuple[str, ...]
+    spill: Spill | None = None
 
     __repr__ = brief
 
@@ -256,7 +259,7 @@ def _measured(found: Adjusted, corners: Corners, board: Board, nominal: Nominal,
     numbers = len(found.camera.numbers)
     result = Measured(
         found.camera, found.covariance[:numbers, :numbers], found.noise, board, (),
-        math.sqrt(float(np.mean(found.residual**2))), int(np.sum(~found.kept)), (),
+        math.sqrt(float(np.mean(found.residual**2))), int(np.sum(~found.kept)), (), corners.spill,
     )  # fmt: skip
     poses = []
     for k, frame in enumerate(corners.frames.tolist()):
@@ -311,8 +314,8 @@ def _spilt(corners: Corners) -> str:
     if corners.spill is None:
         return (
             "light that lenslets spill into their neighbours' micro-images moves corners in views and makes "
-            "b too long, by 2 to 6 % behind lenslets of 62 µm at f/14: a table of corners does not tell by "
-            "how much. Measure raw images"
+            "b too long, by 2 to 6 % behind lenslets of 62 µm at f/14: this table of corners does not tell "
+            "by how much. Measure raw images, or a table that was written of them"
         )
     return (
         "light that lenslets spill into their neighbours' micro-images moves corners in views, which is "

@@ -10,6 +10,7 @@ import numpy as np
 from lumigraph.core import checks
 from lumigraph.core.brief import brief
 from lumigraph.errors import CalibrationError, FormatError
+from lumigraph.metric.noise import centred, sums
 from lumigraph.metric.spill import Spill
 from lumigraph.units import parse
 
@@ -284,13 +285,8 @@ class Corners:
     def _slopes(self, way: np.ndarray) -> np.ndarray:
         """(n,) How far each one's corner moves from view to view, over the way."""
         sight = self.sights()
-        count = np.bincount(sight)[:, None]
-        off, moved = (
-            one - np.stack([np.bincount(sight, c) for c in one.T], 1)[sight] / count[sight]
-            for one in (way, self.center)
-        )
-        spread = np.bincount(sight, (off**2).sum(1))
-        return (np.bincount(sight, (off * moved).sum(1)) / np.where(spread > 0, spread, 1))[sight]
+        inner, spread = centred(way, sight)
+        return (sums((inner * self.center).sum(1), sight) / spread)[sight]
 
     @property
     def way(self) -> np.ndarray | None:

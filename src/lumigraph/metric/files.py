@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from lumigraph.core import checks
+from lumigraph.core.lattice import Lattice
 from lumigraph.errors import FormatError, LumigraphError
 from lumigraph.io import source
 from lumigraph.metric.calibration import Measured, Pose
 from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import FARTHEST, Board, Corners
 from lumigraph.metric.noise import Noise
+from lumigraph.metric.spill import Spill
 from lumigraph.store import write_bytes
 
 COLUMNS = ("frame", "corner", "y", "x", "center_y", "center_x", "kind")
@@ -24,6 +26,13 @@ COLUMNS = ("frame", "corner", "y", "x", "center_y", "center_x", "kind")
 
 IN_VIEWS = "in_views"
 """A column of ones in a table of corners that were found in views."""
+
+SPILL = ("wavelength", "fill", "pitch", "rotation", "hexagonal")
+"""Columns more, alike in all rows, where light that lenslets spill is to be allowed for.
+
+Its wavelength [m], the width of micro-images over their pitch, that pitch [px], the rows' turn [rad], 1 for
+hexagons and 0 for squares.
+"""
 
 KIND = "lumigraph metric camera"
 
@@ -35,12 +44,15 @@ _MM = 1e-3
 
 
 def load_corners(path: str | os.PathLike[str]) -> Corners:
-    """Corners from a table (.csv) with a header of `COLUMNS`, and `IN_VIEWS`; `kind` may be left out.
+    """Corners from a table (.csv) with a header of `COLUMNS`, and of `IN_VIEWS` and `SPILL` where known.
+
+    `kind` may be left out.
 
     Raises
     ------
     FormatError
-        Another file, a column that is missing, text that is no number, some corners in views but not all.
+        Another file, a column that is missing, text that is no number, some corners in views but not all,
+        columns of `SPILL` that change from row to row.
     """
     file = source.regular_file(path)
     found = _table(file, COLUMNS[:-1])
@@ -51,16 +63,39 @@ def load_corners(path: str | os.PathLike[str]) -> Corners:
         place, center = (_pair(found, y, x) for y, x in (("y", "x"), ("center_y", "center_x")))
         found.setdefault("kind", np.zeros(len(place)))
         frame, corner, kind = (_whole(name, found) for name in ("frame", "corner", "kind"))
-        return Corners(frame, corner, place, center, kind, in_views == {1.0})
+        spill = _spill({name: _alike(name, found) for name in SPILL}) if SPILL[0] in found else None
+        return Corners(frame, corner, place, center, kind, in_views == {1.0}, spill)
 
 
 def save_corners(corners: Corners, path: str | os.PathLike[str]) -> None:
     """Write a table of corners (.csv), which `load_corners` reads."""
-    names = (*COLUMNS, IN_VIEWS) if corners.in_views else COLUMNS
+    constant = {IN_VIEWS: 1} if corners.in_views else {}
+    constant |= _plain(corners.spill) or {}
+    names = (*COLUMNS, *constant)
     columns = [corners.frame, corners.corner, *corners.place.T, *corners.center.T, corners.kind]
-    columns += [np.ones_like(corners.frame)] * corners.in_views
+    columns += [np.full(len(corners), value) for value in constant.values()]
     rows = (",".join(map(str, row)) for row in zip(*map(np.ndarray.tolist, columns), strict=True))
     write_bytes(path, ("\n".join((",".join(names), *rows)) + "\n").encode())
+
+
+def _plain(spill: Spill | None) -> dict[str, Any] | None:
+    """The numbers of `SPILL`."""
+    if spill is None:
+        return None
+    lattice = spill.lattice
+    numbers = (spill.wavelength, spill.fill, lattice.pitch, lattice.rotation, int(lattice.layout == "hex"))
+    return dict(zip(SPILL, numbers, strict=True))
+
+
+def _spill(found: dict[str, Any]) -> Spill:
+    wavelength, fill, pitch, rotation, hexagonal = (_number(found, name) for name in SPILL)
+    return Spill((Lattice.hex if hexagonal else Lattice.square)(pitch, rotation), fill, wavelength)
+
+
+def _alike(name: str, found: dict[str, np.ndarray]) -> float:
+    if np.ptp(found[name]) > 0:
+        raise FormatError(f"column {name} must hold the same number in all rows.")
+    return float(found[name][0])
 
 
 def load_compote(folder: str | os.PathLike[str]) -> tuple[Corners, Board, Nominal]:
@@ -136,6 +171,7 @@ def save(measured: Measured, path: str | os.PathLike[str]) -> None:
         "residual_px": measured.residual_px,
         "left_out": measured.left_out,
         "notes": list(measured.notes),
+        "spill": _plain(measured.spill),
         "poses": [
             {
                 name: value.tolist() if isinstance(value, np.ndarray) else value
@@ -173,6 +209,7 @@ def load(path: str | os.PathLike[str]) -> Measured:
             camera, _numbers(found, "covariance", numbers, numbers), noise, board,
             tuple(_pose(one) for one in found["poses"]), _number(found, "residual_px"),
             int(found["left_out"]), tuple(map(str, found["notes"])),
+            _spill(found["spill"]) if found.get("spill") else None,
         )  # fmt: skip
 
 

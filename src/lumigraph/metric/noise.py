@@ -87,8 +87,8 @@ class Noise:
                 part = np.exp(trend[kind] * away)
             own = _own(inner, sight, kind, part)
         else:
-            ways, spread = _centred(way, sight)
-            sway = _sums(np.einsum("na,nak->nk", ways, columns), sight) / spread[:, None]
+            ways, spread = centred(way, sight)
+            sway = sums(np.einsum("na,nak->nk", ways, columns), sight) / spread[:, None]
             inner = _square(columns - mean[sight] - sway[sight, None] * ways[..., None])
             # Slopes and means are taken out of the 2 n numbers of a corner.
             own = np.full(kinds, 2 * inner[many[sight]].sum() / max(np.sum(2 * count[many] - 3), 1))
@@ -116,9 +116,9 @@ class Noise:
         if way is None or not self.sway:
             return white
         # Along a corner's ways from their middle, which what it shares does not touch.
-        inner, spread = _centred(way, sight)
+        inner, spread = centred(way, sight)
         less = (1 - 1 / np.sqrt(1 + (self.sway / self.own[0]) ** 2 * spread)) / spread
-        along = _sums(np.einsum("na,na...->n...", inner, white), sight)
+        along = sums(np.einsum("na,na...->n...", inner, white), sight)
         taken = (less.reshape(-1, *[1] * (along.ndim - 1)) * along)[sight]
         return white - np.einsum("na,n...->na...", inner, taken)
 
@@ -166,13 +166,13 @@ def _square(values: np.ndarray) -> np.ndarray:
     return np.einsum("nak,nak->n", values, values) / 2
 
 
-def _sums(values: np.ndarray, sight: np.ndarray) -> np.ndarray:
+def sums(values: np.ndarray, sight: np.ndarray) -> np.ndarray:
     """Sums (sights, ...) of (n, ...)."""
     together = csr_array((np.ones(len(sight)), (sight, np.arange(len(sight)))))
     return (together @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
 
 
-def _centred(way: np.ndarray, sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def centred(way: np.ndarray, sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ways (n, 2) from the middle of their corner's, and the sums of their squares (sights,)."""
     inner = way - _means(way, sight)[sight]
     return inner, np.maximum(np.bincount(sight, np.sum(inner**2, axis=1)), 1e-9)
@@ -180,4 +180,4 @@ def _centred(way: np.ndarray, sight: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def _means(values: np.ndarray, sight: np.ndarray) -> np.ndarray:
     """(sights, ...) of (n, ...)."""
-    return _sums(values, sight) / np.bincount(sight).reshape(-1, *[1] * (values.ndim - 1))
+    return sums(values, sight) / np.bincount(sight).reshape(-1, *[1] * (values.ndim - 1))

@@ -11,6 +11,8 @@ from lumigraph.core.brief import brief
 from lumigraph.errors import CalibrationError
 from lumigraph.metric import geometry
 from lumigraph.metric.calibration import Measured
+from lumigraph.metric.corners import Corners
+from lumigraph.metric.spill import UNSURE
 from lumigraph.metric.start import Virtual, lines
 
 
@@ -57,8 +59,8 @@ def triangulate(
     kind
         Of the lenslets, (n,) or one for all.
     in_views
-        Whether the point was found in views of a camera 1.0: see `Corners`. Light that lenslets spill is not
-        allowed for here: give places as `Corners.cleared` leaves them.
+        Whether the point was found in views of a camera 1.0: see `Corners`. Light that lenslets spill is
+        allowed for as it was for the camera (`Measured.spill`).
 
     Raises
     ------
@@ -73,7 +75,11 @@ def triangulate(
     checks.finite_array("place", place, CalibrationError)
     checks.finite_array("center", center, CalibrationError)
     kinds = np.broadcast_to(np.asarray(kind), len(place))
-    camera, noise = measured.camera, measured.noise
+    camera, noise, aside = measured.camera, measured.noise, np.zeros_like(place)
+    if in_views and measured.spill is not None:
+        one = np.zeros(len(place), int)
+        cleared = Corners(one, one, place, center, kinds, in_views=True, spill=measured.spill).cleared(camera)
+        aside, place, center = center - cleared.center, cleared.place, cleared.center
     start = _first(measured, place, center, in_views)
     blur = None if in_views else geometry.magnification(camera.numbers, np.full(len(place), start[0]))
     own = noise.each(kinds, blur)[:, None]
@@ -103,7 +109,9 @@ def triangulate(
     )
     # What all places of a point share moves them together, along either axis.
     together = noise.shared * inverse @ np.kron(1 / own, np.eye(2))
-    covariance = inverse @ inverse.T + together @ together.T + sway @ measured.covariance @ sway.T
+    spilt = UNSURE * inverse @ (aside / own).reshape(-1, 1)
+    covariance = inverse @ inverse.T + together @ together.T + spilt @ spilt.T
+    covariance = covariance + sway @ measured.covariance @ sway.T
     return Triangulated(found.x, covariance, float(np.sqrt(np.mean(misfit(camera.numbers, found.x) ** 2))))
 
 
