@@ -14,6 +14,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.deconvolution import Exposure
 from lumigraph.deconvolution.problem import Problem, Scale
 from lumigraph.operators.microscope_pupil import Lit
+from lumigraph.operators.resampling import Part
 from lumigraph.scene import Points
 
 Y, X = np.mgrid[-10.0:11, -10.0:11]
@@ -41,11 +42,8 @@ class Spots:
         changes[0] = self.off * image * (X - points.positions[0, 1] - coefficients[0]) / 4
         yield Lit(image, changes, (0, 0))
 
-    def whole(self, image: np.ndarray, cell: tuple[int, int]) -> np.ndarray:
-        return image
-
-    def placed(self, samples: np.ndarray) -> np.ndarray:
-        return samples
+    def seen(self, images: np.ndarray, cell: tuple[int, int]) -> tuple[Part, np.ndarray]:
+        return (slice(0, len(Y)), slice(0, len(X))), images
 
 
 def bead(light: float) -> Points:
@@ -106,3 +104,20 @@ def test_what_a_fit_leaves_over_noise_is_one_at_the_truth_and_more_beside_it(mod
     exact, beside = (model.judged(Fit(bead(LIGHT), np.full((1, 1), c))) for c in (MOVED, MOVED + 0.5))
     assert model.pearson(exact) == pytest.approx(1, abs=0.25)  # 3 deviations of 441 pixels
     assert model.pearson(beside) > 2
+
+
+def test_a_fit_that_lacks_a_bead_does_not_go_on_for_what_noise_would_gain(model, monkeypatch):
+    other = np.random.default_rng(6).poisson(LIGHT * np.exp(-((Y - 7) ** 2 + (X + 6) ** 2) / 8))
+    lacking, found, asked = (
+        replace(model, problem=replace(model.problem, data=model.problem.data + other)),
+        [],
+        [],
+    )
+    for part in (fit.LEFT, 0.0):
+        monkeypatch.setattr(fit, "LEFT", part)
+        slow = Spots(3.0)  # steps are a third of what they should be
+        start = Fit(bead(LIGHT), np.zeros((1, 1)))
+        found.append(replace(lacking, coarse=slow).improved(start, np.ones(1, bool), 60))
+        asked.append(slow.calls["lit"])
+    assert asked[0] < asked[1]
+    assert found[0].objective < found[1].objective + 2e-2 * model.left(found[0])

@@ -1,10 +1,15 @@
 """Images of points by the pupil's phase, against the simulation, and their derivatives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import lumigraph as lg
+from lumigraph.core.lattice import Lattice
+from lumigraph.core.matrix import Matrix
 from lumigraph.operators.microscope_pupil import PLACES, PupilImages
+from lumigraph.operators.resampling import Resampling
 
 TERMS = tuple(range(4, 16))
 SCOPE = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
@@ -70,6 +75,35 @@ def test_known_aberrations_and_coefficients_add_up():
     )
 
 
+def spread(model, image, cell):
+    """The raw image of a window."""
+    whole, (part, pixels) = np.zeros(model.shape), model.seen(image[None], cell)
+    whole[part] = pixels[0]
+    return whole
+
+
+def calibrated(pitch, rotation):
+    """Of 19 x 19 pixels a lenslet as the sensor's are, of others, or turned."""
+    return replace(SCOPE.calibration, lattice=Lattice.square(pitch, rotation, (47.0, 47.0)))
+
+
+@pytest.mark.parametrize(
+    ("pitch", "rotation"), [(19.0, 0.0), (19.23, 0.0), (19.23, 0.05)], ids=["pixels", "between", "turned"]
+)
+def test_the_part_that_a_window_lights_holds_all_of_its_light(pitch, rotation):
+    model = replace(images(terms=(7,), pixels=calibrated(pitch, rotation)), accuracy=0.3)
+    kinds = {"between": Resampling, "turned": Matrix}
+    name = "turned" if rotation else "pixels" if pitch == 19 else "between"
+    assert type(model.layout.placement) is kinds.get(name, type(None))
+    for place, most in (((1e-6, -3e-6, 5e-6), 1.0), ((14e-6, -14e-6, 0.0), 0.7), ((0.0, 90e-6, 0.0), 0.0)):
+        point = lg.Points(np.array([place]), np.ones(1))
+        (lit,) = model.lit(point, np.array([0.2]))
+        part, _ = model.seen(lit.image[None], lit.cell)
+        true = model.forward(point, np.array([0.2]))
+        assert np.allclose(spread(model, lit.image, lit.cell), true, rtol=0, atol=1e-12 * true.max())
+        assert np.prod([p.stop - p.start for p in part]) <= most * true.size
+
+
 def test_every_terms_derivative_is_that_of_central_differences():
     model, h = images(), 1e-4
     for direction in np.eye(len(TERMS)):
@@ -86,7 +120,7 @@ def test_derivatives_by_a_points_place_are_those_of_central_differences(axis):
             model.forward(lg.Points(POINTS.positions[p : p + 1] + s * step, np.ones(1)), SOME)
             for s in (1, -1)
         )
-        found = model.placed(model.whole(lit.changes[len(TERMS) + axis], lit.cell))
+        found = spread(model, lit.changes[len(TERMS) + axis], lit.cell)
         assert off(found, (ahead - behind) / 2e-9) < 1e-4
 
 
@@ -108,10 +142,10 @@ def test_piston_changes_nothing_and_tilt_is_a_place():
     model = images(terms=(1, 2))
     piston, tilt = (model.derivative(POINTS, np.zeros(2), d) for d in np.eye(2))
     assert np.abs(piston).max() < 1e-12 * np.abs(tilt).max()
-    moved = [model.whole(lit.changes[3] * light, lit.cell) for light, lit in
+    moved = [spread(model, lit.changes[3] * light, lit.cell) for light, lit in
              zip(POINTS.intensities, model.lit(POINTS, np.zeros(2)), strict=True)]  # fmt: skip
     # Z2 = 2 ρ cos θ: one wave rms moves a point by -2 λ/NA along x.
-    assert off(tilt, -2 * 525e-9 / 0.5 * model.placed(sum(moved))) < 1e-9
+    assert off(tilt, -2 * 525e-9 / 0.5 * sum(moved)) < 1e-9
 
 
 def test_light_beside_the_sensor_is_cut():

@@ -15,7 +15,7 @@ from lumigraph.adaptive.fit import OWN, PLACES, Fit, Model, solved
 from lumigraph.adaptive.of_volume import of_volume
 from lumigraph.adaptive.wavefront import Wavefront
 from lumigraph.adaptive.worth import UNKNOWN, worth
-from lumigraph.core import checks, memory
+from lumigraph.core import arrays, checks, memory
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
@@ -293,10 +293,14 @@ def covariance_of(model: Model, fit: Fit) -> np.ndarray:
 
 
 def _require_memory(model: Model, fit: Fit) -> None:
-    unknowns = OWN * len(fit.points.intensities) + fit.coefficients.size
-    needed = 10.0 * unknowns * math.prod(model.images.shape)
-    what = f"the derivatives of {model.images.shape} pixels by {unknowns} unknowns"
-    memory.require(needed, what, "Crop the raw image or use fewer regions.", SamplingError)
+    """Of the changes of the pixels that each bead lights, and twice those of one bead for each thread."""
+    images, count = model.coarse or model.images, len(fit.points.intensities)
+    farthest = float(np.abs(fit.points.positions[:, 2]).max())
+    unknowns = OWN + fit.coefficients.shape[1]
+    lit = images.share(farthest) * math.prod(images.shape)
+    needed = 4.0 * (count + 2 * arrays.WORKERS) * unknowns * lit
+    what = f"the derivatives of {images.shape} pixels by {count} beads and {unknowns} unknowns of each"
+    memory.require(needed, what, "Crop the raw image.", SamplingError)
 
 
 def _regions(regions: tuple[int, int]) -> tuple[int, int]:

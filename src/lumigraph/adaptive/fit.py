@@ -12,12 +12,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from lumigraph.adaptive.changes import Changes, told
 from lumigraph.adaptive.field import Nodes
 from lumigraph.core import arrays
 from lumigraph.core.progress import Progress, Stage, silent
 from lumigraph.core.threads import each
 from lumigraph.deconvolution.problem import Problem
 from lumigraph.operators.microscope_pupil import PLACES, Lit
+from lumigraph.operators.resampling import Part
 from lumigraph.scene import Points
 
 OWN = PLACES + 1
@@ -25,6 +27,9 @@ OWN = PLACES + 1
 
 LONGEST = (1.5e-6, 1.5e-6, 3e-6, 1.0, 0.25)
 """Longest steps before a microscope: y, x, dz [m], the logarithm of light, a coefficient [waves rms]."""
+
+LEFT = 1e-3
+"""Part of what a fit leaves over noise that a step must gain for others to follow: then it lacks beads."""
 
 TRIES = 5
 """Steps, each shorter than the one before, of which one must be likelier."""
@@ -60,12 +65,12 @@ class Images(Protocol):
         """Image and derivatives of each point of intensity 1, in a window around its cell."""
         ...
 
-    def whole(self, image: np.ndarray, cell: tuple[int, int]) -> np.ndarray:
-        """A window around a cell among all samples."""
+    def share(self, dz: float) -> float:
+        """Part of the raw image that a window takes, of a point at a depth [m]."""
         ...
 
-    def placed(self, samples: np.ndarray) -> np.ndarray:
-        """Raw image (ny, nx) of samples."""
+    def seen(self, images: np.ndarray, cell: tuple[int, int]) -> tuple[Part, np.ndarray]:
+        """Part of the raw image that images (k, n, n) of a window around a cell light, and its pixels."""
         ...
 
 
@@ -196,35 +201,33 @@ class Model:
         away = arrays.to_numpy(self.problem.data) - shown
         return float((self.weights * away**2 / shown).sum() / self.counted)
 
+    def left(self, fit: Fit) -> float:
+        """Log-likelihood that a judged fit leaves over noise: what other beads, or terms, could gain."""
+        return (self.pearson(fit) - 1) * self.counted / 2
+
     def around(self, fit: Fit) -> Around:
         """Information and slope at a fit."""
         if fit.around is not None:
             return fit.around
-        points = fit.points
-        basis = self.nodes.at(points)
-        c, count = basis @ fit.coefficients, len(points.intensities) * OWN
-        columns = np.zeros((count + fit.coefficients.size, *self.images.shape), np.float32)
-        by_node = columns[count:].reshape(*fit.coefficients.shape, *self.images.shape)
-        found = each(lambda p: self._columns(_one(points, p), c[p]), range(len(points.intensities)))
-        for p, placed in enumerate(found):
-            columns[p * OWN :][:OWN] = placed[:OWN]
-            for node in np.flatnonzero(basis[p]):
-                by_node[node] += basis[p, node] * placed[OWN:]
+        points, basis = fit.points, self.nodes.at(fit.points)
+        c = basis @ fit.coefficients
+        seen = list(each(lambda p: self._changes(_one(points, p), c[p]), range(len(c))))
         shown = self.expected(self.light(fit) if fit.light is None else fit.light)
-        if self.problem.scale.response is not None:
-            columns *= arrays.to_numpy(self.problem.scale.response).astype(np.float32)
         data, weights = arrays.to_numpy(self.problem.data), self.weights
-        flat, away = columns.reshape(len(columns), -1), data / shown - 1
-        weighted = flat * (weights / shown).ravel().astype(np.float32)
-        slope = flat @ (weights * away).ravel()
-        return Around((weighted @ flat.T).astype(np.float64), slope.astype(np.float64))
+        information, slope = told(seen, weights / shown, weights * (data / shown - 1))
+        shared = _shared(basis, fit.coefficients.shape[1])
+        return Around(shared.T @ information @ shared, shared.T @ slope)
 
-    def _columns(self, point: Points, c: np.ndarray) -> np.ndarray:
-        """Changes (OWN + terms, ny, nx) by a bead's place and light, and by its coefficients."""
+    def _changes(self, point: Points, c: np.ndarray) -> Changes:
+        """Of pixels, by a bead's place and light, and by its coefficients."""
         images = self.images if self.coarse is None else self.coarse
         lit, n = next(iter(images.lit(point, c))), len(c)
-        own = np.concatenate([lit.changes[n:], lit.image[None], lit.changes[:n]]) * point.intensities[0]
-        return np.stack([images.placed(images.whole(one, lit.cell)) for one in own])
+        own = np.concatenate([lit.changes[n:], lit.image[None], lit.changes[:n]])
+        part, by = images.seen(own.astype(np.float32), lit.cell)
+        by = by * np.float32(point.intensities[0])
+        if self.problem.scale.response is not None:
+            by = by * arrays.to_numpy(self.problem.scale.response)[part].astype(np.float32)
+        return Changes(part, by)
 
     def improved(self, fit: Fit, free: np.ndarray, steps: int) -> Fit:
         """The fit after at most some steps, with those coefficients free that are marked (terms,)."""
@@ -239,7 +242,7 @@ class Model:
             gained = (fit.objective - found.objective) / 2
             before, fit = fit, replace(found, steps=fit.steps + 1)
             stepped(self.progress, fit.steps)
-            if gained < GAIN:
+            if gained < max(GAIN, LEFT * self.left(fit)):
                 return fit
         return fit
 
@@ -308,6 +311,16 @@ def _way(before: Fit, after: Fit) -> np.ndarray:
     light = np.log(after.points.intensities / before.points.intensities)
     own = np.column_stack([after.points.positions - before.points.positions, light])
     return np.append(own, after.coefficients - before.coefficients)
+
+
+def _shared(basis: np.ndarray, terms: int) -> np.ndarray:
+    """From all unknowns to those of each bead: its own, and the coefficients at its place."""
+    beads, nodes = basis.shape
+    found = np.zeros((beads, OWN + terms, beads * OWN + nodes * terms))
+    for p in range(beads):
+        found[p, :OWN, p * OWN :][:, :OWN] = np.eye(OWN)
+        found[p, OWN:, beads * OWN :] = np.kron(basis[p], np.eye(terms))
+    return found.reshape(-1, found.shape[-1])
 
 
 def _one(points: Points, p: int) -> Points:

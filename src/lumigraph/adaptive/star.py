@@ -10,6 +10,7 @@ from lumigraph.core.linear import Linear, Shape
 from lumigraph.instruments import LensletCamera
 from lumigraph.operators.microscope_pupil import Lit
 from lumigraph.operators.point_changes import point_changes
+from lumigraph.operators.resampling import Part
 from lumigraph.scene import Points
 
 ACCURACY = 1e-2
@@ -68,13 +69,14 @@ class Star:
         part = (camera.sensor.pixel_pitch / step) ** 2
         return part * image.astype(np.float64), part * changes.astype(np.float64)
 
-    def whole(self, image: np.ndarray, cell: tuple[int, int]) -> np.ndarray:
-        """Images as they are: their window is the raw image."""
-        return image
+    def share(self, dz: float) -> float:
+        """All of the raw image."""
+        return 1.0
 
-    def placed(self, samples: np.ndarray) -> np.ndarray:
-        """Samples as they are: pixels."""
-        return samples
+    def seen(self, images: np.ndarray, cell: tuple[int, int]) -> tuple[Part, np.ndarray]:
+        """Images (k, ny, nx) as they are: of the whole raw image."""
+        ny, nx = self.shape
+        return (slice(0, ny), slice(0, nx)), images
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -51,6 +51,18 @@ class Banded:
         starts = range(0, len(self.blocks), _JOINED)
         return tuple(_joined(self.blocks[start : start + _JOINED]) for start in starts)
 
+    def seeing(self, columns: slice) -> tuple[slice, "Banded"]:
+        """The rows of all blocks that see some of these columns, and their part of the matrix."""
+        rows, blocks, row = [], [], 0
+        for first, m in self.blocks:
+            start, stop = max(first, columns.start), min(first + m.shape[1], columns.stop)
+            if start < stop:
+                rows += [row, row + len(m)]
+                blocks.append((start - columns.start, m[:, start - first : stop - first]))
+            row += len(m)
+        seen = slice(min(rows, default=0), max(rows, default=0))
+        return seen, Banded(columns.stop - columns.start, tuple(blocks))
+
     def down(self, plane: Array) -> Array:
         """``matrix @ plane``: (columns, n) to (rows, n)."""
         result = _zeros(plane, (self.rows, plane.shape[1]))

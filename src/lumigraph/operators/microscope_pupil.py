@@ -27,6 +27,7 @@ from lumigraph.operators.microscope_building import Layout
 from lumigraph.operators.microscope_cell import Lenslet
 from lumigraph.operators.microscope_kernels import Demand, margin_of, reach_of
 from lumigraph.operators.microscope_pupil_waves import Waves, waves_of
+from lumigraph.operators.resampling import Part, Resampling
 from lumigraph.scene import Points
 
 BLOCK = 2**21
@@ -184,15 +185,31 @@ class PupilImages:
         """Along the window that holds the image of a point at a depth [m], without coefficients."""
         return max(self._size(objective, dz)[0] for objective in self.objectives)
 
+    def share(self, dz: float) -> float:
+        """Part of the layout that the window of a point at a depth [m] takes, without coefficients."""
+        return min(1.0, self.cells_at(dz) ** 2 / math.prod(self.layout.cells))
+
     def placed(self, samples: np.ndarray) -> np.ndarray:
         """Raw image (ny, nx) of samples of the layout."""
         return samples if self.layout.placement is None else self.layout.placement.forward(samples)
 
-    def whole(self, image: np.ndarray, cell: tuple[int, int]) -> np.ndarray:
-        """Images (..., count, count) of a window around a cell among all samples of the layout."""
-        plane = np.zeros((*image.shape[:-2], *self._samples))
-        self._add(plane, image, cell)
-        return plane
+    def seen(self, images: np.ndarray, cell: tuple[int, int]) -> tuple[Part, np.ndarray]:
+        """Part of the raw image that images (k, n, n) of a window around a cell light, and its pixels.
+
+        Rows and columns, and (k, rows, columns).
+        """
+        (rows, own_rows), (columns, own_columns) = self._window(cell, images.shape[-1])
+        own, placement = images[:, own_rows, own_columns], self.layout.placement
+        if placement is None:
+            return (rows, columns), own
+        if isinstance(placement, Resampling):
+            return placement.of_part((rows, columns), own)
+        planes = np.zeros((len(own), *self._samples))
+        planes[:, rows, columns] = own
+        pixels = np.stack([placement.forward(plane) for plane in planes])
+        lit = np.abs(pixels).sum(0)
+        part = _between(lit.sum(1)), _between(lit.sum(0))
+        return part, pixels[:, part[0], part[1]]
 
     def _each(
         self, points: Points, coefficients: np.ndarray, directions: np.ndarray
@@ -333,6 +350,12 @@ def _nodes(objective: Objective, count: int) -> tuple[np.ndarray, np.ndarray, np
     y, x, area = disc(count, count)
     a = objective.aperture
     return np.broadcast_to(a * y, x.shape), a * x, area * a**2
+
+
+def _between(lit: np.ndarray) -> slice:
+    """From the first that is not dark to the last."""
+    found = np.flatnonzero(lit)
+    return slice(int(found[0]), int(found[-1]) + 1) if len(found) else slice(0, 0)
 
 
 def _crossed(fields: np.ndarray, field: np.ndarray) -> np.ndarray:

@@ -12,6 +12,9 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear, Shape
 from lumigraph.operators.band import HALF_WIDTH, integral, kernel
 
+Part = tuple[slice, slice]
+"""Rows and columns of a plane."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Resampling(Linear):
@@ -36,6 +39,12 @@ class Resampling(Linear):
         if self.y.rows * self.x.columns > self.y.columns * self.x.rows:
             return self.x.left(self.y.up(raw))
         return self.y.up(self.x.left(raw))
+
+    def of_part(self, part: Part, planes: np.ndarray) -> tuple[Part, np.ndarray]:
+        """Of planes that are dark but for a part (k, rows, columns): what part they light, and with what."""
+        seen = (matrix.seeing(own) for matrix, own in zip((self.y, self.x), part, strict=True))
+        (rows, down), (columns, across) = seen
+        return (rows, columns), _along(down, _along(across, planes).swapaxes(1, 2)).swapaxes(1, 2)
 
     @property
     def memory_bytes(self) -> float:
@@ -78,6 +87,12 @@ def averaged(plane: Grid, pixels: Grid, fill: float = 1.0) -> Resampling:
         return banded(at, (plane.y, plane.x)[axis] / pitch, mean, HALF_WIDTH + width / 2)
 
     return _on_both_axes(matrix, plane, pixels)
+
+
+def _along(matrix: Banded, planes: np.ndarray) -> np.ndarray:
+    """Planes (k, rows, n) to (k, rows, matrix rows)."""
+    k, rows, n = planes.shape
+    return matrix.right(planes.reshape(k * rows, n)).reshape(k, rows, matrix.rows)
 
 
 def _on_both_axes(matrix: Callable[[int], Banded], *grids: Grid) -> Resampling:

@@ -1,0 +1,60 @@
+"""How pixels change by each bead's unknowns, only where it lights them, and what they tell together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lumigraph.operators.resampling import Part
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Changes:
+    """Of the pixels that one bead lights.
+
+    Parameters
+    ----------
+    part
+        Rows and columns of the raw image.
+    by
+        (unknowns, rows, columns): by the bead's place and light, then by each coefficient where it stands.
+    """
+
+    part: Part
+    by: np.ndarray
+
+
+def told(beads: Sequence[Changes], weights: np.ndarray, away: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    r"""Information Jᵀ diag(w) J and slope Jᵀ a of all beads' unknowns, one bead's after another's.
+
+    Pixels (ny, nx) have weights w and derivatives a of the log-likelihood. Beads that light no pixel together
+    have no information in common.
+    """
+    n = len(beads[0].by)
+    whole = np.zeros((len(beads), n, len(beads), n))
+    for p, one in enumerate(beads):
+        weighted = Changes(one.part, one.by * weights[one.part].astype(one.by.dtype))
+        for q, other in enumerate(beads[: p + 1]):
+            whole[p, :, q] = _product(weighted, other)
+            whole[q, :, p] = whole[p, :, q].T
+    slope = [np.tensordot(one.by, away[one.part], 2) for one in beads]
+    return whole.reshape(len(beads) * n, -1), np.concatenate(slope)
+
+
+def _product(one: Changes, other: Changes) -> np.ndarray:
+    """Sums (unknowns, unknowns) over the pixels that both hold."""
+    common = tuple(_common(a, b) for a, b in zip(one.part, other.part, strict=True))
+    left, right = (_cut(changes, common) for changes in (one, other))
+    return left @ right.T
+
+
+def _common(one: slice, other: slice) -> slice:
+    start = max(one.start, other.start)
+    return slice(start, max(start, min(one.stop, other.stop)))
+
+
+def _cut(changes: Changes, part: tuple[slice, ...]) -> np.ndarray:
+    """Flat (unknowns, pixels), of a part of its pixels."""
+    own = (slice(p.start - a.start, p.stop - a.start) for p, a in zip(part, changes.part, strict=True))
+    found = changes.by[(slice(None), *own)]
+    return found.reshape(len(found), -1)
