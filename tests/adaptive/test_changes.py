@@ -15,7 +15,10 @@ PARTS = [
 
 
 def drawn(rng, unknowns):
-    beads = [Changes(part, rng.normal(size=(unknowns, *(p.stop - p.start for p in part)))) for part in PARTS]
+    beads = [
+        Changes(part, rng.normal(size=(unknowns, *(p.stop - p.start for p in part))), np.zeros(0))
+        for part in PARTS
+    ]
     whole = np.zeros((len(beads), unknowns, *SHAPE))
     for one, columns in zip(beads, whole, strict=True):
         columns[:, *one.part] = one.by

@@ -106,6 +106,21 @@ def test_what_a_fit_leaves_over_noise_is_one_at_the_truth_and_more_beside_it(mod
     assert model.pearson(beside) > 2
 
 
+def test_derivatives_of_beads_that_hardly_changed_are_kept(model):
+    at = Fit(bead(LIGHT), np.full((1, 1), MOVED))
+    first = model.around(at)
+    for change, kept in ((0.5, True), (2.0, False)):
+        moved = at.changed(coefficients=at.coefficients + change * fit.STALE * model.longest[-1])
+        found, fresh = model.around(moved, first), model.around(moved)
+        assert (found.beads[0] is first.beads[0]) == kept
+        assert found.slope == pytest.approx(fresh.slope, rel=0.05, abs=0.05 * np.abs(fresh.slope).max())
+    brighter = model.around(at.changed(points=bead(2 * LIGHT)), first)
+    assert brighter.beads[0] is first.beads[0]
+    assert brighter.information[3, 3] == pytest.approx(
+        model.around(at.changed(points=bead(2 * LIGHT))).information[3, 3]
+    )
+
+
 def test_a_fit_that_lacks_a_bead_does_not_go_on_for_what_noise_would_gain(model, monkeypatch):
     other = np.random.default_rng(6).poisson(LIGHT * np.exp(-((Y - 7) ** 2 + (X + 6) ** 2) / 8))
     lacking, found, asked = (

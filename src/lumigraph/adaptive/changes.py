@@ -1,7 +1,7 @@
 """How pixels change by each bead's unknowns, only where it lights them, and what they tell together."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,10 +18,17 @@ class Changes:
         Rows and columns of the raw image.
     by
         (unknowns, rows, columns): by the bead's place and light, then by each coefficient where it stands.
+    at
+        Place and coefficients of the bead.
     """
 
     part: Part
     by: np.ndarray
+    at: np.ndarray
+
+    def times(self, light: float | np.ndarray) -> "Changes":
+        """Of a bead of so much light, or with its pixels weighted."""
+        return replace(self, by=self.by * np.asarray(light, self.by.dtype))
 
 
 def told(beads: Sequence[Changes], weights: np.ndarray, away: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -33,7 +40,7 @@ def told(beads: Sequence[Changes], weights: np.ndarray, away: np.ndarray) -> tup
     n = len(beads[0].by)
     whole = np.zeros((len(beads), n, len(beads), n))
     for p, one in enumerate(beads):
-        weighted = Changes(one.part, one.by * weights[one.part].astype(one.by.dtype))
+        weighted = one.times(weights[one.part])
         for q, other in enumerate(beads[: p + 1]):
             whole[p, :, q] = _product(weighted, other)
             whole[q, :, p] = whole[p, :, q].T

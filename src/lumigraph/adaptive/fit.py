@@ -40,6 +40,11 @@ GAIN = 1.0
 SHORT = 1.2
 """Gain over the promised one above which a step was too short, as along a curved valley."""
 
+STALE = 0.02
+"""Part of the longest steps by which a bead may change before its derivatives are computed anew: they change
+by less than 1 in 10 then, as little as those of coarse images are off.
+"""
+
 CURVED = 10.0
 """Log-likelihood gained by a step above which a fit may go on the way of its last two steps: along a curved
 valley each step is short.
@@ -116,10 +121,13 @@ class Around:
         F (n, n), without the prior.
     slope
         Of the log-likelihood (n,), without the prior.
+    beads
+        How pixels change by each bead, of light 1.
     """
 
     information: np.ndarray
     slope: np.ndarray
+    beads: tuple[Changes, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -205,38 +213,43 @@ class Model:
         """Log-likelihood that a judged fit leaves over noise: what other beads, or terms, could gain."""
         return (self.pearson(fit) - 1) * self.counted / 2
 
-    def around(self, fit: Fit) -> Around:
-        """Information and slope at a fit."""
+    def around(self, fit: Fit, before: Around | None = None) -> Around:
+        """Information and slope at a fit, with derivatives of one before of beads that hardly changed."""
         if fit.around is not None:
             return fit.around
-        points, basis = fit.points, self.nodes.at(fit.points)
-        c = basis @ fit.coefficients
-        seen = list(each(lambda p: self._changes(_one(points, p), c[p]), range(len(c))))
+        basis = self.nodes.at(fit.points)
+        at = np.column_stack([fit.points.positions, basis @ fit.coefficients])
+        known = [None] * len(at) if before is None else before.beads
+        beads = tuple(each(lambda p: self._changes(at[p], known[p]), range(len(at))))
+        seen = [one.times(light) for one, light in zip(beads, fit.points.intensities, strict=True)]
         shown = self.expected(self.light(fit) if fit.light is None else fit.light)
         data, weights = arrays.to_numpy(self.problem.data), self.weights
         information, slope = told(seen, weights / shown, weights * (data / shown - 1))
         shared = _shared(basis, fit.coefficients.shape[1])
-        return Around(shared.T @ information @ shared, shared.T @ slope)
+        return Around(shared.T @ information @ shared, shared.T @ slope, beads)
 
-    def _changes(self, point: Points, c: np.ndarray) -> Changes:
-        """Of pixels, by a bead's place and light, and by its coefficients."""
+    def _changes(self, at: np.ndarray, known: Changes | None) -> Changes:
+        """Of pixels, by the place and light of a bead of light 1 and by its coefficients (places, terms)."""
+        longest = np.append(self.longest[:PLACES], np.full(len(at) - PLACES, self.longest[OWN]))
+        if known is not None and (np.abs(at - known.at) < STALE * longest).all():
+            return known
         images = self.images if self.coarse is None else self.coarse
-        lit, n = next(iter(images.lit(point, c))), len(c)
+        n = len(at) - PLACES
+        (lit,) = images.lit(Points(at[None, :PLACES], np.ones(1)), at[PLACES:])
         own = np.concatenate([lit.changes[n:], lit.image[None], lit.changes[:n]])
         part, by = images.seen(own.astype(np.float32), lit.cell)
-        by = by * np.float32(point.intensities[0])
         if self.problem.scale.response is not None:
             by = by * arrays.to_numpy(self.problem.scale.response)[part].astype(np.float32)
-        return Changes(part, by)
+        return Changes(part, by, at)
 
     def improved(self, fit: Fit, free: np.ndarray, steps: int) -> Fit:
         """The fit after at most some steps, with those coefficients free that are marked (terms,)."""
-        damping, fit, before = 1e-2, self.judged(fit), None
+        damping, fit, before, around = 1e-2, self.judged(fit), None, None
         for _ in range(steps):
-            around = self.around(fit)
+            around = self.around(fit, around)
             found, damping = self._likelier(around, fit, free, damping)
             if found is None:
-                return replace(fit, around=around)
+                return fit
             if before is not None and fit.objective - found.objective > 2 * CURVED:
                 found = self._farther(found, _way(before, found) / 2)
             gained = (fit.objective - found.objective) / 2
