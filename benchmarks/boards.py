@@ -158,10 +158,8 @@ def sighted(true, point, found, views):
         way = np.stack(np.meshgrid(*2 * [np.linspace(-4, 4, 7)]), -1).reshape(-1, 2)
         center = scenes.in_views(true, point, way)
         return center + way, center
-    y, x = np.mgrid[-4:5, -4:5].reshape(2, -1)
-    middle = true.project(point, np.array([[210.0, 250.0]]))[0]
-    near = np.rint(np.stack(found.index(*middle), -1))
-    center = found.position((near + np.stack([y, x], 1)).astype(int))
+    rows, columns = found.shape
+    center = found.position(found.indices_within((0, rows - 1), (0, columns - 1)))
     place = true.project(point, center)
     shown = np.hypot(*(place - center).T) < 0.42 * found.lattice.pitch
     return place[shown], center[shown]
