@@ -278,5 +278,7 @@ class PupilSource(MicroscopeSource):
     def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
         """As `Source.lit`."""
         (one,) = self.images.lit(Points(place[None], np.ones(1)), np.zeros(0))
-        planes = self.images.whole(np.concatenate([one.image[None], one.changes]), one.cell)
-        return np.stack([self.images.placed(plane) for plane in planes]) / self.whole, np.zeros(3)
+        (rows, columns), pixels = self.images.seen(np.concatenate([one.image[None], one.changes]), one.cell)
+        found = np.zeros((len(pixels), *self.images.shape))
+        found[:, rows, columns] = pixels
+        return found / self.whole, np.zeros(3)
