@@ -161,7 +161,8 @@ def run(bench, rng, what, pictures):
         told * ideal.focal_length, ideal.pixel_pitch, true.sensor.shape, pitch_ratio_error=PITCH,
         pitch_ratio=1 + ideal.lenslet_distance / ideal.separation,
     )  # fmt: skip
-    poses = [draw() for draw in planned_poses(rng, (ideal, true.calibration), board, nominal, pictures)]
+    seen = replace(true.calibration, fill=true.micro_image_fill)
+    poses = [draw() for draw in planned_poses(rng, (ideal, seen), board, nominal, pictures)]
     with tempfile.TemporaryDirectory() as folder:
         kept, white, off, last, found = saved(bench, board, poses, rng, what, Path(folder))
         lenslets = pitch * true.lenslets.pitch

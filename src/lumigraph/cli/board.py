@@ -263,11 +263,11 @@ def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int)
         raise FormatError("a plan needs --camera, a file of a plenoptic camera, and --board.")
     ideal = metric.MetricCamera.of(camera)
     told = {name: getattr(ideal, name) for name in ("focal_length", "pixel_pitch")}
-    lattice = camera.calibration.lattice
-    told |= {"lenslet_pitch": camera.lenslets.pitch, "micro_images": lattice.pitch}
+    calibration = replace(camera.calibration, fill=camera.micro_image_fill)
+    told |= {"lenslet_pitch": camera.lenslets.pitch, "micro_images": calibration.lattice.pitch}
     nominal = known.nominal(told | {"shape": camera.sensor.shape})
     in_views = not isinstance(camera, Rendered)
-    found = metric.plan(ideal, camera.calibration, board, nominal, pictures=pictures, in_views=in_views)
+    found = metric.plan(ideal, calibration, board, nominal, pictures=pictures, in_views=in_views)
     table = found.table()
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in table]

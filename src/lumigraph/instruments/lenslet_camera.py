@@ -124,6 +124,11 @@ class LensletCamera(Camera):
         return wide * self.lenslet_distance / self.pupil_distance
 
     @property
+    def micro_image_fill(self) -> float:
+        """Width of the lit part of a micro-image over the pitch, by ray optics; 1 where they touch."""
+        return min(1.0, self.micro_image_width / self.micro_image_pitch)
+
+    @property
     def lattice(self) -> Lattice:
         """Where the lenslets stand [m], in physical coordinates."""
         return self.lenslets.lattice()

@@ -145,7 +145,7 @@ def plan(
     camera
         As its data sheet says, such as ``MetricCamera.of(camera_file)``.
     calibration
-        Where its micro-images stand.
+        Where its micro-images stand, and how much of each is lit (`fill`; all of it where that is None).
     board
         To be used.
     nominal
