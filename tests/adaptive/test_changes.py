@@ -29,7 +29,9 @@ def test_information_and_slope_are_those_of_all_pixels():
     rng = np.random.default_rng(3)
     beads, whole = drawn(rng, 3)
     weights, away = rng.uniform(0.5, 2, SHAPE), rng.normal(size=SHAPE)
-    information, slope = told(beads, weights, away)
+    lights = rng.uniform(1, 9, len(beads))
+    information, slope = told(beads, lights, weights, away)
+    whole *= np.repeat(lights, 3)[:, None]
     np.testing.assert_allclose(information, whole * weights.ravel() @ whole.T, atol=1e-12)
     np.testing.assert_allclose(slope, whole @ away.ravel(), atol=1e-12)
     assert not information[:3, 6:].any()  # the first and the third light no pixel together

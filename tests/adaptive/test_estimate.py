@@ -73,6 +73,16 @@ def test_no_aberration_is_invented():
     assert (found.deviations > 0).all()
 
 
+STRONG = {5: 0.4, 6: -0.5, 7: 0.45, 8: 0.4, 9: -0.35, 10: 0.3, 11: -0.25}
+
+
+def test_shifts_of_views_begin_a_strong_wavefront():
+    found = estimate(exposed(STRONG, 2e4), SCOPE, DEPTHS, tuple(STRONG), exposure=EXPOSURE)
+    assert found.coefficients == pytest.approx(STRONG, abs=0.02)
+    assert found.pearson < 1.2
+    assert found.steps <= 12  # 15 from none
+
+
 def test_regions_of_the_field_have_aberrations_of_their_own():
     sides = [SCOPE.replace(objective={"aberrations": {6: waves}}) for waves in (0.2, -0.1)]
     light = sum(one.point_image(*place, accuracy=2e-2) for one, place in zip(sides, BEADS, strict=True))

@@ -8,6 +8,7 @@ from deconvolution.models import Matrix, blur, blurred, disc, placed
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.linear import Linear
 from lumigraph.deconvolution import Exposure, LeastSquares, RichardsonLucy, Stop
+from lumigraph.deconvolution.problem import Problem, Scale
 
 SHAPE = (15, 16)
 
@@ -222,6 +223,20 @@ def test_a_black_level_has_no_noise_of_its_own(rng):
     method = RichardsonLucy(start=scene * 2 / sensor.gain)
     lg.deconvolve(raw, operator, 1, method=method, exposure=exposure, progress=steps.append)
     assert steps[0].deviance == pytest.approx(1, abs=0.15)  # 3 standard deviations of 900 pixels
+
+
+def test_the_light_of_a_raw_image_is_what_its_counted_pixels_tell_above_the_background(rng):
+    light, response = rng.uniform(1, 9, (4, 5)), rng.uniform(0.5, 1, (4, 5))
+    weights = np.ones((4, 5))
+    weights[1, 2], response[3, 3] = 0, 0
+    raw = response * light + 120.0
+    raw[1, 2], raw[0, 0] = np.nan, 90.0
+    known = {"background": 120.0, "black_level": 100.0, "gain": 2.0, "read_noise": 3.0}
+    exposure = Exposure(**known, response=response, weights=weights)
+    operator = Matrix(np.eye(20), (4, 5), (4, 5))
+    problem = Problem.of(raw, exposure, Scale.of(operator, exposure, raw))
+    light[1, 2] = light[3, 3] = light[0, 0] = 0
+    np.testing.assert_allclose(problem.light, light, atol=1e-9)
 
 
 ONES = Matrix(np.ones((6, 4)), (2, 3), (2, 2))

@@ -26,25 +26,29 @@ class Changes:
     by: np.ndarray
     at: np.ndarray
 
-    def times(self, light: float | np.ndarray) -> "Changes":
-        """Of a bead of so much light, or with its pixels weighted."""
-        return replace(self, by=self.by * np.asarray(light, self.by.dtype))
+    def weighted(self, weights: np.ndarray) -> "Changes":
+        """With weights of all pixels (ny, nx)."""
+        return replace(self, by=self.by * weights[self.part].astype(self.by.dtype))
 
 
-def told(beads: Sequence[Changes], weights: np.ndarray, away: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def told(
+    beads: Sequence[Changes], lights: np.ndarray, weights: np.ndarray, away: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     r"""Information Jᵀ diag(w) J and slope Jᵀ a of all beads' unknowns, one bead's after another's.
 
-    Pixels (ny, nx) have weights w and derivatives a of the log-likelihood. Beads that light no pixel together
-    have no information in common.
+    Beads shine by their lights (beads,). Pixels (ny, nx) have weights w and derivatives a of the
+    log-likelihood. Beads that light no pixel together have no information in common.
     """
     n = len(beads[0].by)
     whole = np.zeros((len(beads), n, len(beads), n))
     for p, one in enumerate(beads):
-        weighted = one.times(weights[one.part])
+        weighted = one.weighted(weights)
         for q, other in enumerate(beads[: p + 1]):
-            whole[p, :, q] = _product(weighted, other)
+            whole[p, :, q] = lights[p] * lights[q] * _product(weighted, other)
             whole[q, :, p] = whole[p, :, q].T
-    slope = [np.tensordot(one.by, away[one.part], 2) for one in beads]
+    slope = [
+        light * np.tensordot(one.by, away[one.part], 2) for one, light in zip(beads, lights, strict=True)
+    ]
     return whole.reshape(len(beads) * n, -1), np.concatenate(slope)
 
 

@@ -13,6 +13,7 @@ from lumigraph.adaptive.checked import BEADS, asked_for, bent
 from lumigraph.adaptive.field import PRIOR, Nodes
 from lumigraph.adaptive.fit import OWN, PLACES, Fit, Model, solved
 from lumigraph.adaptive.of_volume import of_volume
+from lumigraph.adaptive.start import starts
 from lumigraph.adaptive.wavefront import Wavefront
 from lumigraph.adaptive.worth import UNKNOWN, worth
 from lumigraph.core import arrays, checks, memory
@@ -76,9 +77,10 @@ def estimate(
     """Aberrations of a light-field microscope from one raw image, with the object.
 
     Of beads: Richardson-Lucy finds them. Then their places and light and the Zernike coefficients are fitted
-    together, by Levenberg and Marquardt's steps on the Poisson likelihood, and Richardson-Lucy looks for more
-    beads in what is left. A term stays if it gains more log-likelihood than ½ ln N for N pixels (Schwarz's
-    criterion); the others are 0. What is known before: a coefficient is of the order of 1 wave rms.
+    together, from none or from those that the shifts of views show (see `start`), whichever is likelier, by
+    Levenberg and Marquardt's steps on the Poisson likelihood, and Richardson-Lucy looks for more beads in
+    what is left. A term stays if it gains more log-likelihood than ½ ln N for N pixels (Schwarz's criterion);
+    the others are 0. What is known before: a coefficient is of the order of 1 wave rms.
 
     Of any object with texture: the shifts of views give a start (see `start`), unless none is likelier. Then
     Richardson-Lucy's steps on a volume take turns with Gauss and Newton's on the coefficients, for which the
@@ -145,7 +147,7 @@ def estimate(
     _require_memory(model, first)
     every = np.ones(len(given.terms), bool)
     plain = model.improved(first, ~every, STEPS["places"])
-    fit, rounds = _fitted(given, model, plain, every)
+    fit, rounds = _fitted(given, model, _begun(given, model, plain), every)
     covariance = covariance_of(model, fit)[-fit.coefficients.size :, -fit.coefficients.size :]
     free = worth(covariance, fit.coefficients, model.counted)
     if not free.all():
@@ -237,6 +239,10 @@ class _Given:
         along = float(np.ptp(self.depths)) * 10 if shown is None else across / slope
         return brightest(volume, (self.depths, grid.y, grid.x), (across, along), FAINT[0])
 
+    def starts(self) -> list[np.ndarray]:
+        """Coefficients (terms,) of the whole field, from the views' shifts."""
+        return starts(self.problem, self.microscope, self.terms, self.pixels)
+
     @property
     def brighter(self) -> float:
         """Intensity of a point over that of a sample of the volume which sends as much light."""
@@ -248,6 +254,13 @@ class _Given:
         found = self.beads(shown)
         bright = found.intensities > FAINT[1] * float(np.median(fit.points.intensities))
         return Points(found.positions[bright], found.intensities[bright]) if bright.any() else None
+
+
+def _begun(given: _Given, model: Model, plain: Fit) -> Fit:
+    """The likeliest of a fit without aberrations and of its beads with those that views' shifts show."""
+    shifted = (np.tile(c, (len(model.nodes), 1)) for c in given.starts())
+    tried = (model.judged(plain.changed(coefficients=c)) for c in shifted)
+    return min([plain, *tried], key=lambda fit: fit.objective)
 
 
 def _fitted(given: _Given, model: Model, fit: Fit, free: np.ndarray) -> tuple[Fit, int]:
@@ -272,7 +285,7 @@ def _parts(points: Points) -> tuple[np.ndarray, np.ndarray]:
 
 def _without_faint(model: Model, fit: Fit, free: np.ndarray) -> Fit:
     """The fit without beads whose light is not known well enough to be there."""
-    fit = replace(fit, around=model.around(fit))
+    fit = model.known(fit)
     covariance = covariance_of(model, fit)
     light = np.diag(covariance)[PLACES : OWN * len(fit.points.intensities) : OWN]
     kept = light < 1 / (OWN * math.log(model.counted))
@@ -293,12 +306,12 @@ def covariance_of(model: Model, fit: Fit) -> np.ndarray:
 
 
 def _require_memory(model: Model, fit: Fit) -> None:
-    """Of the changes of the pixels that each bead lights, and twice those of one bead for each thread."""
+    """Of the changes of the pixels that each bead lights, twice, and of one bead for each thread."""
     images, count = model.coarse or model.images, len(fit.points.intensities)
     farthest = float(np.abs(fit.points.positions[:, 2]).max())
     unknowns = OWN + fit.coefficients.shape[1]
     lit = images.share(farthest) * math.prod(images.shape)
-    needed = 4.0 * (count + 2 * arrays.WORKERS) * unknowns * lit
+    needed = 4.0 * (2 * count + 2 * arrays.WORKERS) * unknowns * lit
     what = f"the derivatives of {images.shape} pixels by {count} beads and {unknowns} unknowns of each"
     memory.require(needed, what, "Crop the raw image.", SamplingError)
 

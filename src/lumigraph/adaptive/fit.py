@@ -6,7 +6,7 @@ information of Poisson noise is F = Jᵀ diag(g w / m) J. A step solves
 and the logarithm of its light, then the coefficients at each node of the field.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -62,12 +62,13 @@ class Images(Protocol):
         """Of a raw image."""
         ...
 
-    def forward(self, points: Points, coefficients: np.ndarray) -> np.ndarray:
-        """Raw image (ny, nx) of points, for coefficients (terms,) [waves rms]."""
-        ...
+    def lit(
+        self, points: Points, coefficients: np.ndarray, directions: np.ndarray | None = None
+    ) -> Iterator[Lit]:
+        """Image of each point of intensity 1, for coefficients (terms,) [waves rms], around its cell.
 
-    def lit(self, points: Points, coefficients: np.ndarray) -> Iterator[Lit]:
-        """Image and derivatives of each point of intensity 1, in a window around its cell."""
+        With derivatives along directions (k, terms + 3): by all terms, y, x and dz if left out.
+        """
         ...
 
     def share(self, dz: float) -> float:
@@ -95,8 +96,8 @@ class Fit:
         Taken so far.
     light
         On the pixels (ny, nx); None before the fit is judged.
-    around
-        The model around it, where it is known.
+    beads
+        How pixels change by each bead, of light 1, where that was last computed: near here, or elsewhere.
     """
 
     points: Points
@@ -104,11 +105,11 @@ class Fit:
     objective: float = np.inf
     steps: int = 0
     light: np.ndarray | None = None
-    around: "Around | None" = None
+    beads: tuple[Changes, ...] = ()
 
     def changed(self, **changes: Any) -> "Fit":
         """With other points or coefficients, not judged yet."""
-        return replace(self, objective=np.inf, light=None, around=None, **changes)
+        return replace(self, objective=np.inf, light=None, **changes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,13 +122,10 @@ class Around:
         F (n, n), without the prior.
     slope
         Of the log-likelihood (n,), without the prior.
-    beads
-        How pixels change by each bead, of light 1.
     """
 
     information: np.ndarray
     slope: np.ndarray
-    beads: tuple[Changes, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,8 +147,9 @@ class Model:
     longest
         Steps: see `LONGEST`.
     coarse
-        Images whose derivatives show the way; None for `images`. What they get wrong meets only noise at the
-        end, so that it costs no more of a fit's precision than its own square.
+        Images by which the first steps are judged, and whose derivatives show the way of all; None for
+        `images`. What derivatives get wrong meets only noise at the end, so that it costs no more of a fit's
+        precision than its own square.
     """
 
     images: Images
@@ -182,11 +181,21 @@ class Model:
 
     def light(self, fit: Fit) -> np.ndarray:
         """On the pixels (ny, nx)."""
-        points, c = fit.points, self.nodes.at(fit.points) @ fit.coefficients
-        one_by_one = each(
-            lambda p: self.images.forward(_one(points, p), c[p]), range(len(points.intensities))
-        )
-        return sum(one_by_one, np.zeros(self.images.shape))
+        found = np.zeros(self.images.shape)
+        for (part, pixels), light in zip(
+            each(self._image, self._at(fit)), fit.points.intensities, strict=True
+        ):
+            found[part] += light * pixels[0]
+        return found
+
+    def _image(self, at: np.ndarray) -> tuple[Part, np.ndarray]:
+        """What part of the raw image a bead of light 1 lights, by place and coefficients, and its pixels."""
+        (lit,) = self.images.lit(_alone(at), at[PLACES:], np.zeros((0, len(at))))
+        return self.images.seen(lit.image[None], lit.cell)
+
+    def _at(self, fit: Fit) -> np.ndarray:
+        """Place and coefficients of each bead (beads, 3 + terms)."""
+        return np.column_stack([fit.points.positions, self.nodes.at(fit.points) @ fit.coefficients])
 
     def judged(self, fit: Fit) -> Fit:
         """The fit with its objective."""
@@ -213,29 +222,28 @@ class Model:
         """Log-likelihood that a judged fit leaves over noise: what other beads, or terms, could gain."""
         return (self.pearson(fit) - 1) * self.counted / 2
 
-    def around(self, fit: Fit, before: Around | None = None) -> Around:
-        """Information and slope at a fit, with derivatives of one before of beads that hardly changed."""
-        if fit.around is not None:
-            return fit.around
-        basis = self.nodes.at(fit.points)
-        at = np.column_stack([fit.points.positions, basis @ fit.coefficients])
-        known = [None] * len(at) if before is None else before.beads
-        beads = tuple(each(lambda p: self._changes(at[p], known[p]), range(len(at))))
-        seen = [one.times(light) for one, light in zip(beads, fit.points.intensities, strict=True)]
+    def known(self, fit: Fit) -> Fit:
+        """The fit with derivatives of its beads, those before where a bead hardly changed."""
+        return replace(fit, beads=tuple(each(lambda at: self._changes(at, fit.beads), self._at(fit))))
+
+    def around(self, fit: Fit) -> Around:
+        """Information and slope at a fit."""
+        fit = self.known(fit)
         shown = self.expected(self.light(fit) if fit.light is None else fit.light)
         data, weights = arrays.to_numpy(self.problem.data), self.weights
-        information, slope = told(seen, weights / shown, weights * (data / shown - 1))
-        shared = _shared(basis, fit.coefficients.shape[1])
-        return Around(shared.T @ information @ shared, shared.T @ slope, beads)
+        told_of = told(fit.beads, fit.points.intensities, weights / shown, weights * (data / shown - 1))
+        shared = _shared(self.nodes.at(fit.points), fit.coefficients.shape[1])
+        return Around(shared.T @ told_of[0] @ shared, shared.T @ told_of[1])
 
-    def _changes(self, at: np.ndarray, known: Changes | None) -> Changes:
+    def _changes(self, at: np.ndarray, before: Sequence[Changes]) -> Changes:
         """Of pixels, by the place and light of a bead of light 1 and by its coefficients (places, terms)."""
         longest = np.append(self.longest[:PLACES], np.full(len(at) - PLACES, self.longest[OWN]))
-        if known is not None and (np.abs(at - known.at) < STALE * longest).all():
-            return known
+        for one in before:
+            if (np.abs(at - one.at) < STALE * longest).all():
+                return one
         images = self.images if self.coarse is None else self.coarse
         n = len(at) - PLACES
-        (lit,) = images.lit(Points(at[None, :PLACES], np.ones(1)), at[PLACES:])
+        (lit,) = images.lit(_alone(at), at[PLACES:])
         own = np.concatenate([lit.changes[n:], lit.image[None], lit.changes[:n]])
         part, by = images.seen(own.astype(np.float32), lit.cell)
         if self.problem.scale.response is not None:
@@ -244,10 +252,17 @@ class Model:
 
     def improved(self, fit: Fit, free: np.ndarray, steps: int) -> Fit:
         """The fit after at most some steps, with those coefficients free that are marked (terms,)."""
-        damping, fit, before, around = 1e-2, self.judged(fit), None, None
-        for _ in range(steps):
-            around = self.around(fit, around)
-            found, damping = self._likelier(around, fit, free, damping)
+        last = fit.steps + steps
+        if self.coarse is not None:
+            fit = replace(self, images=self.coarse)._fitted(fit.changed(), free, last)
+        return self._fitted(fit.changed(), free, last)
+
+    def _fitted(self, fit: Fit, free: np.ndarray, last: int) -> Fit:
+        """The fit after a last step at most."""
+        damping, fit, before = 1e-2, self.judged(fit), None
+        while fit.steps < last:
+            fit = self.known(fit)
+            found, damping = self._likelier(self.around(fit), fit, free, damping)
             if found is None:
                 return fit
             if before is not None and fit.objective - found.objective > 2 * CURVED:
@@ -336,8 +351,9 @@ def _shared(basis: np.ndarray, terms: int) -> np.ndarray:
     return found.reshape(-1, found.shape[-1])
 
 
-def _one(points: Points, p: int) -> Points:
-    return Points(points.positions[p : p + 1], points.intensities[p : p + 1])
+def _alone(at: np.ndarray) -> Points:
+    """A bead of light 1 at a place, of which coefficients may follow."""
+    return Points(at[None, :PLACES], np.ones(1))
 
 
 def stepped(progress: Progress, steps: int) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from lumigraph.adaptive.checked import VOLUME, asked_for, bent
 from lumigraph.adaptive.field import PRIOR
 from lumigraph.adaptive.sight import Sight
-from lumigraph.adaptive.start import start
+from lumigraph.adaptive.start import starts
 from lumigraph.adaptive.voxels import ITERATIONS, Around, Told, Voxels
 from lumigraph.adaptive.wavefront import Wavefront
 from lumigraph.adaptive.worth import UNKNOWN, worth
@@ -19,8 +19,6 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.deconvolution import Exposure
 from lumigraph.deconvolution.problem import values
-from lumigraph.elements.zernike import noll_to_nm
-from lumigraph.errors import CalibrationError, SamplingError
 from lumigraph.instruments import LightFieldMicroscope
 from lumigraph.scene import Points
 
@@ -52,8 +50,10 @@ def of_volume(
     sight.require_memory()
     sight = Sight.of(images, sight.planes, SAMPLES)
     voxels = Voxels(sight, values(raw, sight.operator(np.zeros(len(found))), exposure), exposure, progress)
-    first = [np.zeros(len(found)), *_starts(given, microscope, found, exposure)]
-    told = min((voxels.begun(c, ITERATIONS[0]) for c in first), key=lambda one: one.state.deviance)
+    told = voxels.begun(np.zeros(len(found)), ITERATIONS[0])
+    shifted = starts(told.problem, microscope, found, pixels)
+    tried = (voxels.begun(c, ITERATIONS[0]) for c in shifted)
+    told = min([told, *tried], key=lambda one: one.state.deviance)
     told, around = _improved(voxels, told, np.ones(len(found), bool), ITERATIONS)
     covariance = _covariance(voxels, told, around)
     free = worth(covariance, told.coefficients[None], voxels.counted(told))
@@ -73,26 +73,6 @@ def of_volume(
         bent(microscope, found, told.coefficients), covariance,
         Volume(volume, grid, sight.planes), _explained(found, around),
     )  # fmt: skip
-
-
-def _starts(
-    given: Given, microscope: LightFieldMicroscope, terms: tuple[int, ...], exposure: Exposure
-) -> list[np.ndarray]:
-    """Coefficients to begin with, from the views' shifts: all of them, and those above the second order.
-
-    A scene of few things passes for astigmatism if those along y and those along x stand at other depths.
-    """
-    raw, _, pixels = given
-    data = np.asarray(raw.data if isinstance(raw, RawImage) else raw, np.float32)
-    background = np.asarray(arrays.to_numpy(exposure.background)) + exposure.black_level
-    try:
-        slopes = start(np.maximum(data - background, 0).astype(np.float32), microscope, terms, pixels=pixels)
-    except (CalibrationError, SamplingError):
-        return []  # nothing to compare: the fit begins without aberrations
-    known = dict(microscope.objective.aberrations)
-    found = np.array([slopes.coefficients[j] - known.get(j, 0.0) for j in terms])
-    high = np.array([noll_to_nm(j)[0] > 2 for j in terms])
-    return [found, found * high] if high.any() and not high.all() else [found]
 
 
 def _improved(voxels: Voxels, told: Told, free: np.ndarray, iterations: Sequence[int]) -> tuple[Told, Around]:

@@ -8,7 +8,7 @@ import numpy as np
 from lumigraph.adaptive.checked import bent
 from lumigraph.core.linear import Linear, Shape
 from lumigraph.instruments import LensletCamera
-from lumigraph.operators.microscope_pupil import Lit
+from lumigraph.operators.microscope_pupil import PLACES, Lit
 from lumigraph.operators.point_changes import point_changes
 from lumigraph.operators.resampling import Part
 from lumigraph.scene import Points
@@ -54,11 +54,17 @@ class Star:
         )
         return sum(images, np.zeros(self.shape))
 
-    def lit(self, points: Points, coefficients: np.ndarray) -> Iterator[Lit]:
-        """Image of each point of intensity 1, and derivatives by coefficients, y, x and dz, which are 0."""
+    def lit(
+        self, points: Points, coefficients: np.ndarray, directions: np.ndarray | None = None
+    ) -> Iterator[Lit]:
+        """Image of each point of intensity 1, and derivatives along directions (k, terms + 3).
+
+        By all coefficients, y, x and dz if left out; those by the last three are 0.
+        """
+        along = np.eye(len(self.terms) + PLACES) if directions is None else directions
         for place in points.positions:
-            image, changes = self._seen(place, coefficients, self.terms)
-            yield Lit(image, np.append(changes, 0 * image[None], 0), (0, 0))
+            image, changes = self._seen(place, coefficients, self.terms if len(along) else ())
+            yield Lit(image, np.tensordot(along[:, : len(changes)], changes, 1), (0, 0))
 
     def _seen(
         self, place: np.ndarray, coefficients: np.ndarray, terms: tuple[int, ...]

@@ -19,8 +19,9 @@ from lumigraph.core import checks
 from lumigraph.core.brief import brief
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.raw import RawImage
+from lumigraph.deconvolution.problem import Problem
 from lumigraph.elements.zernike import noll_to_nm, zernike
-from lumigraph.errors import CalibrationError, GeometryError
+from lumigraph.errors import CalibrationError, GeometryError, SamplingError
 from lumigraph.instruments import LensletCamera, LightFieldMicroscope, PlenopticCamera
 from lumigraph.instruments.capabilities import Decoded, WithPupil
 from lumigraph.rendering import decode
@@ -160,6 +161,25 @@ def start(
         covariance, places, (slopes @ found + left) * size,
         float(np.sqrt(np.mean(np.square(left).sum(1)))) * size, _with(instrument, asked, found[n:]),
     )  # fmt: skip
+
+
+def starts(
+    problem: Problem, microscope: LightFieldMicroscope, terms: Sequence[int], pixels: Calibration | None
+) -> list[np.ndarray]:
+    """Coefficients (terms,) to begin with, from the views' shifts: all, and those above the second order.
+
+    None of an image whose views cannot be compared. A scene of few things passes for astigmatism if those
+    along y and those along x stand at other depths.
+    """
+    try:
+        slopes = start(problem.light.astype(np.float32), microscope, terms, pixels=pixels)
+    except (CalibrationError, SamplingError):
+        return []
+    found = np.array([slopes.coefficients[j] for j in terms]) - _known(
+        microscope.objective.aberrations, terms
+    )
+    high = np.array([noll_to_nm(j)[0] > 2 for j in terms])
+    return [found, found * high] if high.any() and not high.all() else [found]
 
 
 def _with(

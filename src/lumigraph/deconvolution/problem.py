@@ -172,6 +172,15 @@ class Problem:
         light = self._weighted(self.data - self.scale.background)
         return max(float(xp.sum(light)), self.floor) / self.scale.light_of_even
 
+    @property
+    def light(self) -> np.ndarray:
+        """What the pixels tell of the light on them (ny, nx), at least 0; 0 where they do not count."""
+        light = np.maximum(arrays.to_numpy(self.data) - arrays.to_numpy(self.scale.background), 0)
+        if self.scale.response is None:
+            return light
+        response = arrays.to_numpy(self.scale.response)
+        return np.divide(light, response, out=np.zeros_like(light), where=response > 0)
+
     def flat(self) -> Array:
         """The even object of `level`, 0 where nothing is seen."""
         return self.scale.where_seen(self.level)
