@@ -104,6 +104,14 @@ def test_the_part_that_a_window_lights_holds_all_of_its_light(pitch, rotation):
         assert np.prod([p.stop - p.start for p in part]) <= most * true.size
 
 
+def test_coefficients_that_are_fixed_give_the_same_image_and_no_derivatives():
+    model = images(SCOPE.replace(objective={"aberrations": {7: 0.1}}))
+    fixed = model.fixed(SOME)
+    np.testing.assert_allclose(fixed.forward(POINTS, np.zeros(0)), model.forward(POINTS, SOME), rtol=1e-9)
+    ours, theirs = (next(m.lit(POINTS, c)).changes for m, c in ((fixed, np.zeros(0)), (model, SOME)))
+    np.testing.assert_allclose(ours, theirs[-PLACES:], rtol=1e-9, atol=1e-12 * np.abs(theirs).max())
+
+
 def test_every_terms_derivative_is_that_of_central_differences():
     model, h = images(), 1e-4
     for direction in np.eye(len(TERMS)):

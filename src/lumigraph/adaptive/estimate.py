@@ -4,25 +4,24 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from lumigraph.adaptive.beads import brightest
 from lumigraph.adaptive.checked import BEADS, asked_for, bent
 from lumigraph.adaptive.field import PRIOR, Nodes
 from lumigraph.adaptive.fit import OWN, PLACES, Fit, Model, solved
 from lumigraph.adaptive.of_volume import of_volume
+from lumigraph.adaptive.search import Search
 from lumigraph.adaptive.start import starts
 from lumigraph.adaptive.wavefront import Wavefront
 from lumigraph.adaptive.worth import UNKNOWN, worth
-from lumigraph.core import arrays, checks, memory
+from lumigraph.core import checks, memory
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
-from lumigraph.deconvolution import Exposure, RichardsonLucy
-from lumigraph.deconvolution.methods import State
-from lumigraph.deconvolution.problem import Problem, Scale, values
+from lumigraph.deconvolution import Exposure
+from lumigraph.deconvolution.problem import Problem
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
 from lumigraph.instruments import LightFieldMicroscope
 from lumigraph.scene import Points
@@ -36,27 +35,14 @@ ACCURACY = 3e-2
 COARSE = 0.3
 """Accuracy asked of their derivatives, which then are off by 4 to 11 %, and single ones by up to 36 %."""
 
-SAMPLES = 3
-"""Of the volume in which beads are looked for, along a lenslet."""
-
-ITERATIONS = 30
-"""Of Richardson-Lucy, by which beads are looked for."""
-
 ROUNDS = 3
 """How often beads are looked for at most: in the raw image, then in what those before leave."""
 
 STEPS = {"places": 4, "all": 40}
 """Of the fit, at most."""
 
-APART = (1.6, 1.25)
-"""Half axes of the spheroids in which light is one bead's, in lenslets: at first, at whatever depth, for
-aberrations may spread it, and later."""
-
-FAINT = (0.15, 0.05)
-"""Light of a bead that counts, over the brightest's at first, and over the median of those found later."""
-
-BEYOND = 6e-6
-"""How far beyond the outermost depths beads may stand [m]."""
+SPREAD = 3.0
+"""Pixels that beads light through aberrations of 1 wave rms, over those without: 2.7 before a 20x/0.5."""
 
 MISFIT = 2.0
 """Mean of (r - m)²/m above which an object does not explain the raw image."""
@@ -143,13 +129,17 @@ def estimate(
         raise GeometryError(f"object is {object!r} but must be 'beads' or 'volume'.")
     given = _Given.of((raw, exposure, pixels), microscope, depths, terms)
     model = given.model(parted, progress or silent)
-    first = Fit(given.beads(), np.zeros((len(model.nodes), len(given.terms))))
+    none = np.zeros((len(model.nodes), len(given.terms)))
+    first = Fit(given.search.beads(none[0]), none)
     _require_memory(model, first)
     every = np.ones(len(given.terms), bool)
-    plain = model.improved(first, ~every, STEPS["places"])
+    plain = model.placed(first, STEPS["places"])
     fit, rounds = _fitted(given, model, _begun(given, model, plain), every)
-    covariance = covariance_of(model, fit)[-fit.coefficients.size :, -fit.coefficients.size :]
-    free = worth(covariance, fit.coefficients, model.counted)
+    if len(model.nodes) > 1:
+        model = replace(model, nodes=model.nodes.learnt(fit.coefficients, _shared(model, fit)))
+        fit = model.improved(fit, every, STEPS["all"])
+    covariance = _shared(model, fit)
+    free = worth(covariance, fit.coefficients, model.counted, model.nodes.information)
     if not free.all():
         fit = model.improved(fit.changed(coefficients=fit.coefficients * free), free, STEPS["all"])
     pearson = model.pearson(fit)
@@ -181,9 +171,8 @@ class _Given:
     """What is given, put together."""
 
     microscope: LightFieldMicroscope
-    operator: Any
+    search: Search
     problem: Problem
-    depths: np.ndarray
     terms: tuple[int, ...]
     untold: dict[int, str]
     pixels: Calibration | None
@@ -204,74 +193,43 @@ class _Given:
             )
         if exposure is None:
             exposure = Exposure.of(raw) if isinstance(raw, RawImage) else Exposure()
-        operator = microscope.operator(tuple(planes), SAMPLES, accuracy=ACCURACY, pixels=pixels)
-        data = values(raw, operator, exposure)
-        problem = Problem.of(raw, exposure, Scale.of(operator, exposure, data))
-        return cls(microscope, operator, problem, planes, found, untold, pixels)
+        search = Search.of(microscope, found, planes, (raw, exposure, pixels), ACCURACY)
+        return cls(microscope, search, search.problem(np.zeros(len(found))), found, untold, pixels)
 
     def model(self, regions: tuple[int, int], progress: Progress) -> Model:
         """Of the pixels."""
-        farthest = float(np.abs(self.depths).max())
-        images = self.microscope.pupil_images(
-            self.terms, farthest=farthest, accuracy=ACCURACY, pixels=self.pixels
-        )
-        grid, beside = self.operator.object_grid, self.microscope.lenslet_size
-        low, high = (
-            np.array([end(grid.y), end(grid.x), end(self.depths)]) + side * np.array([beside, beside, BEYOND])
-            for end, side in ((np.min, -1), (np.max, 1))
-        )
-        nodes = Nodes.of(grid, regions, len(self.terms))
+        images = replace(self.search.sight.images, accuracy=ACCURACY)
+        nodes = Nodes.of(self.search.sight.picture, regions, len(self.terms))
         coarse = replace(images, accuracy=COARSE)
-        return Model(images, self.problem, nodes, (low, high), progress, coarse=coarse)
-
-    def beads(self, shown: np.ndarray | None = None) -> Points:
-        """Beads by Richardson-Lucy; of what is brighter than `shown` where that is given."""
-        problem = self.problem
-        if shown is not None:
-            problem = replace(problem, scale=replace(problem.scale, background=shown))
-        method, state = RichardsonLucy(), State.at(problem, problem.flat())
-        for _ in range(ITERATIONS):
-            state = method.step(problem, state)
-        grid, part = self.operator.object_grid, self.microscope.objective
-        slope = part.numerical_aperture / math.sqrt(part.immersion_index**2 - part.numerical_aperture**2)
-        volume = np.asarray(state.estimate) * self.brighter
-        across = APART[shown is not None] * self.microscope.lenslet_size
-        along = float(np.ptp(self.depths)) * 10 if shown is None else across / slope
-        return brightest(volume, (self.depths, grid.y, grid.x), (across, along), FAINT[0])
+        return Model(images, self.problem, nodes, self.search.limits, progress, coarse=coarse)
 
     def starts(self) -> list[np.ndarray]:
         """Coefficients (terms,) of the whole field, from the views' shifts."""
         return starts(self.problem, self.microscope, self.terms, self.pixels)
 
-    @property
-    def brighter(self) -> float:
-        """Intensity of a point over that of a sample of the volume which sends as much light."""
-        count = round(self.microscope.lenslet_size / self.microscope.object_grid.pitch[0])
-        return (count / SAMPLES) ** 2
-
-    def more(self, shown: np.ndarray, fit: Fit) -> Points | None:
-        """Beads in what a fit leaves, if they are bright enough; None where there are none."""
-        found = self.beads(shown)
-        bright = found.intensities > FAINT[1] * float(np.median(fit.points.intensities))
-        return Points(found.positions[bright], found.intensities[bright]) if bright.any() else None
-
 
 def _begun(given: _Given, model: Model, plain: Fit) -> Fit:
-    """The likeliest of a fit without aberrations and of its beads with those that views' shifts show."""
-    shifted = (np.tile(c, (len(model.nodes), 1)) for c in given.starts())
-    tried = (model.judged(plain.changed(coefficients=c)) for c in shifted)
-    return min([plain, *tried], key=lambda fit: fit.objective)
+    """A fit without aberrations, or the beads that are seen through those of views' shifts, if likelier."""
+    fits = [plain]
+    for c in given.starts():
+        everywhere = np.tile(c, (len(model.nodes), 1))
+        fits.append(model.judged(plain.changed(coefficients=everywhere)))
+    found = min(fits, key=lambda fit: fit.objective)
+    if found is plain:
+        return plain
+    beads = given.search.beads(found.coefficients[0])
+    return model.placed(found.changed(points=beads), STEPS["places"])
 
 
 def _fitted(given: _Given, model: Model, fit: Fit, free: np.ndarray) -> tuple[Fit, int]:
     """The fit with all beads that are worth their unknowns, and how often they were looked for."""
-    fit = _without_faint(model, model.improved(fit, free, STEPS["all"]), free)
+    fit = _without_faint(model, model.fitted(fit, free, STEPS["all"]), free)
     for done in range(1, ROUNDS):
-        more = given.more(model.expected(model.light(fit)), fit)
+        more = given.search.more(fit, model.expected(model.light(fit)))
         if more is None:
             return fit, done
         both = Points(*(np.concatenate(two) for two in zip(_parts(fit.points), _parts(more), strict=True)))
-        longer = _without_faint(model, model.improved(fit.changed(points=both), free, STEPS["all"]), free)
+        longer = _without_faint(model, model.fitted(fit.changed(points=both), free, STEPS["all"]), free)
         unknowns = OWN * (len(longer.points.intensities) - len(fit.points.intensities))
         if fit.objective - longer.objective < max(unknowns, 1) * math.log(model.counted):
             return fit, done
@@ -297,6 +255,11 @@ def _without_faint(model: Model, fit: Fit, free: np.ndarray) -> Fit:
     return model.improved(fit.changed(points=points), free, STEPS["all"])
 
 
+def _shared(model: Model, fit: Fit) -> np.ndarray:
+    """Covariance of the coefficients (nodes terms, nodes terms)."""
+    return covariance_of(model, fit)[-fit.coefficients.size :, -fit.coefficients.size :]
+
+
 def covariance_of(model: Model, fit: Fit) -> np.ndarray:
     """Of all unknowns; larger where the beads do not explain the raw image."""
     whole = model.around(fit).information / max(model.pearson(fit), 1.0)
@@ -306,12 +269,12 @@ def covariance_of(model: Model, fit: Fit) -> np.ndarray:
 
 
 def _require_memory(model: Model, fit: Fit) -> None:
-    """Of the changes of the pixels that each bead lights, twice, and of one bead for each thread."""
+    """Of the changes of the pixels that each bead lights, before and after a step."""
     images, count = model.coarse or model.images, len(fit.points.intensities)
     farthest = float(np.abs(fit.points.positions[:, 2]).max())
     unknowns = OWN + fit.coefficients.shape[1]
     lit = images.share(farthest) * math.prod(images.shape)
-    needed = 4.0 * (2 * count + 2 * arrays.WORKERS) * unknowns * lit
+    needed = 2 * SPREAD * 4.0 * count * unknowns * lit
     what = f"the derivatives of {images.shape} pixels by {count} beads and {unknowns} unknowns of each"
     memory.require(needed, what, "Crop the raw image.", SamplingError)
 

@@ -1,6 +1,7 @@
 """Nodes of the field at which coefficients stand, and what is expected of them before anything is seen."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +12,13 @@ PRIOR = 1.0
 """Standard deviation that is expected of a coefficient [waves rms]."""
 
 ALIKE = 0.3
-"""Standard deviation that is expected of its difference between neighbouring nodes [waves rms]."""
+"""Standard deviation that is expected, at first, of its difference between neighbouring nodes [waves rms]."""
+
+LEAST = 1e-3
+"""What it may fall to."""
+
+LEARNT = 30
+"""Steps to the expectation that explains a fit best."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,11 +31,14 @@ class Nodes:
         Places of the rows and columns [m].
     terms
         How many coefficients each has.
+    alike
+        Standard deviation that is expected of a coefficient's difference between neighbours [waves rms].
     """
 
     y: np.ndarray
     x: np.ndarray
     terms: int
+    alike: float = ALIKE
 
     @classmethod
     def of(cls, grid: Grid, regions: tuple[int, int], terms: int) -> "Nodes":
@@ -52,10 +62,36 @@ class Nodes:
     @property
     def information(self) -> np.ndarray:
         """Of the prior (nodes terms, nodes terms) [1/waves²]: values are small, neighbours alike."""
+        even = np.eye(len(self)) / PRIOR**2 / len(self)
+        return np.kron(even + self._rough / self.alike**2, np.eye(self.terms))
+
+    @property
+    def _rough(self) -> np.ndarray:
+        """Sum of squares (nodes, nodes) of differences between neighbours, as a form."""
         row, column = np.divmod(np.arange(len(self)), len(self.x))
         beside = np.abs(row[:, None] - row) + np.abs(column[:, None] - column) == 1
-        rough = np.diag(beside.sum(1)) - beside
-        return np.kron(np.eye(len(self)) / PRIOR**2 / len(self) + rough / ALIKE**2, np.eye(self.terms))
+        return np.diag(beside.sum(1)) - beside
+
+    def learnt(self, coefficients: np.ndarray, covariance: np.ndarray) -> "Nodes":
+        """As alike as makes a fit's coefficients (nodes, terms) the most likely ones; at most `ALIKE`.
+
+        From the fit's covariance, by MacKay's fixed point. Neighbours that are as far apart as noise alone
+        puts them are drawn together.
+
+        References
+        ----------
+        D. J. C. MacKay, Neural Comput. 4, 415 (1992), section 4.
+        """
+        rough = np.kron(self._rough, np.eye(self.terms))
+        whole, found = np.linalg.inv(covariance), self
+        seen, right = whole - self.information, whole @ coefficients.ravel()
+        for _ in range(LEARNT):
+            own = np.linalg.inv(seen + found.information)
+            x = own @ right
+            told = (len(self) - 1) * self.terms - float((own * rough).sum()) / found.alike**2
+            alike = math.sqrt(float(x @ rough @ x) / max(told, 1e-9))
+            found = replace(found, alike=min(max(alike, LEAST), ALIKE))
+        return found
 
 
 def _hats(at: np.ndarray, nodes: np.ndarray) -> np.ndarray:

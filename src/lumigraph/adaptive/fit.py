@@ -28,9 +28,6 @@ OWN = PLACES + 1
 LONGEST = (1.5e-6, 1.5e-6, 3e-6, 1.0, 0.25)
 """Longest steps before a microscope: y, x, dz [m], the logarithm of light, a coefficient [waves rms]."""
 
-LEFT = 1e-3
-"""Part of what a fit leaves over noise that a step must gain for others to follow: then it lacks beads."""
-
 TRIES = 5
 """Steps, each shorter than the one before, of which one must be likelier."""
 
@@ -60,6 +57,10 @@ class Images(Protocol):
     @property
     def shape(self) -> tuple[int, int]:
         """Of a raw image."""
+        ...
+
+    def fixed(self, coefficients: np.ndarray) -> "Images":
+        """The same with these coefficients (terms,) [waves rms] known, and no terms left."""
         ...
 
     def lit(
@@ -218,10 +219,6 @@ class Model:
         away = arrays.to_numpy(self.problem.data) - shown
         return float((self.weights * away**2 / shown).sum() / self.counted)
 
-    def left(self, fit: Fit) -> float:
-        """Log-likelihood that a judged fit leaves over noise: what other beads, or terms, could gain."""
-        return (self.pearson(fit) - 1) * self.counted / 2
-
     def known(self, fit: Fit) -> Fit:
         """The fit with derivatives of its beads, those before where a bead hardly changed."""
         return replace(fit, beads=tuple(each(lambda at: self._changes(at, fit.beads), self._at(fit))))
@@ -250,15 +247,23 @@ class Model:
             by = by * arrays.to_numpy(self.problem.scale.response)[part].astype(np.float32)
         return Changes(part, by, at)
 
+    def fitted(self, fit: Fit, free: np.ndarray, steps: int) -> Fit:
+        """The fit after at most some steps of coarse images, and then as many more of exact ones."""
+        if self.coarse is not None:
+            fit = replace(self, images=self.coarse).improved(fit.changed(), free, steps)
+        return self.improved(fit.changed(), free, steps)
+
+    def placed(self, fit: Fit, steps: int) -> Fit:
+        """The fit with beads where coarse images show them, by coefficients that are alike everywhere."""
+        images, nodes = self.coarse or self.images, replace(self.nodes, terms=0)
+        held = replace(self, images=images.fixed(fit.coefficients[0]), coarse=None, nodes=nodes)
+        none = Fit(fit.points, np.zeros((len(nodes), 0)), steps=fit.steps)
+        found = held.improved(none, np.zeros(0, bool), steps)
+        return self.judged(replace(fit.changed(points=found.points), steps=found.steps))
+
     def improved(self, fit: Fit, free: np.ndarray, steps: int) -> Fit:
         """The fit after at most some steps, with those coefficients free that are marked (terms,)."""
         last = fit.steps + steps
-        if self.coarse is not None:
-            fit = replace(self, images=self.coarse)._fitted(fit.changed(), free, last)
-        return self._fitted(fit.changed(), free, last)
-
-    def _fitted(self, fit: Fit, free: np.ndarray, last: int) -> Fit:
-        """The fit after a last step at most."""
         damping, fit, before = 1e-2, self.judged(fit), None
         while fit.steps < last:
             fit = self.known(fit)
@@ -270,7 +275,7 @@ class Model:
             gained = (fit.objective - found.objective) / 2
             before, fit = fit, replace(found, steps=fit.steps + 1)
             stepped(self.progress, fit.steps)
-            if gained < max(GAIN, LEFT * self.left(fit)):
+            if gained < GAIN:
                 return fit
         return fit
 

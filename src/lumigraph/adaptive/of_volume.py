@@ -56,7 +56,7 @@ def of_volume(
     told = min([told, *tried], key=lambda one: one.state.deviance)
     told, around = _improved(voxels, told, np.ones(len(found), bool), ITERATIONS)
     covariance = _covariance(voxels, told, around)
-    free = worth(covariance, told.coefficients[None], voxels.counted(told))
+    free = worth(covariance, told.coefficients[None], voxels.counted(told), np.eye(len(found)) / PRIOR**2)
     if not free.all():
         kept = voxels.begun(told.coefficients * free, ITERATIONS[-1], told.steps)
         told, around = _improved(voxels, kept, free, ITERATIONS[-1:]) if free.any() else (kept, around)

@@ -99,9 +99,8 @@ def sense(
     needed = 10.0 * (len(modes) + OWN) * star.shape[0] * star.shape[1]
     memory.require(needed, "derivatives of the raw image", "Use fewer terms.", SamplingError)
     model, first = _model(star, raw, place, exposure, progress or silent)
-    every = np.ones(len(modes), bool)
-    plain = model.improved(first, ~every, STEPS)
-    fit = model.improved(plain, every, STEPS)
+    plain = model.placed(first, STEPS)
+    fit = model.improved(plain, np.ones(len(modes), bool), STEPS)
     pearson = model.pearson(fit)
     warn_of_misfit(pearson, "a point with these modes leaves")
     covariance = covariance_of(model, fit)[-len(modes) :, -len(modes) :]

@@ -125,7 +125,7 @@ class Sight:
         return list(each(one, places))
 
     @property
-    def _brighter(self) -> float:
+    def brighter(self) -> float:
         """Light of a sample of the volume over that of the layout's samples."""
         return (self.images.layout.sampling.points / self.samples) ** 2
 
@@ -134,7 +134,7 @@ class Sight:
         N = self.images.layout.sampling.pixels
         T = image.shape[-1] // N
         cells = image.reshape(T, N, T, N).transpose(0, 2, 1, 3).reshape(T * T, N * N)
-        return (cells * self._brighter).astype(np.float32)
+        return (cells * self.brighter).astype(np.float32)
 
     def _kernel(self, blocks: np.ndarray) -> SliceKernel:
         """Of images (points, T², N²), without the cells that hold little."""

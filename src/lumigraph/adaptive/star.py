@@ -54,6 +54,10 @@ class Star:
         )
         return sum(images, np.zeros(self.shape))
 
+    def fixed(self, coefficients: np.ndarray) -> "Star":
+        """The same with these coefficients (terms,) [waves rms] among the camera's own, and no terms left."""
+        return Star(bent(self.camera, self.terms, coefficients), ())
+
     def lit(
         self, points: Points, coefficients: np.ndarray, directions: np.ndarray | None = None
     ) -> Iterator[Lit]:

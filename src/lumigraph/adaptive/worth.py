@@ -7,8 +7,13 @@ import numpy as np
 UNKNOWN = "the light field holds too little information"
 
 
-def worth(covariance: np.ndarray, coefficients: np.ndarray, pixels: float) -> np.ndarray:
-    """Which terms (terms,) gain more log-likelihood than Schwarz's criterion asks for, without the others."""
+def worth(covariance: np.ndarray, coefficients: np.ndarray, pixels: float, prior: np.ndarray) -> np.ndarray:
+    """Which terms (terms,) of coefficients (nodes, terms) a raw image of so many pixels is worth.
+
+    Those that gain more log-likelihood, without the others, than the part of the prior's width that the
+    data leave them costs (Laplace's approximation of the evidence), and than ½ ln N (Schwarz's criterion).
+    Covariance and the prior's information are (nodes terms, nodes terms).
+    """
     nodes, count = coefficients.shape
     free = np.ones(count, bool)
     while free.any():
@@ -21,9 +26,18 @@ def worth(covariance: np.ndarray, coefficients: np.ndarray, pixels: float) -> np
         else:
             own = covariance
         places = {j: np.flatnonzero(np.flatnonzero(known) % count == j) for j in np.flatnonzero(free)}
-        gains = {j: x[:, j] @ np.linalg.solve(own[np.ix_(at, at)], x[:, j]) for j, at in places.items()}
+        gains = {
+            j: x[:, j] @ np.linalg.solve(own[np.ix_(at, at)], x[:, j])
+            - max(math.log(pixels), _narrowed(own[np.ix_(at, at)], prior[j::count, j::count]))
+            for j, at in places.items()
+        }
         weakest = min(gains, key=lambda j: gains[j])
-        if gains[weakest] >= nodes * math.log(pixels):
+        if gains[weakest] >= 0:
             break
         free[weakest] = False
     return free
+
+
+def _narrowed(covariance: np.ndarray, prior: np.ndarray) -> float:
+    """Twice the logarithm of how much narrower a covariance is than the prior of this information."""
+    return -float(np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(prior)[1])

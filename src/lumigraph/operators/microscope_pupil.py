@@ -123,6 +123,17 @@ class PupilImages:
         N = self.layout.sampling.pixels
         return self.layout.cells[0] * N, self.layout.cells[1] * N
 
+    def fixed(self, coefficients: np.ndarray) -> "PupilImages":
+        """The same with these coefficients (terms,) [waves rms] among the known ones, and no terms left."""
+        c = self._checked("coefficients", coefficients)
+        objectives = []
+        for objective in self.objectives:
+            known = dict(objective.aberrations)
+            for j, waves in zip(self.terms, c, strict=True):
+                known[j] = known.get(j, 0.0) + float(waves)
+            objectives.append(replace(objective, aberrations=known))
+        return replace(self, objectives=tuple(objectives), terms=())
+
     def forward(self, points: Points, coefficients: np.ndarray) -> np.ndarray:
         """Raw image (ny, nx) of points, for coefficients (terms,) [waves rms]."""
         whole = np.zeros(self._samples)
@@ -246,12 +257,7 @@ class PupilImages:
         self, points: Points, coefficients: np.ndarray
     ) -> Iterator[tuple[Waves, np.ndarray, np.ndarray, list[int]]]:
         """Of points whose windows are alike: waves, pupil (modes, rows, nodes) as it is known, phases."""
-        c = self._checked("coefficients", coefficients)
-        for objective in self.objectives:
-            known = dict(objective.aberrations)
-            for j, waves in zip(self.terms, c, strict=True):
-                known[j] = known.get(j, 0.0) + float(waves)
-            bent = replace(objective, aberrations=known)
+        for objective, bent in zip(self.objectives, self.fixed(coefficients).objectives, strict=True):
             alike: dict[tuple[int, int, int], list[int]] = {}
             for p, (_, _, dz) in enumerate(points.positions):
                 alike.setdefault(self._size(bent, float(dz)), []).append(p)
