@@ -6,7 +6,8 @@
 - `wavefront`: `Wavefront`, the result; `wavefront_map`, Zernike terms over the pupil
 - `of_volume`: of any object; `sight`: operators by coefficients; `voxels`: steps on volume and coefficients
 - `field`: nodes of the field at which coefficients stand
-- `fit`: beads and coefficients by steps of Levenberg and Marquardt; `beads`: beads of a volume
+- `search`: beads of a raw image through a wavefront; `beads`: of a volume; `changes`: what beads tell
+- `fit`: beads and coefficients by steps of Levenberg and Marquardt
 - `worth`: which terms stay; `checked`: what is asked for
 """
 

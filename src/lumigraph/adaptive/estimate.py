@@ -62,11 +62,13 @@ def estimate(
 ) -> Wavefront:
     """Aberrations of a light-field microscope from one raw image, with the object.
 
-    Of beads: Richardson-Lucy finds them. Then their places and light and the Zernike coefficients are fitted
-    together, from none or from those that the shifts of views show (see `start`), whichever is likelier, by
-    Levenberg and Marquardt's steps on the Poisson likelihood, and Richardson-Lucy looks for more beads in
-    what is left. A term stays if it gains more log-likelihood than ½ ln N for N pixels (Schwarz's criterion);
-    the others are 0. What is known before: a coefficient is of the order of 1 wave rms.
+    Of beads: Richardson-Lucy finds them, through no wavefront or through the one that the shifts of views
+    show (see `start`), whichever is likelier. Then their places and light and the Zernike coefficients are
+    fitted together, by Levenberg and Marquardt's steps on the Poisson likelihood, and Richardson-Lucy looks
+    for more beads in what is left. A term stays if it gains more log-likelihood than ½ ln N for N pixels
+    (Schwarz's criterion), and than the part of the expected width that it leaves costs (Laplace's
+    approximation of the evidence); the others are 0. What is known before: a coefficient is of the order of 1
+    wave rms.
 
     Of any object with texture: the shifts of views give a start (see `start`), unless none is likelier. Then
     Richardson-Lucy's steps on a volume take turns with Gauss and Newton's on the coefficients, for which the
@@ -85,7 +87,7 @@ def estimate(
         Noll indices. Piston, tilt and defocus cannot be told from the object's place: see `Wavefront.untold`.
     regions
         Of the field along y and x, each with coefficients of its own at its middle; linear between.
-        Neighbours are expected to differ by 0.3 waves rms.
+        Neighbours are expected to differ by 0.3 waves rms, or less if the fit shows that they are more alike.
     exposure
         Background, gain, dead pixels; None for what a `RawImage` records. Without a gain a grey value
         counts as one electron.
