@@ -1,10 +1,10 @@
-"""Images of points before microscopes: axes, signs and units, by closed forms of rays and by each other."""
+"""Images of points before instruments: axes, signs and units, by closed forms of rays and by each other."""
 
 import numpy as np
 import pytest
 
 import lumigraph as lg
-from lumigraph.information.points import MicroscopeSource, PupilSource, source
+from lumigraph.information.points import CameraSource, MicroscopeSource, PupilSource, source
 
 UM = 1e-6
 PIXELS = 12
@@ -78,3 +78,41 @@ def test_square_lenslets_show_the_same_by_the_pupil_as_by_the_image():
     one, other = source(scope(), np.array([-9 * UM]), 1e-2), MicroscopeSource(scope(), 1e-2)
     image, wanted = (points.image(np.array([1.3, -0.7, -9.0]) * UM) for points in (one, other))
     assert np.linalg.norm(image - wanted) < 0.02 * np.linalg.norm(wanted)  # both were asked for 1e-2
+
+
+@pytest.mark.parametrize(
+    ("changes", "dz"),
+    [
+        ({}, -5e-3),
+        ({"lenslets": {"rotation": "2 deg"}}, 4e-3),
+        ({"main_lens": {"aberrations": {6: 0.3, 8: 0.2}}}, 4e-3),
+        ({"lenslets": {"layout": "hex", "focal_length": ["4.9 mm", "4.6 mm", "5.3 mm"]}}, 0.0),
+        ({"lenslets": {"fill_factor": 0.9, "shape": "round"}}, 4e-3),
+    ],
+)
+def test_derivatives_before_cameras_are_those_of_their_images(changes, dz):
+    camera = lg.load_camera("thesis-plenoptic-2-m050").replace(main_lens={"diameter": "3 mm"})
+    camera = camera.replace(sensor={"pixel_pitch": "3.4 um"}, lenslets={"pitch": "0.2 mm"}).replace(**changes)
+    points = source(camera, np.array([dz]), 1e-2)
+    lit, errors = points.lit(np.array([0.11e-3, -0.23e-3, dz]), checked=True)
+    assert (errors == 0).all()
+    assert np.linalg.norm(lit[0] - points.image(np.array([0.11e-3, -0.23e-3, dz]))) == 0
+    plain, errors = _by_differences(points, np.array([0.11e-3, -0.23e-3, dz]))
+    for axis in (1, 2, 3):
+        off = np.linalg.norm(lit[axis] - plain[axis]) / np.linalg.norm(plain[axis])
+        # Along the axis two images may have other samples each: what two steps differ by tells of it.
+        assert off < (1e-4 if axis < 3 else 1e-4 + 2 * errors[2])
+
+
+def _by_differences(points, place):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("lumigraph.information.points.has_changes", lambda camera: False)
+        return points.lit(place, checked=True)
+
+
+def test_exact_cameras_keep_differences():
+    camera = lg.load_camera("thesis-plenoptic-2-m050").replace(main_lens={"diameter": "2 mm"}, model="exact")
+    points = source(camera, np.array([0.0]), 1e-2)
+    assert isinstance(points, CameraSource)
+    _, errors = points.lit(np.array([0.1e-3, 0.1e-3, 0.0]), checked=True)
+    assert (errors > 0).all()

@@ -1,12 +1,14 @@
 """Images of points of light and their derivatives by place, of any instrument, as parts of the light.
 
-Microscopes with square lenslets and Fourier microscopes have exact derivatives. Those of cameras, and of
-microscopes whose lenslets are round or whose images are traced by rays, are central differences.
+Microscopes with square lenslets, Fourier microscopes and paraxial cameras with lenslets have exact derivatives, where
+the main lens is thin. Those of others, and of microscopes whose lenslets are round or whose images are traced
+by rays, are central differences.
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol, cast
 
 import numpy as np
@@ -17,9 +19,11 @@ from lumigraph.instruments import Camera, LensletCamera, LightFieldMicroscope
 from lumigraph.instruments.capabilities import WithPupil
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.operators import single_lens
+from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.fourier_points import FourierPoints
 from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.paraxial import resolved
+from lumigraph.operators.point_changes import has_changes, place_changes
 from lumigraph.operators.points import points_image
 from lumigraph.operators.relay import Relay
 from lumigraph.scene import Points
@@ -116,7 +120,7 @@ def differences(
     return np.stack(found), np.array(errors) if checked else np.full(3, np.nan)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class CameraSource:
     """Of a camera with a main lens.
 
@@ -147,19 +151,31 @@ class CameraSource:
 
     def image(self, place: np.ndarray) -> np.ndarray:
         """As `Source.image`."""
-        points, optics = Points(place[None], np.ones(1)), resolved(self.camera.optics(), self.accuracy)
+        points, optics = Points(place[None], np.ones(1)), self._optics
         if self.camera.lattice is None:
             found, _ = single_lens.points_image(optics, points)
         else:
             found = points_image(optics, points, self.accuracy, self._kept(float(place[2])))
-        step = optics.object_pitch * optics.separation / (optics.object_distance + float(place[2]))
-        return np.asarray(found, np.float64) * (optics.sensor.pixel_pitch / step) ** 2
+        return self._part(place) * np.asarray(found, np.float64)
 
     def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
         """As `Source.lit`."""
+        if has_changes(self._optics):
+            found = place_changes(self._optics, place, self.accuracy, self._kept(float(place[2])))
+            return self._part(place) * found.astype(np.float64), np.zeros(3)
         ratio = (self.camera.object_distance + place[2]) / self.camera.pupil_diameter
         across, along = ACROSS * self.camera.wavelength * ratio, ALONG * self.camera.wavelength * ratio**2
         return differences(self.image, place, np.array([across, across, along]), checked)
+
+    @cached_property
+    def _optics(self) -> CameraOptics:
+        return resolved(self.camera.optics(), self.accuracy)
+
+    def _part(self, place: np.ndarray) -> float:
+        """Of the light through the main lens, in an image of 1: a sample of the object has more nearer by."""
+        optics = self._optics
+        step = optics.object_pitch * optics.separation / (optics.object_distance + float(place[2]))
+        return (optics.sensor.pixel_pitch / step) ** 2
 
     def _kept(self, dz: float) -> dict[tuple[float, float], Relay]:
         """Relays of this depth and of those just used; many would fill the memory."""

@@ -1,11 +1,12 @@
-"""Image of a point before a camera with lenslets, and its changes by the main lens' phase and by its place.
+"""Image of a point before a camera with lenslets, and its changes by its place and the main lens' phase.
 
 Light behind the lenslets is linear in the pupil: U = A P. A phase φ_j changes it by A (i φ_j P), and the
 image by 2 Re(U* ∂U). The cells that are lit, and what is known of the lenslets, serve all changes.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,12 +14,14 @@ from lumigraph.core.threads import single_products
 from lumigraph.elements import ZernikePlate
 from lumigraph.errors import GeometryError
 from lumigraph.operators import cells as _cells
-from lumigraph.operators.camera import HasOptics
+from lumigraph.operators import varying
+from lumigraph.operators.camera import CameraOptics, HasOptics
+from lumigraph.operators.fineness import FINEST
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.paraxial import resolved
-from lumigraph.operators.point_light import Sampled
-from lumigraph.operators.points import farthest, lit_cells, on_lenslets, share
-from lumigraph.operators.relay import relay
+from lumigraph.operators.point_light import PointLight, Sampled, paraxial_light
+from lumigraph.operators.points import SPARE, farthest, known_relay, lit_cells, on_lenslets, share
+from lumigraph.operators.relay import Relay, relay
 from lumigraph.operators.tiles import readout
 
 PUPIL = 512
@@ -50,28 +53,100 @@ def point_changes(
     plain = resolved(camera.optics(), accuracy)
     if plain.model == "exact":
         raise GeometryError("derivatives by the pupil's phase are paraxial. Use model = 'paraxial'.")
-    optics = Optics.of(plain, plain.object_distance + float(place[2]), accuracy)
-    at, lenslets = on_lenslets(optics, place[None, :2], optics.distance), relay(optics)
+    lenslets = relay(Optics.of(plain, plain.object_distance + float(place[2]), accuracy))
+    optics = lenslets.optics
+    at = on_lenslets(optics, place[None, :2], optics.distance)
     light = Sampled(plain, _cells.lens(plain), optics.distance, farthest(optics, at), PUPIL)
-    rows, columns = lit_cells(optics, light, at[0])
-    (y, x), scale = lenslets.places(rows, columns), share(optics)
-    (ky, kx), whole = (
-        optics.cells.samples,
-        [n * k for n, k in zip(optics.cells.image, optics.cells.samples, strict=True)],
-    )
-    read = readout(optics)
+    seen = _Seen.of(lenslets, light, at[0])
+    images = seen.images(light, (one.at(*seen.around) for one in _changed(optics, light, terms)))
+    return images[0], images[1:]
 
-    def field(one: Sampled) -> np.ndarray:
-        return lenslets.field(one.at(y - at[0, 0], x - at[0, 1]).astype(np.complex64), rows, columns)
 
-    def pixels(intensity: np.ndarray) -> np.ndarray:
-        plane = np.zeros(whole, np.float32)
-        plane[rows.start * ky : rows.stop * ky, columns.start * kx : columns.stop * kx] = scale * intensity
-        return read.forward(plane)
+def has_changes(camera: CameraOptics) -> bool:
+    """Whether `place_changes` is of such a camera: paraxial, a thin lens for all fields before lenslets."""
+    plain = camera.array is not None and camera.objects is None and camera.model == "paraxial"
+    return plain and varying.plate_of(camera) is None
 
-    middle = field(light)
-    changes = [pixels(2 * np.real(middle.conj() * field(one))) for one in _changed(optics, light, terms)]
-    return pixels(np.abs(middle) ** 2), np.stack(changes)
+
+@single_products()
+def place_changes(
+    camera: CameraOptics, place: np.ndarray, accuracy: float, known: dict[tuple[float, float], Relay]
+) -> np.ndarray:
+    """Image of a point of intensity 1 and its derivatives by y, x and dz (4, ny, nx) [1/m].
+
+    The part of the light that a sample of the object stands for, by its depth, is not differentiated.
+
+    Parameters
+    ----------
+    camera
+        That `has_changes`.
+    place
+        (y, x, dz) before the array [m].
+    accuracy
+        Relative rms error of the image.
+    known
+        Relays that are used again.
+    """
+    lenslets = known_relay(camera, float(place[2]), max(SPARE * accuracy, FINEST), known)
+    optics = lenslets.optics
+    at = on_lenslets(optics, place[None, :2], optics.distance)
+    light = paraxial_light(camera, optics.distance, farthest(optics, at))
+    seen = _Seen.of(lenslets, light, at[0])
+    down, across, deeper = light.changes(*seen.around)
+    moves = [on_lenslets(optics, move[None], optics.distance)[0] for move in np.eye(2)]
+    moves.append(-at[0] / optics.distance)  # a deeper point's image is nearer to the axis
+    lights = [-move[0] * down - move[1] * across for move in moves]
+    lights[2] += deeper
+    return seen.images(light, lights)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """Cells that a point lights.
+
+    Parameters
+    ----------
+    lenslets
+        To the image.
+    rows, columns
+        Of the cells.
+    around
+        Places along y and x where light is needed, from the point's image [m].
+    """
+
+    lenslets: Relay
+    rows: range
+    columns: range
+    around: tuple[np.ndarray, np.ndarray]
+
+    @classmethod
+    def of(cls, lenslets: Relay, light: PointLight, at: np.ndarray) -> "_Seen":
+        """Of a point imaged at a place (2,)."""
+        rows, columns = lit_cells(lenslets.optics, light, at)
+        y, x = lenslets.places(rows, columns)
+        return cls(lenslets, rows, columns, (y - at[0], x - at[1]))
+
+    def images(self, light: PointLight, changes: Iterable[np.ndarray]) -> np.ndarray:
+        """Of the pixels, and how they change (n + 1, ny, nx) with light that changes so (y, x)."""
+        middle, read = self._field(light.at(*self.around)), readout(self.lenslets.optics)
+        found = [np.abs(middle) ** 2]
+        found += [2 * np.real(middle.conj() * self._field(one)) for one in changes]
+        return np.stack([read.forward(self._whole(one)) for one in found])
+
+    def _field(self, light: np.ndarray) -> np.ndarray:
+        return self.lenslets.field(light.astype(np.complex64), self.rows, self.columns)
+
+    def _whole(self, intensity: np.ndarray) -> np.ndarray:
+        """Of all samples."""
+        cells = self.lenslets.optics.cells
+        ky, kx = cells.samples
+        whole = np.zeros([n * k for n, k in zip(cells.image, cells.samples, strict=True)], np.float32)
+        rows, columns = (
+            slice(mine.start * k, mine.stop * k)
+            for mine, k in zip((self.rows, self.columns), (ky, kx), strict=True)
+        )
+        whole[rows, columns] = share(self.lenslets.optics) * intensity
+        return whole
 
 
 def _changed(optics: Optics, light: Sampled, terms: Sequence[int]) -> list[Sampled]:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -37,38 +38,85 @@ def point_light(
 
     Where the image is makes no difference, but to the exact model: at `place` in the lenslet plane [m].
     """
+    if camera.model != "exact":
+        return paraxial_light(camera, distance, widest)
     lens = _cells.lens(camera)
-    first = next(iter(lens.elements))
-    if camera.model == "exact" and (place != (0.0, 0.0) or len(lens.elements) > 1):
+    if place != (0.0, 0.0) or _round(lens) is None:
         return exact_light.Oblique(camera, lens, distance, widest, place)
+    return Round(exact_light.radial(camera, distance, widest))
+
+
+def _round(lens: Train) -> ThinLens | None:
+    """The only element of a lens, where that has a round stop."""
+    first = next(iter(lens.elements))
     if len(lens.elements) == 1 and isinstance(first, ThinLens) and first.diameter is not None:
-        if camera.model == "exact":
-            return Round(exact_light.radial(camera, distance, widest))
-        return Round(_radial(camera, first.focal_length, distance, widest))
+        return first
+    return None
+
+
+def paraxial_light(camera: CameraOptics, distance: float, widest: float) -> "Round | Sampled":
+    """As `point_light` of a paraxial camera, with derivatives."""
+    lens = _cells.lens(camera)
+    if (first := _round(lens)) is not None:
+        half, squared = camera.pupil_diameter / 2, camera.wavelength * camera.separation
+        focus = 1 / distance + 1 / camera.separation - 1 / first.focal_length
+        airy = squared / half / 2
+        far = airy * 2 ** (math.ceil(8 * math.log2(max(widest / airy, 1.0))) / 8)  # points share it
+        return Round(*_radial(half, squared, np.pi / camera.wavelength * focus, far), camera, distance)
     return Sampled(camera, lens, distance, widest)
+
+
+def by_distance(camera: CameraOptics, distance: float, rho: np.ndarray) -> np.ndarray:
+    """How the phase at a distance rho from a lens' middle changes with that of the point [rad/m]."""
+    return -np.pi / camera.wavelength * (rho / distance) ** 2
 
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """Behind a round lens: a Hankel transform, the same in all directions."""
+    """Behind a round lens: a Hankel transform, the same in all directions.
+
+    Parameters
+    ----------
+    radial
+        Amplitude by the distance from the image.
+    bent
+        The same, of light that is multiplied by the square of the place in the stop [m²].
+    camera, distance
+        Of a paraxial camera, those that the light is of.
+    """
 
     radial: CubicSpline
+    bent: CubicSpline | None = None
+    camera: CameraOptics | None = None
+    distance: float = math.inf
 
     def at(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
         """As `PointLight.at`."""
         return self.radial(np.hypot(y[:, None], x))
 
+    def changes(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Derivatives (3, y, x) of `at` by y, x and the point's distance; of paraxial light."""
+        assert self.bent is not None  # as `paraxial_light` makes it
+        assert self.camera is not None
+        far = np.hypot(y[:, None], x)
+        slope = self.radial(far, 1) / np.maximum(far, np.finfo(np.float64).tiny)
+        deeper = 1j * by_distance(self.camera, self.distance, np.ones(1)) * self.bent(far)
+        return np.stack([slope * y[:, None], slope * x, deeper])
 
-def _radial(camera: CameraOptics, focal_length: float, distance: float, widest: float) -> CubicSpline:
-    half, squared = camera.pupil_diameter / 2, camera.wavelength * camera.separation
-    focus = np.pi / camera.wavelength * (1 / distance + 1 / camera.separation - 1 / focal_length)
+
+@lru_cache(maxsize=64)
+def _radial(half: float, squared: float, focus: float, widest: float) -> tuple[CubicSpline, CubicSpline]:
+    """Light behind a stop of radius `half`, with λL `squared`, as `Round` has it."""
     turns = (abs(focus) * half**2 + 2 * np.pi * widest * half / squared) / np.pi
     rho, weight = legendre(0, half, 64 + 3 * int(turns))
     at = np.arange(0, widest + 2 * squared / half, squared / half / 64)
-    pupil = np.exp(1j * focus * rho**2) * 2 * np.pi * rho * weight
+    pupil = np.exp(1j * focus * rho**2) * 2 * np.pi * rho * weight / (squared * half * np.sqrt(np.pi))
+    both = np.stack([pupil.real, pupil.imag, (pupil * rho**2).real, (pupil * rho**2).imag], axis=1)
     parts = np.array_split(2 * np.pi / squared * at, math.ceil(len(at) * len(rho) / _BLOCK))
-    values = np.concatenate([j0(np.outer(part, rho)) @ pupil for part in parts])
-    return CubicSpline(at, values / (squared * half * np.sqrt(np.pi)))
+    values = np.concatenate([j0(np.outer(part, rho)) @ both for part in parts])
+    return CubicSpline(at, values[:, 0] + 1j * values[:, 1]), CubicSpline(
+        at, values[:, 2] + 1j * values[:, 3]
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +148,14 @@ class Sampled:
             light = (np.abs(pupil) ** 2).sum() * squared**2 / np.prod(grid.pitch)
             self._pupil.extend((grid, pupil * np.sqrt(_cells.stop_area(self.lens) / light)))
         return self._pupil[0], self._pupil[1]
+
+    def changes(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Derivatives (3, y, x) of `at` by y, x and the point's distance."""
+        grid, _ = self.behind()
+        tilt = -2 * np.pi / (self.camera.wavelength * self.camera.separation)
+        deeper = by_distance(self.camera, self.distance, np.hypot(grid.y[:, None], grid.x))
+        phases = tilt * grid.y[:, None], tilt * grid.x, deeper
+        return np.stack([self.turned(phase).at(y, x) for phase in phases])
 
     def turned(self, phase: np.ndarray) -> "Sampled":
         """How the light changes with a factor of this phase (y, x) [rad] on the pupil's grid."""

@@ -54,12 +54,12 @@ def points_image(
     for dz in np.unique(points.positions[:, 2]):
         mine = points.positions[:, 2] == dz
         positions, intensities = points.positions[mine, :2], points.intensities[mine]
-        lenslets = _relay(camera, float(dz), max(SPARE * accuracy, FINEST), known)
+        lenslets = known_relay(camera, float(dz), max(SPARE * accuracy, FINEST), known)
         within = _within(lenslets.optics, on_lenslets(lenslets.optics, positions, lenslets.optics.distance))
         if within.any():
             total += _plane_image(lenslets, positions[within], intensities[within])
         if not within.all():
-            finer = _relay(camera, float(dz), max(accuracy * OUTSIDE, FINEST), known)
+            finer = known_relay(camera, float(dz), max(accuracy * OUTSIDE, FINEST), known)
             total += _plane_image(finer, positions[~within], intensities[~within])
     return total
 
@@ -85,9 +85,10 @@ def image_and_error(camera: HasOptics, points: Points, accuracy: float) -> tuple
     return image, more * float(off) / (float(np.linalg.norm(alone)) or 1.0)
 
 
-def _relay(
+def known_relay(
     camera: CameraOptics, dz: float, accuracy: float, known: dict[tuple[float, float], Relay]
 ) -> Relay:
+    """Of a depth and an accuracy, computed once."""
     if (dz, accuracy) not in known:
         known[dz, accuracy] = relay(Optics.of(camera, camera.object_distance + dz, accuracy))
     return known[dz, accuracy]
