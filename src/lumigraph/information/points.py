@@ -1,7 +1,7 @@
 """Images of points of light and their derivatives by place, of any instrument, as parts of the light.
 
-Microscopes with square lenslets, Fourier microscopes and paraxial cameras with lenslets have exact derivatives, where
-the main lens is thin. Those of others, and of microscopes whose lenslets are round or whose images are traced
+Microscopes with square lenslets, Fourier microscopes, and paraxial cameras with lenslets behind a thin lens
+have exact derivatives. Those of others, and of microscopes whose lenslets are round or whose images are traced
 by rays, are central differences.
 """
 
