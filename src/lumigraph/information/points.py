@@ -1,8 +1,8 @@
 """Images of points of light and their derivatives by place, of any instrument, as parts of the light.
 
-Microscopes with square lenslets, Fourier microscopes, and paraxial cameras with lenslets behind a thin lens
-have exact derivatives. Those of others, and of microscopes whose lenslets are round or whose images are traced
-by rays, are central differences.
+Derivatives are exact before microscopes with square lenslets, Fourier microscopes, and paraxial cameras with
+lenslets behind a thin lens. Those of others, and of microscopes whose lenslets are round or whose images are
+traced by rays, are central differences.
 """
 
 import math

@@ -90,7 +90,7 @@ def place_changes(
     lenslets = known_relay(camera, float(place[2]), max(SPARE * accuracy, FINEST), known)
     optics = lenslets.optics
     at = on_lenslets(optics, place[None, :2], optics.distance)
-    light = paraxial_light(camera, optics.distance, farthest(optics, at))
+    light = paraxial_light(camera, optics.distance, farthest(optics, at), PUPIL)
     seen = _Seen.of(lenslets, light, at[0])
     down, across, deeper = light.changes(*seen.around)
     moves = [on_lenslets(optics, move[None], optics.distance)[0] for move in np.eye(2)]

@@ -54,8 +54,10 @@ def _round(lens: Train) -> ThinLens | None:
     return None
 
 
-def paraxial_light(camera: CameraOptics, distance: float, widest: float) -> "Round | Sampled":
-    """As `point_light` of a paraxial camera, with derivatives."""
+def paraxial_light(
+    camera: CameraOptics, distance: float, widest: float, samples: int = PUPIL
+) -> "Round | Sampled":
+    """As `point_light` of a paraxial camera, with derivatives; so many samples across the lens, at least."""
     lens = _cells.lens(camera)
     if (first := _round(lens)) is not None:
         half, squared = camera.pupil_diameter / 2, camera.wavelength * camera.separation
@@ -63,7 +65,7 @@ def paraxial_light(camera: CameraOptics, distance: float, widest: float) -> "Rou
         airy = squared / half / 2
         far = airy * 2 ** (math.ceil(8 * math.log2(max(widest / airy, 1.0))) / 8)  # points share it
         return Round(*_radial(half, squared, np.pi / camera.wavelength * focus, far), camera, distance)
-    return Sampled(camera, lens, distance, widest)
+    return Sampled(camera, lens, distance, widest, samples)
 
 
 def by_distance(camera: CameraOptics, distance: float, rho: np.ndarray) -> np.ndarray:
@@ -151,11 +153,14 @@ class Sampled:
 
     def changes(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Derivatives (3, y, x) of `at` by y, x and the point's distance."""
-        grid, _ = self.behind()
-        tilt = -2 * np.pi / (self.camera.wavelength * self.camera.separation)
-        deeper = by_distance(self.camera, self.distance, np.hypot(grid.y[:, None], grid.x))
-        phases = tilt * grid.y[:, None], tilt * grid.x, deeper
-        return np.stack([self.turned(phase).at(y, x) for phase in phases])
+        grid, pupil = self.behind()
+        turn = -2j * np.pi / (self.camera.wavelength * self.camera.separation)
+        down, across = np.exp(turn * np.outer(y, grid.y)), np.exp(turn * np.outer(grid.x, x))
+        right, left = pupil @ across, pupil @ (across * grid.x[:, None])
+        wide = pupil @ (across * grid.x[:, None] ** 2)
+        deeper = 1j * by_distance(self.camera, self.distance, np.ones(1))
+        bent = (down * grid.y**2) @ right + down @ wide
+        return np.stack([(turn * down * grid.y) @ right, turn * (down @ left), deeper * bent])
 
     def turned(self, phase: np.ndarray) -> "Sampled":
         """How the light changes with a factor of this phase (y, x) [rad] on the pupil's grid."""
