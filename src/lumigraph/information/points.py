@@ -7,7 +7,7 @@ traced by rays, are central differences.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol, cast
 
@@ -18,14 +18,14 @@ from lumigraph.errors import GeometryError
 from lumigraph.instruments import Camera, LensletCamera, LightFieldMicroscope
 from lumigraph.instruments.capabilities import WithPupil
 from lumigraph.instruments.instrument import Instrument
-from lumigraph.operators import single_lens
+from lumigraph.operators import cells, single_lens
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.fourier_points import FourierPoints
 from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.paraxial import resolved
 from lumigraph.operators.point_changes import has_changes, place_changes
 from lumigraph.operators.points import points_image
-from lumigraph.operators.relay import Relay
+from lumigraph.operators.relay import Relays
 from lumigraph.scene import Points
 from lumigraph.simulation.microscope_scene import SAMPLES
 
@@ -82,7 +82,7 @@ def source(instrument: Instrument, depths: np.ndarray, accuracy: float) -> Sourc
     if isinstance(instrument, Camera):
         for dz in depths:
             instrument.defocused(float(dz))
-        return CameraSource(_small(instrument, depths), accuracy)
+        return CameraSource(_small(instrument, depths), accuracy, depths)
     raise GeometryError(f"{type(instrument).__name__} has no images of points.")
 
 
@@ -130,11 +130,13 @@ class CameraSource:
         With as many lenslets as the light reaches.
     accuracy
         Relative rms error of images.
+    depths
+        (nz,), whose points lenslets are sampled for [m].
     """
 
     camera: Camera
     accuracy: float
-    _known: dict[tuple[float, float], Relay] = field(default_factory=dict)
+    depths: np.ndarray
 
     @property
     def pixels(self) -> int:
@@ -155,13 +157,13 @@ class CameraSource:
         if self.camera.lattice is None:
             found, _ = single_lens.points_image(optics, points)
         else:
-            found = points_image(optics, points, self.accuracy, self._kept(float(place[2])))
+            found = points_image(optics, points, self.accuracy, self._relays)
         return self._part(place) * np.asarray(found, np.float64)
 
     def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
         """As `Source.lit`."""
         if has_changes(self._optics):
-            found = place_changes(self._optics, place, self.accuracy, self._kept(float(place[2])))
+            found = place_changes(self._optics, place, self.accuracy, self._relays)
             return self._part(place) * found.astype(np.float64), np.zeros(3)
         ratio = (self.camera.object_distance + place[2]) / self.camera.pupil_diameter
         across, along = ACROSS * self.camera.wavelength * ratio, ALONG * self.camera.wavelength * ratio**2
@@ -171,17 +173,17 @@ class CameraSource:
     def _optics(self) -> CameraOptics:
         return resolved(self.camera.optics(), self.accuracy)
 
+    @cached_property
+    def _relays(self) -> Relays:
+        optics = self._optics
+        distances = (optics.object_distance + self.depths).tolist()
+        return Relays(max(distances, key=lambda z: cells.blur(optics, z)))
+
     def _part(self, place: np.ndarray) -> float:
         """Of the light through the main lens, in an image of 1: a sample of the object has more nearer by."""
         optics = self._optics
         step = optics.object_pitch * optics.separation / (optics.object_distance + float(place[2]))
         return (optics.sensor.pixel_pitch / step) ** 2
-
-    def _kept(self, dz: float) -> dict[tuple[float, float], Relay]:
-        """Relays of this depth and of those just used; many would fill the memory."""
-        if len(self._known) > 8 and not any(dz == key[0] for key in self._known):
-            self._known.clear()
-        return self._known
 
 
 def _cell(lattice: Lattice) -> np.ndarray:

@@ -86,16 +86,20 @@ class Axis:
         They are the discrete prolate sequences of the window: most of a band-limited signal in the fewest
         numbers, and between the samples too.
         """
-        x = self.window
-        strength, vectors = np.linalg.eigh(np.sinc(2 * self.band * (x[:, None] - x)))
-        kept = strength > 1e-10 * strength[-1]
-        scaled = vectors[:, kept] / strength[kept]
-        return vectors[:, kept].T, lambda at: np.sinc(2 * self.band * (at[:, None] - x)) @ scaled
+        return held(self.window, self.band)
 
     def fade(self, at: np.ndarray, pitch: float) -> np.ndarray:
         """Weight of light at positions [m]: 1, and 0 at the end of the neighbourhood."""
         left = np.clip((np.abs(at) - self.size / 2 - self.neighbourhood + pitch) / pitch, 0, 1)
         return np.cos(np.pi / 2 * left) ** 2
+
+
+def held(x: np.ndarray, band: float) -> tuple[np.ndarray, Any]:
+    """`Axis.basis` of samples at places x [m] of light with a band [1/m]."""
+    strength, vectors = np.linalg.eigh(np.sinc(2 * band * (x[:, None] - x)))
+    kept = strength > 1e-10 * strength[-1]
+    scaled = vectors[:, kept] / strength[kept]
+    return vectors[:, kept].T, lambda at: np.sinc(2 * band * (at[:, None] - x)) @ scaled
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,7 +141,6 @@ class Lenslets:
         self.axes, self.array, self.pixels = axes, array, pixels
         self.optics = wavelength, distance
         self._bases = axes[0].basis(), axes[1].basis()
-        self._members: dict[tuple[float, float], np.ndarray] = {}
 
     @property
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
@@ -214,26 +217,6 @@ class Lenslets:
             mine = pairs[:, 0] == row
             across = places[mine, 1].round(12).tolist()
             yield float(places[mine, 0][0]), list(zip(across, focal[mine].tolist(), strict=True))
-
-    def member(self, middle: float, focal_length: float) -> np.ndarray:
-        """Field (lines, n_x m_x) along x of one lenslet, on all lines across it; kept."""
-        known = self._members.get((middle, focal_length))
-        if known is not None:
-            return known
-        axis, (_, light) = self.axes[1], self._bases[1]
-        wavelength, result = self.optics[0], []
-        lines, _, chords = self.lines
-        chords, like = np.unique(chords.round(12), return_inverse=True)
-        for chord in chords.tolist():
-            at, weight = legendre(
-                middle - chord, middle + chord, nodes(chord, focal_length, axis, self.optics)
-            )
-            phase = np.exp(-1j * np.pi * (at - middle) ** 2 / (wavelength * focal_length))
-            weight = weight * axis.fade(at, self.array.lattice.pitch)
-            spread = self.spread(axis.image, at)
-            result.append(((spread * (weight * phase)) @ light(at)).astype(np.complex64).ravel())
-        bend = np.exp(-1j * np.pi * lines**2 / (wavelength * focal_length)).astype(np.complex64)
-        return self._members.setdefault((middle, focal_length), np.array(result)[like] * bend[:, None])
 
     @cached_property
     def lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -20,8 +20,8 @@ from lumigraph.operators.fineness import FINEST
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.paraxial import resolved
 from lumigraph.operators.point_light import PointLight, Sampled, paraxial_light
-from lumigraph.operators.points import SPARE, farthest, known_relay, lit_cells, on_lenslets, share
-from lumigraph.operators.relay import Relay, relay
+from lumigraph.operators.points import SPARE, farthest, lit_cells, on_lenslets, share
+from lumigraph.operators.relay import Relay, Relays, relay
 from lumigraph.operators.tiles import readout
 
 PUPIL = 512
@@ -69,9 +69,7 @@ def has_changes(camera: CameraOptics) -> bool:
 
 
 @single_products()
-def place_changes(
-    camera: CameraOptics, place: np.ndarray, accuracy: float, known: dict[tuple[float, float], Relay]
-) -> np.ndarray:
+def place_changes(camera: CameraOptics, place: np.ndarray, accuracy: float, known: Relays) -> np.ndarray:
     """Image of a point of intensity 1 and its derivatives by y, x and dz (4, ny, nx) [1/m].
 
     The part of the light that a sample of the object stands for, by its depth, is not differentiated.
@@ -87,7 +85,7 @@ def place_changes(
     known
         Relays that are used again.
     """
-    lenslets = known_relay(camera, float(place[2]), max(SPARE * accuracy, FINEST), known)
+    lenslets = known.of(camera, float(place[2]), max(SPARE * accuracy, FINEST))
     optics = lenslets.optics
     at = on_lenslets(optics, place[None, :2], optics.distance)
     light = paraxial_light(camera, optics.distance, farthest(optics, at), PUPIL)

@@ -101,7 +101,7 @@ class Round:
         assert self.bent is not None  # as `paraxial_light` makes it
         assert self.camera is not None
         far = np.hypot(y[:, None], x)
-        slope = self.radial(far, 1) / np.maximum(far, np.finfo(np.float64).tiny)
+        slope = self.radial(far, 1) / np.where(far > 0, far, 1)
         deeper = 1j * by_distance(self.camera, self.distance, np.ones(1)) * self.bent(far)
         return np.stack([slope * y[:, None], slope * x, deeper])
 

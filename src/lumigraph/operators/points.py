@@ -16,7 +16,7 @@ from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.fineness import COARSEST, FINEST
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.point_light import PointLight, Sampled, point_light
-from lumigraph.operators.relay import Relay, relay
+from lumigraph.operators.relay import Relay, Relays, relay
 from lumigraph.operators.seen import seen_points
 from lumigraph.operators.tiles import readout
 from lumigraph.scene import Points
@@ -45,21 +45,21 @@ _PER_CELL = 4
 
 @single_products()
 def points_image(
-    camera: HasOptics, points: Points, accuracy: float, known: dict[tuple[float, float], Relay] | None = None
+    camera: HasOptics, points: Points, accuracy: float, known: Relays | None = None
 ) -> np.ndarray:
     """Raw image (ny, nx), to a relative rms error of `accuracy`; relays that are `known` are used again."""
     camera, points = seen_points(camera.optics(), points)
-    known = {} if known is None else known
+    known = Relays() if known is None else known
     total = np.zeros(camera.sensor.shape, np.float32)
     for dz in np.unique(points.positions[:, 2]):
         mine = points.positions[:, 2] == dz
         positions, intensities = points.positions[mine, :2], points.intensities[mine]
-        lenslets = known_relay(camera, float(dz), max(SPARE * accuracy, FINEST), known)
+        lenslets = known.of(camera, float(dz), max(SPARE * accuracy, FINEST))
         within = _within(lenslets.optics, on_lenslets(lenslets.optics, positions, lenslets.optics.distance))
         if within.any():
             total += _plane_image(lenslets, positions[within], intensities[within])
         if not within.all():
-            finer = known_relay(camera, float(dz), max(accuracy * OUTSIDE, FINEST), known)
+            finer = known.of(camera, float(dz), max(accuracy * OUTSIDE, FINEST))
             total += _plane_image(finer, positions[~within], intensities[~within])
     return total
 
@@ -67,7 +67,7 @@ def points_image(
 def image_and_error(camera: HasOptics, points: Points, accuracy: float) -> tuple[np.ndarray, float]:
     """`points_image`, and its relative rms error: of the brightest point, beside a finer image of it."""
     camera, points = seen_points(camera.optics(), points)
-    known: dict[tuple[float, float], Relay] = {}
+    known = Relays()
     image = points_image(camera, points, accuracy, known)
     if not np.any(points.intensities):
         return image, 0.0
@@ -83,15 +83,6 @@ def image_and_error(camera: HasOptics, points: Points, accuracy: float) -> tuple
         more = 1 / (other / accuracy - AS_WELL)
     off = np.linalg.norm(points_image(camera, one, other) - alone)
     return image, more * float(off) / (float(np.linalg.norm(alone)) or 1.0)
-
-
-def known_relay(
-    camera: CameraOptics, dz: float, accuracy: float, known: dict[tuple[float, float], Relay]
-) -> Relay:
-    """Of a depth and an accuracy, computed once."""
-    if (dz, accuracy) not in known:
-        known[dz, accuracy] = relay(Optics.of(camera, camera.object_distance + dz, accuracy))
-    return known[dz, accuracy]
 
 
 def _within(optics: Optics, places: np.ndarray) -> np.ndarray:

@@ -6,13 +6,14 @@ and exactly those lenslets count that exist.
 """
 
 import math
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol, cast
 
 import numpy as np
 
 from lumigraph.elements import form
 from lumigraph.errors import GeometryError
+from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.cell_response import (
     INFINITE,
     MIDDLE,
@@ -26,11 +27,15 @@ from lumigraph.operators.cell_response import (
     nodes,
 )
 from lumigraph.operators.exact import lenslets_of
+from lumigraph.operators.lines import Lines
 from lumigraph.operators.optics import Optics
 
 Pair = tuple[float, float]
 
 Members = tuple[Pair, ...]
+
+_KEPT = 8
+"""Relays at a time, of those that are sampled alike; more might fill the memory."""
 
 _STRONGEST = 0.2
 """Of the focal length, what no lenslet falls below that differs from the others: it sets quadratures."""
@@ -55,6 +60,36 @@ def relay(optics: Optics) -> Relay:
     if optics.array.scatter is not None:
         return Each(optics)
     return Straight(optics) if optics.straight else Lines(optics)
+
+
+@dataclass(slots=True)
+class Relays:
+    """Of depths and accuracies, computed once; those whose cells and windows are alike share their matrices.
+
+    Parameters
+    ----------
+    blurred
+        Distance of the plane whose points are blurred most [m]: all are sampled as it asks for. None where
+        each is sampled as it asks for itself.
+    """
+
+    blurred: float | None = None
+    _known: dict[tuple[float, float], Relay] = field(default_factory=dict)
+
+    def of(self, camera: CameraOptics, dz: float, accuracy: float) -> Relay:
+        """Of one camera's plane at a depth [m]."""
+        if (key := (dz, accuracy)) not in self._known:
+            optics = Optics.of(camera, camera.object_distance + dz, accuracy, self.blurred)
+            if len(self._known) >= _KEPT and self.blurred is not None:
+                self._known.pop(next(iter(self._known)))
+            alike = next((one for one in self._known.values() if _alike(one.optics, optics)), None)
+            self._known[key] = relay(optics) if alike is None else replace(cast(Any, alike), optics=optics)
+        return self._known[key]
+
+
+def _alike(one: Optics, other: Optics) -> bool:
+    same = one.cells == other.cells and one.axes == other.axes
+    return same and one.fineness == other.fineness
 
 
 @dataclass(slots=True)
@@ -140,90 +175,6 @@ class Straight:
             found = self._lenslets.along(which, middle, limits, key[2], box)
             self._known[key] = found.astype(np.complex64)
         return self._known[key]
-
-
-@dataclass(slots=True)
-class Lines:
-    """Lenslets of any shape: line after line across each row of them."""
-
-    optics: Optics
-    _known: dict[Members, np.ndarray] = field(default_factory=dict)
-    _spreads: dict[float, np.ndarray] = field(default_factory=dict)
-    _lenslets: Lenslets = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._lenslets = lenslets_of(self.optics)
-
-    def places(self, rows: range, columns: range) -> tuple[np.ndarray, np.ndarray]:
-        """As `Relay.places`: along y, the lines of all rows of lenslets."""
-        lines = self._lenslets.lines[0]
-        return (self._rows(rows)[:, None] + lines).ravel(), _Cells(self.optics, 1).places(columns)
-
-    def field(self, light: np.ndarray, rows: range, columns: range) -> np.ndarray:
-        """As `Relay.field`."""
-        (y, x), all_rows = self.optics.axes, self._rows(rows)
-        light = light.reshape(len(all_rows), -1, light.shape[1])
-        result = np.zeros((len(rows), y.samples, len(columns), x.samples), np.complex64)
-        for k, column in enumerate(columns):
-            around = [self._around(row, column, all_rows) for row in rows]
-            behind = self._behind(light[:, :, _Cells(self.optics, 1).window(k)], around)
-            for j, seen in enumerate(around):
-                for number, (place, _) in seen.items():
-                    result[j, :, k] += self._spread(place) @ behind[number]
-        return result.reshape(len(rows) * y.samples, -1)
-
-    def _rows(self, cells: range) -> np.ndarray:
-        """Places of the rows of lenslets that the cells see [m]."""
-        mine, lattice, axis = _Cells(self.optics, 0), self.optics.array.lattice, self.optics.axes[0]
-        reach, step = axis.size / 2 + axis.neighbourhood, lattice.basis[1][0]
-        low, high = mine.center(cells[0]) - reach, mine.center(cells[-1]) + reach
-        first = math.ceil((low - lattice.origin[0]) / step - 1e-6)
-        last = math.floor((high - lattice.origin[0]) / step + 1e-6)
-        return lattice.origin[0] + np.arange(first, last + 1) * step
-
-    def _around(self, row: int, column: int, all_rows: np.ndarray) -> dict[int, tuple[float, Members]]:
-        """Rows of lenslets around a cell: number, place along y from the cell's centre, and members."""
-        y, x = _Cells(self.optics, 0), _Cells(self.optics, 1)
-        center, limits = (y.center(row), x.center(column)), (y.limits(row), x.limits(column))
-        return {
-            int(np.abs(all_rows - place - center[0]).argmin()): (round(place, 12), tuple(members))
-            for place, members in self._lenslets.rows(center, limits)
-        }
-
-    def _behind(
-        self, light: np.ndarray, around: list[dict[int, tuple[float, Members]]]
-    ) -> dict[int, np.ndarray]:
-        """Amplitude (lines, samples) along x behind each row of lenslets, of light (rows, lines, window)."""
-        alike: dict[Members, set[int]] = {}
-        for seen in around:
-            for number, (_, members) in seen.items():
-                alike.setdefault(members, set()).add(number)
-        result = {}
-        for members, numbers in alike.items():
-            order = sorted(numbers)
-            behind = self._matrix(members) @ light[order].transpose(1, 2, 0)
-            result |= {number: behind[:, :, k] for k, number in enumerate(order)}
-        return result
-
-    def _matrix(self, members: Members) -> np.ndarray:
-        """Amplitude (lines, samples, window) along x behind these lenslets of a row."""
-        if members not in self._known:
-            coefficients = self._lenslets.coefficients[1]
-            behind = self._lenslets.member(*members[0]).copy()
-            for member in members[1:]:
-                behind += self._lenslets.member(*member)
-            behind = behind.reshape(len(behind), self.optics.axes[1].samples, -1)
-            self._known[members] = behind @ coefficients.astype(np.complex64)
-        return self._known[members]
-
-    def _spread(self, place: float) -> np.ndarray:
-        """Amplitude (samples, lines) along y of a row of lenslets there from the cell's centre [m]."""
-        if place not in self._spreads:
-            axis, (lines, weight, _) = self.optics.axes[0], self._lenslets.lines
-            spread = self._lenslets.spread(axis.image, place + lines)
-            spread *= weight * axis.fade(place + lines, self.optics.array.lattice.pitch)
-            self._spreads[place] = spread.astype(np.complex64)
-        return self._spreads[place]
 
 
 @dataclass(slots=True)
