@@ -5,6 +5,8 @@ import pytest
 
 import lumigraph as lg
 from lumigraph.information.points import CameraSource, MicroscopeSource, PupilSource, source
+from lumigraph.operators.lines import Lines
+from lumigraph.operators.point_light import paraxial_light
 
 UM = 1e-6
 PIXELS = 12
@@ -112,11 +114,25 @@ def _by_differences(points, place):
         return points.lit(place, checked=True)
 
 
-def test_a_point_on_the_axis_whose_image_is_a_sample_of_light_has_derivatives_like_those_beside_it():
+def test_light_at_a_points_image_itself_does_not_change_across():
+    optics = lg.load_camera("thesis-plenoptic-2-m050").optics()
+    down, across, deeper = paraxial_light(optics, 0.122, 1e-4).changes(np.zeros(1), np.array([0.0, 1e-9]))
+    assert down[0, 0] == across[0, 0] == 0
+    assert deeper[0, 0] == pytest.approx(deeper[0, 1], rel=1e-6)
+
+
+def test_depths_share_what_lenslets_do_to_light(monkeypatch):
+    computed, of = [], Lines._computed
+    monkeypatch.setattr(Lines, "_computed", lambda self: computed.append(1) or of(self))
     camera = lg.load_camera("thesis-plenoptic-2-m050").replace(lenslets={**HEX, "pitch": "0.12 mm"})
-    points = source(camera, np.array([0.0]), 1e-2)
-    at, beside = (points.lit(np.array([0.0, x, 2e-3]), checked=True)[0] for x in (0.0, 1e-9))
-    assert all(np.linalg.norm(a - b) < 1e-3 * np.linalg.norm(b) for a, b in zip(at, beside, strict=True))
+    place = np.array([1e-4, -2e-4, 2e-3])
+    points = source(camera, np.array([-6e-3, 2e-3]), 1e-2)
+    points.image(np.array([0.0, 0.0, -6e-3]))
+    shared, alone = points.image(place), source(camera, place[2:], 1e-2).image(place)
+    assert len(computed) == 2  # once for both depths, once alone
+    width = (shared.shape[0] - alone.shape[0]) // 2
+    inner = shared[width:-width, width:-width] if width else shared
+    assert np.linalg.norm(inner - alone) < 1e-2 * np.linalg.norm(alone)  # of the accuracy that was asked for
 
 
 def test_exact_cameras_keep_differences():

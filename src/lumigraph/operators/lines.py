@@ -16,7 +16,7 @@ from functools import cached_property
 from itertools import groupby
 
 import numpy as np
-from scipy.signal.windows import dpss
+import scipy.linalg
 
 from lumigraph.operators.cell_response import STEP, Lenslets, focal_lengths, held, legendre, nodes
 from lumigraph.operators.exact import lenslets_of
@@ -161,14 +161,23 @@ class Lines:
 
     @cached_property
     def _sequences(self) -> tuple[np.ndarray, np.ndarray, float]:
-        """Prolate sequences (k, samples) along x, their parts of light in the window, and their band."""
+        """Prolate sequences (k, samples) along x, their parts of light in the window, and their band.
+
+        D. Slepian, Bell Syst. Tech. J. 57, 1371 (1978).
+        """
         count, pitch = self._count(1), self._first(1, 0)[1]
         band = self._half[1] / self._squared * pitch
         most = min(count, math.ceil(2 * count * band) + MORE)
-        found, ratios = dpss(count, count * band, most, return_ratios=True)
-        strength = np.asarray(ratios)
+        number = np.arange(count)
+        middle = ((count - 1) / 2 - number) ** 2 * math.cos(2 * math.pi * band)  # Slepian's matrix
+        beside = number[1:] * (count - number[1:]) / 2
+        _, vectors = scipy.linalg.eigh_tridiagonal(
+            middle, beside, select="i", select_range=(count - most, count - 1)
+        )
+        inside = scipy.linalg.matmul_toeplitz(2 * band * np.sinc(2 * band * number), vectors)
+        strength = np.einsum("ik,ik->k", vectors, inside)
         kept = strength > FAINT
-        return found[kept], strength[kept], band
+        return vectors[:, kept].T, strength[kept], band
 
     def _count(self, which: int) -> int:
         """Samples along an axis around a lenslet."""
