@@ -137,7 +137,7 @@ def test_bounds_fall_and_the_best_is_a_camera_that_has_them():
 
 def test_the_best_bound_carries_the_error_of_its_derivatives():
     """A step that is far too long shows: what is said holds the bound by the right one."""
-    camera = lg.load_camera(CAMERA).replace(main_lens={"diameter": "3 mm"})
+    camera = lg.load_camera(CAMERA).replace(main_lens={"diameter": "3 mm"}, model="exact")
     goal, first = Goal("lateral", depths=(2e-3,), light=Light(5000), places=1), collected(camera)
     rough = goal.values(camera, first)
     value, error, over_depths = goal.checked(camera, first, rough)
