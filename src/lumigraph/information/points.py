@@ -7,7 +7,7 @@ traced by rays, are central differences.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol, cast
 
@@ -136,7 +136,7 @@ class CameraSource:
 
     camera: Camera
     accuracy: float
-    depths: np.ndarray
+    depths: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
     @property
     def pixels(self) -> int:
