@@ -38,23 +38,23 @@ STEP = {"views": 6e-3, "focused": 6e-3, "kinds": 6e-3}
 """Between slices near the focus [m]: from one to the next, views of a corner move by 0.15 of a sample, places
 by 0.2 px."""
 
-BOARDS = {"views": "4 x 3 corners, 3.3 mm", "focused": "5 x 4 corners, 2.4 mm"}
+BOARDS = {"views": "6 x 5 corners, 3.6 mm", "focused": "9 x 7 corners, 2.4 mm"}
 KNOWN, PITCH = 0.02, 1e-4
 ACCURACY = 1e-2
 
 
 def camera(rng, what):
-    """A camera of few lenslets."""
+    """A camera of a few thousand lenslets, or one of a thousand."""
     f = 50e-3 * rng.uniform(0.95, 1.05)
     sensor = {"pixel_pitch": 5.5e-6, "black_level": 64.0, "full_well": 12000.0, "read_noise": 6.0}
     common = {"wavelength": 550e-9, "main_lens": {"focal_length": f}, "sensor": sensor}
     if what == "views":
-        own = {"pitch": 62e-6, "focal_length": 0.9e-3 * rng.uniform(0.9, 1.1), "count": (47, 47)}
+        own = {"pitch": 62e-6, "focal_length": 0.9e-3 * rng.uniform(0.9, 1.1), "count": (70, 70)}
         return lg.PlenopticCamera(**common, object_distance=8.2 * f * rng.uniform(0.98, 1.02), lenslets=own)
     focal = 1.9e-3 * rng.uniform(0.95, 1.05)
     lengths = (focal, 1.04 * focal, 0.96 * focal) if what == "kinds" else focal
     own = {
-        "pitch": 120e-6, "focal_length": lengths, "count": (25, 22), "layout": "hex", "magnification": 0.3
+        "pitch": 120e-6, "focal_length": lengths, "count": (34, 30), "layout": "hex", "magnification": 0.3
     }  # fmt: skip
     return lg.FocusedPlenopticCamera(**common, object_distance=9 * f, lenslets=own)
 
@@ -162,7 +162,8 @@ def run(bench, rng, what, pictures):
         pitch_ratio=1 + ideal.lenslet_distance / ideal.separation,
     )  # fmt: skip
     seen = replace(true.calibration, fill=true.micro_image_fill)
-    poses = [draw() for draw in planned_poses(rng, (ideal, seen), board, nominal, pictures)]
+    draws = planned_poses(rng, (ideal, seen), board, nominal, pictures, what == "views")
+    poses = [draw() for draw in draws]
     with tempfile.TemporaryDirectory() as folder:
         kept, white, off, last, found = saved(bench, board, poses, rng, what, Path(folder))
         lenslets = pitch * true.lenslets.pitch

@@ -76,11 +76,10 @@ def drawn_poses(rng, board, views):
     return [lambda distance=one: pose(rng, distance, board) for one in distances]
 
 
-def planned_poses(rng, camera, board, nominal, count):
+def planned_poses(rng, camera, board, nominal, count, views):
     """The same, as `lg.metric.plan` asks for by what data sheets say, to 3 degrees and 1 %."""
-    from metric import drawn, drawn_views
+    from metric import drawn
 
-    views = board == drawn_views.BOARD
     plan = lg.metric.plan(*camera, board, nominal, pictures=count, in_views=views)
 
     def draw(step):
@@ -134,7 +133,7 @@ def run(rng, what, known, pitch=None, planned=None):
         nominal = replace(nominal, pitch_ratio=found.lattice.pitch / lenslets, pitch_ratio_error=pitch)
     board = drawing.BOARD
     if planned:
-        draws = planned_poses(rng, (true, found), board, nominal, planned)
+        draws = planned_poses(rng, (true, found), board, nominal, planned, not kinds)
     else:
         draws = drawn_poses(rng, board, not kinds)
     corners, again = pictures(rng, true, white, found, (kinds, board, draws))

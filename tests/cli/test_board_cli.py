@@ -77,8 +77,9 @@ def test_a_plan_says_which_pictures_to_take(capsys) -> None:
     assert printed[0].split()[:2] == ["picture", "distance"]
     assert len(printed) == 6
     assert printed[4].startswith(
-        "note: known to 1%, in 95 of 100 cases: no length; not with all 3 pictures: f (± 3.8 %), L (± "
+        "note: known to 1%, in 95 of 100 cases: no length; with all 3 pictures: f ± 3.8 %, L ± 4 %, b ± "
     )
+    assert ", distances ± " in printed[4]
     assert printed[5].startswith("note: f, and with it L")
     assert main([*words[:2], *words[4:]]) == 1
     assert "a plan needs --camera" in capsys.readouterr().err

@@ -5,13 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
+from scipy.signal import fftconvolve
+from scipy.spatial import KDTree
 
 import lumigraph as lg
 from lumigraph import io, metric
+from lumigraph.analysis import find_chart
+from lumigraph.analysis.crossings import crossed
 from lumigraph.cli import main
+from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
+from lumigraph.core.lattice import Lattice
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
+from lumigraph.metric import finding
 from lumigraph.preparation import prepare
 from lumigraph.scene import targets
 from metric import drawn
@@ -55,6 +63,46 @@ def test_a_whole_chessboard_that_opencv_misses_is_found(monkeypatch) -> None:
     assert min(np.abs(found - one).max() for one in (true, true[::-1])) < 0.1
     with pytest.raises(CalibrationError, match="it does not show a whole chessboard of 4 x 3"):
         metric.chessboard.find(picture[:80], board, "it")
+
+
+def test_the_rim_of_a_micro_image_pulls_at_corners_beyond_the_clear_radius_alone() -> None:
+    """Outwards: of a lenslet's beam the stop leaves less there, so that an edge's inner side is brighter."""
+    none, ratio, fine = np.zeros((0, 2)), 0.3, 5
+    pitch, fill = 22.64, 0.82
+    known = Calibration(Lattice.hex(pitch), (31, 31), none.astype(int), none, 0.0, fill=fill)
+    y, x = np.meshgrid(*2 * [(np.arange(31 * fine) + 0.5) / fine - 15.5], indexing="ij")
+    stop, beam = np.hypot(y, x) < fill * pitch / 2, np.hypot(y, x) < ratio * pitch / 2
+    light = fftconvolve(stop, beam / beam.sum(), mode="same")
+
+    def pulled(away: float) -> float:
+        down, right = y, x - away
+        one, other = 0.34 * right + 0.94 * down, 0.94 * right - 0.34 * down
+        seen, white = (
+            gaussian_filter(part, 0.8 * fine).reshape(31, fine, 31, fine).mean((1, 3))
+            for part in (light * (0.5 + 0.4 * np.sign(one) * np.sign(other)), light)
+        )
+        return float(crossed(seen / white, np.array([[15.0, 15 + away]]), 2)[0, 1] - 15 - away)
+
+    clear, lit = finding.clear_radius(known, np.array([ratio]))[0], finding.lit_radius(known)
+    assert lit - clear > 0.7
+    assert 0 < pulled(clear) < 0.012
+    assert pulled(lit) > 0.02
+
+
+@pytest.mark.parametrize(("turn", "away", "saddles"), [(0.52, -1.0, 13), (0.7, -2.0, 14)])
+def test_saddles_between_a_board_and_a_dark_rim_are_none_of_its_corners(turn, away, saddles) -> None:
+    """As of the array on views: the tip of a square near it makes one."""
+    board, fine, (c, s) = metric.Board((3, 4), 6.6), 5, (np.cos(turn), np.sin(turn))
+    y, x = np.meshgrid(*2 * [(np.arange(47 * fine) + 0.5) / fine - 23.5], indexing="ij")
+    at = np.stack([c * y - s * x, s * y + c * x + away], -1).reshape(-1, 2) + board.middle[1:]
+    picture = drawn.squares(at, np.full(len(at), 0.2), board).reshape(47, fine, 47, fine).mean((1, 3))
+    picture[:3] = picture[-3:] = picture[:, :3] = picture[:, -3:] = 0
+    assert len(find_chart(picture)) == saddles
+    found, _ = metric.chessboard.whole(picture, board)
+    flat = board.points()[:, 1:] - board.middle[1:] - (0, away)
+    true = flat @ np.array([[c, -s], [s, c]]) + 23
+    assert np.asarray(KDTree(true).query(found)[0]).max() < 0.2
+    assert len(np.unique(KDTree(true).query(found)[1])) == 12
 
 
 def test_the_board_tells_the_sign_of_the_patches(monkeypatch) -> None:

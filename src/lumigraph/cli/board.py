@@ -279,18 +279,16 @@ def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int)
 
 
 def _enough(found: "Plan") -> str:
-    """From which picture on lengths are known to 1 %, and how well the others are with all."""
+    """From which picture on lengths and distances are known to 1 %, and how well with all."""
     from lumigraph.metric.calibration import WELL
 
-    lengths, errors = found.camera.numbers, found.steps[-1].errors
-    well, badly = [], []
-    for name, count, value, error in zip("fLb", found.enough(WELL), lengths, errors, strict=False):
-        if count is None:
-            badly.append(f"{name} (± {196 * error / value:.2g} %)")
-        else:
-            well.append(f"{name} from picture {count} on")
-    told = f"known to {WELL:.0%}, in 95 of 100 cases: {', '.join(well) or 'no length'}"
-    return told + (f"; not with all {len(found.steps)} pictures: {', '.join(badly)}" if badly else "")
+    names, counts = ("f", "L", "b", "distances"), found.enough(WELL)
+    well = [f"{name} from picture {n} on" for name, n in zip(names, counts, strict=True) if n is not None]
+    last = [f"{name} ± {part:.2g} %" for name, part in zip(names, 100 * found.known[-1], strict=True)]
+    return (
+        f"known to {WELL:.0%}, in 95 of 100 cases: {', '.join(well) or 'no length'}; with all "
+        f"{len(found.steps)} pictures: {', '.join(last)}"
+    )
 
 
 def _hardly_told(found: "Plan", nominal: "Nominal") -> tuple[str, ...]:

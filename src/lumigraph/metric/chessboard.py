@@ -4,6 +4,7 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from lumigraph.analysis import find_chart
 from lumigraph.errors import CalibrationError, LumigraphError, SamplingError
@@ -68,17 +69,28 @@ def whole(picture: np.ndarray, board: Board) -> tuple[np.ndarray, int]:
     """Corners (n, 2) of a whole chessboard (`find_chart`), NaN where it is not seen, and how many are seen.
 
     It finds boards of few squares on small pictures, which OpenCV misses, and none that others hide in part.
+    Between a board's outer squares and a dark rim of the picture are saddles, too: the board is all of its
+    rows and columns, if they are found once.
     """
     (down, across), seen = board.shape, 0
     with suppress(SamplingError):
         chart = find_chart(picture)
         index, seen = chart.indices - chart.indices.min(0), len(chart)
-        if seen == down * across and sorted(index.max(0) + 1) == sorted(board.shape):
-            grid = np.zeros((*(index.max(0) + 1), 2))
-            grid[tuple(index.T)] = chart.corners
-            grid = grid if grid.shape[:2] == board.shape else grid.swapaxes(0, 1)
-            return grid.reshape(-1, 2), seen
+        number = np.full(index.max(0) + 1, -1)
+        number[tuple(index.T)] = np.arange(seen)
+        grids = [*_full(number, (down, across))]
+        grids += [grid.T for grid in _full(number, (across, down))] if down != across else []
+        if len(grids) == 1:
+            return chart.corners[grids[0].ravel()], seen
     return np.full((down * across, 2), np.nan), seen
+
+
+def _full(number: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Parts (k, *shape) of a table that have no -1."""
+    if (np.array(number.shape) < shape).any():
+        return np.zeros((0, *shape), int)
+    parts = sliding_window_view(number, shape).reshape(-1, *shape)
+    return parts[(parts >= 0).all((1, 2))]
 
 
 def _dots(cv2: Any, picture: np.ndarray, board: Board) -> np.ndarray:

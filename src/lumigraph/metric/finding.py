@@ -28,6 +28,9 @@ LEAST_SEEN = 3
 _NARROW = 0.1
 """Half the window about a corner, over the pitch: wide windows fit into few micro-images."""
 
+_DIM = 0.7
+"""How far a beam may reach beyond the main lens' stop where edges are looked for, over half its width."""
+
 _ROUNDS = 3  # corners found, places of the next round told by those found
 _STRAY = 2.5  # px: from where a corner is expected
 _OFF = 3.0  # times the median distance from the corner's own line
@@ -141,7 +144,17 @@ def _sights(
             f"picture {frame} shows the board, but no corner behind {LEAST_SEEN} lenslets or more. Move the "
             "board to where the micro-images are sharp."
         )
-    return lines, sights
+    return lines, sights[lines.clear(sights, calibration, radius)]
+
+
+def clear_radius(calibration: Calibration, ratio: np.ndarray, margin: float = windows.LEAST) -> np.ndarray:
+    """How far from a micro-image's centre corners (n,) may be so that its rim does not pull at them [px].
+
+    The beam of a lenslet is `ratio` times as wide on the micro-image. Where the stop cuts it, light falls off
+    outwards within an edge's blur, so that the edge is found farther out.
+    """
+    dim = _DIM * np.abs(ratio) * calibration.lattice.pitch / 2
+    return lit_radius(calibration, margin) + 2 - np.maximum(2.0, dim + 0.5)
 
 
 def lit_radius(calibration: Calibration, margin: float = windows.LEAST) -> float:
@@ -209,6 +222,12 @@ class _Lines:
         corner, lenslet = np.nonzero(np.hypot(*np.moveaxis(way, -1, 0)) <= lit_radius(calibration, margin))
         chosen = index[lenslet]
         return _Sights(corner, chosen, flat[lenslet], calibration.position(chosen), way[corner, lenslet])
+
+    def clear(self, sights: _Sights, calibration: Calibration, margin: int) -> np.ndarray:
+        """(n,) Which sights no micro-image's rim pulls at, or all of a corner that has too few of them."""
+        clear = np.hypot(*sights.way.T) <= clear_radius(calibration, self.ratio[sights.corner], margin)
+        few = np.bincount(sights.corner, clear, len(self.corner)) < LEAST_SEEN
+        return clear | few[sights.corner]
 
     def fitted(self, sights: _Sights) -> tuple["_Lines", _Sights]:
         """The lines that fit the sights of each corner, and the sights on them."""

@@ -17,7 +17,7 @@ from lumigraph.metric.adjustment import Problem, freedom
 from lumigraph.metric.calibration import LEAST_FRAMES
 from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
-from lumigraph.metric.finding import LEAST_SEEN, lit_radius
+from lumigraph.metric.finding import LEAST_SEEN, clear_radius
 from lumigraph.metric.noise import Noise
 from lumigraph.metric.views import DIRECTIONS, reach
 from lumigraph.metric.windows import LEAST_SQUARE, nearest
@@ -26,11 +26,17 @@ Turn = tuple[float, float, float]
 
 _TILTS = (0.0, 0.35, -0.35, 0.7, -0.7)  # rad: beyond, the squares are too narrow
 _STEEPEST = 0.8  # rad, about both axes together
-_ROLLED = 0.2
-"""Turn about the line of sight in views [rad]: edges along rows may be anywhere between two lenslets."""
+_ASLANT = math.radians(18)
+"""From edges in views to rows of lenslets: edges that run along them may be anywhere between two."""
+
+_ROLLS = np.array(sorted(np.linspace(-0.8, 0.8, 65), key=abs))
+"""Turns about the line of sight that are tried [rad], the smallest first."""
+
+KEPT_TO = (0.02, math.radians(5))
+"""How far pictures may be from a plan: of their distance, and in each angle [rad]."""
 
 _RATIOS = (0.08, 0.6)  # how far a corner moves against a lenslet, as `depth.correlation` looks for it
-_DISTANCES, _DISTANCES_IN_VIEWS = 12, 6
+_DISTANCES = 24
 _FARTHEST = 200.0  # focal lengths
 
 _MOVED = 3.0
@@ -41,6 +47,9 @@ _MARGIN = 4.0
 
 _BESIDE = 1.5
 """Squares beyond the outer corners that finding a board needs."""
+
+_SWAY = 0.01
+"""Noise of how far a corner moves from view to view (see `Noise`)."""
 
 _SURE = (0.1, 0.3)
 """Of L and b: how well they are known without any picture, over themselves."""
@@ -61,12 +70,16 @@ class Step:
         Of corners behind lenslets that it gives.
     errors
         Standard deviations (f, L, b) [m] with this picture and those before it.
+    distance_error
+        Of the distance of a point over itself, with the same pictures, at worst where boards can stand; what
+        the point's own places add is not in it.
     """
 
     distance: float
     turn: Turn
     places: int
     errors: tuple[float, float, float]
+    distance_error: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,26 +111,32 @@ class Plan:
             Quantity("turns", tuple(step.turn for step in self.steps), "rad"),
         )
 
-    def enough(self, part: float) -> tuple[int | None, int | None, int | None]:
-        """Pictures that tell f, L and b to a part of themselves, in 95 of 100 cases; None where all do not.
+    @property
+    def known(self) -> np.ndarray:
+        """(steps, 4) Half the 95 % intervals of f, L, b and distances of points over themselves."""
+        errors = np.array([(*step.errors, step.distance_error) for step in self.steps])
+        return 1.96 * errors / np.append(self.camera.numbers[:3], 1.0)
+
+    def enough(self, part: float) -> tuple[int | None, ...]:
+        """Pictures that tell f, L, b and distances to a part of themselves, in 95 of 100 cases.
+
+        None where all pictures do not.
 
         Parameters
         ----------
         part
             Half the interval's width over the length.
         """
-        errors, lengths = np.array([step.errors for step in self.steps]), self.camera.numbers[:3]
-        told = 1.96 * errors <= part * np.abs(lengths)
-        f, L, b = (int(np.argmax(one)) + 1 if one.any() else None for one in told.T)
-        return f, L, b
+        return tuple(int(np.argmax(one)) + 1 if one.any() else None for one in (self.known <= part).T)
 
     def table(self) -> list[list[str]]:
         """The pictures as rows of text, their header first."""
         turns = ["turn (sight)", "tilt (vertical)", "tilt (horizontal)"]
-        rows = [["picture", "distance", *turns, "places", "f", "L", "b"]]
+        rows = [["picture", "distance", *turns, "places", "f", "L", "b", "distances"]]
         for number, step in enumerate(self.steps, 1):
             tilts = [f"{math.degrees(angle):+.0f}°" for angle in step.turn]
             errors = [f"± {1.96 * error * 1e3:.3g} mm" for error in step.errors]
+            errors.append(f"± {196 * step.distance_error:.2g} %")
             rows.append([str(number), f"{step.distance * 1e3:.4g} mm", *tilts, str(step.places), *errors])
         return rows
 
@@ -135,8 +154,9 @@ def plan(
     """Poses of a board, one after the other those that tell f, L and b best together.
 
     Boards stand on the axis where three lenslets or more show each corner, straight or tilted; before a
-    camera 1.0, where views over the stop move no corner by more than three lenslets, turned by 11° about the
-    line of sight where they fit so. What a picture tells of
+    camera 1.0, where views over the stop move no corner by more than three lenslets, and turned about the
+    line of sight until their edges in the picture run 18° or more from rows of lenslets, where they fit so.
+    They can be used 2 % nearer or farther and turned by 5° more or less, too. What a picture tells of
     the camera is known before it is taken: its Fisher information, less what its own pose takes. Each picture
     is the one that makes the sum of the relative variances of f, L and b least.
 
@@ -156,7 +176,7 @@ def plan(
         Whether it is a camera 1.0, whose views show the corners.
     noise_px
         Of one place, and of what all places of a corner share (see `Noise`) [px]; None for 0.1 and 0.05, in
-        views for 2 % and 1 % of a pitch.
+        views for 1.2 % and 0.4 % of a pitch.
 
     Raises
     ------
@@ -165,12 +185,13 @@ def plan(
     """
     checks.whole("pictures", pictures, LEAST_FRAMES, CalibrationError)
     pitch = calibration.lattice.pitch
-    usual = (0.02 * pitch, 0.01 * pitch) if in_views else (0.1, 0.05)
+    usual = (0.012 * pitch, 0.004 * pitch) if in_views else (0.1, 0.05)
     own, shared = (checks.positive("noise_px", one, "px") for one in noise_px or usual)
-    before = _Before(camera, calibration, board, Noise(np.full(len(camera.gains), own), shared), in_views)
+    noise = Noise(np.full(len(camera.gains), own), shared, _SWAY if in_views else 0.0)
+    before = _Before(camera, calibration, board, noise, in_views)
     distances = _in_views(camera, pitch) if in_views else _distances(camera)
-    useful = before.shots(distances, _ROLLED) if in_views else []
-    useful = useful or before.shots(distances, 0.0)
+    useful = before.shots(distances, aslant=True) if in_views else []
+    useful = useful or before.shots(distances, aslant=False)
     if not useful:
         seen = "in squares 6 samples of a view wide" if in_views else (
             f"and {LEAST_SEEN} lenslets show each corner, in squares {LEAST_SQUARE:.2g} px wide"
@@ -215,7 +236,7 @@ def _in_views(camera: MetricCamera, pitch: float) -> list[float]:
     points = np.stack([every, 0 * every, 0 * every], 1)
     moved = [_centers(camera, points, np.array([0.0, side * pitch / 2])) for side in (1, -1)]
     usable = every[np.abs(moved[0] - moved[1]).max(1) <= _MOVED * pitch]
-    return usable[np.linspace(0, len(usable) - 1, min(_DISTANCES_IN_VIEWS, len(usable))).astype(int)].tolist()
+    return usable[np.linspace(0, len(usable) - 1, min(_DISTANCES, len(usable))).astype(int)].tolist()
 
 
 def _centers(camera: MetricCamera, points: np.ndarray, way: np.ndarray) -> np.ndarray:
@@ -235,19 +256,20 @@ class _Before:
     noise: Noise
     in_views: bool
 
-    def shots(self, distances: list[float], roll: float) -> list[_Shot]:
-        """Of boards straight and tilted, turned about the line of sight, where all corners can be used."""
-        turns = [(roll, y, x) for y, x in product(_TILTS, _TILTS) if math.hypot(y, x) <= _STEEPEST]
-        every = (self.shot(*place) for place in product(distances, turns))
+    def shots(self, distances: list[float], *, aslant: bool) -> list[_Shot]:
+        """Of boards straight and tilted, their edges aslant to rows or not, where all corners can be used."""
+        tilts = [(y, x) for y, x in product(_TILTS, _TILTS) if math.hypot(y, x) <= _STEEPEST]
+        every = (
+            self.shot(distance, (self.roll(distance, *tilt) if aslant else 0.0, *tilt))
+            for distance, tilt in product(distances, tilts)
+        )
         return [shot for shot in every if shot is not None]
 
     def shot(self, distance: float, turn: Turn) -> _Shot | None:
         """A board at a distance; None where not all of its corners can be used."""
-        still = np.array([*turn, 0.0, 0.0, 0.0])
-        middle = geometry.moved(self.board.middle, still)
-        pose = np.concatenate([turn, np.array([distance, 0.0, 0.0]) - middle])
+        pose = self.pose(np.array([distance]), np.array([turn]))[0]
         points = geometry.moved(self.board.points(), pose)
-        if points[:, 0].min() <= 1.02 * self.camera.focal_length or not self.whole(pose):
+        if not self.usable(distance, turn):
             return None
         seen = self.by_views(points) if self.in_views else self.by_lenslets(points)
         if seen is None:
@@ -262,12 +284,58 @@ class _Before:
         told = of_camera.T @ of_camera - across.T @ np.linalg.solve(of_pose.T @ of_pose, across)
         return _Shot(distance, turn, len(seen), told)
 
-    def whole(self, pose: np.ndarray) -> bool:
-        """Whether the board is in the picture with its outer squares and half a square of white margin."""
-        rim = [np.array([-_BESIDE, n - 1 + _BESIDE]) * self.board.spacing for n in self.board.shape]
+    def pose(self, distance: np.ndarray, turn: np.ndarray) -> np.ndarray:
+        """(k, 6) Of boards whose middles are on the axis, at distances (k,), turned by (k, 3)."""
+        still = np.concatenate([turn, np.zeros_like(turn)], 1)
+        place = -geometry.moved(self.board.middle, still)
+        place[:, 0] += distance
+        return np.concatenate([turn, place], 1)
+
+    def usable(self, distance: float, turn: Turn) -> bool:
+        """Whether a board can be found, also as far from its pose as it may be."""
+        sides = np.array([*product((-1, 1), repeat=4), (0, 0, 0, 0)])
+        nearer, angle = KEPT_TO
+        poses = self.pose(distance * (1 + nearer * sides[:, 0]), turn + angle * sides[:, 1:])
+        points = geometry.moved(self.board.points(), poses[:, None])
+        if points[..., 0].min() <= 1.02 * self.camera.focal_length or not self.whole(poses):
+            return False
+        return min(map(self.square, points)) >= LEAST_SQUARE
+
+    def square(self, points: np.ndarray) -> float:
+        """Least way between corners (n, 3) behind a lenslet [px], or in a view [samples]."""
+        if self.in_views:
+            return nearest(_centers(self.camera, points, np.zeros(2))) / self.calibration.lattice.pitch
+        axis = np.repeat(np.array([self.camera.axis]), len(points), 0)
+        return nearest(self.camera.project(points, axis))
+
+    def whole(self, poses: np.ndarray) -> bool:
+        """Whether boards (k, 6) are in the picture with what finding them needs.
+
+        That are the outer squares and half a square of white margin; of chessboards in views the corners
+        alone, and some lenslets around them.
+        """
+        alone = self.in_views and self.board.pattern == "corners"
+        margin = _MARGIN * self.calibration.lattice.pitch if alone else 0.0
+        beside = 0.0 if alone else _BESIDE
+        rim = [np.array([-beside, n - 1 + beside]) * self.board.spacing for n in self.board.shape]
         y, x = (one.ravel() for one in np.meshgrid(*rim))
-        at = _centers(self.camera, geometry.moved(np.stack([0 * y, y, x], 1), pose), np.zeros(2))
-        return bool(((at > 0) & (at < np.array(self.calibration.shape) - 1)).all())
+        points = geometry.moved(np.stack([0 * y, y, x], 1), poses[:, None]).reshape(-1, 3)
+        at, size = _centers(self.camera, points, np.zeros(2)), np.array(self.calibration.shape)
+        return bool(((at > margin) & (at < size - 1 - margin)).all())
+
+    def roll(self, distance: float, y: float, x: float) -> float:
+        """The smallest turn about the line of sight that keeps edges far enough from rows of lenslets."""
+        tilts = np.full((len(_ROLLS), 2), (y, x))
+        poses = self.pose(np.full(len(_ROLLS), distance), np.column_stack([_ROLLS, tilts]))
+        down, across = ((n - 1) * self.board.spacing for n in self.board.shape)
+        outline = np.array([(0, 0, 0), (0, 0, across), (0, down, across), (0, down, 0), (0, 0, 0)])
+        points = geometry.moved(outline, poses[:, None]).reshape(-1, 3)
+        sides = np.diff(_centers(self.camera, points, np.zeros(2)).reshape(-1, 5, 2), axis=1)
+        edges = np.arctan2(*np.moveaxis(sides, -1, 0))
+        lattice = self.calibration.lattice
+        apart = math.pi / (2 if lattice.layout == "square" else 3)
+        away = np.abs((edges - lattice.rotation + apart / 2) % apart - apart / 2).min(1)
+        return float(_ROLLS[np.argmax(np.minimum(away, _ASLANT).round(6))])
 
     def by_lenslets(self, points: np.ndarray) -> Corners | None:
         """Places of all corners behind lenslets; None where one cannot be found."""
@@ -277,10 +345,9 @@ class _Before:
         center, kinds = calibration.position(index), calibration.lattice.kind(*index.T)
         corner, lenslet = (each.ravel() for each in np.indices((len(points), len(center))))
         place = camera.project(points[corner], center[lenslet], kinds[lenslet])
-        shown = np.hypot(*(place - center[lenslet]).T) <= lit_radius(calibration)
+        ratio = geometry.magnification(camera.numbers, points[:, 0])
+        shown = np.hypot(*(place - center[lenslet]).T) <= clear_radius(calibration, ratio)[corner]
         if np.bincount(corner[shown], minlength=len(points)).min() < LEAST_SEEN:
-            return None
-        if _square(camera, points) < LEAST_SQUARE:
             return None
         corner, lenslet, place = corner[shown], lenslet[shown], place[shown]
         return Corners(np.zeros(len(corner), int), corner, place, center[lenslet], kinds[lenslet])
@@ -293,17 +360,11 @@ class _Before:
         ways = ways[np.hypot(*ways.T) <= reach(self.calibration, DIRECTIONS)]
         corner, view = (each.ravel() for each in np.indices((len(points), len(ways))))
         center = _centers(self.camera, points[corner], ways[view])
-        middle = center.reshape(len(points), len(ways), 2).mean(1)
-        wide, margin = nearest(middle) / pitch, _MARGIN * pitch
-        if wide < LEAST_SQUARE or not ((center > margin) & (center < size - 1 - margin)).all():
+        margin = _MARGIN * pitch
+        if not ((center > margin) & (center < size - 1 - margin)).all():
             return None
         frame = np.zeros(len(corner), int)
         return Corners(frame, corner, center + ways[view], center, frame, in_views=True)
-
-
-def _square(camera: MetricCamera, points: np.ndarray) -> float:
-    """Least way between corners behind a lenslet [px]."""
-    return nearest(camera.project(points, np.repeat(np.array([camera.axis]), len(points), 0)))
 
 
 def _chosen(shots: list[_Shot], camera: MetricCamera, nominal: Nominal, pictures: int) -> Iterator[Step]:
@@ -316,11 +377,26 @@ def _chosen(shots: list[_Shot], camera: MetricCamera, nominal: Nominal, pictures
     known = np.array(known)
     told = known.T @ known
 
-    def errors(told: np.ndarray) -> np.ndarray:
-        return np.sqrt(np.diag(free @ np.linalg.inv(told) @ free.T)[:3])
+    def covariance(told: np.ndarray) -> np.ndarray:
+        return (free @ np.linalg.inv(told) @ free.T)[:3, :3]
 
+    def unsure(shot: _Shot) -> float:
+        return float(np.sum(np.diag(covariance(told + shot.told)) / lengths**2))
+
+    slopes = _slopes_of_distance(camera, np.unique([shot.distance for shot in shots]))
     for _ in range(pictures):
-        shot = min(shots, key=lambda shot: float(np.sum((errors(told + shot.told) / lengths) ** 2)))
+        shot = min(shots, key=unsure)
         told = told + shot.told
-        f, L, b = errors(told).tolist()
-        yield Step(shot.distance, shot.turn, shot.places, (f, L, b))
+        now = covariance(told)
+        f, L, b = np.sqrt(np.diag(now)).tolist()
+        far = np.sqrt(np.einsum("ka,ab,kb->k", slopes, now, slopes)).max()
+        yield Step(shot.distance, shot.turn, shot.places, (f, L, b), float(far))
+
+
+def _slopes_of_distance(camera: MetricCamera, distance: np.ndarray) -> np.ndarray:
+    """(k, 3) Of what lenslets say of distances (k,), over them, by f, L and b: b / (L - image) is seen."""
+    f, L, b = camera.numbers[:3]
+    image = f * distance / (distance - f)
+    of_image = -((f / (image - f)) ** 2)
+    of_f = (image / (image - f)) ** 2
+    return np.stack([of_f, of_image, -of_image * (L - image) / b], 1) / distance[:, None]

@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 from lumigraph.errors import CalibrationError
 from lumigraph.metric.corners import Board
 
-_PART = 0.35
+_PART = 0.42
 """Half the window about a corner, over the way to the nearest other one: no window holds two."""
 
 _RIM = 0.5
@@ -16,7 +16,7 @@ _RIM = 0.5
 
 LEAST, _MOST = 2, 6  # px, of those about corners
 
-LEAST_SQUARE = LEAST / _PART
+LEAST_SQUARE = 5.7
 """Of a board behind a lenslet [px], or in a view [samples]: squares, or the way between dots."""
 
 
