@@ -100,6 +100,7 @@ def test_a_wavelength_of_nothing_is_refused() -> None:
         Spill(Lattice.square(PITCH), 1.0, 0.0)
 
 
+@pytest.mark.long
 def test_a_board_seen_through_spilt_light_gives_the_camera_and_how_sure_it_is() -> None:
     camera, seen = scenes.VIEWS_CAMERA, scenes.corners_in_views(np.random.default_rng(7), frames=6, views=5)
     spill = Spill(Lattice.square(PITCH), 1.0, 400e-9)
