@@ -11,7 +11,7 @@ from data_folder import DATA
 from lumigraph.metric import Board, Corners, MetricCamera, Nominal, board, calibration, geometry, triangulate
 from lumigraph.metric.noise import Noise
 
-from .scenes import BOARD, CAMERA, NOMINAL, corners
+from .scenes import BOARD, CAMERA, NOMINAL, VIEWS_CAMERA, corners, corners_in_views
 
 
 @pytest.fixture(scope="module")
@@ -253,3 +253,11 @@ def test_a_raytrix_r12_is_measured_as_its_makers_lens_says() -> None:
     assert found.residual_px < 0.72
     assert found.camera.focal_length == pytest.approx(49.89e-3, rel=0.01)
     assert found.errors[0] > 0.5e-3  # the corners alone do not tell it
+
+
+def test_corners_without_noise_lose_no_place() -> None:
+    """What is left over is rounding, which has no wild ones."""
+    seen = corners_in_views(np.random.default_rng(0), frames=4, views=3, noise=0.0, shared=0.0)
+    found = board(seen, BOARD, NOMINAL)
+    assert found.left_out == 0
+    assert found.camera.numbers[:3] == pytest.approx(VIEWS_CAMERA.numbers[:3], rel=1e-5)

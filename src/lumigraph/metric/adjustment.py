@@ -14,7 +14,7 @@ from lumigraph.errors import CalibrationError
 from lumigraph.metric import geometry
 from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
-from lumigraph.metric.noise import Noise
+from lumigraph.metric.noise import LEAST_NOISE, Noise
 
 _ROUNDS = 3
 """Adjustments, each with the noise of the one before."""
@@ -342,7 +342,7 @@ def _again(first: Problem, unknowns: np.ndarray) -> tuple[Problem, np.ndarray]:
     typical = np.array([
         np.median(np.abs(misfit[kind == k])) if np.any(kind == k) else 1.0 for k in range(int(kind.max()) + 1)
     ])  # fmt: skip
-    kept = np.abs(misfit).max(axis=1) < _WILD * 1.48 * typical[kind]
+    kept = np.abs(misfit).max(axis=1) < _WILD * np.maximum(1.48 * typical, LEAST_NOISE)[kind]
     corners, frame = first.corners[kept], first.frame[kept]
     if len(np.unique(frame)) != first.frames:
         raise CalibrationError(
