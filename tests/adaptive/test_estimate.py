@@ -111,7 +111,7 @@ def test_neighbours_that_are_alike_are_drawn_together():
 def test_beads_are_looked_for_through_a_wavefront():
     raw, c = exposed(STRONG, 2e4), np.array(list(STRONG.values()))
     search = Search.of(SCOPE, tuple(STRONG), np.array(DEPTHS), (raw, EXPOSURE, None), 3e-2)
-    found, without = search.beads(c), search.beads(0 * c)
+    found, without = search.beads(search.problem(c)), search.beads(search.problem(0 * c))
     away = np.linalg.norm(found.positions[:, None] - BEADS, axis=-1)
     assert away.shape == (2, 2)
     assert away.min(0).max() < 2e-6

@@ -132,15 +132,16 @@ def estimate(
     given = _Given.of((raw, exposure, pixels), microscope, depths, terms)
     model = given.model(parted, progress or silent)
     none = np.zeros((len(model.nodes), len(given.terms)))
-    first = Fit(given.search.beads(none[0]), none)
+    first = Fit(given.search.beads(given.problem), none)
     _require_memory(model, first)
     every = np.ones(len(given.terms), bool)
     plain = model.placed(first, STEPS["places"])
     fit, rounds = _fitted(given, model, _begun(given, model, plain), every)
     if len(model.nodes) > 1:
-        model = replace(model, nodes=model.nodes.learnt(fit.coefficients, _shared(model, fit)))
+        nodes = model.nodes.learnt(fit.coefficients, covariance_of_coefficients(model, fit))
+        model = replace(model, nodes=nodes)
         fit = model.improved(fit, every, STEPS["all"])
-    covariance = _shared(model, fit)
+    covariance = covariance_of_coefficients(model, fit)
     free = worth(covariance, fit.coefficients, model.counted, model.nodes.information)
     if not free.all():
         fit = model.improved(fit.changed(coefficients=fit.coefficients * free), free, STEPS["all"])
@@ -219,7 +220,7 @@ def _begun(given: _Given, model: Model, plain: Fit) -> Fit:
     found = min(fits, key=lambda fit: fit.objective)
     if found is plain:
         return plain
-    beads = given.search.beads(found.coefficients[0])
+    beads = given.search.beads(given.search.problem(found.coefficients[0]))
     return model.placed(found.changed(points=beads), STEPS["places"])
 
 
@@ -257,17 +258,17 @@ def _without_faint(model: Model, fit: Fit, free: np.ndarray) -> Fit:
     return model.improved(fit.changed(points=points), free, STEPS["all"])
 
 
-def _shared(model: Model, fit: Fit) -> np.ndarray:
-    """Covariance of the coefficients (nodes terms, nodes terms)."""
-    return covariance_of(model, fit)[-fit.coefficients.size :, -fit.coefficients.size :]
-
-
 def covariance_of(model: Model, fit: Fit) -> np.ndarray:
     """Of all unknowns; larger where the beads do not explain the raw image."""
     whole = model.around(fit).information / max(model.pearson(fit), 1.0)
     n = len(model.nodes.information)
     whole[-n:, -n:] += model.nodes.information
     return solved(whole, np.eye(len(whole)))
+
+
+def covariance_of_coefficients(model: Model, fit: Fit) -> np.ndarray:
+    """The part (nodes terms, nodes terms) of it [waves² rms]."""
+    return covariance_of(model, fit)[-fit.coefficients.size :, -fit.coefficients.size :]
 
 
 def _require_memory(model: Model, fit: Fit) -> None:

@@ -90,9 +90,8 @@ class Search:
         axes = grid.y, grid.x, self.sight.planes
         return np.array([min(a) for a in axes]) - beside, np.array([max(a) for a in axes]) + beside
 
-    def beads(self, coefficients: np.ndarray, shown: np.ndarray | None = None) -> Points:
-        """Through a wavefront; of what is brighter than `shown` (ny, nx) where that is given."""
-        problem = self.problem(coefficients)
+    def beads(self, problem: Problem, shown: np.ndarray | None = None) -> Points:
+        """Of a `problem`; of what is brighter than `shown` (ny, nx) where that is given."""
         if shown is not None:
             problem = replace(problem, scale=replace(problem.scale, background=shown))
         method, state = RichardsonLucy(), State.at(problem, problem.flat())
@@ -105,6 +104,6 @@ class Search:
 
     def more(self, fit: Fit, shown: np.ndarray) -> Points | None:
         """Beads in what a fit leaves of the raw image, if bright enough; None where there are none."""
-        found = self.beads(fit.coefficients.mean(0), shown)
+        found = self.beads(self.problem(fit.coefficients.mean(0)), shown)
         bright = found.intensities > FAINT[1] * float(np.median(fit.points.intensities))
         return Points(found.positions[bright], found.intensities[bright]) if bright.any() else None

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lumigraph.adaptive.checked import PISTON, bent
-from lumigraph.adaptive.estimate import covariance_of, warn_of_misfit
+from lumigraph.adaptive.estimate import covariance_of_coefficients, warn_of_misfit
 from lumigraph.adaptive.field import PRIOR, Nodes
 from lumigraph.adaptive.fit import OWN, PLACES, Fit, Model
 from lumigraph.adaptive.star import Alone, Star
@@ -103,7 +103,7 @@ def sense(
     fit = model.improved(plain, np.ones(len(modes), bool), STEPS)
     pearson = model.pearson(fit)
     warn_of_misfit(pearson, "a point with these modes leaves")
-    covariance = covariance_of(model, fit)[-len(modes) :, -len(modes) :]
+    covariance = covariance_of_coefficients(model, fit)
     deviations = np.sqrt(np.diag(covariance))
     unknown = {j: UNKNOWN for j, d in zip(modes, deviations, strict=True) if d > PRIOR / 2}
     return Wavefront(
