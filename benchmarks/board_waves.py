@@ -1,17 +1,19 @@
 """Cameras 1.0, 2.0 and of three kinds, measured by the command from pictures of boards by wave optics.
 
 ``python -m benchmarks.board_waves views | focused | kinds [--runs 3] [--first 0] [--pictures 20] [--each 6]
-[--workers 1] [--minutes 60]``: each run simulates a white image and boards at the poses of `lg.metric.plan`
-through wave optics, exposes them with the sensor's noise, and runs ``lumigraph board`` on the files, told a
-focal length that is off by 2 % and the lenslets' pitch off by 1e-4 (one standard deviation). Poses, noise
-and what is told are drawn anew in each run; the camera serves ``--each`` runs, which is what makes
-many affordable: lenslets' matrices are computed once for it. Boards lean, so that each is shared out to
-slices by its own distance. The last picture takes no part: its best-seen corner is the point whose distance
-is asked for. Printed are how far corners are from where rays put them, the lengths' and a point's errors over
-the truth (over what is said), and CPU seconds; at the end how many intervals hold.
+[--workers 1] [--minutes 60] [--keep FOLDER]``: each run simulates a white image and boards at the poses of
+`lg.metric.plan` through wave optics, exposes them with the sensor's noise, finds corners on the files, and
+runs ``lumigraph board`` on their table, told a focal length that is off by 2 % and the lenslets' pitch off by
+1e-4 (one standard deviation). Poses, noise and what is told are drawn anew in each run; the camera serves
+``--each`` runs, which is what makes many affordable: lenslets' matrices are computed once for it. Boards
+lean, so that each is shared out to slices by its own distance. The last picture takes no part: its best-seen
+corner is the point whose distance is asked for. Printed are how far corners are from where rays put them,
+the lengths' and a point's errors over the truth (over what is said), and CPU seconds; at the end how many
+intervals hold.
 
 Runs are the same whatever the number of processes, and each is printed once it is finished. After
-``--minutes`` none begins.
+``--minutes`` none begins. ``--keep FOLDER`` keeps raw images, tables and cameras; pictures that are there at
+the same poses are not simulated again.
 """
 
 import argparse
@@ -34,19 +36,20 @@ from benchmarks.boards import NAMES, planned_poses, summary
 from lumigraph.cli import main as command
 from lumigraph.metric import geometry
 
-STEP = {"views": 6e-3, "focused": 6e-3, "kinds": 6e-3}
+STEP = {"views": 6e-3, "focused": 2e-3, "kinds": 2e-3}
 """Between slices near the focus [m]: from one to the next, views of a corner move by 0.15 of a sample, places
 by 0.2 px."""
 
-BOARDS = {"views": "6 x 5 corners, 3.6 mm", "focused": "9 x 7 corners, 2.4 mm"}
+BOARDS = {"views": "6 x 5 corners, 3.6 mm", "focused": "12 x 10 corners, 1.1 mm"}
 KNOWN, PITCH = 0.02, 1e-4
 ACCURACY = 1e-2
+PIXEL = 5.5e-6
 
 
 def camera(rng, what):
-    """A camera of a few thousand lenslets, or one of a thousand."""
+    """A camera of a few thousand lenslets, or one of half as many, with a close-up."""
     f = 50e-3 * rng.uniform(0.95, 1.05)
-    sensor = {"pixel_pitch": 5.5e-6, "black_level": 64.0, "full_well": 12000.0, "read_noise": 6.0}
+    sensor = {"pixel_pitch": PIXEL, "black_level": 64.0, "full_well": 12000.0, "read_noise": 6.0}
     common = {"wavelength": 550e-9, "main_lens": {"focal_length": f}, "sensor": sensor}
     if what == "views":
         own = {"pitch": 62e-6, "focal_length": 0.9e-3 * rng.uniform(0.9, 1.1), "count": (70, 70)}
@@ -54,9 +57,9 @@ def camera(rng, what):
     focal = 1.9e-3 * rng.uniform(0.95, 1.05)
     lengths = (focal, 1.04 * focal, 0.96 * focal) if what == "kinds" else focal
     own = {
-        "pitch": 120e-6, "focal_length": lengths, "count": (34, 30), "layout": "hex", "magnification": 0.3
+        "pitch": 120e-6, "focal_length": lengths, "count": (44, 38), "layout": "hex", "magnification": 0.3
     }  # fmt: skip
-    return lg.FocusedPlenopticCamera(**common, object_distance=9 * f, lenslets=own)
+    return lg.FocusedPlenopticCamera(**common, object_distance=5 * f, lenslets=own)
 
 
 def on_board(pose, grid):
@@ -113,27 +116,39 @@ class Bench:
         return np.maximum(lit, 0)
 
 
-def saved(bench, board, poses, rng, what, folder):
-    """Names of the raw images on which the board is found, but for the last of them, and the white one's.
+def exposed(bench, board, poses, rng, folder):
+    """Files of the dark and white image and of boards at poses; those of an earlier run at the same ones."""
+    names, at = [folder / f"{n}.tif" for n in ("dark", "white", *range(len(poses)))], folder / "poses.npy"
+    if at.exists() and np.array_equal(np.load(at), poses):
+        return names
+    sensor, white = bench.camera.sensor, bench.white()
+    lg.io.save(sensor.expose(0 * white, reference=1, rng=rng), names[0])
+    lights = (white, *(bench.board(board, pose) for pose in poses))
+    for name, light in zip(names[1:], lights, strict=True):
+        lg.io.save(sensor.expose(light, reference=white.max(), fill=0.8, rng=rng), name)
+    np.save(at, poses)
+    return names
 
-    And corners off (n, 2) [px]; those of the last picture and where they are (n, 3) [m]; and the calibration.
+
+def found(bench, board, poses, names, what):
+    """Corners on the boards that are found but the last, how far off they are (n, 2) [px], how many boards.
+
+    And the last one's corners, where they are (n, 3) [m], and the calibration of the lenslets.
     """
-    true, white = bench.camera, bench.white()
-    sensor, lights = true.sensor, [white, *(bench.board(board, pose) for pose in poses)]
-    exposed = [sensor.expose(one, reference=white.max(), fill=0.8, rng=rng) for one in lights]
-    dark = sensor.expose(0 * white, reference=1, rng=rng)
-    names = [folder / f"{n}.tif" for n in range(len(exposed))]
-    lg.io.save(dark, folder / "dark.tif")
-    for name, raw in zip(names, exposed, strict=True):
-        lg.io.save(raw, name)
-    found, seen = lg.calibrate(np.asarray(exposed[0].data) - np.asarray(dark.data)), []
-    for name, raw, pose in zip(names[1:], exposed[1:], poses, strict=True):
-        ready = lg.prepare(raw, found, white=exposed[0], dark=dark)
+    dark, white, *boards = (replace(lg.open(name), pixel_pitch=PIXEL) for name in names)
+    lenslets, seen = lg.calibrate(np.asarray(white.data) - np.asarray(dark.data)), []
+    for raw, pose in zip(boards, poses, strict=True):
+        ready = lg.prepare(raw, lenslets, white=white, dark=dark)
         with contextlib.suppress(lg.LumigraphError):
             corners = lg.metric.find_corners([ready], board, in_views=what == "views")
-            seen.append((name, corners, *away(true, board, corners, pose)))
-    kept, corners, off, points = zip(*seen, strict=True)
-    return kept[:-1], names[0], np.concatenate(off), (corners[-1], points[-1]), found
+            seen.append(
+                (replace(corners, frame=corners.frame + len(seen)), *away(bench.camera, board, corners, pose))
+            )
+    corners, off, points = zip(*seen, strict=True)
+    columns = ("frame", "corner", "place", "center", "kind")
+    joined = (np.concatenate([getattr(one, name) for one in corners[:-1]]) for name in columns)
+    whole = lg.metric.Corners(*joined, in_views=what == "views", spill=corners[0].spill)
+    return whole, np.concatenate(off), len(corners) - 1, (corners[-1], points[-1]), lenslets
 
 
 def away(true, board, corners, pose):
@@ -151,8 +166,11 @@ def away(true, board, corners, pose):
     return min(both, key=lambda one: float(np.abs(one[0]).mean()))
 
 
-def run(bench, rng, what, pictures):
-    """Errors of `NAMES` over the truth, and over what is said; corners off, rms [px]; pictures used."""
+def run(bench, rng, what, pictures, place):
+    """Errors of `NAMES` over the truth, and over what is said; corners off, rms [px]; pictures used.
+
+    Files are in a folder, which a context gives.
+    """
     true, written = bench.camera, BOARDS["views" if what == "views" else "focused"]
     board = lg.metric.Board.from_text(written)
     ideal = lg.metric.MetricCamera.of(true)
@@ -164,22 +182,23 @@ def run(bench, rng, what, pictures):
     seen = replace(true.calibration, fill=true.micro_image_fill)
     draws = planned_poses(rng, (ideal, seen), board, nominal, pictures, what == "views")
     poses = [draw() for draw in draws]
-    with tempfile.TemporaryDirectory() as folder:
-        kept, white, off, last, found = saved(bench, board, poses, rng, what, Path(folder))
-        lenslets = pitch * true.lenslets.pitch
-        sure = f"{1e6 * PITCH * lenslets} um"
+    with place as kept:
+        names = exposed(bench, board, poses, rng, kept)
+        seen, off, pictures, last, lenslets = found(bench, board, poses, names, what)
+        lg.metric.save_corners(seen, kept / "corners.csv")
+        mask = pitch * true.lenslets.pitch
         options = {
             "--board": written, "--focal-length": f"{1e3 * nominal.focal_length} mm",
-            "--white": white, "--dark": Path(folder) / "dark.tif", "--pixel-pitch": "5.5 um",
-            "--lenslet-pitch": f"{1e6 * lenslets} um", "--lenslet-pitch-error": sure,
-            "-o": Path(folder) / "camera.json",
+            "--pixel-pitch": f"{1e6 * PIXEL} um", "--lenslet-pitch": f"{1e6 * mask} um",
+            "--lenslet-pitch-error": f"{1e6 * PITCH * mask} um",
+            "--micro-image-pitch": lenslets.lattice.pitch, "-o": kept / "camera.json",
         }  # fmt: skip
         words = [str(word) for pair in options.items() for word in pair]
-        views = ["--views"] if what == "views" else []
         with contextlib.redirect_stdout(io.StringIO()) as out:
-            if command(["board", *map(str, kept), *words, *views]):
+            size = map(str, true.sensor.shape)
+            if command(["board", str(kept / "corners.csv"), "--shape", *size, *words]):
                 raise lg.LumigraphError(out.getvalue())
-        measured = lg.metric.load(Path(folder) / "camera.json")
+        measured = lg.metric.load(kept / "camera.json")
     corners, points = last
     mine = corners.sights() == np.bincount(corners.sights()).argmax()
     point = points[mine][0]
@@ -188,8 +207,20 @@ def run(bench, rng, what, pictures):
     )
     errors = np.append(measured.camera.numbers[:3] - ideal.numbers[:3], seen.position[0] - point[0])
     truth, sure = np.append(ideal.numbers[:3], point[0]), np.append(measured.errors[:3], seen.errors[0])
-    unit = found.lattice.pitch if what == "views" else 1.0
-    return errors / truth, errors / sure, float(np.sqrt((off**2).mean())) / unit, len(kept)
+    unit = lenslets.lattice.pitch if what == "views" else 1.0
+    return errors / truth, errors / sure, float(np.sqrt((off**2).mean())) / unit, pictures
+
+
+@contextlib.contextmanager
+def folder(given, k):
+    """Where a run's files are: one that stays, or one that goes."""
+    if given.keep is None:
+        with tempfile.TemporaryDirectory() as name:
+            yield Path(name)
+        return
+    name = given.keep / f"{given.what}-{given.seed}-{k}"
+    name.mkdir(parents=True, exist_ok=True)
+    yield name
 
 
 def work(given, todo, done):
@@ -206,7 +237,8 @@ def work(given, todo, done):
                 if bench is None:
                     rng = np.random.default_rng([given.seed, 0, which])
                     bench = Bench(camera(rng, given.what), STEP[given.what])
-                one = run(bench, np.random.default_rng([given.seed, 1, k]), given.what, given.pictures)
+                drawn = np.random.default_rng([given.seed, 1, k])
+                one = run(bench, drawn, given.what, given.pictures, folder(given, k))
             except Exception as error:  # whatever it is, other runs go on, and it is printed and counted
                 one = f"{type(error).__name__}: {error}"
             done.put((k, one, time.process_time() - started))
@@ -249,6 +281,7 @@ def told(given):
     for name, value in usual.items():
         parser.add_argument(f"--{name}", type=int, default=value)
     parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--keep", type=Path)
     given = parser.parse_args(given)
     given.last, given.until = given.first + given.runs, time.time() + 60 * given.minutes
     return given

@@ -9,7 +9,7 @@ import pytest
 from lumigraph import metric
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError, FormatError, LumigraphError
-from lumigraph.metric import Board, Corners, MetricCamera, chessboard, geometry, windows
+from lumigraph.metric import Board, Corners, MetricCamera, chessboard, finding, geometry, windows
 from lumigraph.metric.adjustment import Problem
 from lumigraph.metric.noise import Noise
 from lumigraph.preparation import prepare
@@ -206,7 +206,14 @@ def test_dots_too_close_to_each_other_are_refused():
     with pytest.raises(
         CalibrationError, match=r"on picture 2 .* are 4 px wide behind a lenslet, but 5\.7 are"
     ):
-        windows.radius(4 * DOTS.points()[:, 1:] / DOTS.spacing, DOTS, 2, "px wide behind a lenslet")
+        windows.radius(np.array([9.0, 4.0, 8.0]), DOTS, 2, "px wide behind a lenslet")
+
+
+def test_squares_are_as_wide_behind_a_lenslet_as_each_ones_patch_says() -> None:
+    """Of a board that leans, far from the picture's corner: patches there add nothing to its squares."""
+    rows = np.mgrid[0:4, 0:4].reshape(2, -1).T * 40.0 + 600
+    lines = finding._Lines(np.arange(16), rows, np.linspace(0.30, 0.15, 16))
+    assert lines.window(40.0, Board((4, 4), 1e-3), 0) == 2
 
 
 def test_a_camera_measured_by_dots_survives_its_file_and_says_how_wide_they_were_taken(tmp_path):

@@ -164,13 +164,15 @@ def test_corners_in_views_survive_their_table(tmp_path) -> None:
 def test_tables_of_corners_in_views_tell_what_lenslets_spill(tmp_path) -> None:
     seen = scenes.corners_in_views(np.random.default_rng(1), frames=1, views=3)
     for lattice in (Lattice.square(20.0, 0.1), Lattice.hex(20.0, -0.02)):
-        metric.save_corners(replace(seen, spill=Spill(lattice, 0.9, 532e-9)), tmp_path / "corners.csv")
+        known = Spill(lattice, 0.9, 532e-9, 0.25)
+        metric.save_corners(replace(seen, spill=known), tmp_path / "corners.csv")
         again = metric.load_corners(tmp_path / "corners.csv").spill
         assert (again.wavelength, again.fill, again.lattice.layout) == (532e-9, 0.9, lattice.layout)
+        assert again.sharp == 0.25
         np.testing.assert_allclose(again.lattice.basis, lattice.basis, atol=1e-12)
     text = (tmp_path / "corners.csv").read_text()
-    (tmp_path / "corners.csv").write_text(text.rstrip()[:-1] + "0\n")
-    with pytest.raises(FormatError, match="column hexagonal must hold the same number in all rows"):
+    (tmp_path / "corners.csv").write_text(text.rstrip()[:-1] + "6\n")
+    with pytest.raises(FormatError, match="column sharp must hold the same number in all rows"):
         metric.load_corners(tmp_path / "corners.csv")
 
 
@@ -192,7 +194,7 @@ def test_a_point_in_views_is_triangulated_without_what_lenslets_spill(
     without = metric.triangulate(replace(known, spill=None), rays + aside + way, rays + aside, in_views=True)
     assert found.position == pytest.approx(true, rel=1e-3)
     assert abs(without.position[0] - true[0]) > 0.005 * true[0]
-    monkeypatch.setattr("lumigraph.metric.triangulation.UNSURE", 0.0)
+    monkeypatch.setattr("lumigraph.metric.spill._UNSURE", 0.0)
     surer = metric.triangulate(known, rays + aside + way, rays + aside, in_views=True)
     assert found.errors[0] > 1.001 * surer.errors[0]
 

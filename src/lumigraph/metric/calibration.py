@@ -16,7 +16,7 @@ from lumigraph.metric.camera import MetricCamera, Nominal
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.metric.known import disagreement
 from lumigraph.metric.noise import Noise
-from lumigraph.metric.spill import UNSURE, Spill
+from lumigraph.metric.spill import Spill
 from lumigraph.metric.start import LEAST_CORNERS, search
 from lumigraph.metric.twofold import turned_over
 
@@ -32,7 +32,7 @@ _BENT = 5e-4
 _LENGTHS = ("f", "L", "b")
 
 _ROUNDS = 2
-"""In which light that lenslets spill is taken out."""
+"""In which light that lenslets spread and spill is taken out."""
 
 WELL = 0.01
 """Half a 95 % interval over a length, beyond which a note names it."""
@@ -92,7 +92,7 @@ class Measured:
     notes
         What to know, one sentence each.
     spill
-        Of corners in views, the light that was allowed for; `triangulate` allows for it, too.
+        The light beside its place that was allowed for; `triangulate` allows for it, too.
     """
 
     camera: MetricCamera
@@ -242,16 +242,16 @@ def board(corners: Corners, board: Board, nominal: Nominal) -> Measured:
     found = adjust(corners[usable], board, nominal, camera, np.array([poses[f] for f in known.tolist()]))
     found = turned_over(found, corners[usable], board, nominal)
     if corners.spill is not None:
-        found = _cleared(found, corners[usable], board, nominal)
+        found = _cleared(found, corners[usable], corners.spill.unsure, board, nominal)
     return _measured(found, corners[usable], found.board, nominal, len(corners.frames) - len(known))
 
 
-def _cleared(found: Adjusted, corners: Corners, board: Board, nominal: Nominal) -> Adjusted:
-    """By corners without what lenslets spill; its own error is in the covariance."""
+def _cleared(found: Adjusted, corners: Corners, unsure: float, board: Board, nominal: Nominal) -> Adjusted:
+    """By corners without what lenslets spread and spill; its own error is in the covariance."""
     again = found
     for _ in range(_ROUNDS):  # it depends on b
         again = adjust(corners.cleared(again.camera), board, nominal, again.camera, again.poses)
-    moved = UNSURE * np.append(again.camera.numbers - found.camera.numbers, again.poses - found.poses)
+    moved = unsure * np.append(again.camera.numbers - found.camera.numbers, again.poses - found.poses)
     return replace(again, covariance=again.covariance + np.outer(moved, moved))
 
 
@@ -270,8 +270,8 @@ def _measured(found: Adjusted, corners: Corners, board: Board, nominal: Nominal,
         pose = found.poses[k]
         poses.append(Pose(frame, pose[:3], pose[3:], found.covariance[rows, rows], off, expected))
     result = replace(result, poses=tuple(poses))
-    notes = (*_notes(result, nominal, unused), *([_spilt(corners)] if corners.in_views else []))
-    return replace(result, notes=notes)
+    told = [_spilt(corners)] if corners.in_views or corners.spill is not None else []
+    return replace(result, notes=(*_notes(result, nominal, unused), *told))
 
 
 def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
@@ -310,16 +310,18 @@ def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
 
 
 def _spilt(corners: Corners) -> str:
-    """What was done about light that lenslets spill."""
-    if corners.spill is None:
-        return (
-            "light that lenslets spill into their neighbours' micro-images moves corners in views and makes "
-            "b too long, by 2 to 6 % behind lenslets of 62 µm at f/14: this table of corners does not tell "
-            "by how much. Measure raw images, or a table that was written of them"
-        )
+    """What was done about light that lenslets spread and spill."""
+    what = (
+        "light that lenslets spill into their neighbours' micro-images moves corners in views"
+        if corners.in_views
+        else "where the main lens' stop cuts a lenslet's beam, diffraction moves corners outwards"
+    )
+    if corners.spill is not None:
+        wavelength, unsure = corners.spill.wavelength, corners.spill.unsure
+        return f"{what}, which is allowed for by diffraction at {wavelength * 1e9:.0f} nm, to {unsure:.0%}"
     return (
-        "light that lenslets spill into their neighbours' micro-images moves corners in views, which is "
-        f"allowed for by diffraction at {corners.spill.wavelength * 1e9:.0f} nm, to {UNSURE:.0%}"
+        f"{what} and makes b too long, by 2 to 6 % behind lenslets of 62 µm at f/14: this table of corners "
+        "does not tell by how much. Measure raw images, or a table that was written of them"
     )
 
 

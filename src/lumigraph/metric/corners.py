@@ -218,8 +218,8 @@ class Corners:
         Whether they were found in views of a camera 1.0: then place less centre is the view, which is exact,
         and the centre is what was measured, that of a micro-image between those of two lenslets.
     spill
-        Of corners in views, what lenslets spill into their neighbours' micro-images; None if it is not known
-        or taken out.
+        The light that lenslets spread over their micro-image, and spill into their neighbours'; None if it is
+        not known or taken out.
 
     Raises
     ------
@@ -273,20 +273,29 @@ class Corners:
         return Corners(*columns, in_views=self.in_views, spill=self.spill)
 
     def cleared(self, camera: "MetricCamera") -> "Corners":
-        """Where corners would be if this camera's lenslets spilt no light into other micro-images."""
-        if self.spill is None or self.way is None:
+        """Where corners would be if this camera's lenslets spread and spilt no light."""
+        if self.spill is None:
             return self
         apart = self.spill.lattice.pitch * camera.pixel_pitch
         lenslets = apart / (1 + camera.lenslet_distance / camera.exit_pupil)
         width = self.spill.wavelength * camera.lenslet_distance / lenslets / apart
-        aside = self.spill.aside(self.way, self._slopes(self.way), width)
-        return replace(self, place=self.place - aside, center=self.center - aside, spill=None)
+        way = self.place - self.center
+        if self.in_views:
+            aside = self.spill.aside(way, self._slopes(way, self.center), width)
+            return replace(self, place=self.place - aside, center=self.center - aside, spill=None)
+        aside = self.spill.outwards(way, 1 / self._slopes(self.center, way), width)
+        return replace(self, place=self.place - aside, spill=None)
 
-    def _slopes(self, way: np.ndarray) -> np.ndarray:
-        """(n,) How far each one's corner moves from view to view, over the way."""
+    def _slopes(self, way: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        """(n,) How far each one's corner moves over the way."""
         sight = self.sights()
         inner, spread = centred(way, sight)
-        return (sums((inner * self.center).sum(1), sight) / spread)[sight]
+        return (sums((inner * moved).sum(1), sight) / spread)[sight]
+
+    @property
+    def sharp(self) -> float:
+        """How far micro-images of the middle one of all corners move, over the way between their lenslets."""
+        return float(np.median(self._slopes(self.center, self.place - self.center)))
 
     @property
     def way(self) -> np.ndarray | None:

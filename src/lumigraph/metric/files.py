@@ -27,11 +27,12 @@ COLUMNS = ("frame", "corner", "y", "x", "center_y", "center_x", "kind")
 IN_VIEWS = "in_views"
 """A column of ones in a table of corners that were found in views."""
 
-SPILL = ("wavelength", "fill", "pitch", "rotation", "hexagonal")
+SPILL = ("wavelength", "fill", "pitch", "rotation", "hexagonal", "sharp")
 """Columns more, alike in all rows, where light that lenslets spill is to be allowed for.
 
 Its wavelength [m], the width of micro-images over their pitch, that pitch [px], the rows' turn [rad], 1 for
-hexagons and 0 for squares.
+hexagons and 0 for squares; and how far micro-images of a point in focus move, over the way between their
+lenslets, 0 where that is left out.
 """
 
 KIND = "lumigraph metric camera"
@@ -63,7 +64,8 @@ def load_corners(path: str | os.PathLike[str]) -> Corners:
         place, center = (_pair(found, y, x) for y, x in (("y", "x"), ("center_y", "center_x")))
         found.setdefault("kind", np.zeros(len(place)))
         frame, corner, kind = (_whole(name, found) for name in ("frame", "corner", "kind"))
-        spill = _spill({name: _alike(name, found) for name in SPILL}) if SPILL[0] in found else None
+        known = {name: _alike(name, found) for name in SPILL if name in found}
+        spill = _spill(known) if SPILL[0] in found else None
         return Corners(frame, corner, place, center, kind, in_views == {1.0}, spill)
 
 
@@ -83,13 +85,14 @@ def _plain(spill: Spill | None) -> dict[str, Any] | None:
     if spill is None:
         return None
     lattice = spill.lattice
-    numbers = (spill.wavelength, spill.fill, lattice.pitch, lattice.rotation, int(lattice.layout == "hex"))
-    return dict(zip(SPILL, numbers, strict=True))
+    told = spill.wavelength, spill.fill, lattice.pitch, lattice.rotation
+    return dict(zip(SPILL, (*told, int(lattice.layout == "hex"), spill.sharp), strict=True))
 
 
 def _spill(found: dict[str, Any]) -> Spill:
-    wavelength, fill, pitch, rotation, hexagonal = (_number(found, name) for name in SPILL)
-    return Spill((Lattice.hex if hexagonal else Lattice.square)(pitch, rotation), fill, wavelength)
+    known = {SPILL[-1]: 0.0} | found
+    wavelength, fill, pitch, rotation, hexagonal, sharp = (_number(known, name) for name in SPILL)
+    return Spill((Lattice.hex if hexagonal else Lattice.square)(pitch, rotation), fill, wavelength, sharp)
 
 
 def _alike(name: str, found: dict[str, np.ndarray]) -> float:

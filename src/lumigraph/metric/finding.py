@@ -25,9 +25,6 @@ from lumigraph.rendering.patches import Layout, Patches
 LEAST_SEEN = 3
 """Lenslets that must show a corner."""
 
-_NARROW = 0.1
-"""Half the window about a corner, over the pitch: wide windows fit into few micro-images."""
-
 _DIM = 0.7
 """How far a beam may reach beyond the main lens' stop where edges are looked for, over half its width."""
 
@@ -69,8 +66,9 @@ def find_corners(
     in_views
         Whether the raw images are of a camera 1.0.
     wavelength
-        Of the light [m]: how much lenslets of a camera 1.0 spill into their neighbours' micro-images, which
-        `board` allows for; None for pictures that rays drew.
+        Of the light [m]: how much lenslets of a camera 1.0 spill into their neighbours' micro-images, and
+        how far outwards micro-images of a camera 2.0 show corners, which `board` allows for; None for
+        pictures that rays drew.
     progress
         Called as ``progress(fraction)``.
 
@@ -93,12 +91,13 @@ def find_corners(
         progress((frame + 1) / len(raws))
     if not found:
         raise CalibrationError("there are no raw images. Give three or more of the board.")
-    spill = None
-    if in_views and wavelength is not None:
-        known = calibration or getattr(raws[0], "calibration", None)
-        spill = None if known is None else Spill(known.lattice, known.fill or 1.0, wavelength)
     columns = (np.concatenate(column) for column in zip(*found, strict=True))
-    return Corners(*columns, in_views=in_views, spill=spill)
+    corners = Corners(*columns, in_views=in_views)
+    known = calibration or getattr(raws[0], "calibration", None)
+    if wavelength is None or known is None or (board.radius and not in_views):
+        return corners
+    sharp = 0.0 if in_views else corners.sharp
+    return replace(corners, spill=Spill(known.lattice, known.fill or 1.0, wavelength, sharp))
 
 
 @of_raw
@@ -209,9 +208,9 @@ class _Lines:
 
     def window(self, pitch: float, board: Board, frame: int) -> int:
         """Radius of the window about a corner behind a lenslet [px]."""
-        shown = self.places * np.abs(self.ratio)[:, None]
-        found = windows.radius(shown, board, frame, "px wide behind a lenslet")
-        return found if board.radius else max(windows.LEAST, min(found, round(pitch * _NARROW)))
+        ways = windows.ways(self.places) * np.abs(self.ratio)
+        found = windows.radius(ways, board, frame, "px wide behind a lenslet")
+        return found if board.radius else min(found, windows.behind(pitch))
 
     def sights(self, calibration: Calibration, margin: int) -> _Sights:
         """Lenslets that should show each corner with `margin` [px] around it."""

@@ -1,47 +1,45 @@
-r"""Light that lenslets spill into their neighbours' micro-images, and what it does to views.
+"""Light that lenslets spread and spill, and what it does to corners of boards.
 
-Behind each lenslet of a camera 1.0 stands a picture of the main lens' stop S, spread by diffraction at the
-lenslet's opening. At a way w from the middle of a micro-image is light from lenslets k beside it, which a
-view takes for its own lenslet's from direction w. So a part of each corner that it shows stands aside, and
-the corner is found aside. Main lens and lenslets act on the same waves: a point's image is as wide as λ over
-the stop's angle, and what spills comes from points that are imaged on lenslets' rims. The field of a point at
-c is
-
-.. math::
-    A(c) = \int S(u) e^{-i \pi \sigma u^2 / \lambda} e^{-2\pi i u c / \lambda}
-    \sum_k e^{i \pi (w - k)^2 / \lambda + 2\pi i u k / \lambda} \hat h(u - w + k) \,\mathrm{d}u
-
-with lengths in pitches, λ short for λ b/d², σ how far corners move from view to view, over the way, and ĥ the
-transform of a lenslet's opening. Rays put all the light at c = -σ w. Edges are found where
-`analysis.crossings` fits them to \|A\|²: what is farther aside than the edge is soft pulls no more.
+Behind each lenslet stands a picture of the main lens' stop, spread by diffraction at the lenslet's opening
+(`lumigraph.metric.waves`). At a way from the middle of a micro-image of a camera 1.0 is light from lenslets
+beside it, too, which a view takes for its own lenslet's from that direction. So a part of each corner that it
+shows stands aside, and the corner is found aside: a point's image is as wide as λ over the stop's angle, and
+what spills comes from points that are imaged on lenslets' rims. Edges are found where `analysis.crossings`
+fits them to the light: what is farther aside than the edge is soft pulls no more. In micro-images of a
+camera 2.0 corners are found outwards (`lumigraph.metric.rims`).
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
-from scipy.special import erf, j1
+from scipy.special import erf
 
 from lumigraph.core import checks
 from lumigraph.core.lattice import Lattice
+from lumigraph.metric import rims, windows
+from lumigraph.metric.waves import Waves
 
 GREEN = 550e-9
 """Wavelength where none is said [m]."""
 
-FAR, LEAST_ACROSS = 2, 8
-"""Neighbours to each side; and lenslets across which light is looked for, beside those that corners move."""
+LEAST_ACROSS = 8
+"""Lenslets across which light is looked for, beside those that corners move from view to view."""
 
 NARROW, _APART = 0.1, 1.1
 """λ b/d² below which it is computed for this, and ratio of those for which it is: what spills is proportional
 to it, within 4 % down to 0.015."""
 
-UNSURE = 0.15
-"""Of what is taken out, over itself: by wave optics, up to 0.009 of 0.065 is left from view to view."""
+_UNSURE, _UNSURE_BEHIND = 0.15, 0.2
+"""Of what is taken out, over itself: by wave optics, up to 0.009 of 0.065 is left from view to view, and up
+to 0.0006 of 0.0029 of the way in micro-images of a camera 2.0."""
 
 _WAYS, _SLOPES = 0.05, 0.5  # steps of ways [pitches] and of σ, between which it is interpolated
 _RIM, _STEEP = 0.5, 4.0  # ways and σ beyond which it is taken to be what it is there
+_SLOPES_BEHIND, _NARROW_BEHIND = (1.5, 8.0), 0.08  # of cameras 2.0: as `_STEEP`, and as `NARROW`
+_CLOSE = 0.02  # steps of the logarithm of λ b/d²
 _SOFT = 0.3  # pitches: blur of an edge over its sample, as in `analysis.crossings`
 _ROUNDS = 8
 
@@ -55,9 +53,12 @@ class Spill:
     lattice
         Of the micro-images [px].
     fill
-        Width of a micro-image over their pitch.
+        Width of a micro-image over their pitch, as white images show it.
     wavelength
         Of the light [m].
+    sharp
+        How far micro-images of a point in focus move, over the way from lenslet to lenslet; 0 of a camera
+        1.0.
 
     Raises
     ------
@@ -68,10 +69,16 @@ class Spill:
     lattice: Lattice
     fill: float
     wavelength: float
+    sharp: float = 0.0
 
     def __post_init__(self) -> None:
         checks.positive("wavelength", self.wavelength)
         checks.positive("fill", self.fill, "1")
+
+    @property
+    def unsure(self) -> float:
+        """How well it is known how far corners are moved, over that: one standard deviation."""
+        return _UNSURE_BEHIND if self.sharp else _UNSURE
 
     def aside(self, way: np.ndarray, slope: np.ndarray, width: float) -> np.ndarray:
         """How far (n, 2) [px] views at ways (n, 2) [px] show corners aside.
@@ -85,82 +92,80 @@ class Spill:
         width
             λ b/d over the micro-images' pitch: that of the light behind a lenslet d wide.
         """
-        (down, right), pitch = self.lattice.basis[0], self.lattice.pitch
-        axes = np.array([(down, right), (right, -down)]) / pitch  # along the lattice's rows, and across them
+        pitch, axes = self.lattice.pitch, self._axes()
         ways = np.clip(np.asarray(way) @ axes.T / pitch, -_RIM, _RIM)
         slope = np.clip(slope, -_STEEP, _STEEP)
         computed = max(NARROW, _APART ** round(math.log(max(width, NARROW), _APART)))
-        lenslets = tuple(map(tuple, (np.array(self.lattice.basis) @ axes.T / pitch).round(9).tolist()))
         table = _table(
-            _Waves(computed, self.fill, lenslets, self.lattice.layout == "square"),
+            self._waves(computed),
             math.ceil(float(np.abs(ways).max()) / _WAYS),
             (math.floor(slope.min()), math.floor(slope.max()) + 2),
         )  # fmt: skip
         return table(np.column_stack([ways, slope])) @ axes * pitch * (width / computed)
 
+    def outwards(self, way: np.ndarray, slope: np.ndarray, width: float) -> np.ndarray:
+        """How far (n, 2) [px] micro-images of a camera 2.0 show corners at ways (n, 2) [px] aside.
+
+        Parameters
+        ----------
+        way
+            From the micro-images' middles.
+        slope
+            (n,), how far a point moves over how far its micro-images do.
+        width
+            As of `aside`.
+        """
+        pitch, sign = self.lattice.pitch, float(np.sign(np.median(slope)))
+        steps = np.log(np.clip(sign * slope, *_SLOPES_BEHIND)) / math.log(rims.RATIO)
+        nodes = range(math.floor(steps.min()), math.floor(steps.max()) + 2)
+        computed = math.exp(_CLOSE * round(math.log(max(width, _NARROW_BEHIND)) / _CLOSE))
+        table = rims.outwards(
+            _filled(self._waves(computed)), round(pitch, 1), windows.behind(pitch),
+            tuple(sign * rims.RATIO**k for k in nodes),
+        )  # fmt: skip
+        size = np.hypot(*way.T)
+        far = np.clip(size, 0, table.grid[0][-1])
+        found = table(np.column_stack([far, steps * math.log(rims.RATIO)]))
+        return (found / np.maximum(size, 1e-9) * min(1.0, width / computed))[:, None] * way
+
+    def _axes(self) -> np.ndarray:
+        """Along the lattice's rows, and across them (2, 2)."""
+        down, right = self.lattice.basis[0]
+        return np.array([(down, right), (right, -down)]) / self.lattice.pitch
+
+    def _waves(self, width: float) -> Waves:
+        """Of a lattice whose rows run along the first axis."""
+        lenslets = (np.array(self.lattice.basis) @ self._axes().T / self.lattice.pitch).round(9).tolist()
+        return Waves(width, self.fill, tuple(map(tuple, lenslets)), self.sharp)
+
 
 @lru_cache(maxsize=16)
-def _table(waves: "_Waves", reach: int, slopes: tuple[int, int]) -> RegularGridInterpolator:
+def _filled(waves: Waves) -> Waves:
+    """With the stop whose micro-images are seen to fill as much as its own do."""
+    return replace(waves, fill=2 * waves.fill - waves.seen_fill())
+
+
+@lru_cache(maxsize=16)
+def _table(waves: Waves, reach: int, slopes: tuple[int, int]) -> RegularGridInterpolator:
     """What `_Waves.aside` gives, of ways up to so many steps and slopes from one to another."""
     line = np.arange(-max(reach, 2), max(reach, 2) + 1) * _WAYS
     moved = np.arange(slopes[0], slopes[1] + _SLOPES / 2, _SLOPES)
     ways = np.stack(np.meshgrid(line, line, indexing="ij"), -1).reshape(-1, 2)
-    half = np.array([waves.aside(way, moved) for way in ways[: len(ways) // 2 + 1]])
+    half = np.array([_views(waves, way, moved) for way in ways[: len(ways) // 2 + 1]])
     found = np.concatenate([half, -half[-2::-1]])  # lenslets on the other side spill the other way
     return RegularGridInterpolator((line, line, moved), found.reshape(len(line), len(line), -1, 2), "cubic")
 
 
-@dataclass(frozen=True, slots=True)
-class _Waves:
-    """Light of points before neighbouring lenslets, on a lattice of a basis; all lengths in pitches."""
-
-    width: float
-    fill: float
-    basis: tuple[tuple[float, ...], ...]
-    square: bool
-
-    def aside(self, way: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-        """(slopes, 2) Where one view shows corners that move by slopes (m,)."""
-        found = []
-        across = LEAST_ACROSS + math.ceil(np.abs(slopes).max())
-        u = self.directions(across)
-        field = self.opened(u, way)
-        for slope in slopes:
-            light, at = self.light(u, field, slope)
-            found.append([_edge(light.sum(1 - k), at + slope * way[k]) for k in (0, 1)])
-        return -np.array(found)
-
-    def directions(self, across: int) -> np.ndarray:
-        """(y, x, 2) So close that light is told over so many lenslets."""
-        step = self.width / across
-        half = int(self.fill / 2 / step) + 1
-        line = np.arange(-half, half + 1) * step
-        return np.stack(np.meshgrid(line, line, indexing="ij"), -1)
-
-    def light(self, u: np.ndarray, field: np.ndarray, slope: float) -> tuple[np.ndarray, np.ndarray]:
-        """Of points (y, x), and where they are along either axis, by fields in directions u."""
-        step, distance = float(u[1, 0, 0] - u[0, 0, 0]), np.hypot(u[..., 0], u[..., 1])
-        stop = np.clip((self.fill / 2 - distance) / step + 0.5, 0, 1)
-        count = 2 * len(u)
-        bent = stop * field * np.exp(-1j * np.pi * slope * distance**2 / self.width)
-        light = np.fft.fftshift(np.abs(np.fft.fft2(bent, (count, count))) ** 2)
-        return light, (np.arange(count) - count // 2) * self.width / step / count
-
-    def opened(self, u: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """Transform of all lenslets' fields in one view, at directions (y, x, 2)."""
-        total: np.ndarray = np.zeros(u.shape[:2], complex)
-        steps = np.arange(-FAR, FAR + 1)
-        for k in np.stack(np.meshgrid(steps, steps), -1).reshape(-1, 2) @ np.array(self.basis):
-            phase = np.pi * ((way - k) ** 2).sum() + 2 * np.pi * u @ k
-            total += np.exp(1j * phase / self.width) * self.opening((u - way + k) / self.width)
-        return total
-
-    def opening(self, frequency: np.ndarray) -> np.ndarray:
-        """Transform of one lenslet: a square, or a disc of the same area for hexagons."""
-        if self.square:
-            return np.sinc(frequency).prod(-1)
-        radius = 2 * math.sqrt(np.pi) * np.maximum(np.hypot(*np.moveaxis(frequency, -1, 0)), 1e-9)
-        return 2 * j1(radius) / radius
+def _views(waves: Waves, way: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """(slopes, 2) Where one view shows corners that move by slopes (m,)."""
+    found = []
+    across = LEAST_ACROSS + math.ceil(np.abs(slopes).max())
+    u = waves.directions(across)
+    field = waves.opened(u, way)
+    for slope in slopes:
+        light, at = waves.light(u, field, slope)
+        found.append([_edge(light.sum(1 - k), at + slope * way[k]) for k in (0, 1)])
+    return -np.array(found)
 
 
 def _edge(light: np.ndarray, at: np.ndarray) -> float:

@@ -12,7 +12,6 @@ from lumigraph.errors import CalibrationError
 from lumigraph.metric import geometry
 from lumigraph.metric.calibration import Measured
 from lumigraph.metric.corners import Corners
-from lumigraph.metric.spill import UNSURE
 from lumigraph.metric.start import Virtual, lines
 
 
@@ -59,8 +58,8 @@ def triangulate(
     kind
         Of the lenslets, (n,) or one for all.
     in_views
-        Whether the point was found in views of a camera 1.0: see `Corners`. Light that lenslets spill is
-        allowed for as it was for the camera (`Measured.spill`).
+        Whether the point was found in views of a camera 1.0: see `Corners`. Light that lenslets spread and
+        spill is allowed for as it was for the camera (`Measured.spill`), as it moves a corner.
 
     Raises
     ------
@@ -75,11 +74,13 @@ def triangulate(
     checks.finite_array("place", place, CalibrationError)
     checks.finite_array("center", center, CalibrationError)
     kinds = np.broadcast_to(np.asarray(kind), len(place))
-    camera, noise, aside = measured.camera, measured.noise, np.zeros_like(place)
-    if in_views and measured.spill is not None:
+    camera, noise, unsure = measured.camera, measured.noise, np.zeros_like(place)
+    if measured.spill is not None:
         one = np.zeros(len(place), int)
-        cleared = Corners(one, one, place, center, kinds, in_views=True, spill=measured.spill).cleared(camera)
-        aside, place, center = center - cleared.center, cleared.place, cleared.center
+        seen = Corners(one, one, place, center, kinds, in_views=in_views, spill=measured.spill)
+        cleared = seen.cleared(camera)
+        unsure = measured.spill.unsure * (place - cleared.place)
+        place, center = cleared.place, cleared.center
     start = _first(measured, place, center, in_views)
     blur = None if in_views else geometry.magnification(camera.numbers, np.full(len(place), start[0]))
     own = noise.each(kinds, blur)[:, None]
@@ -109,7 +110,7 @@ def triangulate(
     )
     # What all places of a point share moves them together, along either axis.
     together = noise.shared * inverse @ np.kron(1 / own, np.eye(2))
-    spilt = UNSURE * inverse @ (aside / own).reshape(-1, 1)
+    spilt = inverse @ (unsure / own).reshape(-1, 1)
     covariance = inverse @ inverse.T + together @ together.T + spilt @ spilt.T
     covariance = covariance + sway @ measured.covariance @ sway.T
     return Triangulated(found.x, covariance, float(np.sqrt(np.mean(misfit(camera.numbers, found.x) ** 2))))

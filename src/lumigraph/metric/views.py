@@ -49,7 +49,7 @@ def on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: int
     which, way = which[near], way[near]
     first = _board(data[count // 2, count // 2], board, f"the middle view of picture {frame}")
     known = np.flatnonzero(np.isfinite(first[:, 0]))
-    radius = windows.radius(first[known], board, frame, "samples of a view wide")
+    radius = windows.radius(windows.ways(first[known]), board, frame, "samples of a view wide")
     track = _Track.of(first[known], radius, len(way), dots=board.radius > 0)
     for k in np.argsort(np.hypot(*way.T), kind="stable"):
         track.follow(data[tuple(which[k])], way, int(k))

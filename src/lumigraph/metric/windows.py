@@ -1,12 +1,15 @@
 """Windows about corners and dots, in which they are looked for."""
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from lumigraph.errors import CalibrationError
-from lumigraph.metric.corners import Board
+
+if TYPE_CHECKING:
+    from lumigraph.metric.corners import Board
 
 _PART = 0.42
 """Half the window about a corner, over the way to the nearest other one: no window holds two."""
@@ -20,31 +23,45 @@ LEAST_SQUARE = 5.7
 """Of a board behind a lenslet [px], or in a view [samples]: squares, or the way between dots."""
 
 
+NARROW = 0.1
+"""Half the window about a corner behind a lenslet, over the pitch: wide windows fit into few micro-images."""
+
+
+def behind(pitch: float) -> int:
+    """Radius of the window about corners of large squares in micro-images of a pitch [px]."""
+    return max(LEAST, round(pitch * NARROW))
+
+
+def ways(places: np.ndarray) -> np.ndarray:
+    """(n,) From each of n places (n, 2) to the nearest other one, n at least 2."""
+    return np.asarray(KDTree(places).query(places, 2)[0])[:, 1]
+
+
 def nearest(places: np.ndarray) -> float:
     """Least way between any two of n places (n, 2), n at least 2."""
-    return float(np.asarray(KDTree(places).query(places, 2)[0])[:, 1].min())
+    return float(ways(places).min())
 
 
-def radius(places: np.ndarray, board: Board, frame: int, where: str) -> int:
-    """Of the windows about places (n, 2) of a board [px].
+def radius(ways: np.ndarray, board: "Board", frame: int, where: str) -> int:
+    """Of the windows about places of a board, by the way from each to the nearest (n,) [px].
 
     Raises
     ------
     CalibrationError
         Places so close to each other that a window would hold two.
     """
-    apart = nearest(places)
+    apart = float(ways.min())
     if apart < LEAST_SQUARE:
         raise CalibrationError(
             f"on picture {frame} the squares, or ways between dots, are {apart:.3g} {where}, but "
             f"{LEAST_SQUARE:.2g} are needed. Use a board with larger ones, or bring it nearer."
         )
     if board.radius:
-        return max(LEAST, math.ceil(apart * board.radius / nearest(board.points()[:, 1:]) + _RIM))
+        return max(LEAST, round(apart * board.radius / nearest(board.points()[:, 1:]) + _RIM))
     return max(LEAST, min(_MOST, int(apart * _PART), int(apart * _free(board))))
 
 
-def _free(board: Board) -> float:
+def _free(board: "Board") -> float:
     """Way from a corner to the nearest marker, whose dark rim would pull at it, over the squares' width."""
     if board.pattern != "charuco" or board.size is None:
         return 1.0

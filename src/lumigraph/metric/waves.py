@@ -1,0 +1,120 @@
+r"""Waves of a point that lenslets spread over their own micro-image and their neighbours'.
+
+Main lens and lenslets act on the same waves. Of a point at c, what stands at a way w from the middle of a
+micro-image is
+
+.. math::
+    A(c) = \int S(u) e^{-i \pi \sigma u^2 / \lambda} e^{-2\pi i u c / \lambda}
+    \sum_k e^{i \pi (w - k)^2 / \lambda + 2\pi i u k / \lambda} \hat h(u - w + k) \,\mathrm{d}u
+
+over the main lens' stop S, with lengths in pitches, λ short for λ b/d², k the lenslets, and ĥ the transform
+of the field behind a lenslet, which reaches to its neighbours. That is flat where a point at infinity is in
+focus; where one is whose micro-images move by s of the way from lenslet to lenslet, it is curved by π s t²/λ.
+Rays put all the light at c = -σ w.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+FAR = 2
+"""Neighbours to each side."""
+
+_ACROSS = 12  # lenslets over which the light of all points is added up
+_FINE, _SPAN = 96, 1.2  # steps over a lenslet and a bit, and how far they reach [pitches]
+
+
+@dataclass(frozen=True, slots=True)
+class Waves:
+    """Light of points before neighbouring lenslets that fill a lattice; all lengths in pitches.
+
+    Parameters
+    ----------
+    width
+        λ b/d².
+    fill
+        Width of a micro-image.
+    basis
+        Of the lattice of lenslets.
+    sharp
+        How far micro-images of a point that is in focus move, over the way from lenslet to lenslet: 0 behind
+        lenslets that are in focus at infinity.
+    """
+
+    width: float
+    fill: float
+    basis: tuple[tuple[float, ...], ...]
+    sharp: float = 0.0
+
+    def directions(self, across: int) -> np.ndarray:
+        """(y, x, 2) So close that light is told over so many lenslets."""
+        step = self.width / across
+        half = int(self.fill / 2 / step) + 1
+        line = np.arange(-half, half + 1) * step
+        return np.stack(np.meshgrid(line, line, indexing="ij"), -1)
+
+    def light(self, u: np.ndarray, field: np.ndarray, slope: float) -> tuple[np.ndarray, np.ndarray]:
+        """Of points (..., y, x), and where they are along either axis, by fields in directions u."""
+        step, count = float(u[1, 0, 0] - u[0, 0, 0]), 2 * len(u)
+        bent = self.stop(u) * field * np.exp(-1j * np.pi * slope / self.width * (u**2).sum(-1))
+        light = np.fft.fftshift(np.abs(np.fft.fft2(bent, (count, count))) ** 2, (-2, -1))
+        return light, (np.arange(count) - count // 2) * self.width / step / count
+
+    def opened(self, u: np.ndarray, way: np.ndarray, far: int = FAR) -> np.ndarray:
+        """Transform of all lenslets' fields at one way, at directions (y, x, 2)."""
+        total: np.ndarray = np.zeros(u.shape[:2], complex)
+        (t, field), line, steps = _opening(self), u[:, 0, 0], np.arange(-far, far + 1)
+        lenslets = np.stack(np.meshgrid(steps, steps), -1).reshape(-1, 2) @ np.array(self.basis)
+
+        def turned(axis: int) -> dict[float, np.ndarray]:
+            at = {k: line - way[axis] + k for k in set(lenslets[:, axis].tolist())}
+            return {k: np.exp(-2j * np.pi / self.width * np.outer(one, t)) for k, one in at.items()}
+
+        down = {k: one @ field for k, one in turned(0).items()}
+        right = {k: one.T for k, one in turned(1).items()}
+        for k in lenslets:
+            phase = np.pi * ((way - k) ** 2).sum() + 2 * np.pi * u @ k
+            total += np.exp(1j * phase / self.width) * (down[k[0]] @ right[k[1]])
+        return total
+
+    def stop(self, u: np.ndarray) -> np.ndarray:
+        """The part of each cell about directions (y, x, 2) that is open."""
+        step, distance = float(u[1, 0, 0] - u[0, 0, 0]), np.hypot(u[..., 0], u[..., 1])
+        return np.clip((self.fill / 2 - distance) / step + 0.5, 0, 1)
+
+    def white(self, way: np.ndarray) -> float:
+        """Light at a way of all points alike."""
+        u = self.directions(_ACROSS)
+        return float((self.stop(u) * np.abs(self.opened(u, way, 1)) ** 2).mean())
+
+    def seen_fill(self) -> float:
+        """Width where white micro-images are half as bright as between the darkest and the middle.
+
+        That is what a white image's `Calibration.fill` is measured by.
+        """
+        rim, basis = self.fill / 2 + np.linspace(-0.08, 0.08, 9), np.array(self.basis)
+        darkest = basis.sum(0) / (2 if abs(basis[0] @ basis[1]) < 0.1 else 3)
+        half = (self.white(np.zeros(2)) + self.white(darkest)) / 2
+        across = np.array([(-basis[0, 1], basis[0, 0]), basis[0]]) / math.hypot(*basis[0])
+        seen = [[self.white(way * axis) for way in rim] for axis in across]
+        return 2 * float(np.mean([np.interp(-half, -np.array(line), rim) for line in seen]))
+
+
+@lru_cache(maxsize=4)
+def _opening(waves: Waves) -> tuple[np.ndarray, np.ndarray]:
+    """Steps along either axis over a lenslet (n,), and its field (n, n), curved by what is sharp."""
+    t = ((np.arange(_FINE) + 0.5) / _FINE - 0.5) * _SPAN
+    at = np.stack(np.meshgrid(t, t, indexing="ij"), -1)
+    field = np.exp(-1j * np.pi * waves.sharp / waves.width * (at**2).sum(-1)) * (t[1] - t[0]) ** 2
+    for k in _around(waves.basis):  # no part of it is nearer to another lenslet's middle
+        short = math.hypot(*k) / 2 - at @ k / math.hypot(*k)
+        field *= np.clip(short / (t[1] - t[0]) + 0.5, 0, 1)
+    return t, field
+
+
+def _around(basis: tuple[tuple[float, ...], ...]) -> np.ndarray:
+    """Ways (8, 2) to neighbours, of which the nearest bound a lenslet."""
+    steps = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), -1).reshape(-1, 2)
+    return steps[steps.any(1)] @ np.array(basis)
