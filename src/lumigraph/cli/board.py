@@ -53,8 +53,9 @@ class Known:
     micro_image_pitch
         Pixels between micro-images, for a table of corners; of raw images it is measured.
     wavelength
-        Of the light, such as '532 nm', for raw images of a camera 1.0: what its lenslets spill into their
-        neighbours' micro-images is allowed for. That of --camera, or 550 nm, if left out.
+        Of the light, such as '532 nm', for raw images: what lenslets of a camera 1.0 spill into their
+        neighbours' micro-images, and how far outwards those of a camera 2.0 show corners, is allowed for.
+        That of --camera, or 550 nm, if left out.
     """
 
     focal_length: str | None = None

@@ -14,7 +14,7 @@ from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
 from lumigraph.depth.correlation import of_signs
 from lumigraph.errors import CalibrationError
-from lumigraph.metric import chessboard, views, windows
+from lumigraph.metric import chessboard, rims, views, windows
 from lumigraph.metric.corners import Board, Corners
 from lumigraph.metric.spill import GREEN, Spill
 from lumigraph.preparation import of_raw
@@ -146,7 +146,7 @@ def _sights(
     return lines, sights[lines.clear(sights, calibration, radius)]
 
 
-def clear_radius(calibration: Calibration, ratio: np.ndarray, margin: float = windows.LEAST) -> np.ndarray:
+def clear_radius(calibration: Calibration, ratio: np.ndarray, margin: float = rims.LEAST) -> np.ndarray:
     """How far from a micro-image's centre corners (n,) may be so that its rim does not pull at them [px].
 
     The beam of a lenslet is `ratio` times as wide on the micro-image. Where the stop cuts it, light falls off
@@ -156,7 +156,7 @@ def clear_radius(calibration: Calibration, ratio: np.ndarray, margin: float = wi
     return lit_radius(calibration, margin) + 2 - np.maximum(2.0, dim + 0.5)
 
 
-def lit_radius(calibration: Calibration, margin: float = windows.LEAST) -> float:
+def lit_radius(calibration: Calibration, margin: float = rims.LEAST) -> float:
     """How far from a micro-image's centre a corner may be, with `margin` of light around it [px]."""
     return (calibration.fill or 1.0) * calibration.lattice.pitch / 2 - margin - 2
 
@@ -210,7 +210,7 @@ class _Lines:
         """Radius of the window about a corner behind a lenslet [px]."""
         ways = windows.ways(self.places) * np.abs(self.ratio)
         found = windows.radius(ways, board, frame, "px wide behind a lenslet")
-        return found if board.radius else min(found, windows.behind(pitch))
+        return found if board.radius else min(found, rims.window(pitch))
 
     def sights(self, calibration: Calibration, margin: int) -> _Sights:
         """Lenslets that should show each corner with `margin` [px] around it."""

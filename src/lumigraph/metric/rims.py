@@ -17,6 +17,10 @@ from lumigraph.analysis.crossings import crossed
 from lumigraph.analysis.saddles import disc
 from lumigraph.metric.waves import Waves
 
+LEAST, _NARROW = 2, 0.1
+"""Half the window about a corner behind a lenslet, at least [px], and over the pitch: wide windows fit into
+few micro-images."""
+
 MARGIN = 3.0
 """Between the farthest corner and a micro-image's rim [px]."""
 
@@ -29,8 +33,13 @@ _FAR = 1  # neighbours whose light counts
 _REACH = 7  # px: from a pixel to the farthest places whose light it is told
 
 
+def window(pitch: float) -> int:
+    """Radius of the window about corners of large squares in micro-images of a pitch [px]."""
+    return max(LEAST, round(pitch * _NARROW))
+
+
 @lru_cache(maxsize=16)
-def outwards(waves: Waves, pitch: float, radius: int, slopes: tuple[float, ...]) -> RegularGridInterpolator:
+def outwards(waves: Waves, pitch: float, slopes: tuple[float, ...]) -> RegularGridInterpolator:
     """How far [px] corners are found outwards, over the way from the middle [px] and the logarithm of slopes.
 
     Parameters
@@ -39,13 +48,11 @@ def outwards(waves: Waves, pitch: float, radius: int, slopes: tuple[float, ...])
         Of points behind the lenslets.
     pitch
         Of the micro-images [px].
-    radius
-        Of the window about corners [px].
     slopes
         How far a point moves over how far its micro-images do: of one sign, two or more, ascending in size.
     """
     count = max(2, math.ceil(_STEP * max(0.0, waves.fill * pitch / 2 - MARGIN)) + 1)
-    ways = np.arange(count) / _STEP
+    ways, radius = np.arange(count) / _STEP, window(pitch)
     found = sum(_along(direction, waves, pitch, radius, slopes, ways) for direction in _directions(waves))
     mean = found / (len(list(_directions(waves))) * len(_TURNS))
     return RegularGridInterpolator((ways, np.log(np.abs(slopes))), mean)

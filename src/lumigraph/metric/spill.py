@@ -19,7 +19,7 @@ from scipy.special import erf
 
 from lumigraph.core import checks
 from lumigraph.core.lattice import Lattice
-from lumigraph.metric import rims, windows
+from lumigraph.metric import rims
 from lumigraph.metric.waves import Waves
 
 GREEN = 550e-9
@@ -120,7 +120,7 @@ class Spill:
         nodes = range(math.floor(steps.min()), math.floor(steps.max()) + 2)
         computed = math.exp(_CLOSE * round(math.log(max(width, _NARROW_BEHIND)) / _CLOSE))
         table = rims.outwards(
-            _filled(self._waves(computed)), round(pitch, 1), windows.behind(pitch),
+            _filled(self._waves(computed)), round(pitch, 1),
             tuple(sign * rims.RATIO**k for k in nodes),
         )  # fmt: skip
         size = np.hypot(*way.T)

@@ -1,15 +1,13 @@
 """Windows about corners and dots, in which they are looked for."""
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from lumigraph.errors import CalibrationError
-
-if TYPE_CHECKING:
-    from lumigraph.metric.corners import Board
+from lumigraph.metric.corners import Board
+from lumigraph.metric.rims import LEAST
 
 _PART = 0.42
 """Half the window about a corner, over the way to the nearest other one: no window holds two."""
@@ -17,19 +15,10 @@ _PART = 0.42
 _RIM = 0.5
 """By how much a window is wider than a dot [px]: it holds the edge, and fits into most micro-images."""
 
-LEAST, _MOST = 2, 6  # px, of those about corners
+_MOST = 6  # px, of those about corners
 
 LEAST_SQUARE = 5.7
 """Of a board behind a lenslet [px], or in a view [samples]: squares, or the way between dots."""
-
-
-NARROW = 0.1
-"""Half the window about a corner behind a lenslet, over the pitch: wide windows fit into few micro-images."""
-
-
-def behind(pitch: float) -> int:
-    """Radius of the window about corners of large squares in micro-images of a pitch [px]."""
-    return max(LEAST, round(pitch * NARROW))
 
 
 def ways(places: np.ndarray) -> np.ndarray:
@@ -42,7 +31,7 @@ def nearest(places: np.ndarray) -> float:
     return float(ways(places).min())
 
 
-def radius(ways: np.ndarray, board: "Board", frame: int, where: str) -> int:
+def radius(ways: np.ndarray, board: Board, frame: int, where: str) -> int:
     """Of the windows about places of a board, by the way from each to the nearest (n,) [px].
 
     Raises
@@ -61,7 +50,7 @@ def radius(ways: np.ndarray, board: "Board", frame: int, where: str) -> int:
     return max(LEAST, min(_MOST, int(apart * _PART), int(apart * _free(board))))
 
 
-def _free(board: "Board") -> float:
+def _free(board: Board) -> float:
     """Way from a corner to the nearest marker, whose dark rim would pull at it, over the squares' width."""
     if board.pattern != "charuco" or board.size is None:
         return 1.0
