@@ -210,10 +210,10 @@ def test_dots_too_close_to_each_other_are_refused():
 
 
 def test_squares_are_as_wide_behind_a_lenslet_as_each_ones_patch_says() -> None:
-    """Of a board that leans, far from the picture's corner: patches there add nothing to its squares."""
-    rows = np.mgrid[0:4, 0:4].reshape(2, -1).T * 40.0 + 600
-    lines = finding._Lines(np.arange(16), rows, np.linspace(0.30, 0.15, 16))
-    assert lines.window(40.0, Board((4, 4), 1e-3), 0) == 2
+    """Of a board that leans, far from the picture's corner: patches there take nothing from its squares."""
+    places = np.mgrid[0:4, 0:4].reshape(2, -1).T * 40.0 + (600, 0)
+    lines = finding._Lines(np.arange(16), places, 180 / places[:, 0])
+    assert lines.window(40.0, Board((4, 4), 1e-3), 0) == 4
 
 
 def test_a_camera_measured_by_dots_survives_its_file_and_says_how_wide_they_were_taken(tmp_path):
