@@ -140,7 +140,7 @@ def test_the_best_bound_carries_the_error_of_its_derivatives():
     camera = lg.load_camera(CAMERA).replace(main_lens={"diameter": "3 mm"}, model="exact")
     goal, first = Goal("lateral", depths=(2e-3,), light=Light(5000), places=1), collected(camera)
     rough = goal.values(camera, first)
-    value, error, over_depths = goal.checked(camera, first, rough)
+    value, error, over_depths, _ = goal.checked(camera, first, rough)
     again = lg.information.bounds(camera, (2e-3,), Light(5000), places=range(1, 5))
     assert value == pytest.approx(again.lateral, rel=1e-9)
     assert over_depths == pytest.approx(again.of("lateral"), rel=1e-9)
@@ -150,7 +150,7 @@ def test_the_best_bound_carries_the_error_of_its_derivatives():
     assert (
         exact.checked["best"]
         == exact.checked["swept"]
-        == (pytest.approx(exact.best["depth"], rel=1e-2), ANY, ANY)
+        == (pytest.approx(exact.best["depth"], rel=1e-2), ANY, ANY, ANY)
     )
     assert exact.best["fourier_lens"] == "75 mm"
     shown = dataclasses.replace(exact, checked={"best": Judged(8e-8, 0.25, np.zeros(1))}).quantities()
@@ -191,7 +191,7 @@ def test_a_search_starts_from_the_camera_given_too(monkeypatch):
         return {"depth": 1 + min((f - 100) ** 2 + 1, (f - 77) ** 2 / 4), "places": 2}
 
     monkeypatch.setattr(Goal, "values", two_valleys)
-    monkeypatch.setattr(Goal, "checked", lambda *given: (given[-1]["depth"], 0.0))
+    monkeypatch.setattr(Goal, "checked", lambda *given: Judged(given[-1]["depth"], 0.0, np.zeros(2)))
     found = lg.optimise(scope, {"fourier_lens": "50 mm:100 mm:2"}, depths=DEPTHS, evaluations=40)
     assert found.swept["fourier_lens"] == "100 mm"
     assert found.camera.fourier_lens == pytest.approx(77e-3, rel=2e-3)
@@ -214,13 +214,48 @@ def test_a_cameras_own_values_are_known_within_ranges(vary, own):
 
 
 def test_two_better_ones_beside_the_best_are_said(recwarn):
-    rows = {"depth": 1.0, "places": 2}
+    rows, values = {"depth": 1.0, "places": 2}, {"start": 0.9, "swept": 2.0, "best": 1.0}
     found = Optimum(
         Goal("depth"), lg.load_camera(SCOPE), {**rows, "depth": 3.0}, {**rows, "depth": 2.0}, rows, {}, [],
-        {"start": (0.9, 0.0), "swept": (2.0, 0.0), "best": (1.0, 0.0)},
+        {which: Judged(value, 0.0, np.zeros(1)) for which, value in values.items()},
     )  # fmt: skip
     _warn_of_luck(found)
     assert [str(one.message).split(" has")[0] for one in recwarn] == ["the camera as given"]
+
+
+@pytest.mark.parametrize(
+    ("best", "swept", "said"),
+    [
+        ((1.0, 0.9), (1.5, 0.8), []),  # better half-way, worse in all
+        ((1.0, 0.9), (1.01, 0.5), ["half-way between the depths the best of the first values"]),
+        ((1.0, 1.02), (2.0, 2.0), []),
+        ((1.0, 1.2), (2.0, 2.0), ["the depth bound of the best is 1 m over the depths"]),
+        ((1.0, math.nan), (1.5, math.nan), []),
+    ],
+)
+def test_a_bound_that_is_worse_between_its_depths_is_warned_of(best, swept, said, recwarn):
+    rows = {"depth": 1.0, "places": 2}
+    known = {
+        which: Judged(value, 0.0, np.zeros(2), between)
+        for which, (value, between) in (("swept", swept), ("best", best))
+    }
+    found = Optimum(Goal("depth"), lg.load_camera(SCOPE), rows, {**rows, "depth": 2.0}, rows, {}, [], known)
+    _warn_of_luck(found)
+    told = [str(one.message) for one in recwarn]
+    assert len(told) == len(said)
+    for words, begun in zip(told, said, strict=True):
+        assert words.startswith(begun)
+        assert words.endswith("Search again with more depths.")
+
+
+def test_a_bound_is_judged_half_way_between_its_depths():
+    scope, light = lg.load_camera(SCOPE), Light(5000)
+    goal = Goal("depth", depths=(20e-6, -20e-6, 4e-6), light=light, places=2)
+    judged = goal.checked(scope, collected(scope), goal.values(scope, collected(scope)))
+    there = lg.information.bounds(scope, [-8e-6, 12e-6], light, places=range(2, 6))
+    assert judged.between == pytest.approx(there.depth, rel=1e-9)
+    one = dataclasses.replace(goal, depths=(4e-6,))
+    assert math.isnan(one.checked(scope, collected(scope), one.values(scope, collected(scope))).between)
 
 
 def test_more_aperture_collects_more_of_the_same_points_light():
@@ -303,6 +338,7 @@ def test_the_verb_writes_a_camera_and_says_before_and_after(tmp_path, capsys):
     )  # lengths have a unit that suits
     assert "as given" in said
     assert "fourier_lens = " in said
+    assert "half-way between the depths the best bound is " in " ".join(said.split())
     assert main([*words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     camera = lg.load_camera(best)
@@ -312,7 +348,7 @@ def test_the_verb_writes_a_camera_and_says_before_and_after(tmp_path, capsys):
 
 
 def test_gradients_move_single_lenslets_where_a_simplex_stalls():
-    """Twelve keys, 14 cameras: lenslets leave the lattice, and the bound falls as slopes say."""
+    """Twelve keys, 14 cameras: the bound falls as slopes say, at the two depths and not between them."""
     start = lg.load_camera(SCOPE).replace(
         fourier_lens="76 mm",
         lenslets={
@@ -325,7 +361,9 @@ def test_gradients_move_single_lenslets_where_a_simplex_stalls():
     for n in (1, 2, 3, 4):
         vary |= {f"lenslets.single.{n}.offset_{axis}": "-200 um:200 um:1" for axis in "yx"}
     goal = Goal("depth", depths=(-24e-6, 24e-6), light=Light(5000), places=2)
-    found = lg.optimise(start, vary, goal, search="gradient", evaluations=12)
+    with pytest.warns(SamplingWarning, match="half-way between"):
+        found = lg.optimise(start, vary, goal, search="gradient", evaluations=12)
+    assert found.checked["best"].between > 2 * found.checked["best"].value
     simplex = lg.optimise(start, vary, goal, search="local", evaluations=12)
     assert len(found.rows) <= 14
     assert found.gain(found.start) > 0.2

@@ -1,5 +1,6 @@
 """`lumigraph optimise`: the camera that reaches a goal best, of all that can be made."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -174,7 +175,7 @@ def _changed(found: "Optimum") -> dict[str, Any]:
 
 def _notes(found: "Optimum") -> Iterator[str]:
     if "best" in found.checked:
-        best, error, _ = found.checked["best"]
+        best, error, *_ = found.checked["best"]
         beside = ", ".join(
             f"{words} {found.goal.told(found.checked[which].value)}"
             for which, words in NAMES.items()
@@ -185,6 +186,8 @@ def _notes(found: "Optimum") -> Iterator[str]:
             f"is {found.goal.told(best)} within {error:.1%} "
             f"(searched: {found.goal.told(found.best[found.goal.name])}), {beside}"
         )
+        if math.isfinite(found.checked["best"].between):
+            yield f"half-way between the depths the best bound is {_between(found)}"
     if found.gain(found.start) < 0:
         yield "the camera as given is better than all of these: give other ranges"
     if found.active:
@@ -193,6 +196,13 @@ def _notes(found: "Optimum") -> Iterator[str]:
     bad = [row["error"] for row in found.rows if "error" in row]
     if bad:
         yield f"{len(bad)} of {len(found.rows)} cameras cannot be, such as: {bad[0]}"
+
+
+def _between(found: "Optimum") -> str:
+    """Of the best, and of those before it."""
+    names = {"best": "", **{which: f"{words} " for which, words in NAMES.items()}}
+    some = {words: found.checked[which].between for which, words in names.items() if which in found.checked}
+    return ", ".join(f"{words}{found.goal.told(value)}" for words, value in some.items())
 
 
 def _figures(found: "Optimum", given: "Instrument") -> Iterator[Figure]:
@@ -273,8 +283,6 @@ def _scaled(goal: "Goal", values: list[float]) -> tuple[list[float], str]:
 
 def _search(found: "Optimum") -> Iterator[Figure]:
     """The best so far over the cameras in turn."""
-    import math
-
     from lumigraph import plots
     from lumigraph.optimisation.goals import BOUNDS
     from lumigraph.plots.axes import length_unit

@@ -35,7 +35,7 @@ OTHERS = 4
 
 
 class Judged(NamedTuple):
-    """A bound at other places than those of a search.
+    """A bound at other places and depths than those of a search.
 
     Parameters
     ----------
@@ -45,11 +45,14 @@ class Judged(NamedTuple):
         Relative: of the derivatives, or what places and steps change of the bound where that is more.
     over_depths
         The bound at each depth (nz,); infinite where it is not told.
+    between
+        The bound half-way between neighbouring depths, rms, at the other places; NaN of one depth.
     """
 
     value: float
     error: float
     over_depths: np.ndarray
+    between: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +189,7 @@ class Goal:
         require_slopes(instrument)
 
     def checked(self, instrument: Instrument, first: float, rough: Mapping[str, Any]) -> Judged:
-        """A bound at other places, by derivatives of two steps.
+        """A bound at other places, by derivatives of two steps, and half-way between the depths.
 
         Parameters
         ----------
@@ -200,7 +203,14 @@ class Goal:
         found = bounds(instrument, self.depths, light, places=others)
         value = float(getattr(found, self.name))
         error = max(float(np.max(found.errors)), abs(rough[self.name] / value - 1))
-        return Judged(value, error, found.of(self.name))
+        return Judged(value, error, found.of(self.name), self._between(instrument, light, others))
+
+    def _between(self, instrument: Instrument, light: Light, places: range) -> float:
+        depths = np.unique(self.depths)
+        if len(depths) < 2:
+            return math.nan
+        found = bounds(instrument, (depths[1:] + depths[:-1]) / 2, light, places=places, checked=False)
+        return float(getattr(found, self.name))
 
     def _light(self, instrument: Instrument, first: float) -> Light:
         return Light(self.light.photons * collected(instrument) / first, self.light.background)

@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from os import PathLike
@@ -28,7 +28,10 @@ MOST = 100_000
 """Evaluations."""
 
 LUCK = 0.03
-"""Part of a bound, better where it was searched than at other places, that is warned of."""
+"""Part of a bound, better where it was searched than at other places or depths, that is warned of."""
+
+BEFORE = {"start": "the camera as given", "swept": "the best of the first values"}
+"""Cameras beside the best, in words."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +53,7 @@ class Optimum:
     checked
         Of bounds: by "start", "swept" and "best", the bound at other places than those of the search, by
         derivatives of two steps where they are not exact, its relative error, at least what it differs
-        by from the searched one, and the bound over depth. Empty of other goals.
+        by from the searched one, the bound over depth, and half-way between the depths. Empty of other goals.
     against
         The goal that was weighed against it; None for none.
     front
@@ -112,7 +115,8 @@ def optimise(
     ("gradient"): each step takes the time of some five cameras, however many keys vary, such as the places
     of single lenslets. Values of a stock stay as the combination has them.
     What no camera can be is left out, with its reason. Bounds are judged at other places than those of the
-    search, for where pixels are coarse a search finds the places' luck.
+    search, for where pixels are coarse a search finds the places' luck, and half-way between its depths,
+    for lenslets may be sharp at these alone.
 
     Parameters
     ----------
@@ -154,7 +158,8 @@ def optimise(
     Warns
     -----
     SamplingWarning
-        At other places the best bound is larger by more than 3 %, or others are better than it.
+        At other places, or half-way between the depths, the best bound is larger by more than 3 %, or others
+        are better than it.
 
     Examples
     --------
@@ -255,26 +260,45 @@ def _elsewhere(cameras: Evaluations, items: Mapping[str, Mapping[str, Any]]) -> 
 
 
 def _warn_of_luck(found: Optimum) -> None:
-    """Say where a bound is of the places at which it was searched, not of the camera."""
+    """Say where a bound is of the places or depths at which it was searched, not of the camera."""
     if "best" not in found.checked:
         return
     name, told = found.goal.name, found.goal.told
-    here, (there, *_) = found.best[name], found.checked["best"]
-    said = []
+    here, there = found.best[name], found.checked["best"].value
+    said = list(_luck_of_depths(found))
     if there > here * (1 + LUCK):
         said.append(
             f"the {name} bound of the best is {told(here)} at the {found.best[PLACES]} places a depth "
             f"where it was searched, but {told(there)} at others: {there / here - 1:.1%} are chance"
         )
-    for which, words in (("start", "the camera as given"), ("swept", "the best of the first values")):
-        other = found.checked.get(which, (math.inf,))[0]
+    for which, words in BEFORE.items():
+        other = found.checked[which].value if which in found.checked else math.inf
         if other < there and found.gain(getattr(found, which)) > 0:
             said.append(
                 f"{words} has a {name} bound of {told(other)} at other places, the best {told(there)}: "
                 "it is better only where it was searched"
             )
     for words in said:
-        warnings.warn(f"{words}. Search again with more places.", SamplingWarning, stacklevel=3)
+        more = "depths" if "half-way" in words else "places"
+        warnings.warn(f"{words}. Search again with more {more}.", SamplingWarning, stacklevel=3)
+
+
+def _luck_of_depths(found: Optimum) -> Iterator[str]:
+    """Where a bound is worse half-way between its depths, ends left out, or others are better in all."""
+    name, told, best = found.goal.name, found.goal.told, found.checked["best"]
+    both = math.hypot(best.value, best.between)
+    if best.between > best.value * (1 + LUCK):
+        yield (
+            f"the {name} bound of the best is {told(best.value)} over the depths where it was searched, but "
+            f"{told(best.between)} half-way between them"
+        )
+    for which, words in BEFORE.items():
+        other = found.checked.get(which, best)
+        if other.between < best.between and math.hypot(other.value, other.between) < both:
+            yield (
+                f"half-way between the depths {words} has a {name} bound of {told(other.between)}, the best "
+                f"{told(best.between)}: it is better only where it was searched"
+            )
 
 
 def _check(start: Instrument, item: Mapping[str, Any]) -> None:
