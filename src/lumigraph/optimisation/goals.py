@@ -209,7 +209,8 @@ class Goal:
         depths = np.unique(self.depths)
         if len(depths) < 2:
             return math.nan
-        found = bounds(instrument, (depths[1:] + depths[:-1]) / 2, light, places=places, checked=False)
+        halves = ((depths[1:] + depths[:-1]) / 2).tolist()
+        found = bounds(instrument, halves, light, places=places, checked=False)
         return float(getattr(found, self.name))
 
     def _light(self, instrument: Instrument, first: float) -> Light:
