@@ -49,6 +49,7 @@ from .instruments import (
     PlenopticCamera as PlenopticCamera,
     SingleLensCamera as SingleLensCamera,
     catalogue as catalogue,
+    find_shifts as find_shifts,
     joint_operator as joint_operator,
     load_camera as load_camera,
     scan as scan,

@@ -7,6 +7,8 @@
 - `parts`: `MainLens`, `Pixels`, and `lenslets`: `Lenslets`: the tables of a camera file
 - `built`: `Built`, distances as built; `tolerances`: `Tolerance`, how far values may be off
 - `joint`: `joint_operator` of several raw images of one object, `scan`, shifts between them
+- `shifts`: `find_shifts`, from the raw images themselves; `lenslet_light`: what they show of the object;
+  `texture`: how likely that is
 - `loading`: `load_camera` for every kind
 - `instrument`, `camera`, `lenslet_camera`: what the kinds share; `capabilities`: what some of them can do
 - `parameters`: what a designer can change; `point_view`: a point's image at once
@@ -32,6 +34,7 @@ from lumigraph.instruments.parts import MainLens, Pixels
 from lumigraph.instruments.plenoptic1 import PlenopticCamera
 from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
 from lumigraph.instruments.row import Row
+from lumigraph.instruments.shifts import FoundShifts, find_shifts
 from lumigraph.instruments.single_lens import SingleLensCamera
 from lumigraph.instruments.tolerances import Tolerance
 
@@ -40,6 +43,7 @@ __all__ = [
     "Camera",
     "Description",
     "FocusedPlenopticCamera",
+    "FoundShifts",
     "Instrument",
     "LensletCamera",
     "Lenslets",
@@ -53,6 +57,7 @@ __all__ = [
     "SingleLensCamera",
     "Tolerance",
     "catalogue",
+    "find_shifts",
     "joint_operator",
     "load_camera",
     "scan",

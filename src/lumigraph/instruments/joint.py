@@ -111,7 +111,7 @@ def joint_operator(
     --------
     ``lg.deconvolve(raws, lg.joint_operator(camera, shifts=shifts))``
     """
-    moved = _shifts(shifts, None if isinstance(cameras, Instrument) else len(cameras))
+    moved = pairs_of(shifts, None if isinstance(cameras, Instrument) else len(cameras))
     some = [cameras] * len(moved) if isinstance(cameras, Instrument) else list(cameras)
     for camera in some:
         checks.instance("a camera", camera, Instrument)
@@ -216,7 +216,7 @@ def _maker(
     return Maker.of(own)
 
 
-def _shifts(shifts: Sequence[Sequence[float]] | np.ndarray | None, count: int | None) -> list[Shift]:
+def pairs_of(shifts: Sequence[Sequence[float]] | np.ndarray | None, count: int | None) -> list[Shift]:
     """Pairs (y, x) [m], one for each raw image."""
     if shifts is None:
         if not count:

@@ -1,0 +1,141 @@
+"""Light of each lenslet of a camera 1.0, and of which part of an object in focus it comes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.grid import Grid
+from lumigraph.core.linear import Linear
+from lumigraph.core.raw import RawImage
+from lumigraph.deconvolution import Exposure
+from lumigraph.errors import CalibrationError
+from lumigraph.instruments.lenslet_camera import LensletCamera
+from lumigraph.instruments.texture import SAMPLES, Part, Textures
+
+FAINT = 0.5
+"""Light of a lenslet, over the median's, below which it does not count."""
+
+FEWEST = 25
+"""Lenslets."""
+
+NEAR = 2
+"""How far a lenslet's footprint is followed [lenslets]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LensletLight:
+    """Which pixels are whose, and what they see of the object.
+
+    Parameters
+    ----------
+    labels
+        Number of the lenslet of each pixel (ny, nx).
+    even
+        What each pixel shows of an even object (ny, nx).
+    places
+        Of the lenslets in the object (n, 2) [lenslets].
+    """
+
+    labels: np.ndarray
+    even: np.ndarray
+    places: np.ndarray
+    textures: Textures
+
+    @classmethod
+    def of(cls, camera: LensletCamera) -> "LensletLight":
+        """Of the camera's own pixels.
+
+        Raises
+        ------
+        CalibrationError
+            Fewer than 5 x 5 lenslets.
+        """
+        pixels, operator = camera.calibration, camera.operator(None, SAMPLES, accuracy=1e-2)
+        if len(pixels.indices) < FEWEST:
+            raise CalibrationError(
+                f"the camera has {len(pixels.indices)} lenslets, but shifts are told by {FEWEST} or more."
+            )
+        y, x = np.meshgrid(*(np.arange(n) for n in pixels.shape), indexing="ij")
+        whole = np.stack(pixels.index(y, x), -1).reshape(-1, 2)
+        indices, labels = np.unique(whole, axis=0, return_inverse=True)
+        labels = labels.reshape(pixels.shape)
+        middle = pixels.indices[np.argmin(np.abs(pixels.indices - pixels.indices.mean(0)).sum(1))]
+        shown = [
+            np.asarray(operator.adjoint(_one(labels, indices, middle + step)), np.float64)
+            for step in ((0, 0), (1, 0), (0, 1))
+        ]
+        grid = _grid(operator)
+        at = np.array([_middle(one, grid) for one in shown]) / camera.lenslet_size
+        even = np.asarray(operator.forward(np.ones(grid.shape, np.float32)), np.float64)
+        return cls(labels, even, indices @ (at[1:] - at[0]), Textures.of(_near(shown[0])))
+
+    def seen(self, raws: Sequence[RawImage], exposures: Sequence[Exposure | None]) -> Part:
+        """Light of each lenslet that counts in all raw images, over its mean.
+
+        Raises
+        ------
+        CalibrationError
+            A raw image of another shape, an unknown gain, a dark one, or too few lenslets that count.
+        """
+        found = [
+            self._of(raw, Exposure.of(raw) if one is None else one)
+            for raw, one in zip(raws, exposures, strict=True)
+        ]
+        light, noise, even = (np.array(one) for one in zip(*found, strict=True))
+        counts = (even > FAINT * np.median(even[even > 0])).all(0) if even.any() else np.zeros(0, bool)
+        if counts.sum() < FEWEST:
+            raise CalibrationError(
+                f"{counts.sum()} lenslets count in all raw images, but shifts are told by {FEWEST} or more."
+            )
+        values, noise = light[:, counts] / even[:, counts], noise[:, counts] / even[:, counts] ** 2
+        mean = float(values.mean())
+        if not mean > 0:
+            raise CalibrationError("the raw images are dark: nothing tells how the object was moved.")
+        noise = np.maximum(noise, 0.1 * noise.mean())
+        return Part(values / mean, noise / mean**2, self.places[counts], self.textures)
+
+    def _of(self, raw: RawImage, known: Exposure) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Electrons of each lenslet, their variance, and what it shows of an even object."""
+        data = np.asarray(to_numpy(raw.data), np.float64)
+        if data.shape != self.labels.shape:
+            raise CalibrationError(
+                f"a raw image has shape {data.shape} but the camera's have {self.labels.shape}."
+            )
+        if known.gain is None:
+            raise CalibrationError(
+                "the gain of the raw images is unknown, and their noise. Give exposure=Exposure(gain=...)."
+            )
+        counts = np.ones(data.shape) if known.weights is None else np.asarray(to_numpy(known.weights)) > 0
+        response = 1.0 if known.response is None else np.asarray(to_numpy(known.response), np.float64)
+        background = np.asarray(to_numpy(known.background), np.float64)
+        light = np.where(counts, known.gain * (data - background), 0.0)
+        dark = known.gain * (background - known.black_level) + known.read_noise**2
+        noise = counts * (np.maximum(light, 0) + dark)
+        return self._sums(light), self._sums(noise), self._sums(counts * response * known.light * self.even)
+
+    def _sums(self, pixels: np.ndarray) -> np.ndarray:
+        return np.bincount(self.labels.ravel(), pixels.ravel(), len(self.places))
+
+
+def _grid(operator: Linear) -> Grid:
+    assert operator.object_grid is not None  # of a camera
+    return operator.object_grid
+
+
+def _one(labels: np.ndarray, indices: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """The pixels of a lenslet."""
+    return (labels == np.flatnonzero((indices == index).all(1))[0]).astype(np.float32)
+
+
+def _middle(light: np.ndarray, grid: Grid) -> np.ndarray:
+    """Of its light, (y, x) [m]."""
+    return np.array([light.sum(1) @ grid.y, light.sum(0) @ grid.x]) / light.sum()
+
+
+def _near(light: np.ndarray) -> np.ndarray:
+    """What is near the brightest sample."""
+    y, x = (round(float(n)) for n in np.argwhere(light > light.max() / 2).mean(0))
+    reach = NEAR * SAMPLES
+    return light[max(y - reach, 0) : y + reach, max(x - reach, 0) : x + reach]

@@ -1,0 +1,300 @@
+r"""`find_shifts`: by how much an object was moved between raw images, from the raw images themselves.
+
+What two raw images of an object differ by is a shift, or detail that lenslets do not resolve, which each raw
+image sees anew: so shifts are fitted to the likelihood of all raw images with the object integrated out
+(`texture`), by steps of Gauss and Newton with Fisher's information. First much noise is assumed, which leaves
+the coarse detail that leads to the right place, and then less and less.
+
+K. V. Mardia & R. J. Marshall, Biometrika 71, 135 (1984), for likelihoods of fields by their covariances.
+"""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lumigraph.core.brief import brief
+from lumigraph.core.progress import Progress, silent
+from lumigraph.core.raw import RawImage
+from lumigraph.deconvolution import Exposure
+from lumigraph.errors import CalibrationError, GeometryError, SamplingWarning
+from lumigraph.instruments.capabilities import Decoded
+from lumigraph.instruments.joint import pairs_of
+from lumigraph.instruments.lenslet_camera import LensletCamera
+from lumigraph.instruments.lenslet_light import LensletLight
+from lumigraph.instruments.texture import Part, Told
+
+REACH = 0.5
+"""How far from where they start shifts are looked for [lenslets]: one standard deviation."""
+
+TOLD = 0.1
+"""Standard deviation [lenslets] above which a shift is warned of; where all are above it they are refused."""
+
+BLUNT = (0.3, 0.06, 0.012, 0.0024)
+"""Noise that is assumed at first, over the texture's variance."""
+
+MOST_STEPS, LONGEST, SETTLED = 40, 0.2, 0.3
+"""Of all; their length [lenslets]; and their size in standard deviations when they end."""
+
+GAIN = 0.1
+"""Of log-likelihood by the last step, when they end: spectra settle, too."""
+
+MOST_VALUES, LEAST_LENSLETS, MOST_PARTS = 640, 16, 12
+"""Of a part of the picture, and how many parts are looked at: those with the most texture."""
+
+ALIKE = 10
+"""How many parts' worth of shifts say in advance that parts agree."""
+
+MARGIN = 1.1
+"""By which errors of drawn objects with edges were larger than Fisher's information says
+(`python -m benchmarks.found_shifts`)."""
+
+LINES = 0.9
+"""Part of the texture's variance in lines of one period above which it is warned of."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundShifts:
+    """By how much an object was moved.
+
+    Parameters
+    ----------
+    shifts
+        (k, 2) as (y, x) [m], for `joint_operator`. The first is as it was given: raw images tell differences.
+    errors
+        (k, 2), their standard deviations [m], with the object unknown; 0 of the first.
+    covariance
+        (2 (k - 1), 2 (k - 1)) of the others [m²], first of all y, then of all x.
+    misfit
+        Scatter of the shifts between parts of the picture over what is expected, squared: near 1. 1 of a
+        picture that is one part.
+    """
+
+    shifts: np.ndarray
+    errors: np.ndarray
+    covariance: np.ndarray
+    misfit: float
+
+    __repr__ = brief
+
+
+def find_shifts(
+    raws: Sequence[RawImage],
+    camera: LensletCamera,
+    start: Sequence[Sequence[float]] | np.ndarray | None = None,
+    *,
+    exposure: Exposure | Sequence[Exposure] | None = None,
+    progress: Progress | None = None,
+) -> FoundShifts:
+    """By how much a flat object in focus was moved between raw images of a camera 1.0.
+
+    Works on the light of each lenslet, and takes the object for an unknown texture whose spectrum is fitted,
+    for each part of the picture apart. Any camera 1.0, of which the raw images show the pixels.
+
+    Parameters
+    ----------
+    raws
+        Two or more, of one object that was moved, or of a camera that was (minus the shifts).
+    camera
+        That took them, of kind "plenoptic".
+    start
+        Where the search begins (k, 2) as (y, x) [m], such as `scan`, within half a lenslet in the object
+        (one standard deviation) of the truth; the first is kept. None for no shifts.
+    exposure
+        Of all raw images, or of each, with the gain; None for what `Sensor.expose` has recorded.
+    progress
+        Called as ``progress(fraction)``.
+
+    Raises
+    ------
+    CalibrationError
+        One raw image, one of another shape, an unknown gain, no light, too few lenslets, or an object that
+        does not tell how it was moved, such as an even one.
+    GeometryError
+        A camera of another kind, or another number of shifts.
+
+    Warns
+    -----
+    SamplingWarning
+        A shift that is not told to a tenth of a lenslet, such as that along lines; lines of one period, finer
+        ones of which lenslets show as coarser ones that move otherwise; shifts that have not settled.
+
+    Examples
+    --------
+    >>> found = lg.find_shifts(raws, camera, lg.scan(3, camera.lenslet_size))  # doctest: +SKIP
+    >>> picture = lg.deconvolve(raws, lg.joint_operator(camera, shifts=found.shifts))  # doctest: +SKIP
+    """
+    if not (isinstance(camera, LensletCamera) and isinstance(camera, Decoded)):
+        raise GeometryError('shifts are found for cameras of kind "plenoptic". Give them for others.')
+    if not isinstance(raws, list | tuple) or len(raws) < 2:
+        raise CalibrationError("shifts are between raw images. Give a list of two or more.")
+    begun = np.array(pairs_of([(0.0, 0.0)] * len(raws) if start is None else start, len(raws)))
+    known = [exposure] * len(raws) if exposure is None or isinstance(exposure, Exposure) else list(exposure)
+    if len(known) != len(raws):
+        raise CalibrationError(f"there are {len(known)} exposures for {len(raws)} raw images.")
+    size = camera.lenslet_size
+    parts = _parts(LensletLight.of(camera).seen(raws, known))
+    found = _judged(_fitted(parts, begun / size, progress or silent), size)
+    _warn_of_lines(parts[0])
+    return found
+
+
+def _parts(whole: Part) -> list[Part]:
+    """Neighbouring lenslets together, few enough for their covariances; those with the most texture."""
+    most = max(MOST_VALUES // len(whole.values), LEAST_LENSLETS)
+    parts = [np.arange(len(whole.places))]
+    while max(map(len, parts)) > most:
+        parts = [half for part in parts for half in _halves(whole.places, part)]
+    found = [whole.of(part) for part in parts]
+    return sorted(found, key=lambda part: -part.variance / float(part.noise.mean()))[:MOST_PARTS]
+
+
+def _halves(places: np.ndarray, part: np.ndarray) -> list[np.ndarray]:
+    along = places[part][:, int(np.argmax(np.ptp(places[part], axis=0)))]
+    return np.array_split(part[np.argsort(along, kind="stable")], 2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """Shifts (k, 2) [lenslets], the spectrum of each part, and what is around them.
+
+    Parameters
+    ----------
+    step
+        To the likeliest shifts (2 (k - 1),), all y first.
+    covariance
+        Of the shifts, by what all parts and the start say.
+    """
+
+    parts: Sequence[Part]
+    start: np.ndarray
+    shifts: np.ndarray
+    spectra: Sequence[np.ndarray]
+    blunt: float
+    told: Sequence[Told]
+    step: np.ndarray
+    covariance: np.ndarray
+
+    @classmethod
+    def of(
+        cls, parts: Sequence[Part], start: np.ndarray, shifts: np.ndarray, spectra: Sequence[np.ndarray],
+        blunt: float,
+    ) -> "_Fit":  # fmt: skip
+        told = [part.told(shifts, one, blunt) for part, one in zip(parts, spectra, strict=True)]
+        ways = [one.of_shifts() for one in told]
+        slope = sum(way[0] for way in ways) - _row(shifts - start) / REACH**2
+        covariance = np.linalg.inv(sum(way[1] for way in ways) + np.eye(len(slope)) / REACH**2)
+        return cls(parts, start, shifts, spectra, blunt, told, covariance @ slope, covariance)
+
+    @property
+    def deviations(self) -> np.ndarray:
+        """Of the shifts, in the order of the step."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def off(self) -> float:
+        """The step in standard deviations."""
+        return float(np.max(np.abs(self.step) / self.deviations))
+
+    @property
+    def likelihood(self) -> float:
+        """Its logarithm, with what the start says."""
+        return sum(one.likelihood for one in self.told) - _far(self.shifts - self.start)
+
+    def moved(self) -> tuple[np.ndarray, list[np.ndarray]] | None:
+        """Shifts and spectra that are likelier; None where no step along the slope is."""
+        part = min(1.0, LONGEST / float(np.abs(self.step).max()))
+        for _ in range(5):
+            shifts = self.shifts.copy()
+            shifts[1:] += part * self.step.reshape(2, -1).T
+            steps = [one.spectrum_step(part * self.step) for one in self.told]
+            spectra = [one + part * step for one, step in zip(self.spectra, steps, strict=True)]
+            if self._likelihood(shifts, spectra) > self.likelihood - 1e-6:
+                return shifts, spectra
+            part /= 3
+        return None
+
+    def _likelihood(self, shifts: np.ndarray, spectra: Sequence[np.ndarray]) -> float:
+        found = zip(self.parts, spectra, strict=True)
+        return sum(part.likelihood(shifts, one, self.blunt) for part, one in found) - _far(
+            shifts - self.start
+        )
+
+    def misfit(self) -> float:
+        """Scatter between parts, squared; 1 of one part."""
+        count, scatter = len(self.step) * (len(self.told) - 1), 0.0
+        for one in self.told:
+            slope, information = one.of_shifts()
+            left = slope - information @ self.step
+            scatter += float(left @ np.linalg.pinv(information) @ left)
+        return scatter / count if count else 1.0
+
+
+def _row(shifts: np.ndarray) -> np.ndarray:
+    return shifts[1:].T.ravel()
+
+
+def _far(off: np.ndarray) -> float:
+    return float((off[1:] ** 2).sum()) / (2 * REACH**2)
+
+
+def _fitted(parts: Sequence[Part], start: np.ndarray, progress: Progress) -> _Fit:
+    """From where they start to where all raw images are likeliest."""
+    shifts, spectra = start.copy(), [part.usual() for part in parts]
+    fit, before, gained = None, -np.inf, np.inf
+    for number in range(MOST_STEPS):
+        blunt = BLUNT[number] if number < len(BLUNT) else 0.0
+        fit = _Fit.of(parts, start, shifts, spectra, blunt)
+        progress(number / MOST_STEPS)
+        found = fit.moved()
+        gained, before = fit.likelihood - before, fit.likelihood
+        if blunt == 0 and (found is None or (fit.off < SETTLED and gained < GAIN)):
+            break
+        shifts, spectra = found or (shifts, spectra)
+    else:
+        _warn(
+            f"the last of {MOST_STEPS} steps gained {gained:.2g} of log-likelihood: shifts have not settled, "
+            "and errors are larger than told. Use an object with texture in all directions"
+        )
+    progress(1.0)
+    assert fit is not None  # there are steps
+    return fit
+
+
+def _judged(fit: _Fit, size: float) -> FoundShifts:
+    """The shifts in metres with their errors, or why there are none."""
+    misfit, count = fit.misfit(), len(fit.step) * (len(fit.told) - 1)
+    wider = MARGIN**2 * max(1.0, (ALIKE + count * misfit) / (ALIKE + count))
+    covariance = fit.covariance * wider * size**2
+    errors = np.zeros_like(fit.shifts)
+    errors[1:] = np.sqrt(np.diag(covariance)).reshape(2, -1).T
+    each = np.einsum("akbk->kab", covariance.reshape(2, len(errors) - 1, 2, -1))
+    worst, least = float(errors.max()), float(np.sqrt(np.linalg.eigvalsh(each).min()))
+    if least > TOLD * size:
+        raise CalibrationError(
+            f"the raw images do not tell how the object was moved: to ± {least:.2g} m in any "
+            f"direction, where a lenslet is {size:.2g} m wide. Use an object with texture, or more light."
+        )
+    if worst > TOLD * size:
+        k, axis = np.unravel_index(int(errors.argmax()), errors.shape)
+        _warn(
+            f"the shift of raw image {k} along {'yx'[axis]} is told to ± {worst:.2g} m, where a lenslet is "
+            f"{size:.2g} m wide. Use an object with texture in all directions"
+        )
+    return FoundShifts(fit.shifts * size, errors, covariance, misfit)
+
+
+def _warn_of_lines(part: Part) -> None:
+    """Lines of one period, which lenslets may show as coarser ones."""
+    share = part.lines()
+    if share > LINES:
+        _warn(
+            f"lines of one period are {100 * share:.0f} % of what the raw images show. Finer ones than "
+            "lenslets resolve pass for coarser ones that move otherwise: shifts may be wrong by periods. Use "
+            "an object with other texture"
+        )
+
+
+def _warn(what: str) -> None:
+    warnings.warn(f"{what}.", SamplingWarning, stacklevel=4)
