@@ -74,20 +74,22 @@ class Stage:
     camera: lg.PlenopticCamera
 
     def __post_init__(self) -> None:
-        self.grid = self.camera.operator_grid(SAMPLES)
-        self.operator = self.camera.operator(None, SAMPLES)
+        own = self.camera.operator_grid(SAMPLES)
+        height, width = (n + 4 * SAMPLES for n in own.shape)  # the object goes on beyond the lenslets
+        self.grid = lg.Grid((height, width), own.pitch, own.center)
+        self.operator = self.camera.operator_on(self.grid)
 
     def seen(
         self, picture: np.ndarray, shifts: np.ndarray, photons: float, rng: np.random.Generator
     ) -> list[lg.RawImage]:
         """Raw images of a picture that was moved by shifts (k, 2) [lenslets], of `photons` in all."""
-        waves, raws = np.fft.rfft2(picture), []
+        waves, lights = np.fft.rfft2(picture), []
         rows, columns = (slice((CANVAS - n) // 2, (CANVAS - n) // 2 + n) for n in self.grid.shape)
         for y, x in shifts:
             moved = np.fft.irfft2(waves * np.exp(-2j * np.pi * (FY * y + FX * x)), picture.shape)
-            light = np.maximum(self.operator.forward(moved[rows, columns].astype(np.float32)), 0)
-            raws.append(self.camera.sensor.expose(light, photons=photons / len(shifts), rng=rng))
-        return raws
+            lights.append(np.maximum(self.operator.forward(moved[rows, columns].astype(np.float32)), 0))
+        expose = self.camera.sensor.expose
+        return [expose(light, photons=photons / len(shifts), rng=rng) for light in lights]
 
 
 def off(steps: int, rng: np.random.Generator) -> np.ndarray:

@@ -12,6 +12,7 @@ from lumigraph.core.linear import Linear
 from lumigraph.core.matrix import Matrix
 from lumigraph.core.prepared import PreparedImage
 from lumigraph.deconvolution import Exposure
+from lumigraph.instruments import FoundShifts
 from lumigraph.operators import periodic_operator, single_lens_operator
 
 N = 700
@@ -41,6 +42,7 @@ LARGE = [
     periodic_operator(cameras.focused(count=(4, 4)), lg.Grid.square(40, 1e-5), accuracy=1e-2),
     single_lens_operator(SINGLE, lg.Grid.square(9, 1e-5)),
     SCOPE.operator(None, 1, pixels=3),
+    FoundShifts(PICTURE[:, :2], PICTURE[:, :2], PICTURE, 1.0),
 ]  # fmt: skip
 SMALL = {
     lg.CircularAperture, lg.Coherent, lg.Grid, lg.Incoherent, lg.Lattice, lg.LensletArray, lg.Propagate,

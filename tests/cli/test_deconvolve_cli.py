@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 import tifffile
+from scipy.ndimage import gaussian_filter
 
 import lumigraph as lg
 from lumigraph.cli.deconvolve_options import depths
@@ -362,6 +363,7 @@ def test_raw_images_of_a_moved_object_are_deconvolved_together(scanned, tmp_path
     [
         ([*FILES[:3], "--shifts", "2x2"], "--shifts is for 4 raw images, but there are 3"),
         ([*FILES[:1], "--shifts", "1x1"], "are of several raw images"),
+        ([*FILES[:1], "--find-shifts"], "--find-shifts are between several raw images"),
         ([*FILES[:2], "--shifts", "2x3"], "a scan is square"),
         ([*FILES[:2], "--shifts", "1 um; 2 um"], "must be pairs"),
         ([*FILES[:2], "--shifts", "1 kg, 0 um; 0 um, 0 um"], "--shifts"),
@@ -378,3 +380,23 @@ def test_what_is_no_set_of_raw_images_is_refused(lumigraph, tmp_path, words, mes
     found = lumigraph("deconvolve", *words, "--camera", "camera.toml", "-o", "picture.tiff")
     assert found.code != 0
     assert message in " ".join(found.err.split())
+
+
+def test_shifts_are_found_before_raw_images_are_deconvolved_together(lumigraph, tmp_path):
+    (tmp_path / "camera.toml").write_text(PLENOPTIC.replace("[3, 3]", "[7, 7]"))
+    camera = lg.load_camera(tmp_path / "camera.toml")
+    own, rng = camera.operator_grid(12), np.random.default_rng(3)
+    grid = lg.Grid(tuple(n + 48 for n in own.shape), own.pitch, own.center)
+    true = lg.scan(2, camera.lenslet_size) + np.array([(0, 0), (9e-6, -7e-6), (-5e-6, 12e-6), (8e-6, 4e-6)])
+    joint = lg.joint_operator(camera, None, 12, shifts=true, grid=grid, accuracy=1e-2)
+    texture = gaussian_filter(rng.standard_normal(grid.shape), 3)
+    picture = np.clip(0.5 + 0.15 * texture / texture.std(), 0, None).astype(np.float32)
+    for number, light in enumerate(joint.parted(joint.forward(picture))):
+        lg.save(camera.sensor.expose(light, photons=1000, rng=rng), tmp_path / f"raw{number}.tif")
+    said = ("deconvolve", *FILES, "--camera", "camera.toml", "--iterations", 2, "--samples", 6)
+    found = lumigraph(*said, "--shifts", "2x2", "--find-shifts", "--json", "-o", "picture.tiff")
+    assert found.code == 0, found.err
+    told = json.loads(found.out)["found_shifts"]
+    shifts, errors = np.array(told["shifts"]), np.array(told["errors"])
+    assert np.abs((shifts - shifts[0]) - (true - true[0])).max() < 4e-6  # told: 21e-6
+    assert 0 < errors[1:].max() < 3e-6

@@ -16,7 +16,7 @@ from lumigraph.cli.deconvolve_options import SEEN, WANTED, WAY, Seen, Wanted, Wa
 from lumigraph.cli.deconvolved import reached, result
 from lumigraph.cli.options import Output
 from lumigraph.cli.reporting import REPORTED, Reported
-from lumigraph.cli.several import SEVERAL, Several, Shifts
+from lumigraph.cli.several import SEVERAL, Several, Shifts, with_shifts
 from lumigraph.core.progress import Progress, Stage, silent, within
 from lumigraph.core.result import Result
 from lumigraph.errors import FormatError, LumigraphError
@@ -60,6 +60,8 @@ def deconvolve(
 
     Example: `lumigraph deconvolve a.tif b.tif c.tif d.tif --shifts 2x2 --camera camera.toml -o picture.tiff`
 
+    Example: `lumigraph deconvolve a.tif b.tif c.tif d.tif --shifts 2x2 --find-shifts --camera camera.toml -o picture.tiff`
+
     Parameters
     ----------
     raw
@@ -92,18 +94,20 @@ def deconvolve(
         ready = seen.prepared(frames[0][1], described)
         made = within(shown, 0.0, 1.0, "point images")
         made(0.0)
-        shifts = several.moved(described, 1 + len(more)) if more else None
+        raws = [ready, *(seen.prepared(frame, described) for frame in more)]
+        shifts, moved = several.where(described, raws, within(shown, 0.0, 1.0, "shifts"))
         wavefront = bent.found(ready, described, wanted.depths(), within(shown, 0.0, 1.0, "wavefront"))
         model = described if wavefront is None else wavefront.instrument
         engine = _engine(_Asked.of(model, wanted, way, ready.calibration, made, shifts))
         _begin(engine)
         task = _Task(engine, way, output, None if several.light is None else several.lights())
-        first = [ready, *(seen.prepared(frame, described) for frame in more)] if more else ready
-        for name, page, found in task.run(_pages(frames, first, seen, described), (steps, shown)):
+        for name, page, found in task.run(
+            _pages(frames, raws if more else ready, seen, described), (steps, shown)
+        ):
             ready = ready if more else page
             written.append(_named(output, name))
             io.save(found, written[-1])
-    told = result(found, ready, steps, tuple(written))
+    told = with_shifts(result(found, ready, steps, tuple(written)), moved)
     return told if wavefront is None else with_wavefront(told, wavefront)
 
 

@@ -1,16 +1,20 @@
 """What `lumigraph deconvolve` is told of several raw images of one object."""
 
 import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, cast
 
 from cyclopts import Parameter
 
 from lumigraph.cli.options import length
+from lumigraph.core.progress import Progress
+from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
-    from lumigraph.instruments import Instrument
+    from lumigraph.core.prepared import PreparedImage
+    from lumigraph.instruments import FoundShifts, Instrument, LensletCamera
 
 MOST_STEPS = 30
 """Of a scan, along each axis."""
@@ -28,18 +32,24 @@ class Several:
     shifts
         By which the object was moved: '3x3', thirds of a lenslet in the object, row after row from the least
         y and x; or a pair for each raw image, such as '0 um, 0 um; 33 um, 0 um', y first.
+    find_shifts
+        Find the shifts from the raw images of a camera 1.0, whose noise is known, near those of --shifts: for
+        a flat object in focus with texture, moved by a stage that is off by some tenths of a lenslet.
     light
         Of each raw image over the first one's, such as '1, 1, 4': exposure times. Left out, as the raw images
         of 'simulate' record it, else the same.
     """
 
     shifts: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    find_shifts: Annotated[bool, Parameter(negative="")] = False
     light: str | None = None
 
     def check(self, count: int) -> None:
         """Refuse what does not go with so many raw images, before anything is read."""
         if count == 1 and (self.shifts, self.light) != (None, None):
             raise FormatError("--shifts and --light are of several raw images. Name all their files.")
+        if count == 1 and self.find_shifts:
+            raise FormatError("--find-shifts are between several raw images. Name all their files.")
         _check_count("--shifts", self._count(), count)
         _check_count("--light", None if self.light is None else len(self.lights()), count)
 
@@ -65,6 +75,25 @@ class Several:
             )
         return tuple((float(y), float(x)) for y, x in scan(steps, camera.lenslet_size).tolist())
 
+    def where(
+        self, camera: "Instrument", raws: "Sequence[PreparedImage]", shown: Progress
+    ) -> "tuple[Shifts | None, FoundShifts | None]":
+        """Shifts of several raw images, and with what errors they were found, if they were."""
+        if len(raws) == 1:
+            return None, None
+        given = self.moved(camera, len(raws))
+        if not self.find_shifts:
+            return given, None
+        from lumigraph.deconvolution import Exposure
+        from lumigraph.instruments import find_shifts
+
+        known = [Exposure.of(raw) for raw in raws]
+        if self.light is not None:
+            known = [replace(one, light=t) for one, t in zip(known, self.lights(), strict=True)]
+        of = cast("LensletCamera", camera)  # others are refused
+        found = find_shifts(raws, of, given, exposure=known, progress=shown)
+        return tuple((float(y), float(x)) for y, x in found.shifts.tolist()), found
+
     def lights(self) -> tuple[float, ...]:
         """Of each raw image."""
         words = (self.light or "").split(",")
@@ -78,6 +107,21 @@ class Several:
 
 
 SEVERAL = Several()
+
+
+def with_shifts(result: Result, found: "FoundShifts | None") -> Result:
+    """A result of the deconvolution with the shifts, if they were found."""
+    if found is None:
+        return result
+    worst = float(found.errors.max())
+    moved = "; ".join(f"{1e6 * y:.2f}, {1e6 * x:.2f}" for y, x in found.shifts)
+    line = f"shifts (y, x) in µm: {moved}; between them to ± {1e6 * worst:.2g} µm (one standard deviation)"
+    told = {name: getattr(found, name).tolist() for name in ("shifts", "errors")}
+    return replace(
+        result, headline=(line, *result.headline),
+        quantities=(*result.quantities, Quantity("error_of_shifts", worst, "m")),
+        extra={**result.extra, "found_shifts": told},
+    )  # fmt: skip
 
 
 def _check_count(option: str, found: int | None, count: int) -> None:

@@ -1,13 +1,12 @@
 """Light of each lenslet of a camera 1.0, and of which part of an object in focus it comes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
-from lumigraph.core.linear import Linear
 from lumigraph.core.raw import RawImage
 from lumigraph.deconvolution import Exposure
 from lumigraph.errors import CalibrationError
@@ -23,6 +22,10 @@ FEWEST = 25
 NEAR = 2
 """How far a lenslet's footprint is followed [lenslets]."""
 
+INNER = 0.4
+"""Half of the part of micro-images that counts, along each axis, in pitches: towards their rims they hold
+light of neighbours, which lenslets at the array's border lack."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LensletLight:
@@ -30,8 +33,8 @@ class LensletLight:
 
     Parameters
     ----------
-    labels
-        Number of the lenslet of each pixel (ny, nx).
+    labels, inner
+        Number of the lenslet of each pixel (ny, nx), and how much of it counts, from 0 to 1.
     even
         What each pixel shows of an even object (ny, nx).
     places
@@ -39,6 +42,7 @@ class LensletLight:
     """
 
     labels: np.ndarray
+    inner: np.ndarray
     even: np.ndarray
     places: np.ndarray
     textures: Textures
@@ -52,24 +56,27 @@ class LensletLight:
         CalibrationError
             Fewer than 5 x 5 lenslets.
         """
-        pixels, operator = camera.calibration, camera.operator(None, SAMPLES, accuracy=1e-2)
+        pixels, grid = camera.calibration, _beyond(camera.operator_grid(SAMPLES))
         if len(pixels.indices) < FEWEST:
             raise CalibrationError(
                 f"the camera has {len(pixels.indices)} lenslets, but shifts are told by {FEWEST} or more."
             )
+        operator = camera.operator_on(grid, accuracy=1e-2)
         y, x = np.meshgrid(*(np.arange(n) for n in pixels.shape), indexing="ij")
         whole = np.stack(pixels.index(y, x), -1).reshape(-1, 2)
         indices, labels = np.unique(whole, axis=0, return_inverse=True)
         labels = labels.reshape(pixels.shape)
         middle = pixels.indices[np.argmin(np.abs(pixels.indices - pixels.indices.mean(0)).sum(1))]
-        shown = [
-            np.asarray(operator.adjoint(_one(labels, indices, middle + step)), np.float64)
-            for step in ((0, 0), (1, 0), (0, 1))
-        ]
-        grid = _grid(operator)
-        at = np.array([_middle(one, grid) for one in shown]) / camera.lenslet_size
+        away = np.abs(np.stack(pixels.offset(y, x)))
+        inner = np.clip(INNER * pixels.lattice.pitch + 0.5 - away, 0, 1).prod(0)
+
+        def shown(which: np.ndarray) -> np.ndarray:
+            return np.asarray(operator.adjoint((inner * which[labels]).astype(np.float32)), np.float64)
+
+        places = _places(indices, middle, grid, shown) / camera.lenslet_size
+        footprint = _near(shown((indices == middle).all(1)))
         even = np.asarray(operator.forward(np.ones(grid.shape, np.float32)), np.float64)
-        return cls(labels, even, indices @ (at[1:] - at[0]), Textures.of(_near(shown[0])))
+        return cls(labels, inner, even, places, Textures.of(footprint))
 
     def seen(self, raws: Sequence[RawImage], exposures: Sequence[Exposure | None]) -> Part:
         """Light of each lenslet that counts in all raw images, over its mean.
@@ -113,20 +120,41 @@ class LensletLight:
         light = np.where(counts, known.gain * (data - background), 0.0)
         dark = known.gain * (background - known.black_level) + known.read_noise**2
         noise = counts * (np.maximum(light, 0) + dark)
-        return self._sums(light), self._sums(noise), self._sums(counts * response * known.light * self.even)
+        even = counts * response * known.light * self.even
+        return self._sums(light), self._sums(noise * self.inner), self._sums(even)
 
     def _sums(self, pixels: np.ndarray) -> np.ndarray:
-        return np.bincount(self.labels.ravel(), pixels.ravel(), len(self.places))
+        return np.bincount(self.labels.ravel(), (self.inner * pixels).ravel(), len(self.places))
 
 
-def _grid(operator: Linear) -> Grid:
-    assert operator.object_grid is not None  # of a camera
-    return operator.object_grid
+def _beyond(grid: Grid) -> Grid:
+    """An object that goes on beyond the lenslets, which sends some light there, too."""
+    height, width = (n + 2 * NEAR * SAMPLES for n in grid.shape)
+    return Grid((height, width), grid.pitch, grid.center)
 
 
-def _one(labels: np.ndarray, indices: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """The pixels of a lenslet."""
-    return (labels == np.flatnonzero((indices == index).all(1))[0]).astype(np.float32)
+def _places(
+    indices: np.ndarray, middle: np.ndarray, grid: Grid, shown: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray:
+    """Middles (n, 2) [m] of what lenslets see, each by its own light: neighbours' is not even at a border."""
+    first = [_middle(shown((indices == middle + step).all(1)), grid) for step in ((0, 0), (1, 0), (0, 1))]
+    steps = np.array(first[1:]) - first[0]
+    places = first[0] + (indices - middle) @ steps
+    reach = int(NEAR * np.abs(steps).sum(0).max() / grid.pitch[0])
+    group = (indices % (2 * NEAR + 1)) @ (2 * NEAR + 1, 1)
+    for number in np.unique(group):
+        light = shown(group == number)
+        for k in np.flatnonzero(group == number):
+            row, column = (round(float(n)) for n in (places[k] - (grid.y[0], grid.x[0])) / grid.pitch)
+            part = (_around(row, reach), _around(column, reach))
+            if (own := light[part]).sum() > 0:
+                places[k] = own.sum(1) @ grid.y[part[0]], own.sum(0) @ grid.x[part[1]]
+                places[k] /= own.sum()
+    return places
+
+
+def _around(middle: int, reach: int) -> slice:
+    return slice(max(middle - reach, 0), max(middle + reach + 1, 0))
 
 
 def _middle(light: np.ndarray, grid: Grid) -> np.ndarray:

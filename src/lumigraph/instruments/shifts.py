@@ -46,9 +46,12 @@ MOST_VALUES, LEAST_LENSLETS, MOST_PARTS = 640, 16, 12
 ALIKE = 10
 """How many parts' worth of shifts say in advance that parts agree."""
 
-MARGIN = 1.1
-"""By which errors of drawn objects with edges were larger than Fisher's information says
-(`python -m benchmarks.found_shifts`)."""
+MARGIN = 1.2
+"""By which errors are wider than Fisher's information says: of drawn objects they were 0.8 (smooth
+blobs) to 1.4 times (discs) as large (`python -m benchmarks.found_shifts pulls`)."""
+
+BRIGHTER = 0.1
+"""Light of a raw image beyond that of all in the mean, above which it is warned of."""
 
 LINES = 0.9
 """Part of the texture's variance in lines of one period above which it is warned of."""
@@ -118,7 +121,8 @@ def find_shifts(
     -----
     SamplingWarning
         A shift that is not told to a tenth of a lenslet, such as that along lines; lines of one period, finer
-        ones of which lenslets show as coarser ones that move otherwise; shifts that have not settled.
+        ones of which lenslets show as coarser ones that move otherwise; shifts that have not settled; a raw
+        image a tenth brighter or darker than the others.
 
     Examples
     --------
@@ -134,7 +138,9 @@ def find_shifts(
     if len(known) != len(raws):
         raise CalibrationError(f"there are {len(known)} exposures for {len(raws)} raw images.")
     size = camera.lenslet_size
-    parts = _parts(LensletLight.of(camera).seen(raws, known))
+    whole = LensletLight.of(camera).seen(raws, known)
+    _warn_of_light(whole)
+    parts = _parts(whole)
     found = _judged(_fitted(parts, begun / size, progress or silent), size)
     _warn_of_lines(parts[0])
     return found
@@ -283,6 +289,17 @@ def _judged(fit: _Fit, size: float) -> FoundShifts:
             f"{size:.2g} m wide. Use an object with texture in all directions"
         )
     return FoundShifts(fit.shifts * size, errors, covariance, misfit)
+
+
+def _warn_of_light(whole: Part) -> None:
+    """Raw images of other light than is known of them."""
+    means = whole.values.mean(1)
+    k = int(np.argmax(np.abs(means - 1)))
+    if abs(means[k] - 1) > BRIGHTER:
+        _warn(
+            f"raw image {k} is {means[k]:.3g} times as bright as all of them are in the mean: shifts may be "
+            "wrong. Give its light, Exposure(light=...), or keep the object in the picture"
+        )
 
 
 def _warn_of_lines(part: Part) -> None:

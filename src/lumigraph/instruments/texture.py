@@ -32,7 +32,7 @@ WIDE = np.array([3.0, 3.0, 5.0, 3.0, 0.5])
 ODD = 1e-3
 """Variance, over the texture's, of what no texture of one spectrum shows, such as edges."""
 
-LAMP = 0.01
+LAMP = 0.05
 """Standard deviation of a raw image's light over the others', as far as it is not known."""
 
 LINES = 64
