@@ -18,6 +18,9 @@ from benchmarks import scanned
 from lumigraph.deconvolution import RichardsonLucy, Stop
 
 SIZE, SAMPLES, CANVAS, OFF = scanned.SIZE, 24, 512, 0.2
+FIRST = 1000
+"""Draws are counted from it: those below served to set `shifts.MARGIN`."""
+
 Draw = Callable[[np.random.Generator], np.ndarray]
 FY = np.fft.fftfreq(CANVAS, 1 / SAMPLES)[:, None]
 FX = np.fft.rfftfreq(CANVAS, 1 / SAMPLES)[None]
@@ -123,7 +126,7 @@ def show_pulls(runs: int) -> None:
     for steps, photons, some in ((2, 4500.0, runs), (2, 500.0, runs // 2), (3, 4500.0, runs // 2)):
         for name, draw in KINDS.items():
             began = time.process_time()
-            errors, over = pulls(stage, draw, steps, some, photons)
+            errors, over = pulls(stage, draw, steps, some, photons, FIRST)
             cost = (time.process_time() - began) / some
             told = [float(np.sqrt(np.mean(one**2))) for one in (errors, over)]
             print(

@@ -398,5 +398,7 @@ def test_shifts_are_found_before_raw_images_are_deconvolved_together(lumigraph, 
     assert found.code == 0, found.err
     told = json.loads(found.out)["found_shifts"]
     shifts, errors = np.array(told["shifts"]), np.array(told["errors"])
-    assert np.abs((shifts - shifts[0]) - (true - true[0])).max() < 4e-6  # told: 21e-6
+    off = ((shifts - shifts[0]) - (true - true[0]))[1:]
+    assert np.abs(off).max() < 6e-6  # as the stage was told: 12e-6
+    assert np.abs(off / errors[1:]).max() < 3
     assert 0 < errors[1:].max() < 3e-6

@@ -183,8 +183,8 @@ def test_covariances_are_those_of_drawn_textures(part, rng):
 @pytest.mark.parametrize("kind", sorted(found_shifts.KINDS))
 def test_errors_are_as_large_as_told(kind):
     stage = found_shifts.Stage(CAMERA)
-    _, pulls = found_shifts.pulls(stage, found_shifts.KINDS[kind], 2, 30, 4500.0)
-    assert 0.5 < np.sqrt(np.mean(pulls**2)) < 1.35  # ± 0.1 by 30 draws; smooth objects are told too little of
+    _, pulls = found_shifts.pulls(stage, found_shifts.KINDS[kind], 2, 16, 4500.0, first=1000)
+    assert 0.55 < np.sqrt(np.mean(pulls**2)) < 1.25  # smooth objects are told better than they are said to be
 
 
 @pytest.mark.long
