@@ -401,4 +401,4 @@ def test_shifts_are_found_before_raw_images_are_deconvolved_together(lumigraph, 
     off = ((shifts - shifts[0]) - (true - true[0]))[1:]
     assert np.abs(off).max() < 6e-6  # as the stage was told: 12e-6
     assert np.abs(off / errors[1:]).max() < 3
-    assert 0 < errors[1:].max() < 3e-6
+    assert 0 < errors[1:].max() < 4e-6

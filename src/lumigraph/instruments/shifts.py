@@ -47,7 +47,7 @@ ALIKE = 10
 """How many parts' worth of shifts say in advance that parts agree."""
 
 MARGIN = 1.2
-"""By which errors are wider than Fisher's information says, set on ten draws of each of some kinds of objects:
+"""By which errors are wider than Fisher's information says, set on ten draws of each of some kinds of object:
 what is no Gaussian texture is told less. On other draws errors were then 0.70 to 1.11 times as large as told
 (`python -m benchmarks.found_shifts pulls`)."""
 
