@@ -122,7 +122,7 @@ def test_micro_images_show_corners_as_far_outwards_as_wave_optics() -> None:
         (3.51, 5.12): 0.0084, (4.24, 5.12): 0.0103, (4.79, 5.12): 0.0151, (5.14, 5.12): 0.0243,
     }  # fmt: skip
     for (way, slope), measured in seen.items():
-        moved = BEHIND.outwards(way * rings, np.full(24, slope), WIDTH)
+        moved = BEHIND.outwards(way * rings, np.full(24, 1 / slope), WIDTH)
         assert (moved * rings).sum(1).mean() == pytest.approx(measured, rel=0.25, abs=0.003)
         assert np.abs(moved[:, 0] * rings[:, 1] - moved[:, 1] * rings[:, 0]).max() < 1e-9
 
@@ -131,7 +131,7 @@ def test_corners_are_moved_outwards_where_micro_images_move_the_other_way() -> N
     """As behind lenslets that look at an image behind them."""
     ways = np.array([[0.0, 3.0], [0.0, 5.0]])
     one, other = (
-        replace(BEHIND, sharp=sign * 0.25).outwards(ways, np.full(2, sign * 4.0), WIDTH) for sign in (1, -1)
+        replace(BEHIND, sharp=sign * 0.25).outwards(ways, np.full(2, sign / 4), WIDTH) for sign in (1, -1)
     )
     assert one[1, 1] == pytest.approx(other[1, 1], rel=0.35)
     assert min(one[0, 1], other[0, 1]) > 0.003
@@ -141,6 +141,15 @@ def test_the_stop_is_as_wide_as_a_white_image_says_it_is_seen() -> None:
     hexagons = ((0.0, 1.0), (math.sqrt(0.75), 0.5))
     assert Waves(WIDTH, 0.845, hexagons, 0.2535).seen_fill() == pytest.approx(0.8276, abs=0.004)
     assert spill._filled(Waves(WIDTH, 0.8276, hexagons, 0.2535)).fill == pytest.approx(0.845, abs=0.004)
+    assert spill._filled(Waves(WIDTH, 1.0, hexagons, 0.2535)).fill == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_corner_behind_one_lenslet_alone_is_cleared_as_if_it_were_far() -> None:
+    ways = np.array([[0.0, 4.0], [0.0, 4.0], [0.0, 0.0]])
+    moved = BEHIND.outwards(ways, np.array([0.0, 1e-3, 0.2]), WIDTH)
+    assert moved[0] == pytest.approx(moved[1])
+    assert 0 < moved[0, 1] < 0.05
+    assert (moved[2] == 0).all()
 
 
 def test_corners_in_micro_images_are_cleared_along_their_ways_alone() -> None:

@@ -103,20 +103,21 @@ class Spill:
         )  # fmt: skip
         return table(np.column_stack([ways, slope])) @ axes * pitch * (width / computed)
 
-    def outwards(self, way: np.ndarray, slope: np.ndarray, width: float) -> np.ndarray:
+    def outwards(self, way: np.ndarray, moved: np.ndarray, width: float) -> np.ndarray:
         """How far (n, 2) [px] micro-images of a camera 2.0 show corners at ways (n, 2) [px] aside.
 
         Parameters
         ----------
         way
             From the micro-images' middles.
-        slope
-            (n,), how far a point moves over how far its micro-images do.
+        moved
+            (n,), how far micro-images of a point move, over the way from lenslet to lenslet.
         width
             As of `aside`.
         """
-        pitch, sign = self.lattice.pitch, float(np.sign(np.median(slope)))
-        steps = np.log(np.clip(sign * slope, *_SLOPES_BEHIND)) / math.log(rims.RATIO)
+        pitch, sign = self.lattice.pitch, math.copysign(1.0, float(np.median(moved)))
+        slope = 1 / np.maximum(sign * moved, 1e-9)
+        steps = np.log(np.clip(slope, *_SLOPES_BEHIND)) / math.log(rims.RATIO)
         nodes = range(math.floor(steps.min()), math.floor(steps.max()) + 2)
         computed = math.exp(_CLOSE * round(math.log(max(width, _NARROW_BEHIND)) / _CLOSE))
         table = rims.outwards(

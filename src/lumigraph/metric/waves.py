@@ -92,14 +92,15 @@ class Waves:
     def seen_fill(self) -> float:
         """Width where white micro-images are half as bright as between the darkest and the middle.
 
-        That is what a white image's `Calibration.fill` is measured by.
+        That is what a white image's `Calibration.fill` is measured by; 1 where they touch.
         """
         rim, basis = self.fill / 2 + np.linspace(-0.08, 0.08, 9), np.array(self.basis)
         darkest = basis.sum(0) / (2 if abs(basis[0] @ basis[1]) < 0.1 else 3)
         half = (self.white(np.zeros(2)) + self.white(darkest)) / 2
         across = np.array([(-basis[0, 1], basis[0, 0]), basis[0]]) / math.hypot(*basis[0])
         seen = [[self.white(way * axis) for way in rim] for axis in across]
-        return 2 * float(np.mean([np.interp(-half, -np.array(line), rim) for line in seen]))
+        found = [min(0.5, float(np.interp(-half, -np.array(line), rim))) for line in seen]
+        return 2 * float(np.mean(found))
 
 
 @lru_cache(maxsize=4)
