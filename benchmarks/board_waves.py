@@ -230,7 +230,7 @@ def work(given, todo, done):
     while (which := todo.get()) is not None:
         bench = None
         for k in range(max(which * given.each, given.first), min((which + 1) * given.each, given.last)):
-            if time.time() > given.until:
+            if time.time() > given.until or not multiprocessing.parent_process().is_alive():
                 break
             started = time.process_time()
             try:
