@@ -113,7 +113,7 @@ WIDTH = 0.0889
 def test_micro_images_show_corners_as_far_outwards_as_wave_optics() -> None:
     """On flat boards at 0.5 and 0.65 m, slopes 4.29 and 5.12, means over rings 0.4 to 1 px wide.
 
-    Squares of the second are 9 px wide, and its corners moved up to a quarter less than those of large ones.
+    Of the second up to a quarter is too much near the rim, which is not explained.
     """
     turns = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     rings = np.stack([np.sin(turns), np.cos(turns)], 1)
