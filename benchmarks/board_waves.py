@@ -4,8 +4,9 @@
 [--workers 1] [--minutes 60] [--keep FOLDER]``: each run simulates a white image and boards at the poses of
 `lg.metric.plan` through wave optics, exposes them with the sensor's noise, finds corners on the files, and
 runs ``lumigraph board`` on their table, told a focal length that is off by 2 % and the lenslets' pitch off by
-1e-4 (one standard deviation). Poses, noise and what is told are drawn anew in each run; the camera serves
-``--each`` runs, which is what makes many affordable: lenslets' matrices are computed once for it. Boards
+1e-4 (one standard deviation). Cameras differ in lengths, lenslets' width and wavelength. Poses, noise and
+what is told are drawn anew in each run; the camera serves ``--each`` runs, which is what makes many
+affordable: lenslets' matrices are computed once for it. Boards
 lean, so that each is shared out to slices by its own distance. The last picture takes no part: its best-seen
 corner is the point whose distance is asked for. Printed are how far corners are from where rays put them,
 the lengths' and a point's errors over the truth (over what is said), and CPU seconds; at the end how many
@@ -48,16 +49,17 @@ PIXEL = 5.5e-6
 
 def camera(rng, what):
     """A camera of a few thousand lenslets, or one of half as many, with a close-up."""
-    f = 50e-3 * rng.uniform(0.95, 1.05)
+    f, wavelength, wide = 50e-3 * rng.uniform(0.95, 1.05), rng.uniform(480e-9, 640e-9), rng.uniform(0.9, 1.15)
     sensor = {"pixel_pitch": PIXEL, "black_level": 64.0, "full_well": 12000.0, "read_noise": 6.0}
-    common = {"wavelength": 550e-9, "main_lens": {"focal_length": f}, "sensor": sensor}
+    common = {"wavelength": wavelength, "main_lens": {"focal_length": f}, "sensor": sensor}
     if what == "views":
-        own = {"pitch": 62e-6, "focal_length": 0.9e-3 * rng.uniform(0.9, 1.1), "count": (70, 70)}
+        own = {"pitch": 62e-6 * wide, "focal_length": 0.9e-3 * rng.uniform(0.9, 1.1), "count": (70, 70)}
         return lg.PlenopticCamera(**common, object_distance=8.2 * f * rng.uniform(0.98, 1.02), lenslets=own)
-    focal = 1.9e-3 * rng.uniform(0.95, 1.05)
-    lengths = (focal, 1.04 * focal, 0.96 * focal) if what == "kinds" else focal
+    focal, apart = 1.9e-3 * rng.uniform(0.95, 1.05), rng.uniform(0.03, 0.05)
+    lengths = (focal, (1 + apart) * focal, (1 - apart) * focal) if what == "kinds" else focal
     own = {
-        "pitch": 120e-6, "focal_length": lengths, "count": (44, 38), "layout": "hex", "magnification": 0.3
+        "pitch": 120e-6 * wide, "focal_length": lengths, "count": (44, 38), "layout": "hex",
+        "magnification": 0.3 * rng.uniform(0.9, 1.1),
     }  # fmt: skip
     return lg.FocusedPlenopticCamera(**common, object_distance=5 * f, lenslets=own)
 
@@ -140,7 +142,8 @@ def found(bench, board, poses, names, what):
     for raw, pose in zip(boards, poses, strict=True):
         ready = lg.prepare(raw, lenslets, white=white, dark=dark)
         with contextlib.suppress(lg.LumigraphError):
-            corners = lg.metric.find_corners([ready], board, in_views=what == "views")
+            light = {"in_views": what == "views", "wavelength": bench.camera.wavelength}
+            corners = lg.metric.find_corners([ready], board, **light)
             seen.append(
                 (replace(corners, frame=corners.frame + len(seen)), *away(bench.camera, board, corners, pose))
             )

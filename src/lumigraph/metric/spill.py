@@ -32,9 +32,10 @@ NARROW, _APART = 0.1, 1.1
 """λ b/d² below which it is computed for this, and ratio of those for which it is: what spills is proportional
 to it, within 4 % down to 0.015."""
 
-_UNSURE, _UNSURE_BEHIND = 0.15, 0.2
-"""Of what is taken out, over itself: by wave optics, up to 0.009 of 0.065 is left from view to view, and up
-to 0.0006 of 0.0029 of the way in micro-images of a camera 2.0."""
+_UNSURE, _UNSURE_BEHIND = 0.15, 0.4
+"""Of what is taken out, over itself: by wave optics, up to 0.009 of 0.065 is left from view to view. In
+micro-images of a camera 2.0 the stop's width, taken from the white image, and the lenslets' focus, taken from
+the corners, are off by 2 % and 10 to 30 %: that is up to 0.4 of it."""
 
 _WAYS, _SLOPES = 0.05, 0.5  # steps of ways [pitches] and of σ, between which it is interpolated
 _RIM, _STEEP = 0.5, 4.0  # ways and σ beyond which it is taken to be what it is there
