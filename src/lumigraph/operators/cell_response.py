@@ -17,6 +17,7 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
+from scipy.special import roots_legendre
 
 from lumigraph.elements import LensletArray
 from lumigraph.sensor import AngularResponse
@@ -26,6 +27,9 @@ SLACK = 1.04
 
 STEP = 2
 """Points between those of the window: an amplitude has half the band of its intensity."""
+
+FEWEST = 24
+"""Nodes of a quadrature, however short."""
 
 Pair = tuple[float, float]
 
@@ -230,8 +234,10 @@ class Lenslets:
             chord = half * np.cos(angle)
             return half * np.sin(angle), weight * chord, chord
         corner, pieces = half / math.sqrt(3), []
+        count = nodes(2 * corner, steepest, self.axes[0], self.optics)
         for low, high in ((-2 * corner, -corner), (-corner, corner), (corner, 2 * corner)):
-            at, weight = legendre(low, high, max(24, count * 2 // 3))
+            share = (high - low) / (4 * corner)
+            at, weight = legendre(low, high, FEWEST + math.ceil(share * (count - FEWEST)))
             pieces.append((at, weight, np.minimum(half, 2 * half - math.sqrt(3) * np.abs(at))))
         y, weight, chord = (np.concatenate(part) for part in zip(*pieces, strict=True))
         return y, weight, chord
@@ -254,7 +260,7 @@ def nodes(half: float, focal_length: float, axis: Axis, optics: Pair) -> int:
     """Quadrature nodes across a lenslet: two for each turn of the phase, and a few."""
     wavelength, distance = optics
     steepest = half / abs(focal_length) + (axis.neighbourhood + axis.size + half) / distance
-    return 24 + math.ceil(2 * 2 * half * steepest / wavelength)
+    return FEWEST + math.ceil(2 * 2 * half * steepest / wavelength)
 
 
 def legendre(low: float, high: float, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -265,7 +271,7 @@ def legendre(low: float, high: float, count: int) -> tuple[np.ndarray, np.ndarra
 
 @cache
 def _legendre(count: int) -> tuple[np.ndarray, np.ndarray]:
-    return np.polynomial.legendre.leggauss(count)
+    return roots_legendre(count)[:2]
 
 
 def focal_lengths(array: LensletArray) -> tuple[float, ...]:

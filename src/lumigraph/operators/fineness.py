@@ -67,8 +67,12 @@ class Fineness:
 
         More where a point lights more of them: found for images of points with radii of 2 to 6 pitches.
         """
+        return math.ceil(self.beside(fresnel_number, blur, edges))
+
+    def beside(self, fresnel_number: float, blur: float, edges: Edges = "meet") -> float:
+        """The same, of single lenslets, whose light may be followed to any place [pitches]."""
         pitches = {"meet": 5, "straight": 9, "other": 6}[edges] + _farther(blur)
-        return math.ceil(pitches * (1e-3 / self.accuracy) ** 0.23 * tail(fresnel_number))
+        return pitches * (1e-3 / self.accuracy) ** 0.23 * tail(fresnel_number)
 
     @property
     def rank(self) -> float:

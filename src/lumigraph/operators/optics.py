@@ -11,9 +11,9 @@ from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.cell_response import SLACK, Axis
 from lumigraph.operators.cells import Cells
-from lumigraph.operators.fineness import Fineness
+from lumigraph.operators.fineness import Edges, Fineness
 
-VERSION = 22
+VERSION = 23
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 
@@ -98,9 +98,7 @@ class Optics:
     def axes(self) -> tuple[Axis, Axis]:
         """Sampling of a cell along y and along x."""
         band = SLACK / 2 / _cells.airy(self.camera)
-        neighbours = self.fineness.neighbours(
-            _cells.fresnel_number(self.camera), self.blur, _cells.edges(self.array)
-        )
+        neighbours = self.fineness.neighbours(*self._lit_alike)
         neighbourhood = neighbours * self.array.lattice.pitch + self.spill
         y, x = (
             Axis(size, points, samples, neighbourhood, band)
@@ -109,6 +107,20 @@ class Optics:
             )
         )
         return y, x
+
+    @property
+    def beside(self) -> float:
+        """How far beyond a lenslet its light is followed, as `Fineness.beside`, to a quarter pitch [m].
+
+        Depths whose points light much the same share what lenslets do to light.
+        """
+        pitches = math.ceil(4 * self.fineness.beside(*self._lit_alike)) / 4
+        return pitches * self.array.lattice.pitch + self.spill
+
+    @property
+    def _lit_alike(self) -> tuple[float, float, Edges]:
+        """What tells how far lenslets send light aside."""
+        return _cells.fresnel_number(self.camera), self.blur, _cells.edges(self.array)
 
     @property
     def reach(self) -> tuple[int, int]:

@@ -110,8 +110,8 @@ class Round:
 def _radial(half: float, squared: float, focus: float, widest: float) -> tuple[CubicSpline, CubicSpline]:
     """Light behind a stop of radius `half`, with λL `squared`, as `Round` has it."""
     turns = (abs(focus) * half**2 + 2 * np.pi * widest * half / squared) / np.pi
-    rho, weight = legendre(0, half, 64 + 3 * int(turns))
-    at = np.arange(0, widest + 2 * squared / half, squared / half / 64)
+    rho, weight = legendre(0, half, 64 + 2 * int(turns))
+    at = np.arange(0, widest + 2 * squared / half, squared / half / 32)
     pupil = np.exp(1j * focus * rho**2) * 2 * np.pi * rho * weight / (squared * half * np.sqrt(np.pi))
     both = np.stack([pupil.real, pupil.imag, (pupil * rho**2).real, (pupil * rho**2).imag], axis=1)
     parts = np.array_split(2 * np.pi / squared * at, math.ceil(len(at) * len(rho) / _BLOCK))

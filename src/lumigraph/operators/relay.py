@@ -89,7 +89,7 @@ class Relays:
 
 def _alike(one: Optics, other: Optics) -> bool:
     same = one.cells == other.cells and one.axes == other.axes
-    return same and one.fineness == other.fineness
+    return same and one.fineness == other.fineness and (one.straight or one.beside == other.beside)
 
 
 @dataclass(slots=True)
