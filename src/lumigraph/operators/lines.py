@@ -29,8 +29,8 @@ FAINT = 1e-7
 ASIDE = 0.5, 0.3
 """Pitches that light is followed farther than beside other lenslets: at 5e-3, and more for each tenth.
 
-Behind three kinds with p²/(λb) of 5 and 33, images are then off by 2.5e-3 and 4e-3 at 5e-3, by 2e-4 and 9e-4
-at 5e-4.
+Behind three kinds with p²/(λb) of 5 and 33, images then are 2.6e-3 and 2.0e-3 from those that are followed to
+8 and 5 pitches at 5e-3, 1.9e-4 and 1.8e-4 at 5e-4.
 """
 
 MORE = 24
