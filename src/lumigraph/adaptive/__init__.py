@@ -4,7 +4,8 @@
 - `start`: `start`, a first wavefront from the shifts of views; `Slopes`, its result
 - `sense`: `sense`, of a plenoptic camera before a point of light; `star`: its images by coefficients
 - `wavefront`: `Wavefront`, the result; `wavefront_map`, Zernike terms over the pupil
-- `of_volume`: of any object; `sight`: operators by coefficients; `voxels`: steps on volume and coefficients
+- `of_volume`: of any object; `scene`: a volume or picture before its instrument
+- `sight`: operators by coefficients; `voxels`: steps on volume and coefficients
 - `field`: nodes of the field at which coefficients stand
 - `search`: beads of a raw image through a wavefront; `beads`: of a volume; `changes`: what beads tell
 - `fit`: beads and coefficients by steps of Levenberg and Marquardt

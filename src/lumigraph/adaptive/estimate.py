@@ -4,7 +4,7 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.deconvolution import Exposure
 from lumigraph.deconvolution.problem import Problem
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
-from lumigraph.instruments import LightFieldMicroscope
+from lumigraph.instruments import LightFieldMicroscope, PlenopticCamera
 from lumigraph.scene import Points
 
 TERMS = tuple(range(5, 16))
@@ -50,17 +50,17 @@ MISFIT = 2.0
 
 def estimate(
     raw: RawImage | np.ndarray,
-    microscope: LightFieldMicroscope,
+    instrument: LightFieldMicroscope | PlenopticCamera,
     depths: Sequence[float],
     terms: Sequence[int] = TERMS,
     *,
     regions: tuple[int, int] = (1, 1),
     exposure: Exposure | None = None,
     pixels: Calibration | None = None,
-    object: Literal["beads", "volume"] = "beads",  # noqa: A002 - what it is called everywhere
+    object: Literal["beads", "volume", "picture"] = "beads",  # noqa: A002 - what it is called everywhere
     progress: Progress | None = None,
 ) -> Wavefront:
-    """Aberrations of a light-field microscope from one raw image, with the object.
+    """Aberrations of a light-field microscope or a plenoptic camera from one raw image, with the object.
 
     Of beads: Richardson-Lucy finds them, through no wavefront or through the one that the shifts of views
     show (see `start`), whichever is likelier. Then their places and light and the Zernike coefficients are
@@ -75,16 +75,22 @@ def estimate(
     volume's voxels are unknown, too, until the likelihood rises no more. Each time the volume begins even:
     what has adapted to a wrong wavefront resists a better one.
 
+    Of a picture, something flat with texture at one known depth, in the same way, in as fine samples as
+    points' images change by: defocus is told then. For cameras 1.0 it is the only one. Pixels behind the two
+    outermost lenslets of a camera's array do not count.
+
     Parameters
     ----------
     raw
         As it was read.
-    microscope
-        Configuration "1.0", with square lenslets. Aberrations of its description are taken as known.
+    instrument
+        A microscope of configuration "1.0" or a `PlenopticCamera`, with square lenslets. Aberrations of its
+        description are taken as known.
     depths
-        Planes in which beads are looked for, or of the volume [m], such as each 6 µm.
+        Planes in which beads are looked for, or of the volume [m], such as each 6 µm; the one of a picture.
     terms
-        Noll indices. Piston, tilt and defocus cannot be told from the object's place: see `Wavefront.untold`.
+        Noll indices. Piston, tilt and, but for a picture, defocus cannot be told from the object's place: see
+        `Wavefront.untold`.
     regions
         Of the field along y and x, each with coefficients of its own at its middle; linear between.
         Neighbours are expected to differ by 0.3 waves rms, or less if the fit shows that they are more alike.
@@ -94,8 +100,8 @@ def estimate(
     pixels
         Calibration of a real camera.
     object
-        "beads", sparse points anywhere; "volume", anything, as samples of which three go into a lenslet.
-        A volume has one region.
+        "beads", sparse points anywhere; "volume", anything, as samples of which three go into a lenslet;
+        "picture", anything flat. A volume and a picture have one region.
     progress
         Called as ``progress(fraction)`` after each step; how many there will be is not known.
 
@@ -103,7 +109,8 @@ def estimate(
     ------
     GeometryError
         Another configuration, no terms, no depths, fewer than two of them or no beads where those are
-        looked for, another kind of object, regions of a volume.
+        looked for, several of a picture, another kind of object, beads or a volume before a camera, regions
+        of a volume or picture.
     CalibrationError
         A raw image of another shape, or a dark one.
     SamplingError
@@ -119,17 +126,17 @@ def estimate(
     G. Schwarz, Ann. Stat. 6, 461 (1978).
     """
     parted = _regions(regions)
-    if object == "volume":
+    if object in ("volume", "picture"):
         if parted != (1, 1):
             raise GeometryError(
-                f"regions are {parted} but a volume has one. Crop the raw image, or use beads."
+                f"regions are {parted} but a {object} has one. Crop the raw image, or use beads."
             )
-        found = of_volume((raw, exposure, pixels), microscope, depths, terms, progress or silent)
-        warn_of_misfit(found.pearson, "the volume leaves")
+        found = of_volume((raw, exposure, pixels), instrument, depths, terms, object, progress or silent)
+        warn_of_misfit(found.pearson, f"the {object} leaves")
         return found
     if object != "beads":
-        raise GeometryError(f"object is {object!r} but must be 'beads' or 'volume'.")
-    given = _Given.of((raw, exposure, pixels), microscope, depths, terms)
+        raise GeometryError(f"object is {object!r} but must be 'beads', 'volume' or 'picture'.")
+    given = _Given.of((raw, exposure, pixels), instrument, depths, terms)
     model = given.model(parted, progress or silent)
     none = np.zeros((len(model.nodes), len(given.terms)))
     first = Fit(given.search.beads(given.problem), none)
@@ -154,7 +161,7 @@ def estimate(
     return Wavefront(
         given.terms, found, deviations, (model.nodes.y, model.nodes.x), given.untold | unknown, fit.points,
         (model.deviance(plain), model.deviance(fit)), pearson, rounds, fit.steps,
-        bent(microscope, given.terms, found.mean((0, 1))), covariance,
+        bent(given.microscope, given.terms, found.mean((0, 1))), covariance,
     )  # fmt: skip
 
 
@@ -184,12 +191,13 @@ class _Given:
     def of(
         cls,
         given: tuple[RawImage | np.ndarray, Exposure | None, Calibration | None],
-        microscope: LightFieldMicroscope,
+        instrument: LightFieldMicroscope | PlenopticCamera,
         depths: Sequence[float],
         terms: Sequence[int],
     ) -> "_Given":
         raw, exposure, pixels = given
-        planes, found, untold = asked_for(microscope, depths, terms, BEADS)
+        planes, found, untold = asked_for(instrument, depths, terms, BEADS)
+        microscope = cast("LightFieldMicroscope", instrument)  # cameras have no beads
         if len(planes) < 2:
             raise GeometryError(
                 f"depths are {list(planes)} but beads need at least two planes to stand between."

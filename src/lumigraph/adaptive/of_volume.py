@@ -1,15 +1,15 @@
-"""Aberrations from the light field of any object, together with its volume."""
+"""Aberrations from the light field of any object, together with its volume or picture."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from lumigraph.adaptive.checked import VOLUME, asked_for, bent
+from lumigraph.adaptive.checked import PICTURE, VOLUME, asked_for, bent
 from lumigraph.adaptive.field import PRIOR
-from lumigraph.adaptive.sight import Sight
+from lumigraph.adaptive.scene import Scene, own_defocus
 from lumigraph.adaptive.start import starts
-from lumigraph.adaptive.voxels import ITERATIONS, Around, Told, Voxels
+from lumigraph.adaptive.voxels import Around, Told, Voxels
 from lumigraph.adaptive.wavefront import Wavefront
 from lumigraph.adaptive.worth import UNKNOWN, worth
 from lumigraph.core import arrays
@@ -19,48 +19,37 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.deconvolution import Exposure
 from lumigraph.deconvolution.problem import values
-from lumigraph.instruments import LightFieldMicroscope
+from lumigraph.instruments import LightFieldMicroscope, PlenopticCamera
 from lumigraph.scene import Points
-
-ACCURACY = 2e-2
-"""Of points' images.
-
-With 3e-2, 0.3 waves of astigmatism before a textured volume came out 0.01 to 0.03 too low, by how pixels were
-sampled; with 2e-2 or 1e-2, 0.01.
-"""
-
-SAMPLES = 3
-"""Of the volume along a lenslet."""
 
 Given = tuple[RawImage | np.ndarray, Exposure | None, Calibration | None]
 
 
 def of_volume(
-    given: Given, microscope: LightFieldMicroscope, depths: Sequence[float], terms: Sequence[int],
-    progress: Progress,
+    given: Given, instrument: LightFieldMicroscope | PlenopticCamera, depths: Sequence[float],
+    terms: Sequence[int], kind: str, progress: Progress,
 ) -> Wavefront:  # fmt: skip
-    """The wavefront of (raw image, exposure, pixels), and the volume; see `estimate`."""
+    """The wavefront of (raw image, exposure, pixels), and the volume or picture; see `estimate`."""
     raw, exposure, pixels = given
-    planes, found, untold = asked_for(microscope, depths, terms, VOLUME)
+    planes, found, untold = asked_for(instrument, depths, terms, {"volume": VOLUME, "picture": PICTURE}[kind])
     if exposure is None:
         exposure = Exposure.of(raw) if isinstance(raw, RawImage) else Exposure()
-    farthest = float(np.abs(planes).max())
-    images = microscope.pupil_images(found, farthest=farthest, accuracy=ACCURACY, pixels=pixels)
-    sight = Sight(images, tuple(map(float, planes)), SAMPLES, -images.layout.frame)
-    sight.require_memory()
-    sight = Sight.of(images, sight.planes, SAMPLES)
-    voxels = Voxels(sight, values(raw, sight.operator(np.zeros(len(found))), exposure), exposure, progress)
-    told = voxels.begun(np.zeros(len(found)), ITERATIONS[0])
-    shifted = starts(told.problem, microscope, found, pixels)
-    tried = (voxels.begun(c, ITERATIONS[0]) for c in shifted)
+    scene = Scene(instrument, tuple(map(float, planes)), kind, pixels)
+    sight, exposure = scene.sight(found), scene.counted(exposure)
+    few, many = scene.iterations
+    data = values(raw, sight.operator(np.zeros(len(found))), exposure)
+    voxels = Voxels(sight, data, exposure, progress, scene.method(sight), scene.least)
+    told = voxels.begun(np.zeros(len(found)), few)
+    shifted = starts(told.problem, instrument, found, pixels, own_defocus(sight.images, sight.planes[0]))
+    tried = (voxels.begun(c, few) for c in shifted)
     told = min([told, *tried], key=lambda one: one.state.deviance)
-    told, around = _improved(voxels, told, np.ones(len(found), bool), ITERATIONS)
-    covariance = _covariance(voxels, told, around)
+    told, around = _improved(voxels, told, np.ones(len(found), bool), scene.iterations)
+    covariance = _covariance(voxels, told, around, scene.left)
     free = worth(covariance, told.coefficients[None], voxels.counted(told), np.eye(len(found)) / PRIOR**2)
     if not free.all():
-        kept = voxels.begun(told.coefficients * free, ITERATIONS[-1], told.steps)
-        told, around = _improved(voxels, kept, free, ITERATIONS[-1:]) if free.any() else (kept, around)
-    plain = voxels.begun(np.zeros(len(found)), ITERATIONS[-1], told.steps)
+        kept = voxels.begun(told.coefficients * free, many, told.steps)
+        told, around = _improved(voxels, kept, free, (many,)) if free.any() else (kept, around)
+    plain = voxels.begun(np.zeros(len(found)), many, told.steps)
     if not _is_likelier(voxels, told, plain):
         told = plain
     grid = sight.picture
@@ -70,8 +59,8 @@ def of_volume(
         (np.array([grid.center[0]]), np.array([grid.center[1]])),
         untold | _unknown(found, covariance), Points(np.zeros((0, 3)), np.zeros(0)),
         (plain.state.deviance, told.state.deviance), voxels.pearson(told), 1, told.steps,
-        bent(microscope, found, told.coefficients), covariance,
-        Volume(volume, grid, sight.planes), _explained(found, around),
+        bent(instrument, found, told.coefficients), covariance,
+        Volume(volume, grid, scene.depths), _explained(found, around),
     )  # fmt: skip
 
 
@@ -94,10 +83,10 @@ def _is_likelier(voxels: Voxels, told: Told, plain: Told) -> bool:
     return gained > unknowns * math.log(count) * max(voxels.pearson(told), 1.0)
 
 
-def _covariance(voxels: Voxels, told: Told, around: Around) -> np.ndarray:
-    """Of the coefficients; larger where the volume does not explain the raw image."""
-    information = around.information / max(voxels.pearson(told), 1.0)
-    return np.linalg.inv(information + np.eye(len(information)) / PRIOR**2)
+def _covariance(voxels: Voxels, told: Told, around: Around, left: float) -> np.ndarray:
+    """Of the coefficients; larger where the object does not explain the raw image, and by what it leaves."""
+    information, one = around.information / max(voxels.pearson(told), 1.0), np.eye(len(around.information))
+    return np.linalg.inv(information + one / PRIOR**2) + left**2 * one
 
 
 def _unknown(terms: tuple[int, ...], covariance: np.ndarray) -> dict[int, str]:

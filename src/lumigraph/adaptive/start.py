@@ -6,15 +6,14 @@ compared with the mean of all, moved back. Depth moves pictures in proportion to
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import cast
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, shift
 
-from lumigraph.adaptive.checked import bent
+from lumigraph.adaptive.checked import bent, known_of
 from lumigraph.core import checks
 from lumigraph.core.brief import brief
 from lumigraph.core.calibration import Calibration
@@ -35,7 +34,10 @@ SMOOTH = (2.0, 1.2, 0.7, 0.5)
 TURNS = 8
 """Of comparing and moving, for each of them."""
 
-BASE = (2, 3, 4)
+DEFOCUS = 4
+"""Noll's index."""
+
+BASE = (2, 3, DEFOCUS)
 """Tilts and defocus, which are the scene's place and depth: fitted and dropped."""
 
 STEP = 1e-4
@@ -164,20 +166,24 @@ def start(
 
 
 def starts(
-    problem: Problem, microscope: LightFieldMicroscope, terms: Sequence[int], pixels: Calibration | None
+    problem: Problem,
+    instrument: LightFieldMicroscope | PlenopticCamera,
+    terms: Sequence[int],
+    pixels: Calibration | None,
+    own_defocus: float = 0.0,
 ) -> list[np.ndarray]:
     """Coefficients (terms,) to begin with, from the views' shifts: all, and those above the second order.
 
+    Less the defocus that is due to the scene's own depth [waves rms], where defocus is one of the terms.
     None of an image whose views cannot be compared. A scene of few things passes for astigmatism if those
     along y and those along x stand at other depths.
     """
     try:
-        slopes = start(problem.light.astype(np.float32), microscope, terms, pixels=pixels)
+        slopes = start(problem.light.astype(np.float32), instrument, terms, pixels=pixels)
     except (CalibrationError, SamplingError):
         return []
-    found = np.array([slopes.coefficients[j] for j in terms]) - _known(
-        microscope.objective.aberrations, terms
-    )
+    found = np.array([slopes.coefficients[j] for j in terms]) - _known(instrument, terms)
+    found = found - own_defocus * (np.array(terms) == DEFOCUS)
     high = np.array([noll_to_nm(j)[0] > 2 for j in terms])
     return [found, found * high] if high.any() and not high.all() else [found]
 
@@ -186,14 +192,11 @@ def _with(
     instrument: LightFieldMicroscope | PlenopticCamera, terms: Sequence[int], found: np.ndarray
 ) -> LightFieldMicroscope | PlenopticCamera:
     """The instrument with these coefficients in place of its own."""
-    if isinstance(instrument, LensletCamera):
-        known = _known(instrument.main_lens.aberrations, terms)
-        return cast("PlenopticCamera", bent(instrument, terms, found - known))
-    return bent(instrument, terms, found - _known(instrument.objective.aberrations, terms))
+    return bent(instrument, terms, found - _known(instrument, terms))
 
 
-def _known(aberrations: Mapping[int, float], terms: Sequence[int]) -> np.ndarray:
-    return np.array([aberrations.get(j, 0.0) for j in terms])
+def _known(instrument: LightFieldMicroscope | PlenopticCamera, terms: Sequence[int]) -> np.ndarray:
+    return np.array([known_of(instrument).get(j, 0.0) for j in terms])
 
 
 def _seen(instrument: LightFieldMicroscope | PlenopticCamera) -> tuple[float, float]:

@@ -9,7 +9,7 @@ nothing: u_j is the most likely one for J_j, with a prior of 1 for u, and what i
 S is Fisher's information of c with all voxels unknown (a Schur complement).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -24,9 +24,6 @@ from lumigraph.deconvolution.beyond import BARELY
 from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.methods import State
 from lumigraph.deconvolution.problem import Problem, Scale
-
-ITERATIONS = (4, 15)
-"""Of Richardson-Lucy, accelerated: few at first, for a volume that explains a wrong wavefront resists it."""
 
 SOLVED = 20
 """Steps of conjugate gradients by which the volume explains a change."""
@@ -100,20 +97,26 @@ class Voxels:
         What was seen.
     progress
         Of the steps.
+    method
+        By which the object is found.
+    least
+        Part of the most light that a sample must send onto pixels that count, to be lit.
     """
 
     sight: Sight
     raw: np.ndarray
     exposure: Exposure
     progress: Progress = silent
+    method: RichardsonLucy = field(default_factory=lambda: RichardsonLucy(accelerated=True))
+    least: float = BARELY
 
     def begun(self, coefficients: np.ndarray, iterations: int, steps: int = 0) -> Told:
         """Coefficients with the volume that Richardson-Lucy finds from an even one."""
         operator = self.sight.operator(coefficients)
-        problem = Problem.of(self.raw, self.exposure, Scale.of(operator, self.exposure, self.raw, BARELY))
-        method, state = RichardsonLucy(accelerated=True), State.at(problem, problem.flat())
+        problem = Problem.of(self.raw, self.exposure, Scale.of(operator, self.exposure, self.raw, self.least))
+        state = State.at(problem, problem.flat())
         for _ in range(iterations):
-            state = method.step(problem, state)
+            state = self.method.step(problem, state)
         return Told(coefficients, problem, state, steps, iterations)
 
     def counted(self, told: Told) -> float:

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 TERMS = "5-11"
 """Unless others are asked for: up to coma, trefoil and spherical aberration."""
 
+FLAT = "4-11"
+"""The same of a picture at a known depth: with defocus."""
+
 HIGHEST = 66
 """Noll index: order 10. More of them than a light field tells."""
 
@@ -53,17 +56,19 @@ class Adaptive:
     Parameters
     ----------
     adaptive
-        Find the microscope's aberrations from the raw image, of several pages from the first, and deconvolve
-        with them. Takes minutes.
+        Find the aberrations of a microscope or of a camera of kind plenoptic from the raw image, of several
+        pages from the first, and deconvolve with them. Takes minutes.
     terms
-        Noll indices of the Zernike terms that are looked for, such as 5-11 (the default) or 5,6,8.
+        Noll indices of the Zernike terms that are looked for, such as 5,6,8; left out, 5-11, of a
+        picture 4-11.
     object
-        What the raw image shows: volume, anything with texture; beads, sparse points.
+        What the raw image shows: volume, anything with texture; picture, something flat at one known depth;
+        beads, sparse points. A volume if left out, of cameras a picture.
     """
 
     adaptive: Annotated[bool, Parameter(negative="")] = False
     terms: str | None = None
-    object: Literal["volume", "beads"] | None = None
+    object: Literal["volume", "picture", "beads"] | None = None
 
     def check(self, count: int) -> None:
         """Refuse what can be seen to be wrong before anything is read."""
@@ -73,9 +78,9 @@ class Adaptive:
             raise FormatError(f"--adaptive takes one raw image, but there are {count} files. Give one.")
         self.indices()
 
-    def indices(self) -> tuple[int, ...]:
-        """Noll indices, each once."""
-        return indices(self.terms or TERMS)
+    def indices(self, flat: bool = False) -> tuple[int, ...]:
+        """Noll indices, each once; of something flat at a known depth with defocus."""
+        return indices(self.terms or (FLAT if flat else TERMS))
 
     def found(
         self, raw: "PreparedImage", camera: "Instrument", planes: tuple[float, ...] | None, shown: Progress
@@ -84,16 +89,18 @@ class Adaptive:
         if not self.adaptive:
             return None
         from lumigraph.adaptive import estimate
+        from lumigraph.instruments import LensletCamera
 
         shown(0.0)
-        scope = cast("LightFieldMicroscope", camera)
+        focused = isinstance(camera, LensletCamera)
+        kind = self.object or ("picture" if focused else "volume")
         return estimate(
             raw,
-            scope,
+            cast("LightFieldMicroscope", camera),
             planes or (0.0,),
-            self.indices(),
-            pixels=raw.calibration,
-            object=self.object or "volume",
+            self.indices(kind == "picture"),
+            pixels=None if focused else raw.calibration,  # as `operator_for` has it
+            object=kind,
             progress=shown,
         )
 

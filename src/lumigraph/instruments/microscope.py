@@ -20,12 +20,11 @@ from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.row import Row
 from lumigraph.operators.fourier_microscope import fourier_operator
 from lumigraph.operators.fourier_points import FourierPoints
-from lumigraph.operators.microscope_bench import DEGREE
 from lumigraph.operators.microscope_building import Layout, microscope_operator, require_accuracy
 from lumigraph.operators.microscope_cell import CellSampling
-from lumigraph.operators.microscope_pixels import narrowed, placement, whole_pixels
+from lumigraph.operators.microscope_layout import Behind, cell_sampling, laid_out
+from lumigraph.operators.microscope_pixels import narrowed
 from lumigraph.operators.microscope_pupil import PupilImages
-from lumigraph.operators.microscope_samples import samples_needed
 from lumigraph.operators.points import OUTSIDE
 from lumigraph.simulation.microscope_scene import SAMPLES, point_image
 
@@ -34,9 +33,6 @@ MODELLED = 1e-2
 
 FINER = 1.5
 """Samples of light that is traced by rays, over whole pixels: those between are interpolated."""
-
-PIXELS = 0.6
-"""Of the accuracy, what the interpolation of pixels may take."""
 
 
 class LightFieldMicroscope(DescribedMicroscope):
@@ -262,28 +258,19 @@ class LightFieldMicroscope(DescribedMicroscope):
         calibration = self.calibration if pixels is None else pixels
         if not isinstance(calibration, Calibration):
             raise GeometryError(f"pixels is {pixels!r} but must be a whole number, a Calibration or None.")
-        N = None if self.objective.model == "rays" else whole_pixels(calibration, accuracy)
-        sampling = (
-            self._sampled(samples, N, 1 / N, 0)
-            if N
-            else self._sampling(samples, calibration.lattice.pitch, tuple(depths), accuracy)
-        )
-        placed, cells, middle = placement(calibration, sampling.pixels, sampling.degree)
-        step = self.lenslet_size / calibration.lattice.pitch
-        center = tuple((middle[k] - calibration.shape[k] // 2) * step for k in (0, 1))
-        return Layout(cells, sampling, placed, (center[0], center[1]))
+        sampling = self._sampling(samples, calibration, tuple(depths), accuracy)
+        return laid_out(sampling, calibration, self.lenslet_size)
 
     def _sampling(
-        self, samples: int, pitch: float, depths: tuple[float, ...], accuracy: float
+        self, samples: int, calibration: Calibration, depths: tuple[float, ...], accuracy: float
     ) -> CellSampling:
-        """For pixels of which `pitch` make a lenslet's."""
-        fill = self.pixels.fill_factor
+        fill, pitch = self.pixels.fill_factor, calibration.lattice.pitch
         if self.objective.model == "rays":
             N = math.ceil(max(FINER, math.sqrt(2) / fill) * pitch)
             return self._sampled(samples, N, 1 / pitch, 1)
-        shortest, width = min(self.objectives, key=lambda one: one.wavelength), fill / pitch
-        N = samples_needed(shortest, self.lenslet, width, depths, PIXELS * accuracy)
-        return self._sampled(samples, N, 1 / pitch, DEGREE)
+        shortest = min(self.objectives, key=lambda one: one.wavelength)
+        behind = Behind(calibration, fill)
+        return cell_sampling(shortest, self.lenslet, behind, samples, depths, accuracy)
 
     def _sampled(self, samples: int, N: int, apart: float, degree: int) -> CellSampling:
         """By N samples along a lenslet, for pixels that stand so far apart [lenslets]."""

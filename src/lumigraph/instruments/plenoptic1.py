@@ -1,17 +1,20 @@
 """The plenoptic camera 1.0."""
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from pydantic import model_validator
 
+from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
 from lumigraph.design import plenoptic1, thin_lens
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import describe, trade_offs
+from lumigraph.instruments import camera_pupil, describe, trade_offs
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.parameters import Parameter, lenslets
 from lumigraph.instruments.row import Row
+from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.simulation import plane_views
 
 _MOST_KNOWN = 33
@@ -108,6 +111,38 @@ class PlenopticCamera(LensletCamera):
             focused = thin_lens.object_distance(focal_length, self.separation)
             dz = focused - self.object_distance + plenoptic1.defocus(focal_length, focused, alpha)
         return plane_views(small, small.calibration, dz)
+
+    def pupil_images(
+        self,
+        terms: Sequence[int],
+        *,
+        dz: float = 0.0,
+        accuracy: float = 1e-2,
+        pixels: Calibration | None = None,
+    ) -> PupilImages:
+        """Images of points in a plane as functions of Zernike terms of the main lens, with derivatives.
+
+        Points stand at (y, x, 0) in that plane, and shine as samples as large as a lenslet there. Lenslets go
+        on beyond the array, whose outermost two see some light that is not there.
+
+        Parameters
+        ----------
+        terms
+            Noll indices; their coefficients, in waves rms, add to the description's aberrations.
+        dz
+            Of the plane from the focused one [m], positive farther.
+        accuracy
+            Relative rms error of points' images, 1e-5 to 0.1.
+        pixels
+            Calibration of a real camera; None for the description's own pixels.
+
+        Raises
+        ------
+        GeometryError
+            Lenslets that are not square, alike and in rows and columns along the sensor's; a main lens that
+            changes over the field; the exact model; a term that is no Noll index.
+        """
+        return camera_pupil.pupil_images(self, terms, dz, accuracy, pixels)
 
     def _own_parameters(self) -> tuple[Parameter, ...]:
         return lenslets(self.lenslets, layouts=True)

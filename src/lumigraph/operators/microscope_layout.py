@@ -1,0 +1,44 @@
+"""Lenslets and pixels of a raw image whose lattice is known."""
+
+from typing import NamedTuple
+
+from lumigraph.core.calibration import Calibration
+from lumigraph.elements.objective import Objective
+from lumigraph.operators.microscope_bench import DEGREE
+from lumigraph.operators.microscope_building import Layout
+from lumigraph.operators.microscope_cell import CellSampling, Lenslet
+from lumigraph.operators.microscope_pixels import placement, whole_pixels
+from lumigraph.operators.microscope_samples import samples_needed
+
+PIXELS = 0.6
+"""Of the accuracy, what the interpolation of pixels may take."""
+
+
+class Behind(NamedTuple):
+    """What stands behind the lenslets: where micro-images stand, and the pixels' fill factor."""
+
+    calibration: Calibration
+    fill: float
+
+
+def cell_sampling(
+    objective: Objective, lenslet: Lenslet, behind: Behind, points: int, depths: tuple[float, ...],
+    accuracy: float,
+) -> CellSampling:  # fmt: skip
+    """Of so many points of the object along a lenslet, and of the pixels: those, or samples between which
+    they are interpolated.
+    """
+    calibration, fill = behind
+    if N := whole_pixels(calibration, accuracy):
+        return CellSampling(points, N, fill / N, 0, fill**2)
+    width = fill / calibration.lattice.pitch
+    N = samples_needed(objective, lenslet, width, depths, PIXELS * accuracy)
+    return CellSampling(points, N, width, DEGREE, fill**2)
+
+
+def laid_out(sampling: CellSampling, calibration: Calibration, size: float) -> Layout:
+    """Lenslets that are seen, each so large in the object [m], with their pixels."""
+    placed, cells, middle = placement(calibration, sampling.pixels, sampling.degree)
+    step = size / calibration.lattice.pitch
+    y, x = ((middle[k] - calibration.shape[k] // 2) * step for k in (0, 1))
+    return Layout(cells, sampling, placed, (float(y), float(x)))
