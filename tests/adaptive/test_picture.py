@@ -165,7 +165,7 @@ def test_no_aberration_of_a_picture_is_invented():
         lenslets={"pitch": "120 um", "focal_length": "2.5 mm", "count": (10, 10)},
         sensor={"pixel_pitch": "8 um"},
     )
-    raw = exposed(((4, 0.0),), 0.0, camera, 100.0)
+    raw = exposed.__wrapped__(((4, 0.0),), 0.0, camera, 100.0)
     found = estimate(raw, camera, (0.0,), (4, 6, 7, 11), exposure=EXPOSURE, object="picture")
     assert found.rms < 0.01
     assert (found.deviations > 1e-3).all()
