@@ -135,7 +135,7 @@ RAW = np.ones((135, 135), np.float32)
     ("given", "message"),
     [
         ({"microscope": SCOPE.replace(configuration="2.0", lenslet_offset="1 mm")}, "configuration '1.0'"),
-        ({"microscope": lg.PlenopticCamera.from_catalogue("thesis-plenoptic-1")}, "configuration '1.0'"),
+        ({"microscope": lg.PlenopticCamera.from_catalogue("thesis-plenoptic-1")}, "stands a .picture."),
         ({"terms": (1, 2, 3, 4)}, "beads explain 1 to 4 themselves"),
         ({"terms": ()}, "Give others"),
         ({"terms": (0,)}, "Noll's index is 0"),
@@ -146,7 +146,7 @@ RAW = np.ones((135, 135), np.float32)
         ({"raw": 0 * RAW}, "dark"),
         ({"regions": (0, 1)}, "regions"),
         ({"regions": (1, 1, 1)}, "two whole numbers"),
-        ({"object": "cells"}, "'beads' or 'volume'"),
+        ({"object": "cells"}, "'beads', 'volume' or 'picture'"),
         ({"object": "volume", "regions": (2, 2)}, "a volume has one"),
         ({"object": "volume", "terms": (4,)}, "volume explains 1 to 4 itself"),
         ({"object": "volume", "depths": ()}, "no depths"),

@@ -125,17 +125,17 @@ def test_the_start_knows_the_scenes_own_defocus():
         ({"depths": (0.0, 1e-3)}, "there are 2 depths but a picture stands at one"),
         ({"terms": (1, 2, 3)}, "the picture explains 1 to 3 itself"),
         ({"regions": (2, 2)}, "a picture has one"),
-        ({"instrument": lg.load_camera("thesis-plenoptic-2-m050")}, "or a PlenopticCamera"),
-        ({"instrument": CAMERA.replace(lenslets={"rotation": 0.1})}, "rows and columns along the sensor's"),
-        ({"instrument": CAMERA.replace(lenslets={"layout": "hex"})}, "rows and columns along the sensor's"),
-        ({"instrument": CAMERA.replace(model="exact")}, "Use model = 'paraxial'"),
-        ({"instrument": CAMERA.replace(built={"focal_length_scatter": 0.01})}, "lenslets that are alike"),
-        ({"instrument": CAMERA.replace(lenslets={"shape": "round"})}, "square"),
+        ({"microscope": lg.load_camera("thesis-plenoptic-2-m050")}, "or a PlenopticCamera"),
+        ({"microscope": CAMERA.replace(lenslets={"rotation": 0.1})}, "rows and columns along the sensor's"),
+        ({"microscope": CAMERA.replace(lenslets={"layout": "hex"})}, "rows and columns along the sensor's"),
+        ({"microscope": CAMERA.replace(model="exact")}, "Use model = 'paraxial'"),
+        ({"microscope": CAMERA.replace(built={"focal_length_scatter": 0.01})}, "lenslets that are alike"),
+        ({"microscope": CAMERA.replace(lenslets={"shape": "round"})}, "square"),
     ],
 )
 def test_what_is_no_picture_before_a_camera_is_refused(given, message):
     raw = np.ones(CAMERA.sensor.shape, np.float32)
-    asked = {"instrument": CAMERA, "depths": (0.0,), "terms": (4, 6), "object": "picture", **given}
+    asked = {"microscope": CAMERA, "depths": (0.0,), "terms": (4, 6), "object": "picture", **given}
     with pytest.raises(lg.LumigraphError, match=message):
         estimate(raw, **asked)
 

@@ -50,7 +50,7 @@ MISFIT = 2.0
 
 def estimate(
     raw: RawImage | np.ndarray,
-    instrument: LightFieldMicroscope | PlenopticCamera,
+    microscope: LightFieldMicroscope | PlenopticCamera,
     depths: Sequence[float],
     terms: Sequence[int] = TERMS,
     *,
@@ -83,8 +83,8 @@ def estimate(
     ----------
     raw
         As it was read.
-    instrument
-        A microscope of configuration "1.0" or a `PlenopticCamera`, with square lenslets. Aberrations of its
+    microscope
+        Of configuration "1.0", or a `PlenopticCamera`, with square lenslets. Aberrations of its
         description are taken as known.
     depths
         Planes in which beads are looked for, or of the volume [m], such as each 6 µm; the one of a picture.
@@ -131,12 +131,12 @@ def estimate(
             raise GeometryError(
                 f"regions are {parted} but a {object} has one. Crop the raw image, or use beads."
             )
-        found = of_volume((raw, exposure, pixels), instrument, depths, terms, object, progress or silent)
+        found = of_volume((raw, exposure, pixels), microscope, depths, terms, object, progress or silent)
         warn_of_misfit(found.pearson, f"the {object} leaves")
         return found
     if object != "beads":
         raise GeometryError(f"object is {object!r} but must be 'beads', 'volume' or 'picture'.")
-    given = _Given.of((raw, exposure, pixels), instrument, depths, terms)
+    given = _Given.of((raw, exposure, pixels), microscope, depths, terms)
     model = given.model(parted, progress or silent)
     none = np.zeros((len(model.nodes), len(given.terms)))
     first = Fit(given.search.beads(given.problem), none)
