@@ -77,10 +77,9 @@ def exposed(
     inner, shown = camera.operator_grid(FINE), scene(camera, seed)
     ny, nx = (n + 2 * BEYOND * FINE for n in inner.shape)
     grid = Grid((ny, nx), inner.pitch, inner.center)
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["LUMIGRAPH_CACHE"] = folder
-        operator = bent(camera, TERMS, c).operator_on(grid, (dz,), accuracy=5e-3)
-        light = np.maximum(operator.forward(shown(grid)[None]), 0)
+    through = bent(camera, TERMS, c)
+    light, _ = spent(lambda: through.operator_on(grid, (dz,), accuracy=5e-3).forward(shown(grid)[None]))
+    light = np.maximum(light, 0)
     light *= electrons / light.mean()
     return np.random.default_rng(seed).poisson(light + 0.01).astype(np.float32), shown
 
