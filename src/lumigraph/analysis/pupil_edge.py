@@ -17,7 +17,7 @@ from lumigraph.errors import CalibrationError
 LEAST_PITCH = 6.0
 """Of micro-images [px]: smaller ones have no profile."""
 
-_STRIP = 0.06  # pitches on either side of the line between two centres
+_STRIP = 0.06  # pitches on either side of the line between two centres, or half a pixel
 _BIN = 0.1  # px along it
 _APART = 2.0  # blurs: stops that end so far from each other leave dark between them, which the floor is
 _SECTORS = 4  # of the picture, each measured by itself
@@ -110,8 +110,8 @@ def pupil_edge(white: np.ndarray, calibration: Calibration) -> PupilEdge:
     whole = _profile(data, start, end, pitch)
     if whole is None or any(line is None for line in lines):
         raise CalibrationError("there are too few whole micro-images for the profile of their edges.")
-    fits = np.array([_fit(*line, pitch) for line in lines if line is not None])
-    width, blur = _fit(*whole, pitch)
+    fits = np.array([fitted(*line, pitch) for line in lines if line is not None])
+    width, blur = fitted(*whole, pitch)
     wide = float(student.ppf(0.975, _SECTORS - 1)) / math.sqrt(_SECTORS)
     errors = wide * fits.std(0, ddof=1)
     return PupilEdge(pitch, width, float(errors[0]), blur, float(errors[1]), *whole)
@@ -149,7 +149,7 @@ def _profile(
     along = (offset * way[:, None]).sum(-1)
     aside = offset[..., 0] * way[:, None, 1] - offset[..., 1] * way[:, None, 0]
     rows, columns = data.shape
-    seen = (np.abs(aside) <= max(0.5, _STRIP * pitch)) & (along >= 0) & (along <= pitch)
+    seen = (np.abs(aside) <= strip(pitch)) & (along >= 0) & (along <= pitch)
     seen &= ((pixels >= 0) & (pixels < [rows, columns])).all(-1)
     value = data[tuple(np.clip(pixels, 0, [rows - 1, columns - 1]).transpose(2, 0, 1))]
     flat = seen & ((along < pitch / 5) | (along > pitch * 4 / 5))
@@ -162,8 +162,19 @@ def _profile(
     return (np.flatnonzero(filled) + 0.5) * _BIN, light[filled] / count[filled]
 
 
-def _fit(at: np.ndarray, light: np.ndarray, pitch: float) -> tuple[float, float]:
-    """Width and blur [px] of a profile."""
+def strip(pitch: float) -> float:
+    """How far from the line between two centres light counts [px]."""
+    return max(0.5, _STRIP * pitch)
+
+
+def fitted(at: np.ndarray, light: np.ndarray, pitch: float) -> tuple[float, float]:
+    """Width and blur [px] of a profile from the middle of one micro-image to the next, as of `PupilEdge`.
+
+    Raises
+    ------
+    CalibrationError
+        No dip between them.
+    """
     top, low = float(np.quantile(light, 0.9)), float(light[np.abs(at - pitch / 2) < pitch / 8].min())
     if top - low < 0.05 * top:
         raise CalibrationError(

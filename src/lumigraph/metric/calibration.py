@@ -318,7 +318,10 @@ def _spilt(corners: Corners) -> str:
     )
     if corners.spill is not None:
         wavelength, unsure = corners.spill.wavelength, corners.spill.unsure
-        return f"{what}, which is allowed for by diffraction at {wavelength * 1e9:.0f} nm, to {unsure:.0%}"
+        told = f"{what}, which is allowed for by diffraction at {wavelength * 1e9:.0f} nm, to {unsure:.0%}"
+        if corners.in_views or corners.spill.edge is not None:
+            return told
+        return f"{told}: a white image with dark between micro-images would tell the lenslets' focus"
     return (
         f"{what} and makes b too long, by 2 to 6 % behind lenslets of 62 µm at f/14: this table of corners "
         "does not tell by how much. Measure raw images, or a table that was written of them"

@@ -27,12 +27,13 @@ COLUMNS = ("frame", "corner", "y", "x", "center_y", "center_x", "kind")
 IN_VIEWS = "in_views"
 """A column of ones in a table of corners that were found in views."""
 
-SPILL = ("wavelength", "fill", "pitch", "rotation", "hexagonal", "sharp")
+SPILL = ("wavelength", "fill", "pitch", "rotation", "hexagonal", "sharp", "edge_width", "edge_blur")
 """Columns more, alike in all rows, where light that lenslets spill is to be allowed for.
 
 Its wavelength [m], the width of micro-images over their pitch, that pitch [px], the rows' turn [rad], 1 for
-hexagons and 0 for squares; and how far micro-images of a point in focus move, over the way between their
-lenslets, 0 where that is left out.
+hexagons and 0 for squares; how far micro-images of a point in focus move, over the way between their
+lenslets; width and blur of their edges on a white image, over the pitch. The last three are 0 where they are
+left out.
 """
 
 KIND = "lumigraph metric camera"
@@ -86,13 +87,15 @@ def _plain(spill: Spill | None) -> dict[str, Any] | None:
         return None
     lattice = spill.lattice
     told = spill.wavelength, spill.fill, lattice.pitch, lattice.rotation
-    return dict(zip(SPILL, (*told, int(lattice.layout == "hex"), spill.sharp), strict=True))
+    edge = spill.edge or (0.0, 0.0)
+    return dict(zip(SPILL, (*told, int(lattice.layout == "hex"), spill.sharp, *edge), strict=True))
 
 
 def _spill(found: dict[str, Any]) -> Spill:
-    known = {SPILL[-1]: 0.0} | found
-    wavelength, fill, pitch, rotation, hexagonal, sharp = (_number(known, name) for name in SPILL)
-    return Spill((Lattice.hex if hexagonal else Lattice.square)(pitch, rotation), fill, wavelength, sharp)
+    known = dict.fromkeys(SPILL[-3:], 0.0) | found
+    wavelength, fill, pitch, rotation, hexagonal, sharp, *edge = (_number(known, name) for name in SPILL)
+    lattice = (Lattice.hex if hexagonal else Lattice.square)(pitch, rotation)
+    return Spill(lattice, fill, wavelength, sharp, (edge[0], edge[1]) if any(edge) else None)
 
 
 def _alike(name: str, found: dict[str, np.ndarray]) -> float:

@@ -7,9 +7,12 @@ import numpy as np
 from scipy.ndimage import spline_filter
 
 from lumigraph.analysis.crossings import crossed
+from lumigraph.analysis.pupil_edge import pupil_edge
 from lumigraph.analysis.saddles import settle
 from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.checks import Pair
+from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
 from lumigraph.depth.correlation import of_signs
@@ -96,8 +99,20 @@ def find_corners(
     known = calibration or getattr(raws[0], "calibration", None)
     if wavelength is None or known is None or (board.radius and not in_views):
         return corners
-    sharp = 0.0 if in_views else corners.sharp
-    return replace(corners, spill=Spill(known.lattice, known.fill or 1.0, wavelength, sharp))
+    told = (0.0, None) if in_views else (corners.sharp, _edge(raws[0], known))
+    return replace(corners, spill=Spill(known.lattice, known.fill or 1.0, wavelength, *told))
+
+
+def _edge(raw: RawImage | Array, calibration: Calibration) -> Pair | None:
+    """Width and blur of micro-images over their pitch, by the white image that a picture was divided by."""
+    if not isinstance(raw, PreparedImage) or raw.divisor is None:
+        return None
+    white = raw.divisor.astype(np.float32)
+    try:
+        edge = pupil_edge(white.mean(2) if white.ndim == 3 else white, calibration)
+    except CalibrationError:  # micro-images that are too small, or run into each other
+        return None
+    return edge.width / edge.pitch, edge.blur / edge.pitch
 
 
 @of_raw

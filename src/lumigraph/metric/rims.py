@@ -30,7 +30,7 @@ RATIO = 1.15
 _STEP = 2  # ways that are computed, per pixel
 _TURNS = (0.2, 0.6)  # of a corner's edges against the way from the middle [rad]
 _FAR = 1  # neighbours whose light counts
-_REACH = 7  # px: from a pixel to the farthest places whose light it is told
+_REACH = 14  # px: from a pixel to the farthest places whose light it is told; what is farther comes round
 
 
 def window(pitch: float) -> int:
@@ -81,11 +81,11 @@ def _along(
     ))  # fmt: skip
     pixels = np.moveaxis(steps, 0, -1) @ axes / pitch
     u = waves.directions(math.ceil(2 * _REACH / pitch * max(map(abs, slopes))) + 2)
-    fields = np.array([[waves.opened(u, pixel, _FAR) for pixel in row] for row in pixels])
+    fields = np.array([[waves.opened(u, pixel, _FAR) for pixel in row] for row in pixels], np.complex64)
     found = []
     for slope in slopes:
         middle = np.exp(-2j * np.pi * slope / waves.width * np.einsum("yxc,ijc->ijyx", u, pixels))
-        light, at = waves.light(u, fields / middle, slope)
+        light, at = waves.light(u, fields / middle.astype(np.complex64), slope)
         aside = np.stack(np.meshgrid(at, at, indexing="ij"), -1) @ axes.T * (pitch / -slope)
         found.append(_shown(light / light.sum((2, 3), keepdims=True), aside, len(ways), radius))
     return np.array(found).T
@@ -94,7 +94,7 @@ def _along(
 def _shown(light: np.ndarray, aside: np.ndarray, ways: int, radius: int) -> np.ndarray:
     """(ways,) Where corners are found less where they are [px], by light from beside pixels."""
     size, inside = 2 * radius + 3, disc(radius).astype(int)
-    boards = np.array([[_corner(aside + pixel, turn) for pixel in inside.T] for turn in _TURNS])
+    boards = np.array([[_corner(aside + pixel, turn) for pixel in inside.T] for turn in _TURNS], light.dtype)
     first = _STEP * (inside[0] + radius)
     seen = light[np.arange(ways)[:, None] + first, inside[1] + radius]
     picture = np.zeros((ways * len(_TURNS), size, size))

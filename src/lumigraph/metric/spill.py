@@ -15,9 +15,11 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
+from scipy.optimize import least_squares
 from scipy.special import erf
 
 from lumigraph.core import checks
+from lumigraph.core.checks import Pair
 from lumigraph.core.lattice import Lattice
 from lumigraph.metric import rims
 from lumigraph.metric.waves import Waves
@@ -32,14 +34,18 @@ NARROW, _APART = 0.1, 1.1
 """λ b/d² below which it is computed for this, and ratio of those for which it is: what spills is proportional
 to it, within 4 % down to 0.015."""
 
-_UNSURE, _UNSURE_BEHIND = 0.15, 0.4
-"""Of what is taken out, over itself: by wave optics, up to 0.009 of 0.065 is left from view to view. In
-micro-images of a camera 2.0 the stop's width, taken from the white image, and the lenslets' focus, taken from
-the corners, are off by 2 % and 10 to 30 %: that is up to 0.4 of it."""
+_UNSURE, _UNSURE_BEHIND, _UNSURE_EDGE = 0.15, 0.4, 0.2
+"""Of what is taken out, over itself: by wave optics, up to 0.009 of 0.065 is left from view to view; in
+micro-images of a camera 2.0, where the stop's width is taken from `Calibration.fill` and the lenslets' focus
+from the corners, by 2 % and 10 to 30 %; and where both follow from edges on a white image, within 0.6 %.
+"""
 
 _WAYS, _SLOPES = 0.05, 0.5  # steps of ways [pitches] and of σ, between which it is interpolated
 _RIM, _STEEP = 0.5, 4.0  # ways and σ beyond which it is taken to be what it is there
-_SLOPES_BEHIND, _NARROW_BEHIND = (1.5, 8.0), 0.08  # of cameras 2.0: as `_STEEP`, and as `NARROW`
+_SLOPES_BEHIND, _NARROW_BEHIND = (1.5, 8.0), 0.06  # of cameras 2.0: as `_STEEP`, and as `NARROW`
+_LEAST_EDGE, _MOST_EDGE = np.array([0.3, 0.01]), np.array([1.05, 1.5])  # stop and focus that edges may tell
+_SETTLED = 2e-3
+_FALLS = 1.7  # power of λ b/d² by which corners move outwards from that down, as from 0.08 to 0.04
 _CLOSE = 0.02  # steps of the logarithm of λ b/d²
 _SOFT = 0.3  # pitches: blur of an edge over its sample, as in `analysis.crossings`
 _ROUNDS = 8
@@ -59,27 +65,35 @@ class Spill:
         Of the light [m].
     sharp
         How far micro-images of a point in focus move, over the way from lenslet to lenslet; 0 of a camera
-        1.0.
+        1.0. Where the edge is known it only tells whether they look at an image behind them.
+    edge
+        Width and blur of micro-images on a white image, over their pitch (`analysis.pupil_edge`): they tell
+        the stop's width and what is in focus; None if not measured.
 
     Raises
     ------
     GeometryError
-        A wavelength or a fill that is not above 0.
+        A wavelength, a fill or an edge that is not above 0.
     """
 
     lattice: Lattice
     fill: float
     wavelength: float
     sharp: float = 0.0
+    edge: Pair | None = None
 
     def __post_init__(self) -> None:
         checks.positive("wavelength", self.wavelength)
         checks.positive("fill", self.fill, "1")
+        for value in self.edge or ():
+            checks.positive("edge", value, "1")
 
     @property
     def unsure(self) -> float:
         """How well it is known how far corners are moved, over that: one standard deviation."""
-        return _UNSURE_BEHIND if self.sharp else _UNSURE
+        if not self.sharp:
+            return _UNSURE
+        return _UNSURE_BEHIND if self.edge is None else _UNSURE_EDGE
 
     def aside(self, way: np.ndarray, slope: np.ndarray, width: float) -> np.ndarray:
         """How far (n, 2) [px] views at ways (n, 2) [px] show corners aside.
@@ -121,14 +135,15 @@ class Spill:
         steps = np.log(np.clip(slope, *_SLOPES_BEHIND)) / math.log(rims.RATIO)
         nodes = range(math.floor(steps.min()), math.floor(steps.max()) + 2)
         computed = math.exp(_CLOSE * round(math.log(max(width, _NARROW_BEHIND)) / _CLOSE))
+        waves, apart = self._waves(computed), round(pitch, 1)
         table = rims.outwards(
-            _filled(self._waves(computed)), round(pitch, 1),
+            _filled(waves) if self.edge is None else _edged(waves, self.edge, apart), apart,
             tuple(sign * rims.RATIO**k for k in nodes),
         )  # fmt: skip
         size = np.hypot(*way.T)
         far = np.clip(size, 0, table.grid[0][-1])
         found = table(np.column_stack([far, steps * math.log(rims.RATIO)]))
-        return (found / np.maximum(size, 1e-9) * min(1.0, width / computed))[:, None] * way
+        return (found / np.maximum(size, 1e-9) * min(1.0, width / computed) ** _FALLS)[:, None] * way
 
     def _axes(self) -> np.ndarray:
         """Along the lattice's rows, and across them (2, 2)."""
@@ -145,6 +160,21 @@ class Spill:
 def _filled(waves: Waves) -> Waves:
     """With the stop whose micro-images are seen to fill as much as its own do."""
     return replace(waves, fill=2 * waves.fill - waves.seen_fill())
+
+
+@lru_cache(maxsize=16)
+def _edged(waves: Waves, edge: Pair, pitch: float) -> Waves:
+    """With the stop and the focus whose micro-images have this edge."""
+    sign = math.copysign(1.0, waves.sharp)
+
+    def off(told: np.ndarray) -> np.ndarray:
+        return np.subtract(replace(waves, fill=told[0], sharp=sign * told[1]).edge(pitch), edge)
+
+    start = np.clip([edge[0], abs(waves.sharp)], 1.01 * _LEAST_EDGE, 0.99 * _MOST_EDGE)
+    fill, sharp = least_squares(
+        off, start, bounds=(_LEAST_EDGE, _MOST_EDGE), diff_step=0.02, xtol=_SETTLED, ftol=_SETTLED**2
+    ).x
+    return replace(waves, fill=float(fill), sharp=sign * float(sharp))
 
 
 @lru_cache(maxsize=16)

@@ -18,11 +18,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from scipy.fft import fft2
+from scipy.interpolate import CubicSpline
+
+from lumigraph.analysis.pupil_edge import fitted, strip
 
 FAR = 2
 """Neighbours to each side."""
 
-_ACROSS = 12  # lenslets over which the light of all points is added up
+_ACROSS = 6  # lenslets over which the light of all points is added up
+_PROFILE = 24  # steps from the middle of a micro-image to the next
 _FINE, _SPAN = 96, 1.2  # steps over a lenslet and a bit, and how far they reach [pitches]
 
 
@@ -58,8 +63,9 @@ class Waves:
     def light(self, u: np.ndarray, field: np.ndarray, slope: float) -> tuple[np.ndarray, np.ndarray]:
         """Of points (..., y, x), and where they are along either axis, by fields in directions u."""
         step, count = float(u[1, 0, 0] - u[0, 0, 0]), 2 * len(u)
-        bent = self.stop(u) * field * np.exp(-1j * np.pi * slope / self.width * (u**2).sum(-1))
-        light = np.fft.fftshift(np.abs(np.fft.fft2(bent, (count, count))) ** 2, (-2, -1))
+        bent = self.stop(u) * np.exp(-1j * np.pi * slope / self.width * (u**2).sum(-1))
+        found = fft2(field * bent.astype(field.dtype), (count, count))
+        light = np.fft.fftshift(found.real**2 + found.imag**2, (-2, -1))
         return light, (np.arange(count) - count // 2) * self.width / step / count
 
     def opened(self, u: np.ndarray, way: np.ndarray, far: int = FAR) -> np.ndarray:
@@ -89,6 +95,23 @@ class Waves:
         u = self.directions(_ACROSS)
         return float((self.stop(u) * np.abs(self.opened(u, way, 1)) ** 2).mean())
 
+    def edge(self, pitch: float) -> tuple[float, float]:
+        """Width and blur of white micro-images so many pixels apart, over their pitch; see `pupil_edge`.
+
+        Raises
+        ------
+        CalibrationError
+            Micro-images that run into each other.
+        """
+        aside, row = strip(pitch) / pitch / math.sqrt(3), np.array(self.basis[0]) / math.hypot(*self.basis[0])
+        line = row * (np.arange(_PROFILE // 2 + 1) / _PROFILE)[:, None] + aside * np.array([row[1], -row[0]])
+        half = np.array([self.white(way) for way in line])
+        total = CubicSpline(np.arange(-1, _PROFILE + 2) / _PROFILE, _mirrored(half)).antiderivative()
+        at = (np.arange(round(pitch) * 4) + 0.5) / (round(pitch) * 4)
+        light = (total(at + 0.5 / pitch) - total(at - 0.5 / pitch)) * pitch  # as pixels see it
+        width, blur = fitted(at * pitch, light / light[at < 0.2].mean(), pitch)
+        return width / pitch, blur / pitch
+
     def seen_fill(self) -> float:
         """Width where white micro-images are half as bright as between the darkest and the middle.
 
@@ -101,6 +124,11 @@ class Waves:
         seen = [[self.white(way * axis) for way in rim] for axis in across]
         found = [min(0.5, float(np.interp(-half, -np.array(line), rim))) for line in seen]
         return 2 * float(np.mean(found))
+
+
+def _mirrored(half: np.ndarray) -> np.ndarray:
+    """Light from just before a middle to just after the next, by that up to halfway between them."""
+    return np.concatenate([half[1:2], half, half[-2::-1], half[1:2]])
 
 
 @lru_cache(maxsize=4)
