@@ -75,7 +75,7 @@ class PupilEdge:
         return 2 * sigma * tail / self.width
 
 
-def pupil_edge(white: np.ndarray, calibration: Calibration) -> PupilEdge:
+def pupil_edge(white: np.ndarray, calibration: Calibration, kind: int | None = None) -> PupilEdge:
     r"""Width and blur of micro-images, along their rows, from a white image.
 
     The stop of the main lens is a sharp edge in direction. Between two centres a pitch P apart the light is
@@ -93,6 +93,8 @@ def pupil_edge(white: np.ndarray, calibration: Calibration) -> PupilEdge:
         (y, x), linear in light and less its dark image.
     calibration
         Of that image.
+    kind
+        Of the lenslets whose edges are measured, in an array of three kinds; None for all.
 
     Raises
     ------
@@ -104,10 +106,12 @@ def pupil_edge(white: np.ndarray, calibration: Calibration) -> PupilEdge:
         raise CalibrationError(
             f"micro-images are {pitch:.3g} px wide, but {LEAST_PITCH:g} px are needed to see their edges."
         )
-    start, end = _neighbours(calibration)
+    start, end = _neighbours(calibration, kind)
     sector = _sector((start + end) / 2, calibration.shape)
     lines = [_profile(data, start[sector == k], end[sector == k], pitch) for k in range(_SECTORS)]
     whole = _profile(data, start, end, pitch)
+    if kind is not None:
+        whole, *lines = (line and _near(*line, pitch) for line in (whole, *lines))
     if whole is None or any(line is None for line in lines):
         raise CalibrationError("there are too few whole micro-images for the profile of their edges.")
     fits = np.array([fitted(*line, pitch) for line in lines if line is not None])
@@ -117,14 +121,24 @@ def pupil_edge(white: np.ndarray, calibration: Calibration) -> PupilEdge:
     return PupilEdge(pitch, width, float(errors[0]), blur, float(errors[1]), *whole)
 
 
-def _neighbours(calibration: Calibration) -> tuple[np.ndarray, np.ndarray]:
-    """Centres (n, 2) of whole micro-images, and of those next to them along their row."""
+def _near(at: np.ndarray, light: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray]:
+    """A profile whose farther half is the nearer one, mirrored."""
+    near = at < pitch / 2
+    return np.append(at[near], pitch - at[near]), np.append(light[near], light[near])
+
+
+def _neighbours(calibration: Calibration, kind: int | None) -> tuple[np.ndarray, np.ndarray]:
+    """Centres (n, 2) of whole micro-images, and of those next to them along their row; both, of one kind."""
     rows, columns = calibration.shape
     margin = calibration.lattice.pitch / 2
     whole = ((margin, rows - 1 - margin), (margin, columns - 1 - margin))
     index = calibration.indices_within(*whole)
     index = index[~calibration.misses(index)]
     beside = index + np.array([0, 1])
+    if kind is not None:
+        index = index[calibration.lattice.kind(*index.T) == kind]
+        beside = np.concatenate([index + np.array([0, 1]), index - np.array([0, 1])])
+        index = np.concatenate([index, index])
     at = calibration.position(beside)
     inside = ((at >= margin) & (at <= [rows - 1 - margin, columns - 1 - margin])).all(1)
     inside &= ~calibration.misses(beside)

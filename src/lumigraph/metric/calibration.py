@@ -319,7 +319,7 @@ def _spilt(corners: Corners) -> str:
     if corners.spill is not None:
         wavelength, unsure = corners.spill.wavelength, corners.spill.unsure
         told = f"{what}, which is allowed for by diffraction at {wavelength * 1e9:.0f} nm, to {unsure:.0%}"
-        if corners.in_views or corners.spill.edge is not None:
+        if corners.in_views or corners.spill.edges:
             return told
         return f"{told}: a white image with dark between micro-images would tell the lenslets' focus"
     return (

@@ -283,7 +283,7 @@ class Corners:
         if self.in_views:
             aside = self.spill.aside(way, self._slopes(way, self.center), width)
             return replace(self, place=self.place - aside, center=self.center - aside, spill=None)
-        aside = self.spill.outwards(way, self._slopes(self.center, way), width)
+        aside = self.spill.outwards(way, self._slopes(self.center, way), width, self.kind)
         return replace(self, place=self.place - aside, spill=None)
 
     def _slopes(self, way: np.ndarray, moved: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Corners and measured cameras in files."""
 
+import itertools
 import json
 import os
 from collections.abc import Iterator, Sequence
@@ -27,14 +28,17 @@ COLUMNS = ("frame", "corner", "y", "x", "center_y", "center_x", "kind")
 IN_VIEWS = "in_views"
 """A column of ones in a table of corners that were found in views."""
 
-SPILL = ("wavelength", "fill", "pitch", "rotation", "hexagonal", "sharp", "edge_width", "edge_blur")
+SPILL = ("wavelength", "fill", "pitch", "rotation", "hexagonal", "sharp")
 """Columns more, alike in all rows, where light that lenslets spill is to be allowed for.
 
 Its wavelength [m], the width of micro-images over their pitch, that pitch [px], the rows' turn [rad], 1 for
 hexagons and 0 for squares; how far micro-images of a point in focus move, over the way between their
-lenslets; width and blur of their edges on a white image, over the pitch. The last three are 0 where they are
-left out.
+lenslets, 0 where that is left out.
 """
+
+EDGES = tuple(f"edge_{name}_{kind}" for kind in range(3) for name in ("width", "blur"))
+"""Columns more where a white image was measured: width and blur of micro-images of each kind, over their
+pitch."""
 
 KIND = "lumigraph metric camera"
 
@@ -65,7 +69,7 @@ def load_corners(path: str | os.PathLike[str]) -> Corners:
         place, center = (_pair(found, y, x) for y, x in (("y", "x"), ("center_y", "center_x")))
         found.setdefault("kind", np.zeros(len(place)))
         frame, corner, kind = (_whole(name, found) for name in ("frame", "corner", "kind"))
-        known = {name: _alike(name, found) for name in SPILL if name in found}
+        known = {name: _alike(name, found) for name in (*SPILL, *EDGES) if name in found}
         spill = _spill(known) if SPILL[0] in found else None
         return Corners(frame, corner, place, center, kind, in_views == {1.0}, spill)
 
@@ -87,15 +91,16 @@ def _plain(spill: Spill | None) -> dict[str, Any] | None:
         return None
     lattice = spill.lattice
     told = spill.wavelength, spill.fill, lattice.pitch, lattice.rotation
-    edge = spill.edge or (0.0, 0.0)
-    return dict(zip(SPILL, (*told, int(lattice.layout == "hex"), spill.sharp, *edge), strict=True))
+    known = dict(zip(SPILL, (*told, int(lattice.layout == "hex"), spill.sharp), strict=True))
+    return known | dict(zip(EDGES, itertools.chain(*spill.edges), strict=False))
 
 
 def _spill(found: dict[str, Any]) -> Spill:
-    known = dict.fromkeys(SPILL[-3:], 0.0) | found
-    wavelength, fill, pitch, rotation, hexagonal, sharp, *edge = (_number(known, name) for name in SPILL)
+    known = {SPILL[-1]: 0.0} | found
+    wavelength, fill, pitch, rotation, hexagonal, sharp = (_number(known, name) for name in SPILL)
     lattice = (Lattice.hex if hexagonal else Lattice.square)(pitch, rotation)
-    return Spill(lattice, fill, wavelength, sharp, (edge[0], edge[1]) if any(edge) else None)
+    edges = [_number(found, name) for name in EDGES if name in found]
+    return Spill(lattice, fill, wavelength, sharp, tuple(zip(edges[::2], edges[1::2], strict=True)))
 
 
 def _alike(name: str, found: dict[str, np.ndarray]) -> float:

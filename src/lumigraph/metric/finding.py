@@ -99,20 +99,21 @@ def find_corners(
     known = calibration or getattr(raws[0], "calibration", None)
     if wavelength is None or known is None or (board.radius and not in_views):
         return corners
-    told = (0.0, None) if in_views else (corners.sharp, _edge(raws[0], known))
+    told = (0.0, ()) if in_views else (corners.sharp, _edges(raws[0], known))
     return replace(corners, spill=Spill(known.lattice, known.fill or 1.0, wavelength, *told))
 
 
-def _edge(raw: RawImage | Array, calibration: Calibration) -> Pair | None:
-    """Width and blur of micro-images over their pitch, by the white image that a picture was divided by."""
+def _edges(raw: RawImage | Array, calibration: Calibration) -> tuple[Pair, ...]:
+    """Width and blur of micro-images of each kind over their pitch, by the white image of a picture."""
     if not isinstance(raw, PreparedImage) or raw.divisor is None:
-        return None
-    white = raw.divisor.astype(np.float32)
+        return ()
+    white, count = raw.divisor.astype(np.float32), calibration.lattice.kinds
+    white = white.mean(2) if white.ndim == 3 else white
     try:
-        edge = pupil_edge(white.mean(2) if white.ndim == 3 else white, calibration)
+        found = [pupil_edge(white, calibration, kind if count > 1 else None) for kind in range(count)]
     except CalibrationError:  # micro-images that are too small, or run into each other
-        return None
-    return edge.width / edge.pitch, edge.blur / edge.pitch
+        return ()
+    return tuple((edge.width / edge.pitch, edge.blur / edge.pitch) for edge in found)
 
 
 @of_raw

@@ -9,6 +9,7 @@ fits them to the light: what is farther aside than the edge is soft pulls no mor
 camera 2.0 corners are found outwards (`lumigraph.metric.rims`).
 """
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -66,9 +67,9 @@ class Spill:
     sharp
         How far micro-images of a point in focus move, over the way from lenslet to lenslet; 0 of a camera
         1.0. Where the edge is known it only tells whether they look at an image behind them.
-    edge
-        Width and blur of micro-images on a white image, over their pitch (`analysis.pupil_edge`): they tell
-        the stop's width and what is in focus; None if not measured.
+    edges
+        Width and blur of micro-images on a white image, over their pitch (`analysis.pupil_edge`), of each
+        kind of lenslets, or of all: they tell the stop's width and what is in focus. Empty if not measured.
 
     Raises
     ------
@@ -80,20 +81,20 @@ class Spill:
     fill: float
     wavelength: float
     sharp: float = 0.0
-    edge: Pair | None = None
+    edges: tuple[Pair, ...] = ()
 
     def __post_init__(self) -> None:
         checks.positive("wavelength", self.wavelength)
         checks.positive("fill", self.fill, "1")
-        for value in self.edge or ():
-            checks.positive("edge", value, "1")
+        for value in itertools.chain(*self.edges):
+            checks.positive("edges", value, "1")
 
     @property
     def unsure(self) -> float:
         """How well it is known how far corners are moved, over that: one standard deviation."""
         if not self.sharp:
             return _UNSURE
-        return _UNSURE_BEHIND if self.edge is None else _UNSURE_EDGE
+        return _UNSURE_EDGE if self.edges else _UNSURE_BEHIND
 
     def aside(self, way: np.ndarray, slope: np.ndarray, width: float) -> np.ndarray:
         """How far (n, 2) [px] views at ways (n, 2) [px] show corners aside.
@@ -118,7 +119,7 @@ class Spill:
         )  # fmt: skip
         return table(np.column_stack([ways, slope])) @ axes * pitch * (width / computed)
 
-    def outwards(self, way: np.ndarray, moved: np.ndarray, width: float) -> np.ndarray:
+    def outwards(self, way: np.ndarray, moved: np.ndarray, width: float, kind: np.ndarray) -> np.ndarray:
         """How far (n, 2) [px] micro-images of a camera 2.0 show corners at ways (n, 2) [px] aside.
 
         Parameters
@@ -129,21 +130,26 @@ class Spill:
             (n,), how far micro-images of a point move, over the way from lenslet to lenslet.
         width
             As of `aside`.
+        kind
+            (n,) Of the lenslets.
         """
-        pitch, sign = self.lattice.pitch, math.copysign(1.0, float(np.median(moved)))
-        slope = 1 / np.maximum(sign * moved, 1e-9)
-        steps = np.log(np.clip(slope, *_SLOPES_BEHIND)) / math.log(rims.RATIO)
+        sign, size = math.copysign(1.0, float(np.median(moved))), np.hypot(*way.T)
+        steps = np.log(np.clip(1 / np.maximum(sign * moved, 1e-9), *_SLOPES_BEHIND)) / math.log(rims.RATIO)
         nodes = range(math.floor(steps.min()), math.floor(steps.max()) + 2)
+        slopes = tuple(sign * rims.RATIO**k for k in nodes)
         computed = math.exp(_CLOSE * round(math.log(max(width, _NARROW_BEHIND)) / _CLOSE))
-        waves, apart = self._waves(computed), round(pitch, 1)
-        table = rims.outwards(
-            _filled(waves) if self.edge is None else _edged(waves, self.edge, apart), apart,
-            tuple(sign * rims.RATIO**k for k in nodes),
-        )  # fmt: skip
-        size = np.hypot(*way.T)
-        far = np.clip(size, 0, table.grid[0][-1])
-        found = table(np.column_stack([far, steps * math.log(rims.RATIO)]))
+        found = np.zeros(len(way))
+        for one in np.unique(kind).tolist():
+            mine, table = kind == one, self._table_behind(computed, one, slopes)
+            far = np.minimum(size[mine], table.grid[0][-1])
+            found[mine] = table(np.column_stack([far, steps[mine] * math.log(rims.RATIO)]))
         return (found / np.maximum(size, 1e-9) * min(1.0, width / computed) ** _FALLS)[:, None] * way
+
+    def _table_behind(self, width: float, kind: int, slopes: tuple[float, ...]) -> RegularGridInterpolator:
+        """`rims.outwards` of lenslets of one kind."""
+        waves, apart = self._waves(width), round(self.lattice.pitch, 1)
+        told = _edged(waves, self.edges[kind % len(self.edges)], apart) if self.edges else _filled(waves)
+        return rims.outwards(told, apart, slopes)
 
     def _axes(self) -> np.ndarray:
         """Along the lattice's rows, and across them (2, 2)."""

@@ -16,6 +16,7 @@ Rays put all the light at c = -σ w.
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.fft import fft2
@@ -64,7 +65,7 @@ class Waves:
         """Of points (..., y, x), and where they are along either axis, by fields in directions u."""
         step, count = float(u[1, 0, 0] - u[0, 0, 0]), 2 * len(u)
         bent = self.stop(u) * np.exp(-1j * np.pi * slope / self.width * (u**2).sum(-1))
-        found = fft2(field * bent.astype(field.dtype), (count, count))
+        found: Any = fft2(field * bent.astype(field.dtype), (count, count))
         light = np.fft.fftshift(found.real**2 + found.imag**2, (-2, -1))
         return light, (np.arange(count) - count // 2) * self.width / step / count
 
