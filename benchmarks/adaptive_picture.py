@@ -54,10 +54,10 @@ def spent(work: Callable) -> tuple:
     return found
 
 
-def scene(camera: lg.PlenopticCamera, seed: int) -> Callable[[Grid], np.ndarray]:
-    """Something flat, on any grid: a sum of waves, cut off where it is dark."""
-    rng, size = np.random.default_rng(seed), camera.lenslet_size
-    finest = rng.uniform(0.5, 1.5) * size
+def scene(size: float, seed: int, fine: float | None = None) -> Callable[[Grid], np.ndarray]:
+    """Something flat, on any grid: a sum of waves, cut off where it is dark; as fine as given [lenslets]."""
+    rng = np.random.default_rng(seed)
+    finest = (rng.uniform(0.5, 1.5) if fine is None else fine) * size
     waves, phases = rng.normal(size=(300, 2)) / (2 * np.pi * finest) * 2, rng.uniform(size=300)
 
     def on(grid: Grid) -> np.ndarray:
@@ -71,10 +71,15 @@ def scene(camera: lg.PlenopticCamera, seed: int) -> Callable[[Grid], np.ndarray]
 
 
 def exposed(
-    camera: lg.PlenopticCamera, c: np.ndarray, seed: int, electrons: float, dz: float
+    camera: lg.PlenopticCamera,
+    c: np.ndarray,
+    seed: int,
+    electrons: float,
+    dz: float,
+    fine: float | None = None,
 ) -> tuple[np.ndarray, Callable[[Grid], np.ndarray]]:
     """A raw image through these terms, and what it shows."""
-    inner, shown = camera.operator_grid(FINE), scene(camera, seed)
+    inner, shown = camera.operator_grid(FINE), scene(camera.lenslet_size, seed, fine)
     ny, nx = (n + 2 * BEYOND * FINE for n in inner.shape)
     grid = Grid((ny, nx), inner.pitch, inner.center)
     through = bent(camera, TERMS, c)

@@ -8,7 +8,6 @@ import pytest
 import lumigraph as lg
 from lumigraph.adaptive import estimate
 from lumigraph.adaptive.beads import brightest
-from lumigraph.adaptive.estimate import warn_of_misfit
 from lumigraph.adaptive.field import ALIKE, PRIOR, Nodes
 from lumigraph.adaptive.fit import Fit
 from lumigraph.adaptive.search import Search
@@ -121,11 +120,6 @@ def test_beads_are_looked_for_through_a_wavefront():
     assert again is not None
     assert len(again.intensities) == 2
     assert search.more(Fit(found, c[None]), raw + 1.0) is None
-
-
-def test_beads_that_do_not_explain_the_picture_are_warned_of():
-    with pytest.warns(lg.SamplingWarning, match="2 beads leave 3 times the variance of noise"):
-        warn_of_misfit(3.0, "2 beads leave")
 
 
 RAW = np.ones((135, 135), np.float32)

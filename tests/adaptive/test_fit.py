@@ -117,8 +117,8 @@ def test_short_steps_go_on_the_way_of_the_last_two(model, monkeypatch):
 
 def test_what_a_fit_leaves_over_noise_is_one_at_the_truth_and_more_beside_it(model):
     exact, beside = (model.judged(Fit(bead(LIGHT), np.full((1, 1), c))) for c in (MOVED, MOVED + 0.5))
-    assert model.pearson(exact) == pytest.approx(1, abs=0.25)  # 3 deviations of 441 pixels
-    assert model.pearson(beside) > 2
+    assert model.misfit(exact).pearson == pytest.approx(1, abs=0.25)  # 3 deviations of 441 pixels
+    assert model.misfit(beside).pearson > 2
 
 
 def test_derivatives_of_beads_that_hardly_changed_are_kept(model):

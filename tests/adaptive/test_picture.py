@@ -1,6 +1,7 @@
 """Aberrations of a camera 1.0 from a flat scene, whose raw image another operator makes."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,7 +12,7 @@ from tests.adaptive.test_estimate import SCOPE
 import lumigraph as lg
 from lumigraph.adaptive import estimate
 from lumigraph.adaptive.checked import bent
-from lumigraph.adaptive.scene import ACCURACY, Scene, finest, inner_pixels, own_defocus
+from lumigraph.adaptive.scene import OF_PICTURE, Scene, finest, inner_pixels, own_defocus
 from lumigraph.adaptive.start import starts
 from lumigraph.adaptive.voxels import Voxels
 from lumigraph.deconvolution import Exposure
@@ -43,24 +44,27 @@ def exposed(aberrations, dz=0.0, camera=CAMERA, electrons=300.0, seed=0):
 
 @pytest.mark.parametrize(("built", "dz"), [({}, 0.0), ({}, 4e-3), ({"separation": "400.5 mm"}, 0.0)])
 def test_a_camera_sees_points_as_its_own_waves_do(built, dz):
-    """As those of a telecentric microscope, whose lenslets stand at another distance from the sensor."""
-    camera, terms = CAMERA.replace(built=built), (4, 6, 7)
+    """As those of a telecentric microscope, whose lenslets stand at another distance from the sensor.
+
+    Behind 25 x 25 lenslets: 9 x 9 end within the light, which takes 1.1 % off the changes at any accuracy.
+    Changes are of light farther out, where errors are twice as large.
+    """
+    camera, terms = CAMERA.replace(built=built, lenslets={"count": (25, 25)}), (4, 6, 7)
     c, place = np.array([0.1, -0.2, 0.3]), np.array([13e-6, -21e-6, dz])
     wanted, changes = point_changes(bent(camera, terms, c), place, terms, 1e-3)
     images = camera.pupil_images(terms, dz=dz, accuracy=1e-3)
     point = Points(np.append(place[:2], 0.0)[None], np.ones(1))
     area = np.vdot(images.forward(point, c), wanted) / np.vdot(wanted, wanted)
-    assert np.linalg.norm(images.forward(point, c) / area - wanted) < 3e-3 * np.linalg.norm(wanted)
+    assert np.linalg.norm(images.forward(point, c) / area - wanted) < 1e-3 * np.linalg.norm(wanted)
     for direction, change in zip(np.eye(3), changes, strict=False):
         off = images.derivative(point, c, direction) / area - change
-        assert np.linalg.norm(off) < 1.5e-2 * np.linalg.norm(change)
+        assert np.linalg.norm(off) < 3e-3 * np.linalg.norm(change)
 
 
 @pytest.mark.parametrize("dz", [0.0, 4e-3])
-def test_a_picture_is_seen_as_the_cameras_operator_sees_it(dz, monkeypatch):
+def test_a_picture_is_seen_as_the_cameras_operator_sees_it(dz):
     """As bright, too; but for the outermost lenslets, beyond which the array ends."""
-    monkeypatch.setitem(ACCURACY, "picture", 2e-3)
-    sight = Scene(CAMERA, (dz,), "picture", None).sight((6,))
+    sight = Scene(CAMERA, (dz,), replace(OF_PICTURE, accuracy=2e-3), None).sight((6,))
     picture = np.zeros((1, *sight.grid.shape), np.float32)
     inner = (slice(None), *sight.inside)
     picture[inner] = 1 + np.random.default_rng(1).uniform(size=picture[inner].shape)
@@ -108,7 +112,7 @@ def test_samples_of_a_picture_hold_how_points_images_change():
 
 
 def test_the_start_knows_the_scenes_own_defocus():
-    raw, scene = exposed(((4, 0.1), (7, 0.2)), NEARER), Scene(CAMERA, (NEARER,), "picture", None)
+    raw, scene = exposed(((4, 0.1), (7, 0.2)), NEARER), Scene(CAMERA, (NEARER,), OF_PICTURE, None)
     voxels = Voxels(sight := scene.sight((4, 7)), raw, EXPOSURE)
     begun = voxels.begun(np.zeros(2), 1)
     defocus = own_defocus(sight.images, 0.0)
@@ -155,7 +159,7 @@ def test_aberrations_come_back_with_the_picture(dz):
     assert isinstance(found.instrument, lg.PlenopticCamera)
     assert found.volume is not None
     assert found.volume.depths == (dz,)
-    assert found.volume.grid == Scene(CAMERA, (dz,), "picture", None).sight((4,)).picture
+    assert found.volume.grid == Scene(CAMERA, (dz,), OF_PICTURE, None).sight((4,)).picture
 
 
 @pytest.mark.long

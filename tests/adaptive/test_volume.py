@@ -70,6 +70,22 @@ def test_what_the_volume_explains_counts_for_nothing(sight):
     assert np.abs(np.linalg.solve(around.information, around.slope)).max() < 0.02
 
 
+def test_coefficients_settle_where_the_slope_vanishes(sight):
+    """Of a volume that the model holds, in bright light; and again from there, nothing moves."""
+    true, free = np.array([0.1, -0.08]), np.ones(2, bool)
+    raw = sight.operator(true).forward(volume_of(sight) + 0.2).astype(np.float32) * 200
+    voxels = Voxels(sight, raw, EXPOSURE)
+    begun = voxels.begun(np.array([0.13, -0.05]), 30)
+    told, around = voxels.settled(begun, voxels.around(begun), free)
+    off = told.coefficients - true
+    assert np.abs(off).max() < 0.006
+    assert told.steps > 0
+    chi_square = around.slope @ np.linalg.solve(around.information, around.slope)
+    assert chi_square < 0.01 * (off @ around.information @ off + 1) + 0.1
+    np.testing.assert_allclose(around.scores.sum((1, 2)), around.slope, rtol=1e-6)
+    assert voxels.settled(told, voxels.around(told), free)[0].steps == told.steps
+
+
 def test_views_shift_by_the_wavefronts_slopes():
     """One plane with texture: what rays say of 0.4 waves of coma, astigmatism and spherical aberration."""
     true = {6: 0.25, 7: -0.2, 11: 0.2}

@@ -9,6 +9,7 @@
 - `field`: nodes of the field at which coefficients stand
 - `search`: beads of a raw image through a wavefront; `beads`: of a volume; `changes`: what beads tell
 - `fit`: beads and coefficients by steps of Levenberg and Marquardt
+- `clusters`: deviations that hold what the object does not explain; `misfit`: the warning of it
 - `worth`: which terms stay; `checked`: what is asked for
 """
 

@@ -1,7 +1,6 @@
 """`estimate`: aberrations from the light field, together with the object; here of beads."""
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, cast
@@ -11,6 +10,7 @@ import numpy as np
 from lumigraph.adaptive.checked import BEADS, asked_for, bent
 from lumigraph.adaptive.field import PRIOR, Nodes
 from lumigraph.adaptive.fit import OWN, PLACES, Fit, Model, solved
+from lumigraph.adaptive.misfit import Misfit
 from lumigraph.adaptive.of_volume import of_volume
 from lumigraph.adaptive.search import Search
 from lumigraph.adaptive.start import starts
@@ -22,7 +22,7 @@ from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
 from lumigraph.deconvolution import Exposure
 from lumigraph.deconvolution.problem import Problem
-from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
+from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.instruments import LightFieldMicroscope, PlenopticCamera
 from lumigraph.scene import Points
 
@@ -44,8 +44,12 @@ STEPS = {"places": 4, "all": 40}
 SPREAD = 3.0
 """Pixels that beads light through aberrations of 1 wave rms, over those without: 2.7 before a 20x/0.5."""
 
-MISFIT = 2.0
-"""Mean of (r - m)²/m above which an object does not explain the raw image."""
+REMEDY = {
+    "beads": "Ask for more terms, more depths or regions of the field, or look for a volume.",
+    "volume": "Give depths that are closer together or reach farther, or ask for more terms.",
+    "picture": "Ask for more terms, give the picture's own depth, or crop what is not flat.",
+}
+"""Where an object does not explain the raw image."""
 
 
 def estimate(
@@ -132,7 +136,7 @@ def estimate(
                 f"regions are {parted} but a {object} has one. Crop the raw image, or use beads."
             )
         found = of_volume((raw, exposure, pixels), microscope, depths, terms, object, progress or silent)
-        warn_of_misfit(found.pearson, f"the {object} leaves")
+        Misfit(found.pearson, found.pearson_deviation).warn(f"the {object} leaves", REMEDY[object])
         return found
     if object != "beads":
         raise GeometryError(f"object is {object!r} but must be 'beads', 'volume' or 'picture'.")
@@ -148,32 +152,24 @@ def estimate(
         nodes = model.nodes.learnt(fit.coefficients, covariance_of_coefficients(model, fit))
         model = replace(model, nodes=nodes)
         fit = model.improved(fit, every, STEPS["all"])
-    covariance = covariance_of_coefficients(model, fit)
+    full, covariance = fit.coefficients, covariance_of_coefficients(model, fit)
     free = worth(covariance, fit.coefficients, model.counted, model.nodes.information)
     if not free.all():
         fit = model.improved(fit.changed(coefficients=fit.coefficients * free), free, STEPS["all"])
-    pearson = model.pearson(fit)
-    warn_of_misfit(pearson, f"{len(fit.points.intensities)} beads leave")
+    left_out = (fit.coefficients - full).ravel()
+    covariance += np.outer(left_out, left_out)
+    misfit = model.misfit(fit)
+    misfit.warn(f"{len(fit.points.intensities)} beads leave", REMEDY["beads"])
     shape = (len(model.nodes.y), len(model.nodes.x), len(given.terms))
     deviations = np.sqrt(np.diag(covariance)).reshape(shape)
     unknown = {j: UNKNOWN for j, d in zip(given.terms, deviations.max((0, 1)), strict=True) if d > PRIOR / 2}
     found = fit.coefficients.reshape(shape)
     return Wavefront(
         given.terms, found, deviations, (model.nodes.y, model.nodes.x), given.untold | unknown, fit.points,
-        (model.deviance(plain), model.deviance(fit)), pearson, rounds, fit.steps,
+        (model.deviance(plain), model.deviance(fit)), misfit.pearson, rounds, fit.steps,
         bent(given.microscope, given.terms, found.mean((0, 1))), covariance,
+        pearson_deviation=misfit.deviation,
     )  # fmt: skip
-
-
-def warn_of_misfit(pearson: float, what: str) -> None:
-    """Warn of what an object leaves of the raw image, in variances of noise."""
-    if pearson > MISFIT:
-        warnings.warn(
-            f"{what} {pearson:.3g} times the variance of noise in the raw image: it holds more than that, or "
-            "more terms, or the gain is wrong. The wavefront may be off.",
-            SamplingWarning,
-            stacklevel=3,
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -268,7 +264,7 @@ def _without_faint(model: Model, fit: Fit, free: np.ndarray) -> Fit:
 
 def covariance_of(model: Model, fit: Fit) -> np.ndarray:
     """Of all unknowns; larger where the beads do not explain the raw image."""
-    whole = model.around(fit).information / max(model.pearson(fit), 1.0)
+    whole = model.around(fit).information / max(model.misfit(fit).pearson, 1.0)
     n = len(model.nodes.information)
     whole[-n:, -n:] += model.nodes.information
     return solved(whole, np.eye(len(whole)))

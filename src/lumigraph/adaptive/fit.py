@@ -14,6 +14,7 @@ import numpy as np
 
 from lumigraph.adaptive.changes import Changes, told
 from lumigraph.adaptive.field import Nodes
+from lumigraph.adaptive.misfit import Misfit
 from lumigraph.core import arrays
 from lumigraph.core.progress import Progress, Stage, silent
 from lumigraph.core.threads import each
@@ -212,12 +213,11 @@ class Model:
         x = fit.coefficients.ravel()
         return float(x @ self.nodes.information @ x)
 
-    def pearson(self, fit: Fit) -> float:
-        """Mean of (r - m)²/m over the pixels that count, of a judged fit: 1 where only noise is left."""
+    def misfit(self, fit: Fit) -> Misfit:
+        """What a judged fit leaves of the raw image."""
         assert fit.light is not None  # it was judged
-        shown = self.expected(fit.light)
-        away = arrays.to_numpy(self.problem.data) - shown
-        return float((self.weights * away**2 / shown).sum() / self.counted)
+        data = arrays.to_numpy(self.problem.data)
+        return Misfit.of(self.weights, self.problem.scale.gain, data, self.expected(fit.light))
 
     def known(self, fit: Fit) -> Fit:
         """The fit with derivatives of its beads, those before where a bead hardly changed."""

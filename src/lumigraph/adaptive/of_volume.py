@@ -5,9 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lumigraph.adaptive.checked import PICTURE, VOLUME, asked_for, bent
+from lumigraph.adaptive.checked import asked_for, bent
+from lumigraph.adaptive.clusters import Clusters, widened
 from lumigraph.adaptive.field import PRIOR
-from lumigraph.adaptive.scene import Scene, own_defocus
+from lumigraph.adaptive.scene import SETTINGS, Scene, own_defocus
 from lumigraph.adaptive.start import starts
 from lumigraph.adaptive.voxels import Around, Told, Voxels
 from lumigraph.adaptive.wavefront import Wavefront
@@ -31,20 +32,22 @@ def of_volume(
 ) -> Wavefront:  # fmt: skip
     """The wavefront of (raw image, exposure, pixels), and the volume or picture; see `estimate`."""
     raw, exposure, pixels = given
-    planes, found, untold = asked_for(instrument, depths, terms, {"volume": VOLUME, "picture": PICTURE}[kind])
+    settings = SETTINGS[kind]
+    planes, found, untold = asked_for(instrument, depths, terms, settings.kind)
     if exposure is None:
         exposure = Exposure.of(raw) if isinstance(raw, RawImage) else Exposure()
-    scene = Scene(instrument, tuple(map(float, planes)), kind, pixels)
+    scene = Scene(instrument, tuple(map(float, planes)), settings, pixels)
     sight, exposure = scene.sight(found), scene.counted(exposure)
-    few, many = scene.iterations
+    few, many = settings.iterations
     data = values(raw, sight.operator(np.zeros(len(found))), exposure)
-    voxels = Voxels(sight, data, exposure, progress, scene.method(sight), scene.least)
+    voxels = Voxels(sight, data, exposure, progress, scene.method(sight), settings.least)
     told = voxels.begun(np.zeros(len(found)), few)
     shifted = starts(told.problem, instrument, found, pixels, own_defocus(sight.images, sight.planes[0]))
     tried = (voxels.begun(c, few) for c in shifted)
     told = min([told, *tried], key=lambda one: one.state.deviance)
-    told, around = _improved(voxels, told, np.ones(len(found), bool), scene.iterations)
-    covariance = _covariance(voxels, told, around, scene.left)
+    told, around = _improved(voxels, told, np.ones(len(found), bool), settings.iterations)
+    full, clusters = told.coefficients, scene.clusters(len(found))
+    covariance = _covariance(voxels, told, around, clusters, settings.left)
     free = worth(covariance, told.coefficients[None], voxels.counted(told), np.eye(len(found)) / PRIOR**2)
     if not free.all():
         kept = voxels.begun(told.coefficients * free, many, told.steps)
@@ -52,24 +55,26 @@ def of_volume(
     plain = voxels.begun(np.zeros(len(found)), many, told.steps)
     if not _is_likelier(voxels, told, plain):
         told = plain
-    grid = sight.picture
+    left_out = told.coefficients - full
+    covariance += np.outer(left_out, left_out)
+    grid, misfit = sight.picture, voxels.misfit(told)
     volume = np.asarray(arrays.to_numpy(told.state.estimate))[(slice(None), *sight.inside)]
     return Wavefront(
         found, told.coefficients.reshape(1, 1, -1), np.sqrt(np.diag(covariance)).reshape(1, 1, -1),
         (np.array([grid.center[0]]), np.array([grid.center[1]])),
         untold | _unknown(found, covariance), Points(np.zeros((0, 3)), np.zeros(0)),
-        (plain.state.deviance, told.state.deviance), voxels.pearson(told), 1, told.steps,
+        (plain.state.deviance, told.state.deviance), misfit.pearson, 1, told.steps,
         bent(instrument, found, told.coefficients), covariance,
-        Volume(volume, grid, scene.depths), _explained(found, around),
+        Volume(volume, grid, scene.depths), _explained(found, around), misfit.deviation,
     )  # fmt: skip
 
 
 def _improved(voxels: Voxels, told: Told, free: np.ndarray, iterations: Sequence[int]) -> tuple[Told, Around]:
-    """Step by step with volumes that are followed farther and farther."""
+    """Step by step with volumes that are followed farther and farther, at last by the slope."""
     found = voxels.improved(told, free)
     for n in iterations[1:]:
         found = voxels.improved(voxels.begun(found[0].coefficients, n, found[0].steps), free)
-    return found
+    return voxels.settled(*found, free)
 
 
 def _is_likelier(voxels: Voxels, told: Told, plain: Told) -> bool:
@@ -80,13 +85,15 @@ def _is_likelier(voxels: Voxels, told: Told, plain: Told) -> bool:
     """
     count, unknowns = voxels.counted(told), np.count_nonzero(told.coefficients)
     gained = (plain.state.deviance - told.state.deviance) * count
-    return gained > unknowns * math.log(count) * max(voxels.pearson(told), 1.0)
+    return gained > unknowns * math.log(count) * max(voxels.misfit(told).pearson, 1.0)
 
 
-def _covariance(voxels: Voxels, told: Told, around: Around, left: float) -> np.ndarray:
-    """Of the coefficients; larger where the object does not explain the raw image, and by what it leaves."""
-    information, one = around.information / max(voxels.pearson(told), 1.0), np.eye(len(around.information))
-    return np.linalg.inv(information + one / PRIOR**2) + left**2 * one
+def _covariance(voxels: Voxels, told: Told, around: Around, clusters: Clusters, left: float) -> np.ndarray:
+    """Of the coefficients, by noise, by what the object leaves of the raw image and by what models do."""
+    one = np.eye(len(around.information))
+    known = around.information / max(voxels.misfit(told).pearson, 1.0) + one / PRIOR**2
+    scatter = clusters.scatter(around.scores)
+    return widened(around.information + one / PRIOR**2, known, scatter) + left**2 * one
 
 
 def _unknown(terms: tuple[int, ...], covariance: np.ndarray) -> dict[int, str]:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lumigraph.adaptive.checked import PICTURE, VOLUME, Kind
+from lumigraph.adaptive.clusters import Clusters, on_lattice
 from lumigraph.adaptive.sight import Sight
 from lumigraph.core import arrays
 from lumigraph.core.calibration import Calibration
@@ -14,42 +16,62 @@ from lumigraph.deconvolution.filters import LowPass
 from lumigraph.instruments import LensletCamera, LightFieldMicroscope, PlenopticCamera
 from lumigraph.operators.microscope_pupil import PupilImages
 
-ACCURACY = {"volume": 2e-2, "picture": 1e-2}
-"""Of points' images.
 
-With 3e-2, 0.3 waves of astigmatism before a textured volume came out 0.01 to 0.03 too low, by how pixels were
-sampled; with 2e-2 or 1e-2, 0.01.
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How one kind of object is looked for.
+
+    Parameters
+    ----------
+    kind
+        What it explains itself.
+    accuracy
+        Of points' images.
+    iterations
+        Of Richardson-Lucy, accelerated, at first and then.
+    resolved
+        Of a lenslet, how finely the object is resolved; None for its samples.
+    samples
+        Along a lenslet; None for as many as `finest` says.
+    beside
+        Lenslets that the object goes on beyond what sends most of its light onto the picture.
+    least
+        Part of the most light that a sample must send onto pixels that count, to be lit.
+    left
+        Standard deviation of a term by errors of the model that leave no trace [waves rms].
+    """
+
+    kind: Kind
+    accuracy: float
+    iterations: tuple[int, int]
+    resolved: float | None
+    samples: int | None
+    beside: int
+    least: float
+    left: float
+
+
+OF_VOLUME = Settings(
+    VOLUME, accuracy=2e-2, iterations=(4, 15), resolved=None, samples=3, beside=0, least=BARELY, left=0.0
+)
+"""Few iterations at first, for a volume that explains a wrong wavefront resists it.
+
+With an accuracy of 3e-2, 0.3 waves of astigmatism before a textured volume came out 0.01 to 0.03 too low, by
+how pixels were sampled; with 2e-2 or 1e-2, 0.01.
 """
 
-ITERATIONS = {"volume": (4, 15), "picture": (4, 40)}
-"""Of Richardson-Lucy, accelerated: few at first, for a volume that explains a wrong wavefront resists it.
+OF_PICTURE = Settings(
+    PICTURE, accuracy=1e-2, iterations=(4, 40), resolved=1 / 6, samples=None, beside=2, least=1e-3, left=1e-3
+)
+"""A main lens sends some per cent of a point's light lenslets aside: where samples beside the picture were
+dark, 0.3 waves before a scene that goes on there came out 0.022 too weak; with these, not at all.
 
-After 15 iterations, pictures of a camera without aberrations looked likelier with 0.008 waves of defocus and
-spherical aberration; after 40 and 200 with no more than noise brings, 0.003.
+Resolved to 1/3, 1/6 and 1/12 of a lenslet, scenes of a fine 0.15 of a lenslet and 1000 electrons a pixel pull
+eight terms by 0.0062, 0.0043 and 0.0043 waves rms, smooth ones of 100 electrons by 0.0042, 0.0035 and 0.0036.
+Images of an accuracy of 1e-2 pull them by 0.0033 waves, of 5e-3 by 0.0020, at twice the cost: hence `left`.
 """
 
-SMOOTH = 1 / 3
-"""Of a lenslet, how finely a picture is resolved.
-
-A picture as fine as its samples explains noise, and the better the more light is spread: without aberrations
-0.009 waves came out after 40 iterations, 0.024 after 200. With 1/5 to 1/2 of a lenslet it was 0.003.
-"""
-
-MORE = {"volume": 0, "picture": 2}
-"""Lenslets that the object goes on beyond what sends most of its light onto the picture."""
-
-LEAST = {"volume": BARELY, "picture": 1e-3}
-"""Part of the most light that a sample must send onto pixels that count, to be lit.
-
-A main lens sends some per cent of a point's light lenslets aside. Where samples beside the picture were dark,
-0.3 waves before a scene that goes on there came out 0.022 too weak; with these, not at all.
-"""
-
-LEFT = {"volume": 0.0, "picture": 1e-3}
-"""Standard deviation of a term by what such a picture leaves [waves rms], beside that of noise."""
-
-SAMPLES = 3
-"""Of a volume along a lenslet."""
+SETTINGS = {"volume": OF_VOLUME, "picture": OF_PICTURE}
 
 FINER = 1.1
 """Samples of a picture, over as many as hold how the images of its points change from one to the next: with
@@ -72,55 +94,45 @@ class Scene:
         With the aberrations that are known.
     depths
         Of the planes [m].
-    kind
-        "volume" or "picture".
+    settings
+        How the object is looked for.
     pixels
         Calibration of a real instrument.
     """
 
     instrument: LightFieldMicroscope | PlenopticCamera
     depths: tuple[float, ...]
-    kind: str
+    settings: Settings
     pixels: Calibration | None
-
-    @property
-    def iterations(self) -> tuple[int, int]:
-        """Of Richardson-Lucy, at first and then."""
-        return ITERATIONS[self.kind]
-
-    @property
-    def least(self) -> float:
-        """Light that a sample must send onto pixels that count, over the most."""
-        return LEAST[self.kind]
-
-    @property
-    def left(self) -> float:
-        """Standard deviation of a term by what the object leaves [waves rms]."""
-        return LEFT[self.kind]
 
     def method(self, sight: Sight) -> RichardsonLucy:
         """By which it is found."""
-        low_pass = LowPass((sight.samples * SMOOTH,)) if self.kind == "picture" else None
+        resolved = self.settings.resolved
+        low_pass = None if resolved is None else LowPass((sight.samples * resolved,))
         return RichardsonLucy(accelerated=True, filter=low_pass)
 
     def sight(self, terms: tuple[int, ...]) -> Sight:
         """Its operators by the terms' coefficients."""
         images, planes = self._images(terms)
-        samples = finest(images) if self.kind == "picture" else SAMPLES
+        samples = self.settings.samples or finest(images)
         narrow = Sight(images, planes, samples, -images.layout.frame)
         narrow.require_memory()
         sight = Sight.of(images, planes, samples)
-        return replace(sight, margin=sight.margin + MORE[self.kind])
+        return replace(sight, margin=sight.margin + self.settings.beside)
 
     def _images(self, terms: tuple[int, ...]) -> tuple[PupilImages, tuple[float, ...]]:
         """Images of points, and the depths of the planes as these count them."""
-        accuracy, scope = ACCURACY[self.kind], self.instrument
+        accuracy, scope = self.settings.accuracy, self.instrument
         if isinstance(scope, LensletCamera):
             (dz,) = self.depths
             return scope.pupil_images(terms, dz=dz, accuracy=accuracy, pixels=self.pixels), (0.0,)
         farthest = float(np.abs(self.depths).max())
         images = scope.pupil_images(terms, farthest=farthest, accuracy=accuracy, pixels=self.pixels)
         return images, self.depths
+
+    def clusters(self, terms: int) -> Clusters:
+        """Of the pixels, for so many terms."""
+        return Clusters.of(self.instrument.calibration if self.pixels is None else self.pixels, terms)
 
     def counted(self, exposure: Exposure) -> Exposure:
         """Without the pixels that see where a camera's array ends."""
@@ -149,10 +161,6 @@ def inner_pixels(camera: PlenopticCamera, pixels: Calibration | None) -> np.ndar
     """Weights (ny, nx): 0 behind the `OUTER` lenslets at the array's border, else 1."""
     calibration = camera.calibration if pixels is None else pixels
     array = -camera.lenslets.indices() if pixels is None else calibration.indices
-    ny, nx = calibration.shape
-    y, x = calibration.straightened(np.arange(ny)[:, None] + 0.0, np.arange(nx)[None, :] + 0.0)
-    origin = calibration.lattice.origin
-    place = np.stack(np.broadcast_arrays(y - origin[0], x - origin[1]), -1)
-    own = place @ np.linalg.inv(calibration.lattice.matrix).T
+    own = on_lattice(calibration)
     inside = (own > array.min(0) + OUTER - 0.5) & (own < array.max(0) - OUTER + 0.5)
     return inside.all(-1).astype(np.float64)

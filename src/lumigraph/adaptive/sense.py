@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lumigraph.adaptive.checked import PISTON, bent
-from lumigraph.adaptive.estimate import covariance_of_coefficients, warn_of_misfit
+from lumigraph.adaptive.estimate import covariance_of_coefficients
 from lumigraph.adaptive.field import PRIOR, Nodes
 from lumigraph.adaptive.fit import OWN, PLACES, Fit, Model
 from lumigraph.adaptive.star import Alone, Star
@@ -101,15 +101,16 @@ def sense(
     model, first = _model(star, raw, place, exposure, progress or silent)
     plain = model.placed(first, STEPS)
     fit = model.improved(plain, np.ones(len(modes), bool), STEPS)
-    pearson = model.pearson(fit)
-    warn_of_misfit(pearson, "a point with these modes leaves")
+    misfit = model.misfit(fit)
+    misfit.warn("a point with these modes leaves", "Ask for more modes, or give the point's place.")
     covariance = covariance_of_coefficients(model, fit)
     deviations = np.sqrt(np.diag(covariance))
     unknown = {j: UNKNOWN for j, d in zip(modes, deviations, strict=True) if d > PRIOR / 2}
     return Wavefront(
         modes, fit.coefficients[None], deviations[None, None], (model.nodes.y, model.nodes.x),
-        untold | unknown, fit.points, (model.deviance(plain), model.deviance(fit)), pearson, 1,
+        untold | unknown, fit.points, (model.deviance(plain), model.deviance(fit)), misfit.pearson, 1,
         fit.steps, bent(camera, modes, fit.coefficients[0]), covariance,
+        pearson_deviation=misfit.deviation,
     )  # fmt: skip
 
 

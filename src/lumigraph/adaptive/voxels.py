@@ -9,12 +9,14 @@ nothing: u_j is the most likely one for J_j, with a prior of 1 for u, and what i
 S is Fisher's information of c with all voxels unknown (a Schur complement).
 """
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from lumigraph.adaptive.field import PRIOR
 from lumigraph.adaptive.fit import solved, stepped
+from lumigraph.adaptive.misfit import Misfit
 from lumigraph.adaptive.sight import Sight
 from lumigraph.core import arrays
 from lumigraph.core.progress import Progress, silent
@@ -36,6 +38,14 @@ TRIES = 4
 
 STEPS = 25
 """At most."""
+
+SETTLED, SETTLING = 0.1, 6
+"""Chi square of a step, all coefficients together, that need not be taken any more; and steps at most."""
+
+PROBE, LEAST = 3.0, 0.2
+"""Standard deviations, all coefficients together, of a step that shows how the slope changes; and the least
+part of the promised change that is believed.
+"""
 
 GAIN = 2.0
 """Log-likelihood that a step must gain for another one to follow."""
@@ -78,11 +88,18 @@ class Around:
         Of the log-likelihood (terms,).
     fixed
         Fisher's information (terms, terms) if the volume were known.
+    scores
+        What each pixel adds to the slope (terms, ny, nx).
     """
 
     information: np.ndarray
     slope: np.ndarray
     fixed: np.ndarray
+    scores: np.ndarray
+
+    def of_part(self, part: float) -> "Around":
+        """With a part of the information."""
+        return replace(self, information=part * self.information)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,10 +140,10 @@ class Voxels:
         """Pixels that count."""
         return float(self._weights(told.problem).sum()) / told.problem.scale.gain
 
-    def pearson(self, told: Told) -> float:
-        """Mean of (r - m)²/m over the pixels that count: 1 where only noise is left."""
+    def misfit(self, told: Told) -> Misfit:
+        """What is left of the raw image."""
         shown, data = arrays.to_numpy(told.state.model), arrays.to_numpy(told.problem.data)
-        return float((self._weights(told.problem) * (data - shown) ** 2 / shown).sum() / self.counted(told))
+        return Misfit.of(self._weights(told.problem), told.problem.scale.gain, data, shown)
 
     def improved(self, told: Told, free: np.ndarray, steps: int = STEPS) -> tuple[Told, Around]:
         """After at most some steps, with those coefficients free that are marked; and what is around them."""
@@ -148,6 +165,36 @@ class Voxels:
                 break
         return told, around
 
+    def settled(self, told: Told, around: Around, free: np.ndarray) -> tuple[Told, Around]:
+        """After at most some steps to where the slope vanishes, likelier or not; and what is around them.
+
+        An object takes up noise, and the more of it the more a wavefront spreads the light: where the
+        deviance is least, coefficients are off by that. The slope leaves out what the object takes up.
+        Noise in the object looks like information, too: less of it is left, by how the slope changes.
+        """
+        part = self._part(told, around, free)
+        around = around.of_part(part)
+        for _ in range(SETTLING):
+            if self._steep(told, around, free) < SETTLED:
+                break
+            tried = self._moved(told, self._step(told, around, free, 0.0))
+            beyond = self.around(tried).of_part(part)
+            if self._steep(tried, beyond, free) >= self._steep(told, around, free):
+                break
+            told, around = tried, beyond
+            stepped(self.progress, told.steps)
+        return told, around
+
+    def _part(self, told: Told, around: Around, free: np.ndarray) -> float:
+        """Of the change of the slope that the information promises, what a step brings; at most 1."""
+        whole, _ = self._free(told, around, free)
+        step = np.zeros(len(free))
+        step[free] = np.linalg.inv(np.linalg.cholesky(whole)).T.sum(1) * PROBE / math.sqrt(len(whole))
+        beyond = self.around(self._moved(told, step))
+        return float(
+            np.clip(step @ (around.slope - beyond.slope) / (step @ around.information @ step), LEAST, 1)
+        )
+
     def _farther(self, told: Told, found: Told) -> Told:
         """Twice as far, as long as it is likelier: the volume that resisted goes along."""
         while True:
@@ -167,12 +214,14 @@ class Voxels:
         shown, data = arrays.to_numpy(told.state.model), arrays.to_numpy(told.problem.data)
         weights = (self._weights(told.problem) / shown).astype(np.float32)
         changes = [response * one.forward(volume) for one in self.sight.changes(told.coefficients)]
-        columns = np.stack([*changes, data - shown]).astype(np.float32)
+        columns = np.stack(changes).astype(np.float32)
         left = np.stack([c - self._seen(told, self._explained(told, weights, c)) for c in columns])
-        whole = np.tensordot(columns * weights, left, ((1, 2), (1, 2))).astype(np.float64)
-        fixed = np.tensordot(columns[:-1] * weights, columns[:-1], ((1, 2), (1, 2))).astype(np.float64)
-        information = (whole + whole.T)[:-1, :-1] / 2
-        return Around(information, whole[-1, :-1], fixed)
+        whole, fixed = (
+            np.tensordot(columns * weights, those, ((1, 2), (1, 2))).astype(np.float64)
+            for those in (left, columns)
+        )
+        scores = (left * (weights * (data - shown))).astype(np.float64)
+        return Around((whole + whole.T) / 2, scores.sum((1, 2)), fixed, scores)
 
     def _explained(self, told: Told, weights: np.ndarray, column: np.ndarray) -> np.ndarray:
         """Relative changes u of the volume that explain an image best, by conjugate gradients."""
@@ -205,10 +254,19 @@ class Voxels:
         return np.asarray(told.state.estimate, np.float32) * scale.operator.adjoint(light.astype(np.float32))
 
     def _step(self, told: Told, around: Around, free: np.ndarray, damping: float) -> np.ndarray:
-        step, prior = np.zeros(len(free)), np.eye(len(free)) / PRIOR**2
-        slope = around.slope - told.coefficients / PRIOR**2
-        step[free] = solved((around.information + prior)[np.ix_(free, free)], slope[free], damping)
+        step, (whole, slope) = np.zeros(len(free)), self._free(told, around, free)
+        step[free] = solved(whole, slope, damping)
         return step / max(1.0, float(np.linalg.norm(step)) / LONGEST)
+
+    def _steep(self, told: Told, around: Around, free: np.ndarray) -> float:
+        """Chi square of the step that the slope asks for."""
+        whole, slope = self._free(told, around, free)
+        return float(slope @ solved(whole, slope))
+
+    def _free(self, told: Told, around: Around, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Information and slope of the free coefficients, with the prior."""
+        whole = around.information + np.eye(len(free)) / PRIOR**2
+        return whole[np.ix_(free, free)], (around.slope - told.coefficients / PRIOR**2)[free]
 
     def _moved(self, told: Told, step: np.ndarray) -> Told:
         return self.begun(told.coefficients + step, told.iterations, told.steps + 1)

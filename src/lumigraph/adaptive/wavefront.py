@@ -23,8 +23,10 @@ class Wavefront:
         Noll indices.
     values, deviations
         Of each term at the nodes of the field (rows, columns, terms) [waves rms], beyond what the
-        instrument's description holds; standard deviations from Fisher's information. A term that explains
-        no more than noise has the value 0 and the deviation that it had.
+        instrument's description holds; standard deviations from Fisher's information and from how pixels'
+        scores scatter, over lenslets and over places behind them, where the object does not explain the raw
+        image. A term that explains no more than noise has the value 0, and its deviation holds the value
+        that it had.
     nodes
         Places (y, x) of the rows and of the columns of nodes [m].
     untold
@@ -34,7 +36,7 @@ class Wavefront:
     deviance
         Poisson deviance per pixel with the object alone, and with the wavefront.
     pearson
-        Mean of (r - m)²/m, electrons: 1 where only noise is left.
+        Mean of (r - m)²/m, electrons: 1 where only noise is left; see `pearson_deviation`.
     rounds, steps
         How often objects were looked for, and steps of the fit.
     instrument
@@ -46,6 +48,8 @@ class Wavefront:
     explained
         Part of each term's information, from 0 to 1, that is lost as the volume could explain what the term
         does; empty of beads.
+    pearson_deviation
+        Standard deviation of `pearson` by noise alone.
     """
 
     terms: tuple[int, ...]
@@ -62,6 +66,7 @@ class Wavefront:
     covariance: np.ndarray
     volume: Volume | None = None
     explained: Mapping[int, float] = field(default_factory=dict)
+    pearson_deviation: float = 0.0
 
     __repr__ = brief
 

@@ -1,0 +1,91 @@
+r"""How well coefficients are known where the object does not explain the raw image: by how scores scatter.
+
+Pixels add scores s to the slope of the log-likelihood. Noise alone gives their sum the covariance S, Fisher's
+information. What the object leaves of the raw image is alike in neighbouring pixels, such as detail finer
+than its samples, or in the same place behind all lenslets, such as an error of the model. So sums over
+clusters of pixels, whose squares are added, say how far the whole sum scatters (White's sandwich, clustered
+both ways):
+
+.. math:: C = S^{-1} V S^{-1}, \quad V = V_{lenslets} + V_{places} - V_{both}
+
+H. White, Econometrica 50, 1 (1982); A. C. Cameron, J. B. Gelbach & D. L. Miller, J. Bus. Econ. Stat. 29, 238
+(2011).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from lumigraph.core.calibration import Calibration
+
+PLACES = 5
+"""Along each side of a lenslet, in which pixels are alike, at least."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clusters:
+    """Of the pixels, each (ny, nx) of whole numbers from 0.
+
+    Parameters
+    ----------
+    lenslets
+        Behind which lenslet a pixel stands.
+    places
+        Where it stands behind its lenslet.
+    """
+
+    lenslets: np.ndarray
+    places: np.ndarray
+
+    @classmethod
+    def of(cls, calibration: Calibration, terms: int) -> "Clusters":
+        """Of a calibration's pixels, in more places than twice as many as there are terms."""
+        own = on_lattice(calibration)
+        lenslets = np.rint(own)
+        count = max(PLACES, math.ceil(math.sqrt(2 * terms)))
+        places = np.clip(np.floor((own - lenslets + 0.5) * count), 0, count - 1)
+        return cls(_numbered(lenslets), _numbered(places))
+
+    def scatter(self, scores: np.ndarray) -> np.ndarray:
+        """V (terms, terms) of scores (terms, ny, nx) that add up to little: not always positive."""
+        both = self.lenslets * (int(self.places.max()) + 1) + self.places
+        lenslets, places, each = (_summed(scores, one) for one in (self.lenslets, self.places, both))
+        alike = _free(places) * (places @ places.T - each @ each.T)
+        return _free(lenslets) * lenslets @ lenslets.T + alike
+
+
+def widened(information: np.ndarray, known: np.ndarray, scatter: np.ndarray) -> np.ndarray:
+    """Covariance (terms, terms) by the scatter of scores; nowhere below the inverse of `known`."""
+    inverse = np.linalg.inv(information)
+    root = np.linalg.cholesky(np.linalg.inv(known))
+    back = np.linalg.inv(root)
+    sizes, axes = np.linalg.eigh(back @ inverse @ scatter @ inverse @ back.T)
+    wide = root @ axes * np.sqrt(np.maximum(sizes, 1))
+    return wide @ wide.T
+
+
+def on_lattice(calibration: Calibration) -> np.ndarray:
+    """Places (ny, nx, 2) of the pixels along the lattice's rows and columns [lenslets]."""
+    ny, nx = calibration.shape
+    y, x = calibration.straightened(np.arange(ny)[:, None] + 0.0, np.arange(nx)[None, :] + 0.0)
+    origin = calibration.lattice.origin
+    place = np.stack(np.broadcast_arrays(y - origin[0], x - origin[1]), -1)
+    return place @ np.linalg.inv(calibration.lattice.matrix).T
+
+
+def _numbered(places: np.ndarray) -> np.ndarray:
+    """Pairs (ny, nx, 2) of whole numbers as one each, from 0."""
+    first, second = (places[..., k] - places[..., k].min() for k in (0, 1))
+    return (first * (second.max() + 1) + second).astype(np.int64)
+
+
+def _summed(scores: np.ndarray, clusters: np.ndarray) -> np.ndarray:
+    """Sums (terms, clusters)."""
+    return np.stack([np.bincount(clusters.ravel(), one.ravel()) for one in scores])
+
+
+def _free(sums: np.ndarray) -> float:
+    """Clusters over those that are left when the sums (terms, clusters) add up to 0."""
+    count = np.count_nonzero(sums.any(0))
+    return count / max(count - len(sums), 1)
