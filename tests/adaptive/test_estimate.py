@@ -12,6 +12,7 @@ from lumigraph.adaptive.field import ALIKE, PRIOR, Nodes
 from lumigraph.adaptive.fit import Fit
 from lumigraph.adaptive.search import Search
 from lumigraph.adaptive.worth import worth
+from lumigraph.core import memory
 from lumigraph.deconvolution import Exposure
 
 SCOPE = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
@@ -120,6 +121,17 @@ def test_beads_are_looked_for_through_a_wavefront():
     assert again is not None
     assert len(again.intensities) == 2
     assert search.more(Fit(found, c[None]), raw + 1.0) is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [("beads", "operator of 5 depths needs"), ("volume", "operator of 5 depths with 2 derivatives needs")],
+)
+def test_images_of_points_that_do_not_fit_in_memory_are_refused(kind, message, monkeypatch):
+    """Asked before they are made: 1 MiB is free."""
+    monkeypatch.setattr(memory, "available", lambda: 2**20)
+    with pytest.raises(lg.SamplingError, match=message):
+        estimate(np.ones((135, 135), np.float32), SCOPE, DEPTHS, (6, 8), exposure=EXPOSURE, object=kind)
 
 
 RAW = np.ones((135, 135), np.float32)

@@ -116,7 +116,7 @@ class Scene:
         images, planes = self._images(terms)
         samples = self.settings.samples or finest(images)
         narrow = Sight(images, planes, samples, -images.layout.frame)
-        narrow.require_memory()
+        narrow.require_memory(len(terms))
         sight = Sight.of(images, planes, samples)
         return replace(sight, margin=sight.margin + self.settings.beside)
 

@@ -74,7 +74,9 @@ class Search:
         farthest, part = float(np.abs(planes).max()), microscope.objective
         images = microscope.pupil_images(terms, farthest=farthest, accuracy=accuracy, pixels=pixels)
         slope = part.numerical_aperture / math.sqrt(part.immersion_index**2 - part.numerical_aperture**2)
-        sight = Sight.of(replace(images, accuracy=COARSE), tuple(map(float, planes)), SAMPLES)
+        images, depths = replace(images, accuracy=COARSE), tuple(map(float, planes))
+        Sight(images, depths, SAMPLES).require_memory(0)
+        sight = Sight.of(images, depths, SAMPLES)
         return cls(sight, raw, exposure, slope, microscope.lenslet_size)
 
     def problem(self, coefficients: np.ndarray) -> Problem:

@@ -99,12 +99,13 @@ class Sight:
                 own.append(self._kernel(np.stack([self._parted(one.changes[j]) for one in found])))
         return [self._of(own) for own in kernels]
 
-    def require_memory(self) -> None:
-        """Refuse derivatives that do not fit."""
+    def require_memory(self, changes: int) -> None:
+        """Refuse an operator, and so many changes of it, that do not fit."""
         cells = max(self.images.cells_at(dz) for dz in (self.planes[0], self.planes[-1]))
         rows = cells**2 * self.samples**2 * len(self.planes)
-        needed = 8.0 * (len(self.images.terms) + 2) * rows * self.images.layout.sampling.pixels**2
-        what = f"the images of points at {len(self.planes)} depths and their derivatives"
+        needed = 8.0 * (changes + 2) * rows * self.images.layout.sampling.pixels**2
+        also = f" with {changes} derivatives" if changes else ""
+        what = f"an operator of {len(self.planes)} depths{also}"
         memory.require(needed, what, "Use fewer depths or terms.", SamplingError)
 
     def _lit(

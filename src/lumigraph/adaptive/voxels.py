@@ -220,8 +220,8 @@ class Voxels:
             np.tensordot(columns * weights, those, ((1, 2), (1, 2))).astype(np.float64)
             for those in (left, columns)
         )
-        scores = (left * (weights * (data - shown))).astype(np.float64)
-        return Around((whole + whole.T) / 2, scores.sum((1, 2)), fixed, scores)
+        scores = left * (weights * (data - shown)).astype(np.float32)
+        return Around((whole + whole.T) / 2, scores.sum((1, 2), dtype=np.float64), fixed, scores)
 
     def _explained(self, told: Told, weights: np.ndarray, column: np.ndarray) -> np.ndarray:
         """Relative changes u of the volume that explain an image best, by conjugate gradients."""
