@@ -51,7 +51,7 @@ def of_volume(
     free = worth(covariance, told.coefficients[None], voxels.counted(told), np.eye(len(found)) / PRIOR**2)
     if not free.all():
         kept = voxels.begun(told.coefficients * free, many, told.steps)
-        told, around = _improved(voxels, kept, free, (many,)) if free.any() else (kept, around)
+        told, around = voxels.settled(kept, voxels.around(kept), free) if free.any() else (kept, around)
     plain = voxels.begun(np.zeros(len(found)), many, told.steps)
     if not _is_likelier(voxels, told, plain):
         told = plain
@@ -89,11 +89,13 @@ def _is_likelier(voxels: Voxels, told: Told, plain: Told) -> bool:
 
 
 def _covariance(voxels: Voxels, told: Told, around: Around, clusters: Clusters, left: float) -> np.ndarray:
-    """Of the coefficients, by noise, by what the object leaves of the raw image and by what models do."""
+    """Of the coefficients: by noise, what the object leaves of the raw image, what models do, what pulls."""
     one = np.eye(len(around.information))
     known = around.information / max(voxels.misfit(told).pearson, 1.0) + one / PRIOR**2
     scatter = clusters.scatter(around.scores)
-    return widened(around.information + one / PRIOR**2, known, scatter) + left**2 * one
+    pulled = np.linalg.solve(around.information + one / PRIOR**2, around.pull)
+    found = widened(around.information + one / PRIOR**2, known, scatter)
+    return found + np.outer(pulled, pulled) + left**2 * one
 
 
 def _unknown(terms: tuple[int, ...], covariance: np.ndarray) -> dict[int, str]:

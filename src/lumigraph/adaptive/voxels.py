@@ -10,6 +10,7 @@ S is Fisher's information of c with all voxels unknown (a Schur complement).
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,6 +27,7 @@ from lumigraph.deconvolution.beyond import BARELY
 from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.methods import State
 from lumigraph.deconvolution.problem import Problem, Scale
+from lumigraph.operators.microscope_operator import MicroscopeOperator
 
 SOLVED = 20
 """Steps of conjugate gradients by which the volume explains a change."""
@@ -90,16 +92,19 @@ class Around:
         Fisher's information (terms, terms) if the volume were known.
     scores
         What each pixel adds to the slope (terms, ny, nx).
+    pull
+        What was taken from the slope (terms,).
     """
 
     information: np.ndarray
     slope: np.ndarray
     fixed: np.ndarray
     scores: np.ndarray
+    pull: np.ndarray
 
-    def of_part(self, part: float) -> "Around":
-        """With a part of the information."""
-        return replace(self, information=part * self.information)
+    def less(self, part: float, pull: np.ndarray) -> "Around":
+        """With a part of the information, and a slope without what pulls at it."""
+        return replace(self, information=part * self.information, slope=self.slope - pull, pull=pull)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,21 +174,36 @@ class Voxels:
         """After at most some steps to where the slope vanishes, likelier or not; and what is around them.
 
         An object takes up noise, and the more of it the more a wavefront spreads the light: where the
-        deviance is least, coefficients are off by that. The slope leaves out what the object takes up.
-        Noise in the object looks like information, too: less of it is left, by how the slope changes.
+        deviance is least, coefficients are off by that. The slope leaves out most of what the object takes
+        up, and what pulls at it is taken away. Noise in the object looks like information, too: less of it is
+        left, by how the slope changes.
         """
-        part = self._part(told, around, free)
-        around = around.of_part(part)
+        less = self._part(told, around, free), self._pull(told)
+        around = around.less(*less)
         for _ in range(SETTLING):
             if self._steep(told, around, free) < SETTLED:
                 break
             tried = self._moved(told, self._step(told, around, free, 0.0))
-            beyond = self.around(tried).of_part(part)
+            beyond = self.around(tried).less(*less)
             if self._steep(tried, beyond, free) >= self._steep(told, around, free):
                 break
             told, around = tried, beyond
             stepped(self.progress, told.steps)
         return told, around
+
+    def _pull(self, told: Told) -> np.ndarray:
+        """Slope (terms,) where an object like this one is seen through these very coefficients, with noise.
+
+        With a noise and with its negative, so that what is linear in it goes.
+        """
+        shown, by = arrays.to_numpy(told.state.model), self.sight.changes(told.coefficients)
+        noise = np.random.default_rng(0).normal(size=shown.shape) * np.sqrt(shown / told.problem.scale.gain)
+        slopes = []
+        for sign in (1, -1):
+            drawn = shown + sign * np.clip(noise, -shown, shown) - self.exposure.offset
+            seen = replace(self, raw=drawn.astype(self.raw.dtype))
+            slopes.append(seen.around(seen.begun(told.coefficients, told.iterations), by).slope)
+        return (slopes[0] + slopes[1]) / 2
 
     def _part(self, told: Told, around: Around, free: np.ndarray) -> float:
         """Of the change of the slope that the information promises, what a step brings; at most 1."""
@@ -207,13 +227,13 @@ class Voxels:
             found = tried
 
     @single_products()
-    def around(self, told: Told) -> Around:
+    def around(self, told: Told, by: Sequence[MicroscopeOperator] | None = None) -> Around:
         """How coefficients change the image, and what of that the volume explains."""
         scale, volume = told.problem.scale, np.asarray(told.state.estimate, np.float32)
         response = 1.0 if scale.response is None else arrays.to_numpy(scale.response)
         shown, data = arrays.to_numpy(told.state.model), arrays.to_numpy(told.problem.data)
         weights = (self._weights(told.problem) / shown).astype(np.float32)
-        changes = [response * one.forward(volume) for one in self.sight.changes(told.coefficients)]
+        changes = [response * one.forward(volume) for one in by or self.sight.changes(told.coefficients)]
         columns = np.stack(changes).astype(np.float32)
         left = np.stack([c - self._seen(told, self._explained(told, weights, c)) for c in columns])
         whole, fixed = (
@@ -221,7 +241,8 @@ class Voxels:
             for those in (left, columns)
         )
         scores = left * (weights * (data - shown)).astype(np.float32)
-        return Around((whole + whole.T) / 2, scores.sum((1, 2), dtype=np.float64), fixed, scores)
+        slope = scores.sum((1, 2), dtype=np.float64)
+        return Around((whole + whole.T) / 2, slope, fixed, scores, 0 * slope)
 
     def _explained(self, told: Told, weights: np.ndarray, column: np.ndarray) -> np.ndarray:
         """Relative changes u of the volume that explain an image best, by conjugate gradients."""
