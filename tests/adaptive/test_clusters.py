@@ -92,4 +92,4 @@ def test_what_noise_does_not_explain_is_warned_of():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         Misfit(1.2, 0.05).warn("2 beads leave", "")
-        Misfit(1.05, 0.001).warn("2 beads leave", "")
+        Misfit(1.04, 0.001).warn("2 beads leave", "")

@@ -10,8 +10,8 @@ from lumigraph.errors import SamplingWarning
 SURE = 5.0
 """Standard deviations of noise above which a misfit is none of noise."""
 
-SMALL = 0.1
-"""Variances of noise by which what is left may exceed 1: models to 1e-2 leave as much in 1000 electrons."""
+SMALL = 0.05
+"""Variances of noise by which what is left may exceed 1: models to 1e-2 leave as much in 600 electrons."""
 
 
 class Misfit(NamedTuple):
