@@ -31,6 +31,8 @@ class Optics:
         That of the plane whose points are blurred most, of those that share the cells [m].
     place
         Where all cells are taken to be in the straight array (y, x) [m]; it matters to the exact model.
+    followed_to
+        Lenslets on each side of a cell whose light comes into it; None for what the accuracy asks.
     """
 
     camera: CameraOptics
@@ -40,6 +42,7 @@ class Optics:
     distance: float
     blurred: float
     place: tuple[float, float] = (0.0, 0.0)
+    followed_to: int | None = None
 
     @classmethod
     def of(
@@ -50,6 +53,14 @@ class Optics:
         array, widest = _cells.lenslet_array(plain), distance if blurred is None else blurred
         cells = _cells.cells_of(plain, array, fineness, widest)
         return cls(plain, array, cells, fineness, distance, widest)
+
+    def alike(self, camera: HasOptics) -> "Optics":
+        """Of a camera that hardly differs, with as many cells, points and samples, at a depth as far away."""
+        plain = camera.optics()
+        array, distance = _cells.lenslet_array(plain), self.distance
+        own, mine = _cells.cells_of(plain, array, self.fineness, distance), self.cells
+        cells = replace(own, count=mine.count, points=mine.points, samples=mine.samples, ring=mine.ring)
+        return replace(self, camera=plain, array=array, cells=cells, followed_to=self._neighbours)
 
     @property
     def bricks(self) -> "Optics":
@@ -98,8 +109,7 @@ class Optics:
     def axes(self) -> tuple[Axis, Axis]:
         """Sampling of a cell along y and along x."""
         band = SLACK / 2 / _cells.airy(self.camera)
-        neighbours = self.fineness.neighbours(*self._lit_alike)
-        neighbourhood = neighbours * self.array.lattice.pitch + self.spill
+        neighbourhood = self._neighbours * self.array.lattice.pitch + self.spill
         y, x = (
             Axis(size, points, samples, neighbourhood, band)
             for size, points, samples in zip(
@@ -107,6 +117,12 @@ class Optics:
             )
         )
         return y, x
+
+    @property
+    def _neighbours(self) -> int:
+        if self.followed_to is not None:
+            return self.followed_to
+        return self.fineness.neighbours(*self._lit_alike)
 
     @property
     def beside(self) -> float:

@@ -138,13 +138,18 @@ class Sampled:
         turn = -2j * np.pi / (self.camera.wavelength * self.camera.separation)
         return np.exp(turn * np.outer(y, grid.y)) @ (pupil @ np.exp(turn * np.outer(grid.x, x)))
 
+    @property
+    def grid(self) -> Grid:
+        """The pupil's."""
+        # Light comes again after as many λL/D as there are samples.
+        count = max(self.samples, math.ceil(3 * self.widest / _cells.airy(self.camera)))
+        wide = math.ceil(count * _cells.stop_reach(self.lens))
+        return Grid.square(wide + 8, self.camera.pupil_diameter / count)
+
     def behind(self) -> tuple[Grid, np.ndarray]:
         """The pupil's grid and its samples, for light of 1 behind a round stop."""
         if not self._pupil:
-            # Light comes again after as many λL/D as there are samples.
-            count = max(self.samples, math.ceil(3 * self.widest / _cells.airy(self.camera)))
-            wide = math.ceil(count * _cells.stop_reach(self.lens))
-            grid = Grid.square(wide + 8, self.camera.pupil_diameter / count)
+            grid = self.grid
             pupil = _cells.over_lens(self.camera, self.lens, self.distance, grid)
             squared = self.camera.wavelength * self.camera.separation
             light = (np.abs(pupil) ** 2).sum() * squared**2 / np.prod(grid.pitch)

@@ -131,16 +131,21 @@ class _Cells:
 
 @dataclass(slots=True)
 class Straight:
-    """Square lenslets, whose two axes are apart, or a sum of terms whose are."""
+    """Square lenslets, whose two axes are apart, or a sum of terms whose are; in single precision or not."""
 
     optics: Optics
+    precision: type[np.complexfloating] = np.complex64
     _known: dict[tuple[int, Limits, float, Box], np.ndarray] = field(default_factory=dict)
     _lenslets: Lenslets = field(init=False)
     _sides: tuple[_Cells, _Cells] = field(init=False)
+    _both: bool = field(init=False)
 
     def __post_init__(self) -> None:
         self._lenslets = lenslets_of(self.optics)
         self._sides = _Cells(self.optics, 0), _Cells(self.optics, 1)
+        (y, x), cells, lattice = self.optics.axes, self.optics.cells, self.optics.array.lattice
+        pairs = (y, x), cells.edge, lattice.pitches, lattice.origin
+        self._both = self.optics.camera.model == "paraxial" and all(one == other for one, other in pairs)
 
     def places(self, rows: range, columns: range) -> tuple[np.ndarray, np.ndarray]:
         """As `Relay.places`."""
@@ -163,17 +168,21 @@ class Straight:
     def along(self, which: int, light: np.ndarray, cells: range, box: Box) -> np.ndarray:
         """Amplitudes (terms, samples, n) along one axis of light (1 or terms, places, n)."""
         mine = self._sides[which]
-        parts = [self._matrix(which, cell, box) @ light[:, mine.window(k)] for k, cell in enumerate(cells)]
+        parts = [self.matrix(which, cell, box) @ light[:, mine.window(k)] for k, cell in enumerate(cells)]
         return np.concatenate(parts, axis=1)
 
-    def _matrix(self, which: int, cell: int, box: Box) -> np.ndarray:
+    def window(self, which: int, number: int) -> slice:
+        """Of the cell of this number along an axis, among the places of some."""
+        return self._sides[which].window(number)
+
+    def matrix(self, which: int, cell: int, box: Box = MIDDLE) -> np.ndarray:
         """Amplitudes (terms, samples, window) of one cell along one axis."""
         mine = self._sides[which]
         middle, limits = mine.center(cell), mine.limits(cell)
-        key = which, limits, 0.0 if box is MIDDLE else middle, box
+        key = 0 if self._both else which, limits, 0.0 if box is MIDDLE else middle, box
         if key not in self._known:
             found = self._lenslets.along(which, middle, limits, key[2], box)
-            self._known[key] = found.astype(np.complex64)
+            self._known[key] = found.astype(self.precision)
         return self._known[key]
 
 

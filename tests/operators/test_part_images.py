@@ -1,0 +1,144 @@
+"""Images of points by a camera's parts: against those of points, and their derivatives by every length."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import lumigraph as lg
+from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.operators.points import points_image
+from lumigraph.scene import Points
+from lumigraph.units import mm, nm, um
+
+POINTS = Points(np.array([[0.11, -0.23, -5], [0.3, 0.2, 2]]) * mm, np.array([1.0, 0.6]))
+START = {
+    "object_distance": 120 * mm,
+    "wavelength": 633 * nm,
+    "main_lens": {"focal_length": 60 * mm, "diameter": 3 * mm, "aberrations": {6: 0.3, 8: 0.2}},
+    "lenslets": {
+        "pitch": 0.2 * mm, "focal_length": 5.2 * mm, "count": (9, 9), "magnification": 0.5,
+        "fill_factor": 0.95,
+    },
+    "sensor": {"pixel_pitch": 6 * um, "shape": (240, 240), "fill_factor": 0.9},
+}  # fmt: skip
+FREE = START | {"built": {"separation": 121 * mm, "lenslet_distance": 8 * mm}}
+ONE = {
+    "object_distance": 240 * mm,
+    "wavelength": 633 * nm,
+    "main_lens": {"focal_length": 120 * mm, "diameter": 8 * mm},
+    "lenslets": {"pitch": 0.3 * mm, "focal_length": 8 * mm, "count": (9, 9)},
+    "sensor": {"pixel_pitch": 20 * um, "shape": (110, 110)},
+}
+KEYS = (
+    "object_distance", "wavelength", "main_lens.focal_length", "main_lens.diameter",
+    "main_lens.aberrations.6", "lenslets.pitch", "lenslets.focal_length", "lenslets.magnification",
+    "lenslets.fill_factor", "sensor.pixel_pitch", "sensor.fill_factor",
+)  # fmt: skip
+ALL = [
+    *(("2.0", START, key) for key in KEYS),
+    *(("2.0", FREE, key) for key in ("built.separation", "built.lenslet_distance", "main_lens.focal_length")),
+    *(
+        ("1.0", ONE, key)
+        for key in (*KEYS[:4], "lenslets.pitch", "lenslets.focal_length", "sensor.pixel_pitch")
+    ),
+]
+
+
+def camera(given, kind="2.0"):
+    of = lg.FocusedPlenopticCamera if kind == "2.0" else lg.PlenopticCamera
+    return of(**given)
+
+
+def value(given, key):
+    for part in key.split("."):
+        given = given[int(part) if part.isdigit() else part]
+    return given
+
+
+def moved(given, key, by):
+    """The description with one number that is so much larger, relative."""
+    first, _, rest = key.partition(".")
+    first = int(first) if first.isdigit() else first
+    return given | {first: moved(given[first], rest, by) if rest else given[first] * (1 + by)}
+
+
+def pair(given, key, kind="2.0", step=1e-6):
+    return camera(moved(given, key, -step), kind), camera(moved(given, key, step), kind)
+
+
+def off(found, true):
+    return np.linalg.norm(found - true) / np.linalg.norm(true)
+
+
+@pytest.mark.parametrize(("kind", "given", "key"), ALL, ids=[f"{k} {key}" for k, _, key in ALL])
+def test_derivatives_are_central_differences_of_images(kind, given, key):
+    """Of cameras farther to either side than the pair is, sampled as each asks for."""
+    images = camera(given, kind).part_images([pair(given, key, kind)])
+    low, high = (one.part_images([]).forward(POINTS) for one in pair(given, key, kind, 2e-6))
+    assert off(2 * images.derivative(POINTS, np.ones(1)), high - low) < 1e-4
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3])
+@pytest.mark.parametrize("mask", [{6: 0.3, 8: 0.2}, {}], ids=["mask", "none"])
+def test_images_are_those_of_points(mask, accuracy):
+    """Without a mask, these follow from a Hankel transform: nothing of the stop's edge is sampled."""
+    one = camera(START | {"main_lens": START["main_lens"] | {"aberrations": mask}})
+    found = one.part_images([], accuracy=accuracy).forward(POINTS)
+    assert off(found, points_image(one, POINTS, 1e-4)) < accuracy
+
+
+def test_images_behind_turned_lenslets_are_those_of_points_and_have_derivatives():
+    turned = START | {"lenslets": START["lenslets"] | {"rotation": 0.03}}
+    images = camera(turned).part_images([pair(turned, "lenslets.rotation")])
+    assert off(images.forward(POINTS), points_image(camera(turned), POINTS, 1e-3)) < 1e-2
+    low, high = (one.part_images([]).forward(POINTS) for one in pair(turned, "lenslets.rotation", step=2e-6))
+    assert off(2 * images.derivative(POINTS, np.ones(1)), high - low) < 1e-4
+
+
+def test_the_gradient_is_the_derivatives_transpose(rng):
+    images = camera(START).part_images([pair(START, key) for key in KEYS])
+    weights, change = rng.standard_normal(images.shape), rng.standard_normal(len(KEYS))
+    whole = np.sum(weights * images.derivative(POINTS, change))
+    assert images.gradient(POINTS, weights) @ change == pytest.approx(whole, rel=1e-9)
+
+
+def test_a_gradient_takes_less_than_three_times_the_memory_of_an_image(rng):
+    images = camera(START).part_images([pair(START, key) for key in KEYS])
+    weights, peaks = rng.random(images.shape), []
+    for run in (lambda: images.forward(POINTS), lambda: images.gradient(POINTS, weights)):
+        run()
+        tracemalloc.start()
+        run()
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 3 * peaks[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"model": "exact"}, "model = 'paraxial'"),
+        ({"lenslets": {"layout": "hex", "fill_factor": 1.0}}, "square ones"),
+        ({"built": {"focal_length_scatter": 1e-3}}, "tilts and scatter"),
+    ],
+)
+def test_what_has_no_such_derivatives_is_refused(change, message):
+    with pytest.raises(GeometryError, match=message):
+        camera(START).replace(**change).part_images([])
+
+
+@pytest.mark.parametrize("change", [{"sensor": {"shape": (239, 240)}}, {"lenslets": {"count": (9, 8)}}])
+def test_cameras_with_other_numbers_of_parts_are_refused(change):
+    with pytest.raises(GeometryError, match="derivatives need as many"):
+        camera(START).part_images([(camera(START), camera(START).replace(**change))])
+
+
+def test_other_numbers_of_changes_and_of_pixels_and_finer_accuracies_are_refused():
+    images = camera(START).part_images([])
+    with pytest.raises(GeometryError, match=r"change has shape \(1,\) but must be \(0,\)"):
+        images.derivative(POINTS, np.ones(1))
+    with pytest.raises(GeometryError, match=r"weights have shape \(2, 2\)"):
+        images.gradient(POINTS, np.ones((2, 2)))
+    with pytest.raises(SamplingError, match=r"accuracy is 0\.0001 but must lie between 0\.001"):
+        camera(START).part_images([], accuracy=1e-4)
