@@ -37,7 +37,7 @@ KEYS = (
 )  # fmt: skip
 ALL = [
     *(("2.0", START, key) for key in KEYS),
-    *(("2.0", FREE, key) for key in ("built.separation", "built.lenslet_distance", "main_lens.focal_length")),
+    *(("2.0", FREE, key) for key in ("object_distance", "built.separation", "built.lenslet_distance")),
     *(
         ("1.0", ONE, key)
         for key in (*KEYS[:4], "lenslets.pitch", "lenslets.focal_length", "sensor.pixel_pitch")
