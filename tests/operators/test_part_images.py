@@ -7,7 +7,10 @@ import pytest
 
 import lumigraph as lg
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators.points import points_image
+from lumigraph.operators.optics import Optics
+from lumigraph.operators.point_changes import place_changes
+from lumigraph.operators.points import points_image, share
+from lumigraph.operators.relay import Relays
 from lumigraph.scene import Points
 from lumigraph.units import mm, nm, um
 
@@ -142,3 +145,13 @@ def test_other_numbers_of_changes_and_of_pixels_and_finer_accuracies_are_refused
         images.gradient(POINTS, np.ones((2, 2)))
     with pytest.raises(SamplingError, match=r"accuracy is 0\.0001 but must lie between 0\.001"):
         camera(START).part_images([], accuracy=1e-4)
+
+
+def test_a_camera_that_moves_sees_what_points_show_that_move():
+    """Before lenslets that stay: as deeper points by `place_changes`, but for how bright samples are."""
+    place, step = np.array([0.11, -0.23, -5]) * mm, 1e-6 * START["object_distance"]
+    images, one = camera(FREE).part_images([pair(FREE, "object_distance")]), Points(place[None], np.ones(1))
+    deeper = place_changes(camera(FREE).optics(), place, 1e-2, Relays())
+    light = np.log([share(Optics.of(end, end.object_distance + place[2], 1e-2)) for end in images.pairs[0]])
+    expected = deeper[3] * 2 * step + deeper[0] * (light[1] - light[0])
+    assert off(images.derivative(one, np.ones(1)), expected) < 2e-3
