@@ -155,3 +155,25 @@ def test_a_camera_that_moves_sees_what_points_show_that_move():
     light = np.log([share(Optics.of(end, end.object_distance + place[2], 1e-2)) for end in images.pairs[0]])
     expected = deeper[3] * 2 * step + deeper[0] * (light[1] - light[0])
     assert off(images.derivative(one, np.ones(1)), expected) < 2e-3
+
+
+def test_cameras_of_a_pair_are_sampled_alike_where_an_accuracy_begins_to_ask_for_more():
+    """Of one more lenslet on each side, by bisection."""
+    key = "lenslets.focal_length"
+
+    def followed(by):
+        one = camera(moved(START, key, by))
+        return round(Optics.of(one, 115 * mm, 5e-3).axes[0].neighbourhood / one.lenslets.pitch)
+
+    low, high = 0.0, 0.5
+    assert followed(low) < followed(high)
+    for _ in range(40):
+        middle = (low + high) / 2
+        low, high = (middle, high) if followed(middle) == followed(0.0) else (low, middle)
+    assert followed(low - 1e-6) < followed(low + 1e-6)
+    before, there = (moved(START, key, by) for by in (low - 1e-4, low))
+    one, other = (
+        camera(given).part_images([pair(given, key)]).derivative(POINTS, np.ones(1))
+        for given in (before, there)
+    )
+    assert off(other, one) < 0.02
