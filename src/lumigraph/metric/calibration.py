@@ -247,12 +247,25 @@ def board(corners: Corners, board: Board, nominal: Nominal) -> Measured:
 
 
 def _cleared(found: Adjusted, corners: Corners, unsure: float, board: Board, nominal: Nominal) -> Adjusted:
-    """By corners without what lenslets spread and spill; its own error is in the covariance."""
+    """By corners without what lenslets spread and spill; its own error is in the covariance.
+
+    In micro-images, what is known of near and of far boards may be wrong by different parts.
+    """
     again = found
     for _ in range(_ROUNDS):  # it depends on b
         again = adjust(corners.cleared(again.camera), board, nominal, again.camera, again.poses)
-    moved = unsure * np.append(again.camera.numbers - found.camera.numbers, again.poses - found.poses)
-    return replace(again, covariance=again.covariance + np.outer(moved, moved))
+    numbers = [_numbers(found), _numbers(again)]
+    if not corners.in_views:
+        cleared, near = corners.cleared(again.camera), np.abs(corners.moved) > abs(corners.sharp)
+        half = replace(cleared, place=np.where(near[:, None], cleared.place, corners.place))
+        numbers.insert(1, _numbers(adjust(half, board, nominal, again.camera, again.poses)))
+    moved = unsure * np.diff(numbers, axis=0)
+    return replace(again, covariance=again.covariance + moved.T @ moved)
+
+
+def _numbers(found: Adjusted) -> np.ndarray:
+    """All that was adjusted."""
+    return np.append(found.camera.numbers, found.poses)
 
 
 def _measured(found: Adjusted, corners: Corners, board: Board, nominal: Nominal, unused: int) -> Measured:

@@ -283,7 +283,7 @@ class Corners:
         if self.in_views:
             aside = self.spill.aside(way, self._slopes(way, self.center), width)
             return replace(self, place=self.place - aside, center=self.center - aside, spill=None)
-        aside = self.spill.outwards(way, self._slopes(self.center, way), width, self.kind)
+        aside = self.spill.outwards(way, self.moved, width, self.kind)
         return replace(self, place=self.place - aside, spill=None)
 
     def _slopes(self, way: np.ndarray, moved: np.ndarray) -> np.ndarray:
@@ -293,9 +293,14 @@ class Corners:
         return (sums((inner * moved).sum(1), sight) / spread)[sight]
 
     @property
+    def moved(self) -> np.ndarray:
+        """(n,) How far micro-images of each one's corner move, over the way between their lenslets."""
+        return self._slopes(self.center, self.place - self.center)
+
+    @property
     def sharp(self) -> float:
-        """How far micro-images of the middle one of all corners move, over the way between their lenslets."""
-        return float(np.median(self._slopes(self.center, self.place - self.center)))
+        """`moved` of the middle one of all corners."""
+        return float(np.median(self.moved))
 
     @property
     def way(self) -> np.ndarray | None:

@@ -29,7 +29,7 @@ RATIO = 1.15
 
 _STEP = 2  # ways that are computed, per pixel
 _TURNS = (0.2, 0.6)  # of a corner's edges against the way from the middle [rad]
-_FAR = 1  # neighbours whose light counts
+_FAR = 2  # neighbours whose light counts
 _REACH = 14  # px: from a pixel to the farthest places whose light it is told; what is farther comes round
 
 
