@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 import lumigraph as lg
 from lumigraph import io, metric
-from lumigraph.analysis import find_chart
+from lumigraph.analysis import PupilEdge, find_chart
 from lumigraph.analysis.crossings import crossed
 from lumigraph.cli import main
 from lumigraph.core.calibration import Calibration
@@ -172,3 +172,11 @@ def test_raw_images_give_a_camera_by_one_command(tmp_path, capsys) -> None:
     for name in ("focal_length", "separation", "lenslet_distance"):
         low, high = found[f"{name}_interval"]
         assert low < getattr(camera, name) < high
+
+
+@pytest.mark.parametrize(("width", "told"), [(0.9, ((0.9, 0.1),)), (0.98, ())])
+def test_edges_of_micro_images_that_touch_tell_nothing(width, told, monkeypatch) -> None:
+    edge = PupilEdge(20.0, 20 * width, 0.0, 2.0, 0.0, np.zeros(1), np.zeros(1))
+    monkeypatch.setattr(finding, "pupil_edge", lambda *_: edge)
+    ready = lg.prepare(np.ones(drawn.white(1).shape), drawn.calibration(1), white=drawn.white(1))
+    assert finding._edges(ready, drawn.calibration(1)) == told

@@ -146,11 +146,11 @@ def test_the_stop_is_as_wide_as_a_white_image_says_it_is_seen() -> None:
     assert spill._filled(Waves(WIDTH, 1.0, HEXAGONS, 0.2535)).fill == pytest.approx(1.0, abs=0.03)
 
 
-@pytest.mark.parametrize("sharp", [0.2535, -0.2535])
-def test_stop_and_focus_are_those_whose_white_micro_images_have_the_edge(sharp) -> None:
-    edge = Waves(WIDTH, 0.845, HEXAGONS, sharp).edge(22.6)
+@pytest.mark.parametrize(("fill", "sharp"), [(0.845, 0.2535), (0.845, -0.2535), (0.97, 0.28)])
+def test_stop_and_focus_are_those_whose_white_micro_images_have_the_edge(fill, sharp) -> None:
+    edge = Waves(WIDTH, fill, HEXAGONS, sharp).edge(22.6)
     found = spill._edged(Waves(WIDTH, 0.9, HEXAGONS, math.copysign(0.15, sharp)), edge, 22.6)
-    assert (found.fill, found.sharp) == pytest.approx((0.845, sharp), abs=1e-3)
+    assert (found.fill, found.sharp) == pytest.approx((fill, sharp), abs=1e-3)
 
 
 @pytest.mark.long  # simulates white images by wave optics

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lumigraph.core.calibration import Calibration
+from lumigraph.operators.microscope_pixels import on_lattice
 
 PLACES = 5
 """Along each side of a lenslet, in which pixels are alike, at least."""
@@ -63,15 +64,6 @@ def widened(information: np.ndarray, known: np.ndarray, scatter: np.ndarray) -> 
     sizes, axes = np.linalg.eigh(back @ inverse @ scatter @ inverse @ back.T)
     wide = root @ axes * np.sqrt(np.maximum(sizes, 1))
     return wide @ wide.T
-
-
-def on_lattice(calibration: Calibration) -> np.ndarray:
-    """Places (ny, nx, 2) of the pixels along the lattice's rows and columns [lenslets]."""
-    ny, nx = calibration.shape
-    y, x = calibration.straightened(np.arange(ny)[:, None] + 0.0, np.arange(nx)[None, :] + 0.0)
-    origin = calibration.lattice.origin
-    place = np.stack(np.broadcast_arrays(y - origin[0], x - origin[1]), -1)
-    return place @ np.linalg.inv(calibration.lattice.matrix).T
 
 
 def _numbered(places: np.ndarray) -> np.ndarray:

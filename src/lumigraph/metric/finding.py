@@ -31,6 +31,8 @@ LEAST_SEEN = 3
 _DIM = 0.7
 """How far a beam may reach beyond the main lens' stop where edges are looked for, over half its width."""
 
+_APART = 0.96  # pitches: width of micro-images up to which their edges tell stop and focus
+
 _ROUNDS = 3  # corners found, places of the next round told by those found
 _STRAY = 2.5  # px: from where a corner is expected
 _OFF = 3.0  # times the median distance from the corner's own line
@@ -112,6 +114,8 @@ def _edges(raw: RawImage | Array, calibration: Calibration) -> tuple[Pair, ...]:
     try:
         found = [pupil_edge(white, calibration, kind if count > 1 else None) for kind in range(count)]
     except CalibrationError:  # micro-images that are too small, or run into each other
+        return ()
+    if max(edge.width / edge.pitch for edge in found) > _APART:
         return ()
     return tuple((edge.width / edge.pitch, edge.blur / edge.pitch) for edge in found)
 

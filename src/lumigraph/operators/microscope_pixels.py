@@ -42,12 +42,12 @@ def whole_pixels(calibration: Calibration, accuracy: float) -> int | None:
     [15, None]
     """
     N = round(calibration.lattice.pitch)
-    at = _places(calibration) * N + (N - 1) / 2
+    at = on_lattice(calibration) * N + (N - 1) / 2
     return N if N > 1 and np.abs(at - np.rint(at)).max() <= STEADY * accuracy else None
 
 
-def _places(calibration: Calibration) -> np.ndarray:
-    """Of all pixels (ny, nx, 2), among the lenslets."""
+def on_lattice(calibration: Calibration) -> np.ndarray:
+    """Places (ny, nx, 2) of the pixels along the lattice's rows and columns [lenslets]."""
     ny, nx = calibration.shape
     y, x = calibration.straightened(np.arange(ny)[:, None] + 0.0, np.arange(nx)[None, :] + 0.0)
     origin = calibration.lattice.origin
@@ -76,7 +76,7 @@ def placement(
         the cells are all pixels; the cells (rows, columns) that are seen; and the pixel (y, x) at the middle
         of them.
     """
-    place = _places(calibration)
+    place = on_lattice(calibration)
     # A lenslet whose outermost pixels alone are seen says nothing.
     least = SLIVER / calibration.lattice.pitch
     first = np.floor(place.reshape(-1, 2).min(0) + 0.5 + least).astype(int)
