@@ -129,6 +129,21 @@ def test_micro_images_show_corners_as_far_outwards_as_wave_optics() -> None:
         assert np.abs(moved[:, 0] * rings[:, 1] - moved[:, 1] * rings[:, 0]).max() < 1e-9
 
 
+def test_corners_of_boards_far_away_and_near_are_moved_outwards_as_wave_optics_moves_them() -> None:
+    """On eight flat boards before 133 µm wide lenslets, 500 nm; squares 7.3 and 12.6 px wide behind a lenslet.
+
+    Windows of 3 px about corners, as large squares alone have room for, are pulled by half as much again.
+    """
+    known = Spill(Lattice.hex(25.111), 0.8324, 500e-9, 0.17, ((0.8399, 0.1537),))
+    seen = {
+        (4.72, 5.87): 0.0074, (5.25, 5.87): 0.0106, (5.75, 5.87): 0.0129, (6.21, 5.87): 0.0198,
+        (4.77, 4.45): 0.0057, (5.27, 4.45): 0.0099, (5.73, 4.45): 0.0202,
+    }  # fmt: skip
+    for (way, slope), measured in seen.items():
+        (moved,) = known.outwards(np.array([[0.0, way]]), np.array([1 / slope]), 0.0691, np.zeros(1, int))
+        assert moved[1] == pytest.approx(measured, rel=0.18)
+
+
 def test_corners_are_moved_outwards_where_micro_images_move_the_other_way() -> None:
     """As behind lenslets that look at an image behind them."""
     ways = np.array([[0.0, 3.0], [0.0, 5.0]])

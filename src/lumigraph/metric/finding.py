@@ -153,7 +153,7 @@ def _sights(
     straight lines behind neighbouring lenslets for the right one alone.
     """
     lines = _Lines.of(raw, calibration, board, frame, sizes)
-    radius = lines.window(calibration.lattice.pitch, board, frame)
+    radius = lines.window(board, frame)
     search = _Search.of(raw.data, radius, dots=board.radius > 0)
     lines, sights = search.found(lines, calibration)
     for _ in range(_ROUNDS - 1):
@@ -166,7 +166,7 @@ def _sights(
     return lines, sights[lines.clear(sights, calibration, radius)]
 
 
-def clear_radius(calibration: Calibration, ratio: np.ndarray, margin: float = rims.LEAST) -> np.ndarray:
+def clear_radius(calibration: Calibration, ratio: np.ndarray, margin: float = rims.WINDOW) -> np.ndarray:
     """How far from a micro-image's centre corners (n,) may be so that its rim does not pull at them [px].
 
     The beam of a lenslet is `ratio` times as wide on the micro-image. Where the stop cuts it, light falls off
@@ -176,7 +176,7 @@ def clear_radius(calibration: Calibration, ratio: np.ndarray, margin: float = ri
     return lit_radius(calibration, margin) + 2 - np.maximum(2.0, dim + 0.5)
 
 
-def lit_radius(calibration: Calibration, margin: float = rims.LEAST) -> float:
+def lit_radius(calibration: Calibration, margin: float = rims.WINDOW) -> float:
     """How far from a micro-image's centre a corner may be, with `margin` of light around it [px]."""
     return (calibration.fill or 1.0) * calibration.lattice.pitch / 2 - margin - 2
 
@@ -226,11 +226,11 @@ class _Lines:
             corner, places, patches.between(*indices) / calibration.lattice.pitch * np.ones(len(places))
         )
 
-    def window(self, pitch: float, board: Board, frame: int) -> int:
+    def window(self, board: Board, frame: int) -> int:
         """Radius of the window about a corner behind a lenslet [px]."""
         ways = windows.ways(self.places) * np.abs(self.ratio)
         found = windows.radius(ways, board, frame, "px wide behind a lenslet")
-        return found if board.radius else min(found, rims.window(pitch))
+        return found if board.radius else rims.WINDOW
 
     def sights(self, calibration: Calibration, margin: int) -> _Sights:
         """Lenslets that should show each corner with `margin` [px] around it."""

@@ -17,9 +17,9 @@ from lumigraph.analysis.crossings import crossed
 from lumigraph.analysis.saddles import disc
 from lumigraph.metric.waves import Waves
 
-LEAST, _NARROW = 2, 0.1
-"""Half the window about a corner behind a lenslet, at least [px], and over the pitch: wide windows fit into
-few micro-images."""
+WINDOW = 2
+"""Radius of the window about a corner behind a lenslet [px], however large squares are: one of 3 px is pulled
+by half as much again, and which one it was would have to be known of each picture."""
 
 MARGIN = 3.0
 """Between the farthest corner and a micro-image's rim [px]."""
@@ -31,11 +31,6 @@ _STEP = 2  # ways that are computed, per pixel
 _TURNS = (0.2, 0.6)  # of a corner's edges against the way from the middle [rad]
 _FAR = 2  # neighbours whose light counts
 _REACH = 14  # px: from a pixel to the farthest places whose light it is told; what is farther comes round
-
-
-def window(pitch: float) -> int:
-    """Radius of the window about corners of large squares in micro-images of a pitch [px]."""
-    return max(LEAST, round(pitch * _NARROW))
 
 
 @lru_cache(maxsize=16)
@@ -52,8 +47,8 @@ def outwards(waves: Waves, pitch: float, slopes: tuple[float, ...]) -> RegularGr
         How far a point moves over how far its micro-images do: of one sign, two or more, ascending in size.
     """
     count = max(2, math.ceil(_STEP * max(0.0, waves.fill * pitch / 2 - MARGIN)) + 1)
-    ways, radius = np.arange(count) / _STEP, window(pitch)
-    found = sum(_along(direction, waves, pitch, radius, slopes, ways) for direction in _directions(waves))
+    ways = np.arange(count) / _STEP
+    found = sum(_along(direction, waves, pitch, slopes, ways) for direction in _directions(waves))
     mean = found / (len(list(_directions(waves))) * len(_TURNS))
     return RegularGridInterpolator((ways, np.log(np.abs(slopes))), mean)
 
@@ -69,14 +64,13 @@ def _along(
     direction: np.ndarray,
     waves: Waves,
     pitch: float,
-    radius: int,
     slopes: tuple[float, ...],
     ways: np.ndarray,
 ) -> np.ndarray:
     """(ways, slopes) Sums over `_TURNS` in one direction from the middle."""
     axes = np.array([direction, [direction[1], -direction[0]]])  # outwards, and across
     steps = np.array(np.meshgrid(
-        np.arange(-radius * _STEP, len(ways) + radius * _STEP) / _STEP, np.arange(-radius, radius + 1.0),
+        np.arange(-WINDOW * _STEP, len(ways) + WINDOW * _STEP) / _STEP, np.arange(-WINDOW, WINDOW + 1.0),
         indexing="ij",
     ))  # fmt: skip
     pixels = np.moveaxis(steps, 0, -1) @ axes / pitch
@@ -87,22 +81,22 @@ def _along(
         middle = np.exp(-2j * np.pi * slope / waves.width * np.einsum("yxc,ijc->ijyx", u, pixels))
         light, at = waves.light(u, fields / middle.astype(np.complex64), slope)
         aside = np.stack(np.meshgrid(at, at, indexing="ij"), -1) @ axes.T * (pitch / -slope)
-        found.append(_shown(light / light.sum((2, 3), keepdims=True), aside, len(ways), radius))
+        found.append(_shown(light / light.sum((2, 3), keepdims=True), aside, len(ways)))
     return np.array(found).T
 
 
-def _shown(light: np.ndarray, aside: np.ndarray, ways: int, radius: int) -> np.ndarray:
+def _shown(light: np.ndarray, aside: np.ndarray, ways: int) -> np.ndarray:
     """(ways,) Where corners are found less where they are [px], by light from beside pixels."""
-    size, inside = 2 * radius + 3, disc(radius).astype(int)
+    size, inside = 2 * WINDOW + 3, disc(WINDOW).astype(int)
     boards = np.array([[_corner(aside + pixel, turn) for pixel in inside.T] for turn in _TURNS], light.dtype)
-    first = _STEP * (inside[0] + radius)
-    seen = light[np.arange(ways)[:, None] + first, inside[1] + radius]
+    first = _STEP * (inside[0] + WINDOW)
+    seen = light[np.arange(ways)[:, None] + first, inside[1] + WINDOW]
     picture = np.zeros((ways * len(_TURNS), size, size))
-    picture[:, inside[0] + radius + 1, inside[1] + radius + 1] = np.einsum(
+    picture[:, inside[0] + WINDOW + 1, inside[1] + WINDOW + 1] = np.einsum(
         "wnyx,tnyx->wtn", seen, boards, optimize=True
     ).reshape(len(picture), -1)
-    middles = np.stack([np.arange(len(picture)) * size + radius + 1, np.full(len(picture), radius + 1)], 1)
-    found = crossed(picture.reshape(-1, size), middles.astype(float), radius) - middles
+    middles = np.stack([np.arange(len(picture)) * size + WINDOW + 1, np.full(len(picture), WINDOW + 1)], 1)
+    found = crossed(picture.reshape(-1, size), middles.astype(float), WINDOW) - middles
     return found[:, 0].reshape(ways, -1).sum(1)
 
 

@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 
 from lumigraph.errors import CalibrationError
 from lumigraph.metric.corners import Board
-from lumigraph.metric.rims import LEAST
+from lumigraph.metric.rims import WINDOW
 
 _PART = 0.42
 """Half the window about a corner, over the way to the nearest other one: no window holds two."""
@@ -46,8 +46,8 @@ def radius(ways: np.ndarray, board: Board, frame: int, where: str) -> int:
             f"{LEAST_SQUARE:.2g} are needed. Use a board with larger ones, or bring it nearer."
         )
     if board.radius:
-        return max(LEAST, round(apart * board.radius / nearest(board.points()[:, 1:]) + _RIM))
-    return max(LEAST, min(_MOST, int(apart * _PART), int(apart * _free(board))))
+        return max(WINDOW, round(apart * board.radius / nearest(board.points()[:, 1:]) + _RIM))
+    return max(WINDOW, min(_MOST, int(apart * _PART), int(apart * _free(board))))
 
 
 def _free(board: Board) -> float:
