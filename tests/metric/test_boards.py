@@ -212,8 +212,10 @@ def test_dots_too_close_to_each_other_are_refused():
 def test_squares_are_as_wide_behind_a_lenslet_as_each_ones_patch_says() -> None:
     """Of a board that leans, far from the picture's corner: patches there take nothing from its squares."""
     places = np.mgrid[0:4, 0:4].reshape(2, -1).T * 40.0 + (600, 0)
-    lines = finding._Lines(np.arange(16), places, 180 / places[:, 0])
-    assert lines.window(40.0, Board((4, 4), 1e-3), 0) == 4
+    board = Board((4, 4), 1e-3)
+    assert finding._Lines(np.arange(16), places, 103 / places[:, 0]).window(board, 0) == 2
+    with pytest.raises(CalibrationError, match=r"squares, or ways between dots, are 5\.67 px wide"):
+        finding._Lines(np.arange(16), places, 102 / places[:, 0]).window(board, 0)
 
 
 def test_a_camera_measured_by_dots_survives_its_file_and_says_how_wide_they_were_taken(tmp_path):

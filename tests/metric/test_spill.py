@@ -130,7 +130,7 @@ def test_micro_images_show_corners_as_far_outwards_as_wave_optics() -> None:
 
 
 def test_corners_of_boards_far_away_and_near_are_moved_outwards_as_wave_optics_moves_them() -> None:
-    """On eight flat boards before 133 µm wide lenslets, 500 nm; squares 7.3 and 12.6 px wide behind a lenslet.
+    """On eight flat boards before lenslets of 133 µm, 500 nm; squares 7.3 and 12.6 px wide behind a lenslet.
 
     Windows of 3 px about corners, as large squares alone have room for, are pulled by half as much again.
     """

@@ -382,8 +382,9 @@ def _solved(jacobian: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.
         raise CalibrationError(
             "one of the camera's numbers has no effect on these corners. Use more pictures."
         )
-    q, root = np.linalg.qr(jacobian / scale)
-    return solve_triangular(root, q.T @ residual) / scale, root * scale
+    both: Any = np.linalg.qr(np.column_stack([jacobian / scale, residual]), mode="r")
+    root = both[:-1, :-1]
+    return solve_triangular(root, both[:-1, -1]) / scale, root * scale
 
 
 def _covariance(problem: Problem, unknowns: np.ndarray) -> np.ndarray:

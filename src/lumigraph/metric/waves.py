@@ -71,19 +71,18 @@ class Waves:
 
     def opened(self, u: np.ndarray, way: np.ndarray, far: int = FAR) -> np.ndarray:
         """Transform of all lenslets' fields at one way, at directions (y, x, 2)."""
-        total: np.ndarray = np.zeros(u.shape[:2], complex)
         (t, field), line, steps = _opening(self), u[:, 0, 0], np.arange(-far, far + 1)
         lenslets = np.stack(np.meshgrid(steps, steps), -1).reshape(-1, 2) @ np.array(self.basis)
+        turn = 1j * np.pi / self.width
+        own = [np.exp(-2 * turn * np.outer(line - w, t)) for w in way]
 
-        def turned(axis: int) -> dict[float, np.ndarray]:
-            at = {k: line - way[axis] + k for k in set(lenslets[:, axis].tolist())}
-            return {k: np.exp(-2j * np.pi / self.width * np.outer(one, t)) for k, one in at.items()}
+        def seen(axis: int, k: np.ndarray) -> np.ndarray:
+            bent = np.exp(turn * ((way[axis] - k) ** 2 + 2 * np.outer(line, k)))
+            return own[axis] * (bent @ np.exp(-2 * turn * np.outer(k, t)))
 
-        down = {k: one @ field for k, one in turned(0).items()}
-        right = {k: one.T for k, one in turned(1).items()}
-        for k in lenslets:
-            phase = np.pi * ((way - k) ** 2).sum() + 2 * np.pi * u @ k
-            total += np.exp(1j * phase / self.width) * (down[k[0]] @ right[k[1]])
+        total: np.ndarray = np.zeros(u.shape[:2], complex)
+        for k in np.unique(lenslets[:, 0]):  # a row of them
+            total += seen(0, k[None]) @ field @ seen(1, lenslets[lenslets[:, 0] == k, 1]).T
         return total
 
     def stop(self, u: np.ndarray) -> np.ndarray:
