@@ -12,7 +12,7 @@ from lumigraph.analysis.crossings import crossed
 from lumigraph.analysis.pupil_edge import pupil_edge
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import GeometryError
-from lumigraph.metric import spill
+from lumigraph.metric import calibration, spill
 from lumigraph.metric.spill import Spill
 from lumigraph.metric.waves import Waves
 from metric import scenes
@@ -219,6 +219,22 @@ def test_corners_in_micro_images_are_cleared_along_their_ways_alone() -> None:
     assert np.abs(moved[:, 0] * way[:, 1] - moved[:, 1] * way[:, 0]).max() < 1e-9
     assert (moved * way).sum(1).mean() > 0
     assert cleared.spill is None
+
+
+def test_edges_that_no_such_light_makes_are_said_and_leave_what_is_cleared_open() -> None:
+    """As on pictures that rays drew."""
+    camera, seen = scenes.CAMERA, scenes.corners(np.random.default_rng(3), frames=3)
+    one = Spill(Lattice.hex(23.0), 0.9, 550e-9, seen.sharp, ((0.84, 0.05),))
+    (edge, nearest), drawn = one.unmade(camera), replace(seen, spill=one)
+    assert edge == (0.84, 0.05)
+    assert 0.065 < nearest[1] < 0.1  # by diffraction and pixels
+    assert one.unsure(camera) == 1.0
+    told = calibration._spilt(drawn, camera)
+    assert "to 100%: white micro-images are 0.840 pitches wide with edges 0.050 soft, but such light" in told
+    made = replace(one, edges=(nearest,))
+    assert made.unmade(camera) is None
+    assert made.unsure(camera) == 0.2
+    assert calibration._spilt(replace(drawn, spill=made), camera).endswith("at 550 nm, to 20%")
 
 
 def test_a_wavelength_of_nothing_is_refused() -> None:

@@ -242,11 +242,11 @@ def board(corners: Corners, board: Board, nominal: Nominal) -> Measured:
     found = adjust(corners[usable], board, nominal, camera, np.array([poses[f] for f in known.tolist()]))
     found = turned_over(found, corners[usable], board, nominal)
     if corners.spill is not None:
-        found = _cleared(found, corners[usable], corners.spill.unsure, board, nominal)
+        found = _cleared(found, corners[usable], corners.spill, board, nominal)
     return _measured(found, corners[usable], found.board, nominal, len(corners.frames) - len(known))
 
 
-def _cleared(found: Adjusted, corners: Corners, unsure: float, board: Board, nominal: Nominal) -> Adjusted:
+def _cleared(found: Adjusted, corners: Corners, spill: Spill, board: Board, nominal: Nominal) -> Adjusted:
     """By corners without what lenslets spread and spill; its own error is in the covariance.
 
     In micro-images, what is known of near and of far boards may be wrong by different parts.
@@ -259,7 +259,7 @@ def _cleared(found: Adjusted, corners: Corners, unsure: float, board: Board, nom
         cleared, near = corners.cleared(again.camera), np.abs(corners.moved) > abs(corners.sharp)
         half = replace(cleared, place=np.where(near[:, None], cleared.place, corners.place))
         numbers.insert(1, _numbers(adjust(half, board, nominal, again.camera, again.poses)))
-    moved = unsure * np.diff(numbers, axis=0)
+    moved = spill.unsure(again.camera) * np.diff(numbers, axis=0)
     return replace(again, covariance=again.covariance + moved.T @ moved)
 
 
@@ -283,7 +283,7 @@ def _measured(found: Adjusted, corners: Corners, board: Board, nominal: Nominal,
         pose = found.poses[k]
         poses.append(Pose(frame, pose[:3], pose[3:], found.covariance[rows, rows], off, expected))
     result = replace(result, poses=tuple(poses))
-    told = [_spilt(corners)] if corners.in_views or corners.spill is not None else []
+    told = [_spilt(corners, found.camera)] if corners.in_views or corners.spill is not None else []
     return replace(result, notes=(*_notes(result, nominal, unused), *told))
 
 
@@ -322,22 +322,30 @@ def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
         yield f"{result.left_out} places fit no corner and were left out"
 
 
-def _spilt(corners: Corners) -> str:
+def _spilt(corners: Corners, camera: MetricCamera) -> str:
     """What was done about light that lenslets spread and spill."""
     what = (
         "light that lenslets spill into their neighbours' micro-images moves corners in views"
         if corners.in_views
         else "where the main lens' stop cuts a lenslet's beam, diffraction moves corners outwards"
     )
-    if corners.spill is not None:
-        wavelength, unsure = corners.spill.wavelength, corners.spill.unsure
-        told = f"{what}, which is allowed for by diffraction at {wavelength * 1e9:.0f} nm, to {unsure:.0%}"
-        if corners.in_views or corners.spill.edges:
-            return told
+    spill = corners.spill
+    if spill is None:
+        return (
+            f"{what} and makes b too long, by 2 to 6 % behind lenslets of 62 µm at f/14: this table of "
+            "corners does not tell by how much. Measure raw images, or a table that was written of them"
+        )
+    wavelength, unsure = spill.wavelength, spill.unsure(camera)
+    told = f"{what}, which is allowed for by diffraction at {wavelength * 1e9:.0f} nm, to {unsure:.0%}"
+    if not corners.in_views and not spill.edges:
         return f"{told}: a white image with dark between micro-images would tell the lenslets' focus"
+    if corners.in_views or not (unmade := spill.unmade(camera)):
+        return told
+    (width, blur), (nearest, least) = unmade
     return (
-        f"{what} and makes b too long, by 2 to 6 % behind lenslets of 62 µm at f/14: this table of corners "
-        "does not tell by how much. Measure raw images, or a table that was written of them"
+        f"{told}: white micro-images are {width:.3f} pitches wide with edges {blur:.3f} soft, but such light "
+        f"makes them {nearest:.3f} wide and {least:.3f} soft. Give the light's wavelength; pictures that "
+        "rays drew have none (`find_corners`)"
     )
 
 

@@ -276,10 +276,7 @@ class Corners:
         """Where corners would be if this camera's lenslets spread and spilt no light."""
         if self.spill is None:
             return self
-        apart = self.spill.lattice.pitch * camera.pixel_pitch
-        lenslets = apart / (1 + camera.lenslet_distance / camera.exit_pupil)
-        width = self.spill.wavelength * camera.lenslet_distance / lenslets / apart
-        way = self.place - self.center
+        way, width = self.place - self.center, self.spill.width(camera)
         if self.in_views:
             aside = self.spill.aside(way, self._slopes(way, self.center), width)
             return replace(self, place=self.place - aside, center=self.center - aside, spill=None)

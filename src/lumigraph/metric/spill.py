@@ -13,6 +13,7 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
@@ -24,6 +25,9 @@ from lumigraph.core.checks import Pair
 from lumigraph.core.lattice import Lattice
 from lumigraph.metric import rims
 from lumigraph.metric.waves import Waves
+
+if TYPE_CHECKING:
+    from lumigraph.metric.camera import MetricCamera
 
 GREEN = 550e-9
 """Wavelength where none is said [m]."""
@@ -46,6 +50,7 @@ _RIM, _STEEP = 0.5, 4.0  # ways and σ beyond which it is taken to be what it is
 _SLOPES_BEHIND, _NARROW_BEHIND = (1.5, 8.0), 0.06  # of cameras 2.0: as `_STEEP`, and as `NARROW`
 _LEAST_EDGE, _MOST_EDGE = np.array([0.3, 0.01]), np.array([1.05, 1.5])  # stop and focus that edges may tell
 _SETTLED = 2e-3
+_MADE = 0.01  # pitches: between an edge and one that waves make, which is that edge
 _FALLS = 1.7  # power of λ b/d² by which corners move outwards from that down, as from 0.08 to 0.04
 _CLOSE = 0.02  # steps of the logarithm of λ b/d²
 _SOFT = 0.3  # pitches: blur of an edge over its sample, as in `analysis.crossings`
@@ -89,12 +94,32 @@ class Spill:
         for value in itertools.chain(*self.edges):
             checks.positive("edges", value, "1")
 
-    @property
-    def unsure(self) -> float:
+    def width(self, camera: "MetricCamera") -> float:
+        """λ b/d over the micro-images' pitch: that of the light behind one of a camera's lenslets, d wide."""
+        apart = self.lattice.pitch * camera.pixel_pitch
+        lenslets = apart / (1 + camera.lenslet_distance / camera.exit_pupil)
+        return self.wavelength * camera.lenslet_distance / lenslets / apart
+
+    def unsure(self, camera: "MetricCamera") -> float:
         """How well it is known how far corners are moved, over that: one standard deviation."""
         if not self.sharp:
             return _UNSURE
-        return _UNSURE_EDGE if self.edges else _UNSURE_BEHIND
+        if not self.edges:
+            return _UNSURE_BEHIND
+        return _UNSURE_EDGE if self.unmade(camera) is None else 1.0
+
+    def unmade(self, camera: "MetricCamera") -> tuple[Pair, Pair] | None:
+        """An edge (width, blur) that no such light makes, and the nearest that it does; None without one."""
+        waves, apart = self._waves(_close(self.width(camera))), self._apart
+        for edge in self.edges:
+            made = _edged(waves, edge, apart).edge(apart)
+            if np.abs(np.subtract(made, edge)).max() > _MADE:
+                return edge, made
+        return None
+
+    @property
+    def _apart(self) -> float:
+        return round(self.lattice.pitch, 1)
 
     def aside(self, way: np.ndarray, slope: np.ndarray, width: float) -> np.ndarray:
         """How far (n, 2) [px] views at ways (n, 2) [px] show corners aside.
@@ -106,7 +131,7 @@ class Spill:
         slope
             (n,), how far corners move from view to view, over the way.
         width
-            λ b/d over the micro-images' pitch: that of the light behind a lenslet d wide.
+            As `width` gives it.
         """
         pitch, axes = self.lattice.pitch, self._axes()
         ways = np.clip(np.asarray(way) @ axes.T / pitch, -_RIM, _RIM)
@@ -137,7 +162,7 @@ class Spill:
         steps = np.log(np.clip(1 / np.maximum(sign * moved, 1e-9), *_SLOPES_BEHIND)) / math.log(rims.RATIO)
         nodes = range(math.floor(steps.min()), math.floor(steps.max()) + 2)
         slopes = tuple(sign * rims.RATIO**k for k in nodes)
-        computed = math.exp(_CLOSE * round(math.log(max(width, _NARROW_BEHIND)) / _CLOSE))
+        computed = _close(width)
         found = np.zeros(len(way))
         for one in np.unique(kind).tolist():
             mine, table = kind == one, self._table_behind(computed, one, slopes)
@@ -147,7 +172,7 @@ class Spill:
 
     def _table_behind(self, width: float, kind: int, slopes: tuple[float, ...]) -> RegularGridInterpolator:
         """`rims.outwards` of lenslets of one kind."""
-        waves, apart = self._waves(width), round(self.lattice.pitch, 1)
+        waves, apart = self._waves(width), self._apart
         told = _edged(waves, self.edges[kind % len(self.edges)], apart) if self.edges else _filled(waves)
         return rims.outwards(told, apart, slopes)
 
@@ -160,6 +185,11 @@ class Spill:
         """Of a lattice whose rows run along the first axis."""
         lenslets = (np.array(self.lattice.basis) @ self._axes().T / self.lattice.pitch).round(9).tolist()
         return Waves(width, self.fill, tuple(map(tuple, lenslets)), self.sharp)
+
+
+def _close(width: float) -> float:
+    """The λ b/d² next to one for which corners in micro-images are computed."""
+    return math.exp(_CLOSE * round(math.log(max(width, _NARROW_BEHIND)) / _CLOSE))
 
 
 @lru_cache(maxsize=16)

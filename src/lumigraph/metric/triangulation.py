@@ -79,7 +79,7 @@ def triangulate(
         one = np.zeros(len(place), int)
         seen = Corners(one, one, place, center, kinds, in_views=in_views, spill=measured.spill)
         cleared = seen.cleared(camera)
-        unsure = measured.spill.unsure * (place - cleared.place)
+        unsure = measured.spill.unsure(camera) * (place - cleared.place)
         place, center = cleared.place, cleared.center
     start = _first(measured, place, center, in_views)
     blur = None if in_views else geometry.magnification(camera.numbers, np.full(len(place), start[0]))
