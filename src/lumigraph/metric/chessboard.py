@@ -62,7 +62,12 @@ def _corners(cv2: Any, picture: np.ndarray, board: Board) -> np.ndarray:
     down, across = board.shape
     flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
     found, corners = cv2.findChessboardCornersSB(picture, (across, down), flags=flags)
-    return _upright(corners) if found else whole(picture, board)[0]
+    if not found:
+        return whole(picture, board)[0]
+    with suppress(CalibrationError):
+        return ordered(_upright(corners), board.points()[:, 1:])
+    again, _ = whole(picture, board)  # now and then OpenCV puts one corner amid the side of a square
+    return again if np.isfinite(again).all() else _upright(corners)
 
 
 def whole(picture: np.ndarray, board: Board) -> tuple[np.ndarray, int]:
