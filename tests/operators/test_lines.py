@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cameras
-from lumigraph.operators import lines
+from lumigraph.operators import line_parts, lines
 from lumigraph.operators.lines import Lines
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.points import points_image
@@ -21,14 +21,14 @@ POINT = Points(np.array([[0.1 * mm, -0.05 * mm, 1 * mm]]), np.ones(1))
 @pytest.fixture
 def followed(monkeypatch):
     """Numbers of lenslets around the cells that a point lights, and of those that are followed."""
-    numbers, of = [], Lines._lit
+    numbers, of = [], Lines.lit
 
-    def counted(self, light, around):
-        found = of(self, light, around)
-        numbers.append((sum(len(members) for _, members in around), len(found)))
+    def counted(self, light, rows, columns):
+        found = list(of(self, light, rows, columns))
+        numbers.append((len(self._around(rows, columns)), sum(map(len, found))))
         return found
 
-    monkeypatch.setattr(Lines, "_lit", counted)
+    monkeypatch.setattr(Lines, "lit", counted)
     return numbers
 
 
@@ -53,7 +53,7 @@ def test_a_dark_array_has_a_dark_image():
 def test_light_that_is_followed_farther_changes_images_by_less_than_was_asked(accuracy, monkeypatch):
     camera = WIDE.replace(lenslets={"pitch": 0.2 * mm, "count": (9, 9)})
     image = points_image(camera, POINT, accuracy)
-    monkeypatch.setattr(lines, "ASIDE", (3.0, 0.0))
+    monkeypatch.setattr(line_parts, "ASIDE", (3.0, 0.0))
     farther = points_image(camera, POINT, accuracy)
     assert np.linalg.norm(image - farther) < accuracy * np.linalg.norm(farther)
 
@@ -65,7 +65,7 @@ def test_depths_share_what_lenslets_do_where_they_are_followed_alike_alone():
     near, middle, far = (known.of(optics, dz, 5e-3).optics for dz in (-5 * mm, -4 * mm, 6 * mm))
     assert near.axes == far.axes  # the cells are those of the most blurred
     assert near.beside == middle.beside < far.beside
-    assert known.of(optics, -5 * mm, 5e-3)._matrices is known.of(optics, -4 * mm, 5e-3)._matrices
+    assert known.of(optics, -5 * mm, 5e-3)._pieces is known.of(optics, -4 * mm, 5e-3)._pieces
     for dz in (-4 * mm, 6 * mm):
         point = Points(np.column_stack([places, [dz]]), np.ones(1))
         alone = points_image(camera, point, 1e-2, Relays(optics.object_distance + 6 * mm))

@@ -1,0 +1,304 @@
+"""Matrices that lenslets of any shape are made of: from the light around one to few numbers, and to samples.
+
+Those of cameras that hardly differ are of the same shape and mean the same, number by number.
+"""
+
+import math
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from lumigraph.operators.cell_response import STEP, Lenslets, focal_lengths, held, legendre, nodes
+from lumigraph.operators.exact import lenslets_of
+from lumigraph.operators.lenslet_light import AROUND
+from lumigraph.operators.optics import Optics
+
+FAINT = 1e-7
+"""Part of the light in a sequence's window below which the sequence is left out."""
+
+ASIDE = 0.5, 0.3
+"""Pitches that light is followed farther than beside other lenslets: at 5e-3, and more for each tenth.
+
+Behind three kinds with p²/(λb) of 5 and 33, images then are 2.6e-3 and 2.0e-3 from those that are followed to
+8 and 5 pitches at 5e-3, 1.9e-4 and 1.8e-4 at 5e-4.
+"""
+
+MORE = 24
+"""Sequences beyond those of the band that are looked at."""
+
+Key = tuple[Hashable, ...]
+"""Names a matrix that lenslets are made of."""
+
+Pieces = Callable[[Key], np.ndarray]
+
+ON_LINES: Key = ("on lines",)
+
+
+@dataclass(eq=False)
+class LineParts:
+    """Of a camera; sampled as those of another that hardly differs, if there is one."""
+
+    optics: Optics
+    precision: type[np.complexfloating] = np.complex64
+    like: "LineParts | None" = None
+    _pieces: dict[Key, np.ndarray] = field(default_factory=dict)
+
+    def piece(self, key: Key) -> np.ndarray:
+        """A matrix: `ON_LINES`, "along" or "down" of a kind, "carried" along an axis from an offset."""
+        if key not in self._pieces:
+            if key[0] == "along":
+                self._pieces.update((("along", k), made) for k, made in enumerate(self._computed()))
+            else:
+                self._pieces[key] = self._made(*key).astype(self.precision)
+        return self._pieces[key]
+
+    def _made(self, what: Hashable, *of: Any) -> np.ndarray:
+        made = {"on lines": self._on_lines, "down": self._down, "carried": self._across}
+        return made[str(what)](*of)
+
+    @cached_property
+    def _lenslets(self) -> Lenslets:
+        """As light is followed from them: to places around a lenslet, not around a cell of several."""
+        found, pitch = lenslets_of(self.optics), self.optics.array.lattice.pitch
+        y, x = (replace(axis, size=min(axis.size, pitch)) for axis in found.axes)
+        found.axes = y, x
+        return found
+
+    @cached_property
+    def _squared(self) -> float:
+        return math.prod(self._lenslets.optics)
+
+    @cached_property
+    def _lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `Lenslets.lines`; as many as the other's."""
+        if self.like is None:
+            return self._lenslets.lines
+        larger = self._aperture / self.like._aperture
+        y, weight, chord = (larger * part for part in self.like._lines)
+        return y, weight, chord
+
+    @property
+    def _aperture(self) -> float:
+        """Width of a lenslet [m]."""
+        return self.optics.array.fill_factor * self.optics.array.lattice.pitch
+
+    @cached_property
+    def _half(self) -> tuple[float, float]:
+        """Height and width of a lenslet, halved [m]."""
+        lines, _, chords = self._lines
+        return float(np.abs(lines).max()), float(chords.max())
+
+    @property
+    def _origin(self) -> tuple[float, float]:
+        return self.optics.array.lattice.origin
+
+    @cached_property
+    def _steps(self) -> tuple[float, float]:
+        """Between the samples of light along y and x [m]: all lenslets stand on some."""
+        y, x = (gap / count for gap, count in zip(self._gaps, self._between, strict=True))
+        return y, x
+
+    @property
+    def _gaps(self) -> tuple[float, float]:
+        """Of lenslets, between those of neighbouring rows too [m]."""
+        (_, step), (row, aside) = self.optics.array.lattice.basis
+        return abs(row), abs(aside) or abs(step)
+
+    @cached_property
+    def _between(self) -> tuple[int, int]:
+        """Samples of light to a gap."""
+        if self.like is not None:
+            return self.like._between
+        y, x = (
+            math.ceil(gap / (STEP * axis.size / axis.points) - 1e-9)
+            for gap, axis in zip(self._gaps, self.optics.axes, strict=True)
+        )
+        return y, x
+
+    @cached_property
+    def _beyond(self) -> tuple[int, int]:
+        """Samples of light on each side of a lenslet's middle, along y and x."""
+        if self.like is not None:
+            return self.like._beyond
+        periods = AROUND[0] + AROUND[1] * max(0.0, math.log10(1e-3 / self.optics.fineness.accuracy))
+        y, x = (
+            math.ceil((half + periods / axis.band / 2) / step)
+            for half, axis, step in zip(self._half, self.optics.axes, self._steps, strict=True)
+        )
+        return y, x
+
+    @property
+    def _windows(self) -> tuple[int, int]:
+        """Samples of light around a lenslet."""
+        y, x = (2 * beyond + 1 for beyond in self._beyond)
+        return y, x
+
+    def _window(self, which: int) -> np.ndarray:
+        """Places of the samples around a lenslet [m]."""
+        beyond = self._beyond[which]
+        return np.arange(-beyond, beyond + 1) * self._steps[which]
+
+    def _reach(self, which: int) -> float:
+        """How far from a lenslet's middle its light is followed on the samples [m]."""
+        pitch = self.optics.array.lattice.pitch
+        if self.like is not None:
+            return self.like._reach(which) * pitch / self.like.optics.array.lattice.pitch
+        more = ASIDE[0] + ASIDE[1] * max(0.0, math.log10(5e-3 / self.optics.fineness.accuracy))
+        return self._half[which] + self.optics.beside + more * pitch
+
+    def _first(self, which: int, cell: int) -> tuple[float, float]:
+        """Place of a cell's first sample, and the samples' pitch [m]."""
+        cells = self.optics.cells
+        pitch = cells.size[which] / cells.samples[which]
+        return cells.edge[which] + (cell - cells.ring[which]) * cells.size[which] + pitch / 2, pitch
+
+    def _numbers(self, rows: range, columns: range) -> tuple[range, range]:
+        """Of the samples of light around the lenslets that light some cells, along y and x."""
+        if self.like is not None:
+            return self.like._numbers(rows, columns)
+        found, members = [], self._members(rows, columns)
+        for which, beyond in enumerate(self._beyond):
+            numbers = np.rint((members[:, which] - self._origin[which]) / self._steps[which]).astype(int)
+            ends = (numbers.min() - beyond, numbers.max() + beyond + 1) if len(numbers) else (0, 0)
+            found.append(range(int(ends[0]), int(ends[1])))
+        return found[0], found[1]
+
+    def _members(self, rows: range, columns: range) -> np.ndarray:
+        """Places and kinds (n, 3) of the lenslets that light some cells, row after row."""
+        array, low, high = self.optics.array, [], []
+        for which, mine in enumerate((rows, columns)):
+            reach, far = self._reach(which), math.inf if array.extent is None else array.extent[which] / 2
+            slack = 1e-9 * array.lattice.pitch
+            low.append(max(self._first(which, mine.start)[0] - reach, -far) - slack)
+            high.append(min(self._first(which, mine.stop)[0] + reach, far) + slack)
+        if low[0] > high[0] or low[1] > high[1]:
+            return np.zeros((0, 3))
+        pairs = array.lattice.indices((low[0], high[0]), (low[1], high[1]))
+        kinds = array.lattice.kind(pairs[:, 0], pairs[:, 1]) % len(focal_lengths(array))
+        return np.column_stack([array.lattice.position(pairs), kinds])[np.argsort(pairs[:, 0], kind="stable")]
+
+    def _sequences(self, which: int) -> tuple[np.ndarray, np.ndarray, float]:
+        """Prolate sequences (k, samples) along an axis, their parts of light in the window, and their band.
+
+        D. Slepian, Bell Syst. Tech. J. 57, 1371 (1978).
+        """
+        return self._both_sequences[which]
+
+    @cached_property
+    def _both_sequences(self) -> list[tuple[np.ndarray, np.ndarray, float]]:
+        if self.like is not None:  # any that hold the light do, but they must be the same
+            return self.like._both_sequences
+        found = []
+        for which, half in enumerate(self._half):
+            band = half / self._squared * self._first(which, 0)[1]
+            found.append((*prolate(self._count(which), band), band))
+        return found
+
+    def _count(self, which: int) -> int:
+        """Samples along an axis around a lenslet."""
+        if self.like is not None:
+            return self.like._count(which)
+        return math.ceil(2 * self._reach(which) / self._first(which, 0)[1])
+
+    def _across(self, which: int, offset: float) -> np.ndarray:
+        """Amplitude (k, samples) of the few numbers, between the samples that they are of, too."""
+        sequences, ratios, band = self._sequences(which)
+        pitch = self._first(which, 0)[1]
+        number = np.arange(sequences.shape[1])
+        at = (number + offset) * pitch
+        moved = at / pitch + self._reach(which) / pitch
+        held_there = 2 * band * np.sinc(2 * band * (moved[:, None] - number)) @ (sequences.T / ratios)
+        turn = np.exp(1j * np.pi * np.square(at) / self._squared) / math.sqrt(self._squared)
+        return held_there.T * (turn * self._fade(which, at))
+
+    def _fade(self, which: int, at: np.ndarray) -> np.ndarray:
+        """Weight of samples from a lenslet's middle [m]: 1, and 0 where its light is no longer followed."""
+        pitch = self.optics.array.lattice.pitch
+        left = np.clip((np.abs(at) - self._reach(which) + pitch) / pitch, 0, 1)
+        return np.cos(np.pi / 2 * left) ** 2
+
+    @cached_property
+    def _chords(self) -> np.ndarray:
+        """Halves of those that differ [m]."""
+        return self._lines[2][[mine[0] for mine in self.like_lines]]
+
+    @cached_property
+    def like_lines(self) -> list[np.ndarray]:
+        """Numbers of the lines of each chord."""
+        if self.like is not None:
+            return self.like.like_lines
+        chords, like = np.unique(self._lines[2].round(12), return_inverse=True)
+        return [np.flatnonzero(like == chord) for chord in range(len(chords))]
+
+    def _on_lines(self) -> np.ndarray:
+        """From light along y (window) to the lines across a lenslet: (lines, window)."""
+        coefficients, light = held(self._window(0), self.optics.axes[0].band)
+        return light(self._lines[0]) @ coefficients
+
+    def _down(self, kind: int) -> np.ndarray:
+        """From the lines to few numbers along y, by the kind: (k, lines)."""
+        lines, weight, _ = self._lines
+        return self._seen(0, lines) * weight * self._bend(self._focal[kind], lines)
+
+    @property
+    def _focal(self) -> tuple[float, ...]:
+        """Of each kind."""
+        return focal_lengths(self.optics.array)
+
+    def _bend(self, focal_length: float, at: np.ndarray) -> np.ndarray:
+        """What a lenslet and the way behind it do to light at places from its middle [m]."""
+        wavelength = self._lenslets.optics[0]
+        return np.exp(1j * np.pi * at**2 * (1 / self._squared - 1 / (wavelength * focal_length)))
+
+    def _seen(self, which: int, light: np.ndarray) -> np.ndarray:
+        """Few numbers (k, places) of what light at places from a lenslet's middle [m] brings."""
+        sequences, pitch = self._sequences(which)[0], self._first(which, 0)[1]
+        at = (np.arange(sequences.shape[1]) * pitch - self._reach(which))[:, None]
+        turn = np.exp(-2j * np.pi / self._squared * at * light)
+        return sequences @ (turn * self._lenslets.accepted(at - light))
+
+    def _computed(self) -> list[np.ndarray]:
+        """From light (window) on a line to few numbers along x: (chords, k, window) of each kind.
+
+        They share what goes from a line's nodes to the samples: polynomials give it for all chords, by what
+        it is for the longest.
+        """
+        lenslets, longest = self._lenslets, self._half[1]
+        steepest = min(map(abs, self._focal))
+
+        def count(chord: float) -> int:
+            return nodes(chord, steepest, lenslets.axes[1], lenslets.optics)
+
+        x, weight = legendre(-longest, longest, most := count(longest))
+        degrees = (np.arange(most) + 0.5) / longest
+        polynomials = np.polynomial.legendre.legvander(x / longest, most - 1)
+        seen = self._seen(1, x) * weight @ (polynomials * degrees)
+        coefficients, light = held(self._window(1), self.optics.axes[1].band)
+        shape = len(self._chords), len(seen), coefficients.shape[1]
+        found = [np.empty(shape, self.precision) for _ in self._focal]
+        for number, chord in enumerate(self._chords.tolist()):
+            x, weight = legendre(-chord, chord, count(chord))
+            polynomials = np.polynomial.legendre.legvander(x / longest, most - 1)
+            there, around = seen @ polynomials.T * weight, light(x) @ coefficients
+            for focal_length, mine in zip(self._focal, found, strict=True):
+                mine[number] = (there * self._bend(focal_length, x)) @ around
+        return found
+
+
+def prolate(count: int, band: float) -> tuple[np.ndarray, np.ndarray]:
+    """Sequences (k, count) of a band [1/sample], and the parts of their light in the window, not faint."""
+    most = min(count, math.ceil(2 * count * band) + MORE)
+    number = np.arange(count)
+    middle = ((count - 1) / 2 - number) ** 2 * math.cos(2 * math.pi * band)  # Slepian's matrix
+    beside = number[1:] * (count - number[1:]) / 2
+    _, vectors = scipy.linalg.eigh_tridiagonal(
+        middle, beside, select="i", select_range=(count - most, count - 1)
+    )
+    inside = scipy.linalg.matmul_toeplitz(2 * band * np.sinc(2 * band * number), vectors)
+    strength = np.einsum("ik,ik->k", vectors, inside)
+    kept = strength > FAINT
+    return vectors[:, kept].T, strength[kept]
