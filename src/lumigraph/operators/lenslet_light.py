@@ -111,7 +111,7 @@ class LensletLight:
             top, row = -y.margin - number - self.light.first[0], table[number + counts[0]]
             part = behind[top : top + STEP * down.shape[1] : STEP].reshape(down.shape[1], -1)
             part = (down @ part).reshape(len(down), len(row), -1).transpose(1, 0, 2)
-            row[:] = _times(part.reshape(len(row), -1), kept)
+            row[:] = times_real(part.reshape(len(row), -1), kept)
 
         for _ in each(fill, numbers[0].tolist()):
             pass
@@ -209,7 +209,7 @@ class LensletLight:
             (len(seen.T), base[0].shape[0]) for seen, base in zip(self.modes, self.bases, strict=True)
         )
         both = both.reshape(n, a, m, b).transpose(0, 2, 1, 3).reshape(n * m, a * b)
-        return np.ascontiguousarray(_times(both, self.kept).T)
+        return np.ascontiguousarray(times_real(both, self.kept).T)
 
     def _behind(self, which: int, at: np.ndarray, place: float) -> "_Behind":
         """Nodes of a lenslet at a place, counted from its middle."""
@@ -244,7 +244,7 @@ class _Behind:
     light: np.ndarray
 
 
-def _times(rows: np.ndarray, real: np.ndarray) -> np.ndarray:
+def times_real(rows: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Complex rows (n, k) times a real matrix, as two real products."""
     parts = np.stack([np.real(rows), np.imag(rows)]) @ real
     return parts[0] + 1j * parts[1]

@@ -4,7 +4,7 @@ Those of cameras that hardly differ are of the same shape and mean the same, num
 """
 
 import math
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -14,11 +14,15 @@ import scipy.linalg
 
 from lumigraph.operators.cell_response import STEP, Lenslets, focal_lengths, held, legendre, nodes
 from lumigraph.operators.exact import lenslets_of
-from lumigraph.operators.lenslet_light import AROUND
+from lumigraph.operators.lenslet_light import AROUND, times_real
 from lumigraph.operators.optics import Optics
 
-FAINT = 1e-7
-"""Part of the light in a sequence's window below which the sequence is left out."""
+FAINT = 1e-7, 1e-10
+"""Part of light in a sequence's window below which the sequence is left out, in single and double precision.
+
+With 1e-7 derivatives by the wavelength behind three kinds are 2.6e-4 from differences of images of cameras
+that have sequences of their own, with 1e-9 1.0e-5, with 1e-11 1.3e-6.
+"""
 
 ASIDE = 0.5, 0.3
 """Pitches that light is followed farther than beside other lenslets: at 5e-3, and more for each tenth.
@@ -46,19 +50,32 @@ class LineParts:
     precision: type[np.complexfloating] = np.complex64
     like: "LineParts | None" = None
     _pieces: dict[Key, np.ndarray] = field(default_factory=dict)
+    _values: dict[tuple[int, float], np.ndarray] = field(default_factory=dict)
 
     def piece(self, key: Key) -> np.ndarray:
         """A matrix: `ON_LINES`, "along" or "down" of a kind, "carried" along an axis from an offset."""
         if key not in self._pieces:
-            if key[0] == "along":
-                self._pieces.update((("along", k), made) for k, made in enumerate(self._computed()))
+            what, *of = key
+            if self.like is not None and self._shared(what, *of):
+                self._pieces[key] = self.like.piece(key)
+            elif what == "along":
+                self._pieces.update((("along", kind), made) for kind, made in self._along())
             else:
-                self._pieces[key] = self._made(*key).astype(self.precision)
+                made = {"on lines": self._on_lines, "down": self._down, "carried": self._across}
+                self._pieces[key] = made[str(what)](*of).astype(self.precision)
         return self._pieces[key]
 
-    def _made(self, what: Hashable, *of: Any) -> np.ndarray:
-        made = {"on lines": self._on_lines, "down": self._down, "carried": self._across}
-        return made[str(what)](*of)
+    def _shared(self, what: Hashable, *of: Any) -> bool:
+        """Whether a matrix is the other's, with all it follows from: cameras may differ in one kind alone."""
+        assert self.like is not None
+        if what in ("along", "down") and self._focal[of[0]] != self.like._focal[of[0]]:
+            return False
+        one, other = (
+            (array.lattice, array.fill_factor, parts.optics.cells, parts.optics.axes, *lenslets.optics)
+            for parts in (self, self.like)
+            for array, lenslets in [(parts.optics.array, parts._lenslets)]
+        )
+        return one == other and self._lenslets.pixels == self.like._lenslets.pixels
 
     @cached_property
     def _lenslets(self) -> Lenslets:
@@ -144,11 +161,19 @@ class LineParts:
 
     def _reach(self, which: int) -> float:
         """How far from a lenslet's middle its light is followed on the samples [m]."""
-        pitch = self.optics.array.lattice.pitch
+        return self._followed[which] * self.optics.array.lattice.pitch
+
+    @cached_property
+    def _followed(self) -> tuple[float, float]:
+        """The same along y and along x [pitches]; whatever the fill factor."""
         if self.like is not None:
-            return self.like._reach(which) * pitch / self.like.optics.array.lattice.pitch
-        more = ASIDE[0] + ASIDE[1] * max(0.0, math.log10(5e-3 / self.optics.fineness.accuracy))
-        return self._half[which] + self.optics.beside + more * pitch
+            return self.like._followed
+        array, optics = self.optics.array, self.optics
+        more = ASIDE[0] + ASIDE[1] * max(0.0, math.log10(5e-3 / optics.fineness.accuracy))
+        y, x = (
+            (half / array.fill_factor + optics.beside) / array.lattice.pitch + more for half in self._half
+        )
+        return y, x
 
     def _first(self, which: int, cell: int) -> tuple[float, float]:
         """Place of a cell's first sample, and the samples' pitch [m]."""
@@ -192,10 +217,10 @@ class LineParts:
     def _both_sequences(self) -> list[tuple[np.ndarray, np.ndarray, float]]:
         if self.like is not None:  # any that hold the light do, but they must be the same
             return self.like._both_sequences
-        found = []
+        found, faint = [], FAINT[self.precision is np.complex128]
         for which, half in enumerate(self._half):
             band = half / self._squared * self._first(which, 0)[1]
-            found.append((*prolate(self._count(which), band), band))
+            found.append((*prolate(self._count(which), band, faint), band))
         return found
 
     def _count(self, which: int) -> int:
@@ -206,25 +231,27 @@ class LineParts:
 
     def _across(self, which: int, offset: float) -> np.ndarray:
         """Amplitude (k, samples) of the few numbers, between the samples that they are of, too."""
-        sequences, ratios, band = self._sequences(which)
-        pitch = self._first(which, 0)[1]
-        number = np.arange(sequences.shape[1])
-        at = (number + offset) * pitch
-        moved = at / pitch + self._reach(which) / pitch
-        held_there = 2 * band * np.sinc(2 * band * (moved[:, None] - number)) @ (sequences.T / ratios)
+        at = (np.arange(self._count(which)) + offset) * self._first(which, 0)[1]
         turn = np.exp(1j * np.pi * np.square(at) / self._squared) / math.sqrt(self._squared)
-        return held_there.T * (turn * self._fade(which, at))
+        return self._held(which, offset) * (turn * self._fade(which, at))
+
+    def _held(self, which: int, offset: float) -> np.ndarray:
+        """Values (k, samples) of the sequences at an offset [samples]."""
+        if self.like is not None:
+            return self.like._held(which, offset)
+        if (key := (which, offset)) not in self._values:
+            sequences, ratios, band = self._sequences(which)
+            number = np.arange(sequences.shape[1])
+            moved = number + offset + self._reach(which) / self._first(which, 0)[1]
+            spread = 2 * band * np.sinc(2 * band * (moved[:, None] - number))
+            self._values[key] = (spread @ (sequences.T / ratios)).T
+        return self._values[key]
 
     def _fade(self, which: int, at: np.ndarray) -> np.ndarray:
         """Weight of samples from a lenslet's middle [m]: 1, and 0 where its light is no longer followed."""
         pitch = self.optics.array.lattice.pitch
         left = np.clip((np.abs(at) - self._reach(which) + pitch) / pitch, 0, 1)
         return np.cos(np.pi / 2 * left) ** 2
-
-    @cached_property
-    def _chords(self) -> np.ndarray:
-        """Halves of those that differ [m]."""
-        return self._lines[2][[mine[0] for mine in self.like_lines]]
 
     @cached_property
     def like_lines(self) -> list[np.ndarray]:
@@ -261,35 +288,61 @@ class LineParts:
         turn = np.exp(-2j * np.pi / self._squared * at * light)
         return sequences @ (turn * self._lenslets.accepted(at - light))
 
-    def _computed(self) -> list[np.ndarray]:
-        """From light (window) on a line to few numbers along x: (chords, k, window) of each kind.
+    def _along(self) -> Iterator[tuple[int, np.ndarray]]:
+        """From light (window) on a line to few numbers along x: (chords, k, window) of kinds not shared.
 
         They share what goes from a line's nodes to the samples: polynomials give it for all chords, by what
         it is for the longest.
         """
+        longest, whole = self._half[1], self._nodes[0]
+        degrees = (np.arange(len(whole.at)) + 0.5) / longest
+        seen = self._seen(1, longest * whole.at) * (longest * whole.weight)
+        seen = times_real(seen, whole.polynomials * degrees)
+        coefficients, light = held(self._window(1), self.optics.axes[1].band)
+        chords, around = (
+            self._nodes[1:],
+            [light(longest * mine.at) @ coefficients for mine in self._nodes[1:]],
+        )
+        there = [times_real(seen, mine.polynomials.T) * (longest * mine.weight) for mine in chords]
+        for kind, focal_length in enumerate(self._focal):
+            if self.like is None or not self._shared("along", kind):
+                bends = [self._bend(focal_length, longest * mine.at) for mine in chords]
+                parts = zip(there, bends, around, strict=True)
+                found = [times_real(one * bend, light) for one, bend, light in parts]
+                yield kind, np.array(found, self.precision)
+
+    @cached_property
+    def _nodes(self) -> list["_Nodes"]:
+        """Of the longest chord, and of each that differs."""
+        if self.like is not None:
+            return self.like._nodes
         lenslets, longest = self._lenslets, self._half[1]
         steepest = min(map(abs, self._focal))
 
         def count(chord: float) -> int:
             return nodes(chord, steepest, lenslets.axes[1], lenslets.optics)
 
-        x, weight = legendre(-longest, longest, most := count(longest))
-        degrees = (np.arange(most) + 0.5) / longest
-        polynomials = np.polynomial.legendre.legvander(x / longest, most - 1)
-        seen = self._seen(1, x) * weight @ (polynomials * degrees)
-        coefficients, light = held(self._window(1), self.optics.axes[1].band)
-        shape = len(self._chords), len(seen), coefficients.shape[1]
-        found = [np.empty(shape, self.precision) for _ in self._focal]
-        for number, chord in enumerate(self._chords.tolist()):
-            x, weight = legendre(-chord, chord, count(chord))
-            polynomials = np.polynomial.legendre.legvander(x / longest, most - 1)
-            there, around = seen @ polynomials.T * weight, light(x) @ coefficients
-            for focal_length, mine in zip(self._focal, found, strict=True):
-                mine[number] = (there * self._bend(focal_length, x)) @ around
-        return found
+        chords = [float(self._lines[2][mine[0]]) for mine in self.like_lines]
+        most = count(longest)
+        return [_Nodes.of(chord / longest, count(chord), most) for chord in (longest, *chords)]
 
 
-def prolate(count: int, band: float) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Nodes:
+    """Of a quadrature along a chord: places and weights, of half the longest, and polynomials there."""
+
+    at: np.ndarray
+    weight: np.ndarray
+    polynomials: np.ndarray
+
+    @classmethod
+    def of(cls, chord: float, count: int, degrees: int) -> "_Nodes":
+        """So many, and polynomials of so many degrees."""
+        x, weight = legendre(-chord, chord, count)
+        return cls(x, weight, np.polynomial.legendre.legvander(x, degrees - 1))
+
+
+def prolate(count: int, band: float, faint: float) -> tuple[np.ndarray, np.ndarray]:
     """Sequences (k, count) of a band [1/sample], and the parts of their light in the window, not faint."""
     most = min(count, math.ceil(2 * count * band) + MORE)
     number = np.arange(count)
@@ -300,5 +353,5 @@ def prolate(count: int, band: float) -> tuple[np.ndarray, np.ndarray]:
     )
     inside = scipy.linalg.matmul_toeplitz(2 * band * np.sinc(2 * band * number), vectors)
     strength = np.einsum("ik,ik->k", vectors, inside)
-    kept = strength > FAINT
+    kept = strength > faint
     return vectors[:, kept].T, strength[kept]

@@ -62,21 +62,26 @@ class Lines(LineParts):
 
     def field(self, light: np.ndarray, rows: range, columns: range) -> np.ndarray:
         """As `Relay.field`."""
-        light, total = light.astype(self.precision), self.dark(rows, columns)
+        light, own, total = light.astype(self.precision), self.piece, self.dark(rows, columns)
         for some in self.lit(light, rows, columns):
             few = {}
             for kind, mine in of_kinds(some):
-                along = self.along(self.piece, kind, self.on_lines(self.piece, light, mine))
-                few.update(zip(mine, self.down(self.piece, kind, along), strict=True))
-            for y, row in by_row(few):
-                mine, behind = self.cut(0, y, rows), self.behind(self.piece, row, columns)
-                total[mine.there] += mine.of(self.piece).T @ behind
+                along = self.along(own, kind, self.on_lines(own, light, mine))
+                few.update(zip(mine, self.down(own, kind, along), strict=True))
+            self.add(total, (own, own), few, (rows, columns))
         return total
 
     def dark(self, rows: range, columns: range) -> np.ndarray:
-        """Nothing on the samples of some cells."""
+        """Nothing on the samples (y, x) of some cells."""
         ky, kx = self.optics.cells.samples
         return np.zeros((len(rows) * ky, len(columns) * kx), self.precision)
+
+    def keys(self, rows: range, columns: range) -> set[Key]:
+        """Of all matrices that bring light to some cells."""
+        around = self._around(rows, columns)
+        found: set[Key] = {(what, one.kind) for one in around for what in ("along", "down")}
+        found |= {self.cut(0, one.y, rows).key for one in around}
+        return found | {self.cut(1, one.x, columns).key for one in around} | {ON_LINES}
 
     def lit(self, light: np.ndarray, rows: range, columns: range) -> Iterator[list[One]]:
         """Lenslets, without those that are dark: some rows at a time."""
@@ -120,6 +125,18 @@ class Lines(LineParts):
         """Few numbers (n, k along y, k along x) of those along x."""
         few = (pieces(("down", kind)) @ along.reshape(len(along), -1)).reshape(-1, *along.shape[1:])
         return few.transpose(2, 0, 1)
+
+    def add(
+        self,
+        total: np.ndarray,
+        ways: tuple[Pieces, Pieces],
+        few: dict[One, np.ndarray],
+        cells: tuple[range, range],
+    ) -> None:
+        """Amplitude on the samples (y, x) of cells, of lenslets' few numbers, by matrices along y and x."""
+        for y, row in by_row(few):
+            mine = self.cut(0, y, cells[0])
+            total[mine.there] += mine.of(ways[0]).T @ self.behind(ways[1], row, cells[1])
 
     def behind(self, pieces: Pieces, row: Sequence[tuple[One, np.ndarray]], columns: range) -> np.ndarray:
         """Amplitude (k, samples along x) of the few numbers of a row's lenslets."""

@@ -22,10 +22,11 @@ import numpy as np
 from lumigraph.core.threads import single_products
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators.camera import CameraOptics, HasOptics
-from lumigraph.operators.cell_response import MIDDLE
 from lumigraph.operators.fineness import COARSEST
+from lumigraph.operators.line_parts import Key
 from lumigraph.operators.paraxial import resolved
 from lumigraph.operators.part_sight import Sight, Spot, Turn
+from lumigraph.operators.passed import Passed, Slopes, passed
 from lumigraph.operators.point_changes import has_changes
 from lumigraph.scene import Points
 
@@ -69,7 +70,7 @@ class PartImages:
                 f"accuracy is {self.accuracy:g} but must lie between {FINEST:g} and {COARSEST:g}."
             )
         for one in (self.camera, *(end for pair in self.pairs for end in pair)):
-            _require_square(one)
+            _require_paraxial(one)
             _require_as_many(one, self.camera)
 
     @classmethod
@@ -99,7 +100,9 @@ class PartImages:
             raise GeometryError(f"change has shape {np.shape(change)} but must be ({len(self.pairs)},).")
         own = Sight.of(self.camera, points, self.accuracy)
         light, moved, spots = np.zeros(own.shape), np.zeros(own.shape), own.spots(points)
-        by = _Change.of(zip(np.asarray(change, np.float64).tolist(), self._ends(own), strict=True), spots)
+        by = _Change.of(
+            own, zip(np.asarray(change, np.float64).tolist(), self._ends(own), strict=True), spots
+        )
         for spot in spots:
             waves = _Waves.of(own, spot)
             light[spot.window] += spot.intensity * np.abs(waves.field) ** 2
@@ -138,43 +141,39 @@ class _Waves:
         The point's.
     turns, phases
         Along both axes, and the factors (places, nodes) of these.
-    down, across
-        From the pupil's nodes to the samples, along y and along x.
     right
-        (nodes, samples along x).
-    field
-        On the samples (y, x).
+        From the pupil along x: (nodes, places).
+    passed
+        Past the lenslets.
     """
 
     spot: Spot
     turns: tuple[Turn, Turn]
     phases: tuple[np.ndarray, ...]
-    down: np.ndarray
-    across: np.ndarray
     right: np.ndarray
-    field: np.ndarray
+    passed: Passed
 
     @classmethod
     def of(cls, own: Sight, spot: Spot) -> "_Waves":
         turns = own.turns(spot)
-        phases = tuple(np.exp(1j * np.outer(*turn)) for turn in turns)
-        down, across = (own.lenslets.along(k, phases[k][None], spot.cells[k], MIDDLE)[0] for k in (0, 1))
-        right = own.pupil(spot.dz) @ across.T
-        return cls(spot, turns, phases, down, across, right, down @ right)
+        y, x = phases = tuple(np.exp(1j * np.outer(*turn)) for turn in turns)
+        right = own.pupil(spot.dz) @ x.T
+        return cls(spot, turns, phases, right, passed(own.lenslets, y @ right, *spot.cells))
+
+    @property
+    def field(self) -> np.ndarray:
+        """On the samples (y, x)."""
+        return self.passed.field
 
     def changed(self, own: Sight, by: "_Change") -> np.ndarray:
         """Change of the field with the camera."""
-        ways, pupil = [], own.pupil(self.spot.dz)
+        moved, pupil = [], own.pupil(self.spot.dz)
         for k, turn in enumerate(self.turns):
             places, nodes = (by.sum(lambda one, k=k, j=j: one.turns(self.spot)[k][j]) for j in (0, 1))
-            phase = 1j * (np.outer(places, turn[1]) + np.outer(turn[0], nodes)) * self.phases[k]
-            way = own.lenslets.along(k, phase[None], self.spot.cells[k], MIDDLE)[0]
-            moved = [
-                by.matrices[k, cell] @ self.phases[k][own.lenslets.window(k, n)]
-                for n, cell in enumerate(self.spot.cells[k])
-            ]
-            ways.append(way + np.concatenate(moved))
-        return ways[0] @ self.right + self.down @ (by.pupil(self.spot.dz) @ self.across.T + pupil @ ways[1].T)
+            moved.append(1j * (np.outer(places, turn[1]) + np.outer(turn[0], nodes)) * self.phases[k])
+        y, x = self.phases
+        light = moved[0] @ self.right + y @ (by.pupil(self.spot.dz) @ x.T + pupil @ moved[1].T)
+        return self.passed.changed(light, by.pieces.__getitem__)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -185,26 +184,25 @@ class _Change:
     ----------
     pairs
         Times, and cameras.
-    matrices
-        Change of what lenslets do along an axis to a cell.
+    pieces
+        Change of the lenslets' matrices.
     """
 
     pairs: tuple[tuple[float, Both], ...]
-    matrices: dict[tuple[int, int], np.ndarray]
+    pieces: dict[Key, np.ndarray]
     _pupils: dict[float, np.ndarray] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, pairs: Iterable[tuple[float, Both]], spots: Sequence[Spot]) -> "_Change":
+    def of(cls, own: Sight, pairs: Iterable[tuple[float, Both]], spots: Sequence[Spot]) -> "_Change":
         """For some points."""
-        known, matrices = [], {}
-        lit = {(which, cell) for spot in spots for which in (0, 1) for cell in spot.cells[which]}
+        lit = {key for spot in spots for key in own.lenslets.keys(*spot.cells)}
+        known, pieces = [], {key: np.zeros_like(own.lenslets.piece(key)) for key in lit}
         for weight, both in pairs:
             first, last = (one.lenslets for one in both)
-            for key in lit:
-                change = last.matrix(*key)[0] - first.matrix(*key)[0]
-                matrices[key] = matrices.get(key, 0) + weight * change
+            for key in lit if first is not last else ():
+                pieces[key] += weight * (last.piece(key) - first.piece(key))
             known.append((weight, (both[0].anew, both[1].anew)))
-        return cls(tuple(known), matrices)
+        return cls(tuple(known), pieces)
 
     def sum(self, of: Callable[[Sight], np.ndarray]) -> Any:
         """Change of what is made of a camera."""
@@ -229,38 +227,31 @@ class _Slopes:
     """
 
     light: np.ndarray
-    _matrices: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
+    _pieces: Slopes = field(default_factory=Slopes)
     _turns: list[tuple[Spot, list[Turn]]] = field(default_factory=list)
 
     def add(self, own: Sight, waves: _Waves, seen: np.ndarray) -> np.ndarray:
         """Those of a point, by weights of all samples; returned, those by the pupil (nodes, nodes)."""
-        spot = waves.spot
+        spot, (y, x) = waves.spot, waves.phases
         self.light[spot.window] += spot.intensity * np.abs(waves.field) ** 2
-        back = spot.intensity * seen[spot.window] * waves.field.conj()
-        above = waves.down.T @ back
-        ways = back @ waves.right.T, above.T @ own.pupil(spot.dz)
-        self._turns.append((spot, [self._way(own, waves, k, way) for k, way in enumerate(ways)]))
-        return above @ waves.across
+        light = waves.passed.back(spot.intensity * seen[spot.window] * waves.field.conj(), self._pieces)
+        above = y.T @ light
+        ways = light @ waves.right.T, above.T @ own.pupil(spot.dz)
+        self._turns.append((spot, [self._turn(waves, k, way) for k, way in enumerate(ways)]))
+        return above @ x
 
-    def _way(self, own: Sight, waves: _Waves, which: int, way: np.ndarray) -> Turn:
-        """Along an axis, by the way from the pupil to the samples: of matrices, and of phases (returned)."""
-        phase, n = waves.phases[which], own.optics.axes[which].samples
-        by = np.zeros_like(phase)
-        for k, cell in enumerate(waves.spot.cells[which]):
-            part, window = way[k * n : (k + 1) * n], own.lenslets.window(which, k)
-            key = which, cell
-            self._matrices[key] = self._matrices.get(key, 0) + part @ phase[window].T
-            by[window] += own.lenslets.matrix(which, cell)[0].T @ part
-        by *= 1j * phase
-        places, nodes = waves.turns[which]
+    @staticmethod
+    def _turn(waves: _Waves, which: int, by: np.ndarray) -> Turn:
+        """By places and nodes along an axis, of those by the phases' factors."""
+        by, (places, nodes) = by * 1j * waves.phases[which], waves.turns[which]
         return np.real(by @ nodes), np.real(places @ by)
 
     def along(self, first: Sight, last: Sight, weights: np.ndarray) -> float:
         """From one camera to another close by; weights (ny, nx) are of the pixels."""
         found, both = 0.0, (first, last)
-        for (which, cell), by in self._matrices.items():
-            if first.lenslets is not last.lenslets:
-                found += _times(by, *(one.lenslets.matrix(which, cell)[0] for one in both))
+        if first.lenslets is not last.lenslets:
+            for key, by in self._pieces.of.items():
+                found += _times(by, *(one.lenslets.piece(key) for one in both))
         for spot, turns in self._turns:
             for by, *ends in zip(turns, *(one.turns(spot) for one in both), strict=True):
                 found += sum(_times(*pieces) for pieces in zip(by, *ends, strict=True))
@@ -274,18 +265,13 @@ def _times(by: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
     return 0.0 if low is high else float(np.sum(by * (high - low)).real)
 
 
-def _require_square(camera: CameraOptics) -> None:
+def _require_paraxial(camera: CameraOptics) -> None:
     """Refuse cameras whose light behind lenslets is no product along two axes."""
     array = camera.array
     if not has_changes(camera) or array is None or array.scatter is not None or camera.lean is not None:
         raise GeometryError(
             "derivatives by a camera's parts are of paraxial cameras with lenslets, alike and upright, "
             "behind a thin lens. Use model = 'paraxial' without over_field, prescription, tilts and scatter."
-        )
-    if array.shape != "square" or isinstance(array.focal_length, tuple):
-        raise GeometryError(
-            f"lenslets are {array.shape}, of {array.lattice.kinds} kinds, but derivatives by parts "
-            "need square ones of one focal length."
         )
 
 

@@ -1,4 +1,4 @@
-"""A camera with square lenslets before points: waves, matrices and phases that their images are products of.
+"""A camera with lenslets before points: waves, matrices and phases that their images are products of.
 
 Cameras that hardly differ are sampled alike, so that what they do to light can be compared number by number.
 """
@@ -6,14 +6,16 @@ Cameras that hardly differ are sampled alike, so that what they do to light can 
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from lumigraph.core.linear import Linear
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import CameraOptics
+from lumigraph.operators.lines import Lines
 from lumigraph.operators.optics import Optics
+from lumigraph.operators.passed import Parted
 from lumigraph.operators.point_changes import PUPIL
 from lumigraph.operators.point_light import Sampled
 from lumigraph.operators.points import SPARE, farthest, lit_cells, on_lenslets, share
@@ -95,11 +97,14 @@ class Sight:
         return readout(self.optics)
 
     @cached_property
-    def lenslets(self) -> Straight:
+    def lenslets(self) -> Parted:
         """What they do to light."""
         if self.like is not None and self.like._behind == self._behind:
             return self.like.lenslets
-        return Straight(self.optics, np.complex128)
+        if self.optics.straight:
+            return Straight(self.optics, np.complex128)
+        like = None if self.like is None else cast(Lines, self.like.lenslets)
+        return Lines(self.optics, np.complex128, like)
 
     def pupil(self, dz: float) -> np.ndarray:
         """Wave (nodes, nodes) in the main lens, of a point of 1 at a depth."""

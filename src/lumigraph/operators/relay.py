@@ -27,6 +27,7 @@ from lumigraph.operators.cell_response import (
     nodes,
 )
 from lumigraph.operators.exact import lenslets_of
+from lumigraph.operators.line_parts import Key
 from lumigraph.operators.lines import Lines
 from lumigraph.operators.optics import Optics
 
@@ -174,6 +175,14 @@ class Straight:
     def window(self, which: int, number: int) -> slice:
         """Of the cell of this number along an axis, among the places of some."""
         return self._sides[which].window(number)
+
+    def keys(self, rows: range, columns: range) -> set[Key]:
+        """Of all matrices that bring light to some cells."""
+        return {(which, cell) for which, cells in enumerate((rows, columns)) for cell in cells}
+
+    def piece(self, key: Key) -> np.ndarray:
+        """A matrix (samples, window), by the axis and the cell."""
+        return self.matrix(*cast(tuple[int, int], key))[0]
 
     def matrix(self, which: int, cell: int, box: Box = MIDDLE) -> np.ndarray:
         """Amplitudes (terms, samples, window) of one cell along one axis."""

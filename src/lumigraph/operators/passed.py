@@ -1,0 +1,205 @@
+"""Light on its way through lenslets: how what comes of it changes with it and with them, and the transpose.
+
+Each step is linear in the light and in one matrix of the lenslets. What a sum of changes by is followed back
+without conjugates: it is Re of the products with changes, added up.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from lumigraph.operators.line_parts import ON_LINES, Key, Pieces
+from lumigraph.operators.lines import Lines, One, by_row, of_kinds
+from lumigraph.operators.relay import Straight
+
+Parted = Straight | Lines
+"""Relays whose light can be followed back."""
+
+
+@dataclass(slots=True, eq=False)
+class Slopes:
+    """What something changes by with lenslets' matrices."""
+
+    of: dict[Key, np.ndarray] = field(default_factory=dict)
+
+    def add(self, key: Key, by: np.ndarray) -> None:
+        """With a whole matrix."""
+        self.of[key] = self.of[key] + by if key in self.of else by
+
+    def add_columns(self, key: Key, by: np.ndarray, inside: slice, like: np.ndarray) -> None:
+        """With some columns of one that is `like` another."""
+        if key not in self.of:
+            self.of[key] = np.zeros_like(like)
+        self.of[key][:, inside] += by
+
+
+class Passed(Protocol):
+    """Light behind the lenslets, and what it follows from."""
+
+    @property
+    def field(self) -> np.ndarray:
+        """On the samples (y, x)."""
+        ...
+
+    def changed(self, light: np.ndarray, change: Pieces) -> np.ndarray:
+        """How the field changes with light (y, x) before the lenslets, and with their matrices."""
+        ...
+
+    def back(self, by: np.ndarray, slopes: Slopes) -> np.ndarray:
+        """Slopes by the light, of those by the field (y, x); those by matrices are added."""
+        ...
+
+
+def passed(relay: Parted, light: np.ndarray, rows: range, columns: range) -> Passed:
+    """Light (y, x) at a relay's places, to the samples of some cells."""
+    if isinstance(relay, Straight):
+        return _Squares.of(relay, light, (rows, columns))
+    return _AnyShape.of(relay, light, (rows, columns))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Squares:
+    """Behind square lenslets: along y (`down`), then along x."""
+
+    relay: Straight
+    cells: tuple[range, range]
+    light: np.ndarray
+    down: np.ndarray
+    field: np.ndarray
+
+    @classmethod
+    def of(cls, relay: Straight, light: np.ndarray, cells: tuple[range, range]) -> "_Squares":
+        down = _along(relay, relay.piece, 0, light, cells[0])
+        return cls(relay, cells, light, down, _along(relay, relay.piece, 1, down.T, cells[1]).T)
+
+    def changed(self, light: np.ndarray, change: Pieces) -> np.ndarray:
+        """As `Passed.changed`."""
+        relay, (rows, columns) = self.relay, self.cells
+        down = _along(relay, change, 0, self.light, rows) + _along(relay, relay.piece, 0, light, rows)
+        moved = _along(relay, change, 1, self.down.T, columns)
+        return (moved + _along(relay, relay.piece, 1, down.T, columns)).T
+
+    def back(self, by: np.ndarray, slopes: Slopes) -> np.ndarray:
+        """As `Passed.back`."""
+        return self._back(0, self.light, self._back(1, self.down.T, by.T, slopes).T, slopes)
+
+    def _back(self, which: int, light: np.ndarray, by: np.ndarray, slopes: Slopes) -> np.ndarray:
+        """Along an axis, of light (places, n) and of slopes by the samples (samples, n)."""
+        found, n = np.zeros_like(light), self.relay.optics.axes[which].samples
+        for k, cell in enumerate(self.cells[which]):
+            part, window = by[k * n : (k + 1) * n], self.relay.window(which, k)
+            slopes.add((which, cell), part @ light[window].T)
+            found[window] += self.relay.piece((which, cell)).T @ part
+        return found
+
+
+def _along(relay: Straight, pieces: Pieces, which: int, light: np.ndarray, cells: range) -> np.ndarray:
+    """Amplitudes (samples, n) behind square lenslets along one axis, of light (places, n)."""
+    parts = [pieces((which, cell)) @ light[relay.window(which, k)] for k, cell in enumerate(cells)]
+    return np.concatenate(parts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Alike:
+    """Lenslets of a kind: light on the lines (lines, window, n), and along x (lines, k, n)."""
+
+    kind: int
+    members: Sequence[One]
+    seen: np.ndarray
+    along: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _AnyShape:
+    """Behind lenslets of any shape.
+
+    Parameters
+    ----------
+    alike
+        Those that are lit.
+    few
+        Few numbers (k along y, k along x) of each.
+    """
+
+    relay: Lines
+    cells: tuple[range, range]
+    light: np.ndarray
+    alike: list[_Alike]
+    few: dict[One, np.ndarray]
+    field: np.ndarray
+
+    @classmethod
+    def of(cls, relay: Lines, light: np.ndarray, cells: tuple[range, range]) -> "_AnyShape":
+        alike, few, own = [], {}, relay.piece
+        for some in relay.lit(light, *cells):
+            for kind, mine in of_kinds(some):
+                seen = relay.on_lines(own, light, mine)
+                alike.append(_Alike(kind, mine, seen, relay.along(own, kind, seen)))
+                few.update(zip(mine, relay.down(own, kind, alike[-1].along), strict=True))
+        relay.add(field := relay.dark(*cells), (own, own), few, cells)
+        return cls(relay, cells, light, alike, few, field)
+
+    def changed(self, light: np.ndarray, change: Pieces) -> np.ndarray:
+        """As `Passed.changed`."""
+        relay, own, few = self.relay, self.relay.piece, {}
+        for one in self.alike:
+            seen = relay.on_lines(change, self.light, one.members) + relay.on_lines(own, light, one.members)
+            along = relay.along(change, one.kind, one.seen) + relay.along(own, one.kind, seen)
+            moved = relay.down(change, one.kind, one.along) + relay.down(own, one.kind, along)
+            few.update(zip(one.members, moved, strict=True))
+        relay.add(found := relay.dark(*self.cells), (own, own), few, self.cells)
+        for ways in ((change, own), (own, change)):
+            relay.add(found, ways, self.few, self.cells)
+        return found
+
+    def back(self, by: np.ndarray, slopes: Slopes) -> np.ndarray:
+        """As `Passed.back`."""
+        found, few = np.zeros_like(self.light), self._few_back(by, slopes)
+        for one in self.alike:
+            mine = np.stack([few[member] for member in one.members], axis=-1)
+            seen = self._along_back(one, self._down_back(one, mine, slopes), slopes)
+            window = self.relay.around(self.light, one.members)
+            slopes.add(ON_LINES, _times(seen, window))
+            around = np.tensordot(self.relay.piece(ON_LINES).T, seen, axes=1)
+            for k, member in enumerate(one.members):
+                found[member.top :, member.left :][: len(window), : window.shape[1]] += around[..., k]
+        return found
+
+    def _few_back(self, by: np.ndarray, slopes: Slopes) -> dict[One, np.ndarray]:
+        """By few numbers, of slopes by the samples."""
+        relay, own, (rows, columns), found = self.relay, self.relay.piece, self.cells, {}
+        for y, row in by_row(self.few):
+            mine, behind = relay.cut(0, y, rows), relay.behind(own, row, columns)
+            part, carrier = by[mine.there], mine.of(own)
+            slopes.add_columns(mine.key, behind @ part.T, mine.inside, own(mine.key))
+            part = carrier @ part
+            for one, few in row:
+                mine = relay.cut(1, one.x, columns)
+                there = part[:, mine.there]
+                slopes.add_columns(mine.key, few.T @ there, mine.inside, own(mine.key))
+                found[one] = there @ mine.of(own).T
+        return found
+
+    def _down_back(self, one: _Alike, by: np.ndarray, slopes: Slopes) -> np.ndarray:
+        """By what the lines bring along x, of slopes by few numbers (k along y, k along x, n)."""
+        key = "down", one.kind
+        slopes.add(key, _times(by, one.along))
+        return np.tensordot(self.relay.piece(key).T, by, axes=1)
+
+    def _along_back(self, one: _Alike, by: np.ndarray, slopes: Slopes) -> np.ndarray:
+        """By the light on the lines, of slopes by what these bring along x."""
+        key, found = ("along", one.kind), np.empty_like(one.seen)
+        across = self.relay.piece(key)
+        mine = np.empty_like(across)
+        for chord, lines in enumerate(self.relay.like_lines):
+            mine[chord] = np.tensordot(by[lines], one.seen[lines], axes=([0, 2], [0, 2]))
+            found[lines] = across[chord].T @ by[lines]
+        slopes.add(key, mine)
+        return found
+
+
+def _times(by: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """Slopes by a matrix from light (m, ...) to what has slopes `by` (n, ...)."""
+    return by.reshape(len(by), -1) @ light.reshape(len(light), -1).T
