@@ -32,7 +32,7 @@ class Optics:
     place
         Where all cells are taken to be in the straight array (y, x) [m]; it matters to the exact model.
     followed_to
-        Lenslets on each side of a cell whose light comes into it; None for what the accuracy asks.
+        How far beyond a cell light comes into it [pitches]; None for what the accuracy asks.
     """
 
     camera: CameraOptics
@@ -42,7 +42,7 @@ class Optics:
     distance: float
     blurred: float
     place: tuple[float, float] = (0.0, 0.0)
-    followed_to: int | None = None
+    followed_to: float | None = None
 
     @classmethod
     def of(
@@ -60,7 +60,8 @@ class Optics:
         array, distance = _cells.lenslet_array(plain), self.distance
         own, mine = _cells.cells_of(plain, array, self.fineness, distance), self.cells
         cells = replace(own, count=mine.count, points=mine.points, samples=mine.samples, ring=mine.ring)
-        return replace(self, camera=plain, array=array, cells=cells, followed_to=self._neighbours)
+        followed = self.followed_to or self._aside / self.array.lattice.pitch * (1 - 1e-9)  # however rounded
+        return replace(self, camera=plain, array=array, cells=cells, followed_to=followed)
 
     @property
     def bricks(self) -> "Optics":
@@ -109,9 +110,8 @@ class Optics:
     def axes(self) -> tuple[Axis, Axis]:
         """Sampling of a cell along y and along x."""
         band = SLACK / 2 / _cells.airy(self.camera)
-        neighbourhood = self._neighbours * self.array.lattice.pitch + self.spill
         y, x = (
-            Axis(size, points, samples, neighbourhood, band)
+            Axis(size, points, samples, self._aside, band)
             for size, points, samples in zip(
                 self.cells.size, self.cells.points, self.cells.samples, strict=True
             )
@@ -119,10 +119,12 @@ class Optics:
         return y, x
 
     @property
-    def _neighbours(self) -> int:
+    def _aside(self) -> float:
+        """How far beyond a cell light comes into it [m]."""
+        pitch = self.array.lattice.pitch
         if self.followed_to is not None:
-            return self.followed_to
-        return self.fineness.neighbours(*self._lit_alike)
+            return self.followed_to * pitch
+        return self.fineness.neighbours(*self._lit_alike) * pitch + self.spill
 
     @property
     def beside(self) -> float:

@@ -116,14 +116,14 @@ class PartImages:
             raise GeometryError(f"weights have shape {np.shape(weights)} but the raw image {self.shape}.")
         own = Sight.of(self.camera, points, self.accuracy)
         seen, by = own.read.adjoint(np.asarray(weights, np.float64)), _Slopes(np.zeros(own.shape))
-        found = np.zeros(len(self.pairs))
+        found, ends = np.zeros(len(self.pairs)), list(self._ends(own))
         for dz, spots in groupby(own.spots(points), lambda spot: spot.dz):
             pupil = sum((by.add(own, _Waves.of(own, spot), seen) for spot in spots), np.zeros(()))
-            found += [_times(pupil, *(one.pupil(dz) for one in both)) for both in self._ends(own)]
-        return 2 * (found + [by.along(*both, weights) for both in self._ends(own)])
+            found += [_times(pupil, *(one.anew.pupil(dz) for one in both)) for both in ends]
+        return 2 * (found + [by.along(first.anew, last.anew, weights) for first, last in ends])
 
     def _ends(self, own: Sight) -> Iterator[tuple[Sight, Sight]]:
-        """Cameras of each pair, made anew: what they know is not kept."""
+        """Cameras of each pair."""
         return ((own.alike(first), own.alike(last)) for first, last in self.pairs)
 
 
