@@ -39,6 +39,12 @@ HEX = START | {
         "magnification": 0.5, "layout": "hex",
     },
 }  # fmt: skip
+ROUNDED = START | {"lenslets": START["lenslets"] | {"pitch": 0.3 * mm}}
+"""Whose windows end at whole numbers of samples: 78, or 79 by rounding."""
+ANGLES = HEX | {"sensor": HEX["sensor"] | {"angular_response": {"power": 40.0}}}
+WIDE = START | {"main_lens": {"focal_length": 60 * mm, "diameter": 6 * mm}}
+WIDE_HEX = HEX | {"main_lens": WIDE["main_lens"]}
+"""Whose micro-images reach over the edges of lenslets."""
 FREE_HEX = HEX | {"built": FREE["built"]}
 DISCS = HEX | {"lenslets": HEX["lenslets"] | {"shape": "round", "fill_factor": 0.95}}
 KEYS = (
@@ -60,6 +66,8 @@ ALL = [
             "sensor.pixel_pitch",
         )
     ),
+    *(("2.0", given, "lenslets.pitch") for given in (ROUNDED, ANGLES)),
+    *(("2.0", given, "main_lens.diameter") for given in (WIDE, WIDE_HEX)),
     *(("2.0", FREE_HEX, f"built.{key}") for key in FREE["built"]),
     *(("2.0", DISCS, f"lenslets.{key}") for key in ("focal_length.2", "fill_factor")),
 ]  # fmt: skip
@@ -70,9 +78,9 @@ def camera(given, kind="2.0"):
     return of(**given)
 
 
-def shape(given):
-    """Of lenslets."""
-    return given["lenslets"].get("shape", given["lenslets"].get("layout", "square"))
+def named(given):
+    """A description, by its lenslets and what it has."""
+    return " ".join(k for k, v in globals().items() if v is given)
 
 
 def moved(given, key, by):
@@ -93,7 +101,7 @@ def off(found, true):
 
 
 @pytest.mark.parametrize(
-    ("kind", "given", "key"), ALL, ids=[f"{k} {shape(given)} {key}" for k, given, key in ALL]
+    ("kind", "given", "key"), ALL, ids=[f"{k} {named(given)} {key}" for k, given, key in ALL]
 )
 def test_derivatives_are_central_differences_of_images(kind, given, key):
     """Of cameras farther to either side than the pair is, sampled as each asks for."""

@@ -60,7 +60,8 @@ class Optics:
         array, distance = _cells.lenslet_array(plain), self.distance
         own, mine = _cells.cells_of(plain, array, self.fineness, distance), self.cells
         cells = replace(own, count=mine.count, points=mine.points, samples=mine.samples, ring=mine.ring)
-        followed = self.followed_to or self._aside / self.array.lattice.pitch * (1 - 1e-9)  # however rounded
+        # To a quarter pitch, of which cameras beside it have as many; whole samples, however rounded.
+        followed = self.followed_to or _quarters(self._aside / self.array.lattice.pitch) * (1 - 1e-9)
         return replace(self, camera=plain, array=array, cells=cells, followed_to=followed)
 
     @property
@@ -132,8 +133,8 @@ class Optics:
 
         Depths whose points light much the same share what lenslets do to light.
         """
-        pitches = math.ceil(4 * self.fineness.beside(*self._lit_alike)) / 4
-        return pitches * self.array.lattice.pitch + self.spill
+        pitch = self.array.lattice.pitch
+        return _quarters(self.fineness.beside(*self._lit_alike) + self.spill / pitch) * pitch
 
     @property
     def _lit_alike(self) -> tuple[float, float, Edges]:
@@ -226,3 +227,8 @@ class Optics:
     def image_scale(self) -> float:
         """Magnification of the telecentric image onto the sensor, 1 + b/L."""
         return 1 + _cells.lenslet_distance(self.camera) / self.camera.separation
+
+
+def _quarters(pitches: float) -> float:
+    """Rounded up."""
+    return math.ceil(4 * pitches - 1e-6) / 4

@@ -70,8 +70,9 @@ class Sight:
         blurred = max(distances.tolist(), key=lambda z: _cells.blur(camera, z))
         optics = Optics.of(camera, blurred, SPARE * accuracy)
         places = on_lenslets(optics, points.positions[:, :2], distances)
-        count = math.ceil(3 * farthest(optics, places) / _cells.airy(camera))
-        return cls(optics.alike(camera), max(PUPIL, count, math.ceil(EDGE / accuracy)))
+        least = 3 * farthest(optics, places) / _cells.airy(camera), EDGE / accuracy
+        # Even: the stop's edge then touches no sample's side, on one or the other side of it by rounding.
+        return cls(optics.alike(camera), max(PUPIL, *(2 * math.ceil(count / 2) for count in least)))
 
     def alike(self, camera: CameraOptics) -> "Sight":
         """Of a camera that hardly differs, as finely sampled."""
