@@ -249,13 +249,13 @@ class LensletCamera(Camera):
             term of the main lens' phase. Derivatives are changes from the first to the last of each.
         accuracy
             Relative rms error of points' images, 1e-3 to 1e-2. Changes are less accurate: by the lenslets'
-            focal length and the wavelength 0.1 at 1e-2, 0.03 at 3e-3.
+            focal length and the wavelength 0.05 to 0.15 at 1e-2, 0.03 at 3e-3.
 
         Raises
         ------
         GeometryError
-            Lenslets that are not square or not alike; a main lens that is not thin or changes over the field;
-            the exact model; other numbers of pixels or lenslets.
+            Scatter and tilts; a main lens that is not thin or changes over the field; the exact model; other
+            numbers of pixels or lenslets.
 
         Examples
         --------

@@ -1,14 +1,14 @@
-r"""Images of points before a camera with square lenslets, and how they change with whatever changes of it.
+r"""Images of points before a camera with lenslets, and how they change with whatever changes of it.
 
-A point's light behind the lenslets is a product of matrices, and a raw image what pixels take of its square,
+A point's light is a product of matrices, and a raw image what pixels take of its square,
 
-.. math:: I = R\,|U|^2, \quad U = B_y P B_x^T, \quad
+.. math:: I = R\,|U|^2, \quad U = A(E_y P E_x^T), \quad
           \delta I = R\,2\,\mathrm{Re}(U^* \delta U) + \delta R\,|U|^2
 
-with P the wave in the main lens and B the way from there past the lenslets along one axis. How the four
-change with a length, the wavelength or a term of the phase is the difference of two cameras a little apart,
-which are sampled alike; all else is differentiated. What is made of the image is followed back to them once:
-B is A E, lenslets' matrices cell by cell and phases of places times those of nodes, so that each camera more
+with P the wave in the main lens, E phases of nodes there times those of places before the lenslets, and A
+the way past these, whose steps are each linear in a matrix (`passed`). How all matrices change with a length,
+the wavelength or a term of the phase is the difference of two cameras a little apart, sampled alike; all else
+is differentiated. What is made of the image is followed back to them once, so that each camera more
 costs no product of large matrices.
 """
 
@@ -46,7 +46,7 @@ class PartImages:
     Parameters
     ----------
     camera
-        With square lenslets that are alike, paraxial, behind a thin lens for all fields.
+        With lenslets of any shape and focal lengths, paraxial, behind a thin lens for all fields.
     pairs
         (n,), cameras a little to either side of it: by a length, a term of the phase, the wavelength.
     accuracy
@@ -270,7 +270,7 @@ def _require_paraxial(camera: CameraOptics) -> None:
     array = camera.array
     if not has_changes(camera) or array is None or array.scatter is not None or camera.lean is not None:
         raise GeometryError(
-            "derivatives by a camera's parts are of paraxial cameras with lenslets, alike and upright, "
+            "derivatives by a camera's parts are of paraxial cameras with lenslets, as drawn and upright, "
             "behind a thin lens. Use model = 'paraxial' without over_field, prescription, tilts and scatter."
         )
 
