@@ -11,6 +11,7 @@ pulls, and the part of the coefficients that is inside 95 % intervals.
 import sys
 import time
 import warnings
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -107,11 +108,10 @@ def case(number: int) -> tuple[str, np.ndarray]:
     return f"{'microscopes' if ofs else 'cameras'}, {explained}", pulls
 
 
-def main(count: int, first: int) -> None:
-    """Print lines, and what all pulls of a kind say."""
+def summary(cases: Iterable[tuple[str, np.ndarray]]) -> None:
+    """Print what all pulls of a kind say."""
     kinds: dict[str, list[np.ndarray]] = {}
-    for number in range(first, first + count):
-        kind, pulls = case(number)
+    for kind, pulls in cases:
         kinds.setdefault(kind, []).append(pulls)
     kinds["all"] = [one for some in kinds.values() for one in some]
     for kind, some in kinds.items():
@@ -125,4 +125,5 @@ def main(count: int, first: int) -> None:
 
 if __name__ == "__main__":
     given = [int(one) for one in sys.argv[1:3]]
-    main(given[0] if given else 12, given[1] if len(given) > 1 else 0)
+    count, first = given[0] if given else 12, given[1] if len(given) > 1 else 0
+    summary(case(number) for number in range(first, first + count))

@@ -5,7 +5,7 @@ import pytest
 
 from lumigraph.adaptive import fit
 from lumigraph.adaptive.changes import Changes, told
-from lumigraph.adaptive.fit import OWN
+from lumigraph.adaptive.images import OWN
 
 SHAPE = (9, 12)
 PARTS = [

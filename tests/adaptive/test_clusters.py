@@ -60,7 +60,7 @@ def test_deviations_are_those_of_estimates_from_noise_that_is_alike(kind, cluste
         scores = columns * (data - np.tensordot(c, columns, 1))
         inverse = np.linalg.inv(information)
         found.append(c)
-        said.append(inverse @ clusters.scatter(scores) @ inverse)
+        said.append(inverse @ clusters.scatter(scores, information) @ inverse)
     true = np.cov(np.array(found).T)
     if kind != "noise":
         assert np.trace(true) > 9 * np.trace(np.linalg.inv(information))

@@ -52,6 +52,16 @@ def told(
     return whole.reshape(len(beads) * n, -1), np.concatenate(slope)
 
 
+def scored(beads: Sequence[Changes], lights: np.ndarray, mixed: np.ndarray, away: np.ndarray) -> np.ndarray:
+    """What pixels add (k, ny, nx) to slopes along mixed unknowns of all beads (unknowns, k); see `told`."""
+    found = np.zeros((mixed.shape[1], *away.shape), np.float32)
+    for one, light, own in zip(beads, lights, np.split(mixed, len(beads)), strict=True):
+        found[(slice(None), *one.part)] += np.tensordot(
+            own.T.astype(one.by.dtype) * one.by.dtype.type(light), one.by, 1
+        )
+    return found * away.astype(np.float32)
+
+
 def _product(one: Changes, other: Changes) -> np.ndarray:
     """Sums (unknowns, unknowns) over the pixels that both hold."""
     common = tuple(_common(a, b) for a, b in zip(one.part, other.part, strict=True))

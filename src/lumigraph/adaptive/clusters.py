@@ -23,6 +23,9 @@ from lumigraph.operators.microscope_pixels import on_lattice
 PLACES = 5
 """Along each side of a lenslet, in which pixels are alike, at least."""
 
+SURE = 2.0
+"""Standard deviations of chance, above which scores scatter by more than noise."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clusters:
@@ -31,7 +34,7 @@ class Clusters:
     Parameters
     ----------
     lenslets
-        Behind which lenslet a pixel stands.
+        Behind which lenslet a pixel stands, or which part of it.
     places
         Where it stands behind its lenslet.
     """
@@ -41,19 +44,33 @@ class Clusters:
 
     @classmethod
     def of(cls, calibration: Calibration, terms: int) -> "Clusters":
-        """Of a calibration's pixels, in more places than twice as many as there are terms."""
-        own = on_lattice(calibration)
-        lenslets = np.rint(own)
-        count = max(PLACES, math.ceil(math.sqrt(2 * terms)))
-        places = np.clip(np.floor((own - lenslets + 0.5) * count), 0, count - 1)
-        return cls(_numbered(lenslets), _numbered(places))
+        """Of a calibration's pixels, in more places than twice as many as there are terms.
 
-    def scatter(self, scores: np.ndarray) -> np.ndarray:
-        """V (terms, terms) of scores (terms, ny, nx) that add up to little: not always positive."""
+        Parts of lenslets, each with `PLACES` along its sides, where there are no more than that.
+        """
+        own = on_lattice(calibration)
+        nearest = np.rint(own)
+        count = max(PLACES, math.ceil(math.sqrt(2 * terms)))
+        lenslets, (places, parts) = _numbered(nearest), (_places(own - nearest, n) for n in (count, PLACES))
+        few = len(np.unique(lenslets)) <= 2 * terms
+        return cls(lenslets * PLACES**2 + parts if few else lenslets, places)
+
+    def scatter(self, scores: np.ndarray, noise: np.ndarray) -> np.ndarray:
+        """V (terms, terms) of scores (terms, ny, nx) that add up to little: not always positive.
+
+        As far as it is other than the covariance by noise (terms, terms) by more than chance: with n terms,
+        noise in G clusters differs from it by n (n + 1)/G, sum of squares, to a part of 2/√(n (n + 1)).
+        """
+        root, count = np.linalg.cholesky(noise), len(noise)
+        n = count * (count + 1)
+        white = np.linalg.solve(root, scores.reshape(count, -1))
         both = self.lenslets * (int(self.places.max()) + 1) + self.places
-        lenslets, places, each = (_summed(scores, one) for one in (self.lenslets, self.places, both))
+        lenslets, places, each = (_summed(white, one) for one in (self.lenslets, self.places, both))
         alike = _free(places) * (places @ places.T - each @ each.T)
-        return _free(lenslets) * lenslets @ lenslets.T + alike
+        beyond = _free(lenslets) * lenslets @ lenslets.T + alike - np.eye(count)
+        chance = (n + SURE * 2 * math.sqrt(n)) * (1 / _filled(lenslets) + 1 / _filled(places))
+        part = max(0.0, 1 - chance / float((beyond**2).sum()))
+        return noise + part * root @ beyond @ root.T
 
 
 def widened(information: np.ndarray, known: np.ndarray, scatter: np.ndarray) -> np.ndarray:
@@ -66,6 +83,11 @@ def widened(information: np.ndarray, known: np.ndarray, scatter: np.ndarray) -> 
     return wide @ wide.T
 
 
+def _places(away: np.ndarray, count: int) -> np.ndarray:
+    """Which of `count` along each side a pixel stands in, by how far it is from its lenslet's middle."""
+    return _numbered(np.clip(np.floor((away + 0.5) * count), 0, count - 1))
+
+
 def _numbered(places: np.ndarray) -> np.ndarray:
     """Pairs (ny, nx, 2) of whole numbers as one each, from 0."""
     first, second = (places[..., k] - places[..., k].min() for k in (0, 1))
@@ -73,11 +95,17 @@ def _numbered(places: np.ndarray) -> np.ndarray:
 
 
 def _summed(scores: np.ndarray, clusters: np.ndarray) -> np.ndarray:
-    """Sums (terms, clusters)."""
-    return np.stack([np.bincount(clusters.ravel(), one.ravel()) for one in scores])
+    """Sums (terms, clusters) of scores (terms, pixels)."""
+    return np.stack([np.bincount(clusters.ravel(), one) for one in scores])
 
 
 def _free(sums: np.ndarray) -> float:
     """Clusters over those that are left when the sums (terms, clusters) add up to 0."""
     count = np.count_nonzero(sums.any(0))
     return count / max(count - len(sums), 1)
+
+
+def _filled(sums: np.ndarray) -> float:
+    """As many clusters, all alike, as scatter as much as these sums (terms, clusters) of noise do."""
+    powers = (sums**2).sum(0)
+    return float(powers.sum() ** 2 / (powers**2).sum()) * (1 + 2 / len(sums))

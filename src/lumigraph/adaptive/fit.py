@@ -6,25 +6,23 @@ information of Poisson noise is F = Jᵀ diag(g w / m) J. A step solves
 and the logarithm of its light, then the coefficients at each node of the field.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from lumigraph.adaptive.changes import Changes, told
+from lumigraph.adaptive.changes import Changes, scored, told
 from lumigraph.adaptive.field import Nodes
+from lumigraph.adaptive.images import OWN, Images, changes_of, image_of
 from lumigraph.adaptive.misfit import Misfit
 from lumigraph.core import arrays
 from lumigraph.core.progress import Progress, Stage, silent
 from lumigraph.core.threads import each
 from lumigraph.deconvolution.problem import Problem
-from lumigraph.operators.microscope_pupil import PLACES, Lit
+from lumigraph.operators.microscope_pupil import PLACES
 from lumigraph.operators.resampling import Part
 from lumigraph.scene import Points
-
-OWN = PLACES + 1
-"""Unknowns of a bead: y, x, dz and the logarithm of its light."""
 
 LONGEST = (1.5e-6, 1.5e-6, 3e-6, 1.0, 0.25)
 """Longest steps before a microscope: y, x, dz [m], the logarithm of light, a coefficient [waves rms]."""
@@ -50,36 +48,6 @@ valley each step is short.
 
 USUAL = 10
 """Steps after which progress is said to be half: how many there will be is not known."""
-
-
-class Images(Protocol):
-    """Images of points by Zernike coefficients: `PupilImages` of microscopes, `Star` of cameras."""
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Of a raw image."""
-        ...
-
-    def fixed(self, coefficients: np.ndarray) -> "Images":
-        """The same with these coefficients (terms,) [waves rms] known, and no terms left."""
-        ...
-
-    def lit(
-        self, points: Points, coefficients: np.ndarray, directions: np.ndarray | None = None
-    ) -> Iterator[Lit]:
-        """Image of each point of intensity 1, for coefficients (terms,) [waves rms], around its cell.
-
-        With derivatives along directions (k, terms + 3): by all terms, y, x and dz if left out.
-        """
-        ...
-
-    def share(self, dz: float) -> float:
-        """Part of the raw image that a window takes, of a point at a depth [m]."""
-        ...
-
-    def seen(self, images: np.ndarray, cell: tuple[int, int]) -> tuple[Part, np.ndarray]:
-        """Part of the raw image that images (k, n, n) of a window around a cell light, and its pixels."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,6 +120,8 @@ class Model:
         Images by which the first steps are judged, and whose derivatives show the way of all; None for
         `images`. What derivatives get wrong meets only noise at the end, so that it costs no more of a fit's
         precision than its own square.
+    unit
+        Of the last coefficient, how far beads spread: see `images`; 0 where they are points and it is none.
     """
 
     images: Images
@@ -161,6 +131,7 @@ class Model:
     progress: Progress = silent
     longest: tuple[float, ...] = LONGEST
     coarse: Images | None = None
+    unit: float = 0.0
 
     @property
     def weights(self) -> np.ndarray:
@@ -173,6 +144,11 @@ class Model:
     def counted(self) -> float:
         """Pixels that count."""
         return float(self.weights.sum()) / self.problem.scale.gain
+
+    @property
+    def every(self) -> np.ndarray:
+        """All terms (terms,), as free."""
+        return np.ones(self.nodes.terms, bool)
 
     def expected(self, light: np.ndarray) -> np.ndarray:
         """Values of pixels (ny, nx) that receive this light."""
@@ -192,8 +168,7 @@ class Model:
 
     def _image(self, at: np.ndarray) -> tuple[Part, np.ndarray]:
         """What part of the raw image a bead of light 1 lights, by place and coefficients, and its pixels."""
-        (lit,) = self.images.lit(_alone(at), at[PLACES:], np.zeros((0, len(at))))
-        return self.images.seen(lit.image[None], lit.cell)
+        return image_of(self.images, at, self.unit)
 
     def _at(self, fit: Fit) -> np.ndarray:
         """Place and coefficients of each bead (beads, 3 + terms)."""
@@ -226,11 +201,21 @@ class Model:
     def around(self, fit: Fit) -> Around:
         """Information and slope at a fit."""
         fit = self.known(fit)
-        shown = self.expected(self.light(fit) if fit.light is None else fit.light)
-        data, weights = arrays.to_numpy(self.problem.data), self.weights
-        told_of = told(fit.beads, fit.points.intensities, weights / shown, weights * (data / shown - 1))
+        told_of = told(fit.beads, fit.points.intensities, *self._told(fit))
         shared = _shared(self.nodes.at(fit.points), fit.coefficients.shape[1])
         return Around(shared.T @ told_of[0] @ shared, shared.T @ told_of[1])
+
+    def scores(self, fit: Fit, mixed: np.ndarray) -> np.ndarray:
+        """What pixels add (k, ny, nx) to slopes of the log-likelihood along mixed unknowns (all, k)."""
+        fit = self.known(fit)
+        shared = _shared(self.nodes.at(fit.points), fit.coefficients.shape[1])
+        return scored(fit.beads, fit.points.intensities, shared @ mixed, self._told(fit)[1])
+
+    def _told(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+        """Information, and slope of the log-likelihood, by what each pixel (ny, nx) should read."""
+        shown = self.expected(self.light(fit) if fit.light is None else fit.light)
+        data, weights = arrays.to_numpy(self.problem.data), self.weights
+        return weights / shown, weights * (data / shown - 1)
 
     def _changes(self, at: np.ndarray, before: Sequence[Changes]) -> Changes:
         """Of pixels, by the place and light of a bead of light 1 and by its coefficients (places, terms)."""
@@ -239,10 +224,7 @@ class Model:
             if (np.abs(at - one.at) < STALE * longest).all():
                 return one
         images = self.images if self.coarse is None else self.coarse
-        n = len(at) - PLACES
-        (lit,) = images.lit(_alone(at), at[PLACES:])
-        own = np.concatenate([lit.changes[n:], lit.image[None], lit.changes[:n]])
-        part, by = images.seen(own.astype(np.float32), lit.cell)
+        part, by = changes_of(images, at, self.unit)
         if self.problem.scale.response is not None:
             by = by * arrays.to_numpy(self.problem.scale.response)[part].astype(np.float32)
         return Changes(part, by, at)
@@ -321,8 +303,10 @@ class Model:
         own = step[: OWN * count].reshape(count, OWN)
         places = np.clip(fit.points.positions + own[:, :PLACES], *self.limits)
         points = Points(places, fit.points.intensities * np.exp(own[:, PLACES]))
-        change = step[OWN * count :].reshape(fit.coefficients.shape)
-        return fit.changed(points=points, coefficients=fit.coefficients + change)
+        found = fit.coefficients + step[OWN * count :].reshape(fit.coefficients.shape)
+        if self.unit:
+            found[:, -1] = np.maximum(found[:, -1], 0)
+        return fit.changed(points=points, coefficients=found)
 
 
 def solved(matrix: np.ndarray, right: np.ndarray, damping: float = 0.0) -> np.ndarray:
@@ -354,11 +338,6 @@ def _shared(basis: np.ndarray, terms: int) -> np.ndarray:
         found[p, :OWN, p * OWN :][:, :OWN] = np.eye(OWN)
         found[p, OWN:, beads * OWN :] = np.kron(basis[p], np.eye(terms))
     return found.reshape(-1, found.shape[-1])
-
-
-def _alone(at: np.ndarray) -> Points:
-    """A bead of light 1 at a place, of which coefficients may follow."""
-    return Points(at[None, :PLACES], np.ones(1))
 
 
 def stepped(progress: Progress, steps: int) -> None:

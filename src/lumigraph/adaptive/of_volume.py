@@ -90,9 +90,9 @@ def _is_likelier(voxels: Voxels, told: Told, plain: Told) -> bool:
 
 def _covariance(voxels: Voxels, told: Told, around: Around, clusters: Clusters, left: float) -> np.ndarray:
     """Of the coefficients: by noise, what the object leaves of the raw image, what models do, what pulls."""
-    one = np.eye(len(around.information))
-    known = around.information / max(voxels.misfit(told).pearson, 1.0) + one / PRIOR**2
-    scatter = clusters.scatter(around.scores)
+    one, pearson = np.eye(len(around.information)), max(voxels.misfit(told).pearson, 1.0)
+    known = around.information / pearson + one / PRIOR**2
+    scatter = clusters.scatter(around.scores, pearson * around.information)
     pulled = np.linalg.solve(around.information + one / PRIOR**2, around.pull)
     found = widened(around.information + one / PRIOR**2, known, scatter)
     return found + np.outer(pulled, pulled) + left**2 * one

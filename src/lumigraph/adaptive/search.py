@@ -106,6 +106,7 @@ class Search:
 
     def more(self, fit: Fit, shown: np.ndarray) -> Points | None:
         """Beads in what a fit leaves of the raw image, if bright enough; None where there are none."""
-        found = self.beads(self.problem(fit.coefficients.mean(0)), shown)
+        terms = len(self.sight.images.terms)  # without the beads' spread
+        found = self.beads(self.problem(fit.coefficients[:, :terms].mean(0)), shown)
         bright = found.intensities > FAINT[1] * float(np.median(fit.points.intensities))
         return Points(found.positions[bright], found.intensities[bright]) if bright.any() else None

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from lumigraph.adaptive.checked import PISTON, bent
-from lumigraph.adaptive.estimate import covariance_of_coefficients
 from lumigraph.adaptive.field import PRIOR, Nodes
-from lumigraph.adaptive.fit import OWN, PLACES, Fit, Model
+from lumigraph.adaptive.fit import Fit, Model
+from lumigraph.adaptive.images import OWN
+from lumigraph.adaptive.known import scattered
 from lumigraph.adaptive.star import Alone, Star
 from lumigraph.adaptive.wavefront import Wavefront
 from lumigraph.adaptive.worth import UNKNOWN
@@ -19,6 +20,7 @@ from lumigraph.deconvolution.problem import Problem, Scale, values
 from lumigraph.elements.zernike import noll_to_nm
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.instruments import LensletCamera
+from lumigraph.operators.microscope_pupil import PLACES
 from lumigraph.scene import Points
 
 MODES = tuple(range(4, 22))
@@ -100,10 +102,10 @@ def sense(
     memory.require(needed, "derivatives of the raw image", "Use fewer terms.", SamplingError)
     model, first = _model(star, raw, place, exposure, progress or silent)
     plain = model.placed(first, STEPS)
-    fit = model.improved(plain, np.ones(len(modes), bool), STEPS)
+    fit = model.improved(plain, model.every, STEPS)
     misfit = model.misfit(fit)
     misfit.warn("a point with these modes leaves", "Ask for more modes, or give the point's place.")
-    covariance = covariance_of_coefficients(model, fit)
+    covariance = scattered(model, fit, camera.calibration)
     deviations = np.sqrt(np.diag(covariance))
     unknown = {j: UNKNOWN for j, d in zip(modes, deviations, strict=True) if d > PRIOR / 2}
     return Wavefront(

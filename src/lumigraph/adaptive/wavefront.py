@@ -50,6 +50,9 @@ class Wavefront:
         does; empty of beads.
     pearson_deviation
         Standard deviation of `pearson` by noise alone.
+    bead_width, bead_width_deviation
+        Diameter that all beads have as balls that shine evenly [m], and its standard deviation; 0 where
+        points explain the raw image as well, and the deviation is what they may still be wide.
     """
 
     terms: tuple[int, ...]
@@ -67,6 +70,8 @@ class Wavefront:
     volume: Volume | None = None
     explained: Mapping[int, float] = field(default_factory=dict)
     pearson_deviation: float = 0.0
+    bead_width: float = 0.0
+    bead_width_deviation: float = 0.0
 
     __repr__ = brief
 

@@ -1,0 +1,140 @@
+r"""Images of one bead on the pixels, a point or a ball that shines evenly, and how they change.
+
+27 points have a ball's moments up to the seventh order: its middle, and with coordinates of 0 or ±1/√p,
+±1/√q, ±1/√s radii 6 points on the axes, 12 between two of them and 8 between three, of weights p³/63, q³/630
+and s³/2520. Then <x⁶>, <x⁴ y²> and <x² y² z²> are a ball's 1/21, 1/105 and 1/315; and <x²> = 1/5,
+<x⁴> = 3/35 and <x² y²> = 1/35 where
+
+.. math:: 10 p^2 + 4 q^2 + s^2 = 63, \quad 10 p + 4 q + s = 27, \quad 2 q + s = 9
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from itertools import product
+from typing import Protocol
+
+import numpy as np
+
+from lumigraph.operators.microscope_pupil import PLACES, Lit
+from lumigraph.operators.resampling import Part
+from lumigraph.scene import Points
+
+OWN = PLACES + 1
+"""Unknowns of a bead: y, x, dz and the logarithm of its light."""
+
+STEP = 0.05
+"""Of spread, in which a difference shows how images change by it."""
+
+Q = (18 - math.sqrt(30)) / 7
+P, S = (9 - Q) / 5, 9 - 2 * Q
+
+BALL = np.array(list(product((-1, 0, 1), repeat=3)), float)
+KINDS = np.abs(BALL).sum(1).astype(int)
+"""Coordinates that are not 0."""
+
+BALL *= np.array([1, P, Q, S])[KINDS, None] ** -0.5
+"""Points that stand for a ball, from its middle [radii]."""
+
+WEIGHTS = np.array([0, P**3 / 63, Q**3 / 630, S**3 / 2520])[KINDS]
+WEIGHTS[KINDS == 0] = 1 - WEIGHTS.sum()
+"""Their parts of its light."""
+
+Seen = tuple[Part, np.ndarray]
+"""Rows and columns of a raw image, and planes (k, rows, columns) there."""
+
+
+class Images(Protocol):
+    """Images of points by Zernike coefficients: `PupilImages` of microscopes, `Star` of cameras."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of a raw image."""
+        ...
+
+    def fixed(self, coefficients: np.ndarray) -> "Images":
+        """The same with these coefficients (terms,) [waves rms] known, and no terms left."""
+        ...
+
+    def lit(
+        self, points: Points, coefficients: np.ndarray, directions: np.ndarray | None = None
+    ) -> Iterator[Lit]:
+        """Image of each point of intensity 1, for coefficients (terms,) [waves rms], around its cell.
+
+        With derivatives along directions (k, terms + 3): by all terms, y, x and dz if left out.
+        """
+        ...
+
+    def share(self, dz: float) -> float:
+        """Part of the raw image that a window takes, of a point at a depth [m]."""
+        ...
+
+    def seen(self, images: np.ndarray, cell: tuple[int, int]) -> tuple[Part, np.ndarray]:
+        """Part of the raw image that images (k, n, n) of a window around a cell light, and its pixels."""
+        ...
+
+
+def diameter(spread: float, unit: float) -> float:
+    """Of a ball whose light has a variance of so many squared units along each axis."""
+    return 2 * unit * math.sqrt(5 * spread)
+
+
+def image_of(images: Images, at: np.ndarray, unit: float) -> Seen:
+    """Image (1, rows, columns) of a bead of light 1, by its place and coefficients (3 + terms,).
+
+    With a unit [m] the last coefficient is the bead's spread: see `diameter`. Below 0 it counts as 0.
+    """
+    return _together(images, at, unit, lambda lit: lit.image[None], np.zeros((0, len(at) - bool(unit))))
+
+
+def changes_of(images: Images, at: np.ndarray, unit: float) -> Seen:
+    """How it changes (unknowns, rows, columns), by the bead's place and light, then by coefficients."""
+    n = len(at) - PLACES - bool(unit)
+
+    def own(lit: Lit) -> np.ndarray:
+        return np.concatenate([lit.changes[n:], lit.image[None], lit.changes[:n]]).astype(np.float32)
+
+    part, by = _together(images, at, unit, own, None)
+    if not unit:
+        return part, by
+    more = np.append(at[:-1], max(at[-1], 0) + STEP)
+    part, planes = _beside([(part, by), image_of(images, more, unit)])
+    return part, np.concatenate([planes[:-1], (planes[-1:] - planes[PLACES:OWN]) / np.float32(STEP)])
+
+
+def _together(
+    images: Images, at: np.ndarray, unit: float, planes: Callable[[Lit], np.ndarray], along: np.ndarray | None
+) -> Seen:
+    """Planes of a bead's points, by directions as `Images.lit` takes them."""
+    radius = diameter(max(at[-1], 0), unit) / 2 if unit else 0.0
+    places = at[:PLACES] + radius * BALL if radius else at[None, :PLACES]
+    points = Points(places, np.ones(len(places)))
+    lit = images.lit(points, at[PLACES : len(at) - bool(unit)], along)
+    seen = [images.seen(planes(one), one.cell) for one in lit]
+    if not radius:
+        return seen[0]
+    part = _around([one for one, _ in seen])
+    found = WEIGHTS[0] * _placed(seen[0], part)
+    for weight, one in zip(WEIGHTS[1:], seen[1:], strict=True):
+        found += weight * _placed(one, part)
+    return part, found
+
+
+def _beside(seen: Sequence[Seen]) -> Seen:
+    """All planes, one after another, on the pixels that any of them lights."""
+    part = _around([one for one, _ in seen])
+    return part, np.concatenate([_placed(one, part) for one in seen])
+
+
+def _around(parts: Sequence[Part]) -> Part:
+    """The part that holds all of them."""
+    rows, columns = (
+        slice(min(one[k].start for one in parts), max(one[k].stop for one in parts)) for k in (0, 1)
+    )
+    return rows, columns
+
+
+def _placed(seen: Seen, part: Part) -> np.ndarray:
+    """Planes (k, rows, columns) of a part, where another one holds it."""
+    own, planes = seen
+    beside = [(a.start - b.start, b.stop - a.stop) for a, b in zip(own, part, strict=True)]
+    return np.pad(planes, ((0, 0), *beside))
