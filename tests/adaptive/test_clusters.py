@@ -43,6 +43,28 @@ def test_pixels_are_sorted_by_lenslet_and_by_place(clusters):
     assert set(rows) == set(columns) == {-4, 0, 1}  # once around behind each lenslet
 
 
+def test_few_lenslets_are_parted(clusters):
+    """Into 25, where there are no more than twice as many as terms: each pixel's is in one place."""
+    shape, at = clusters.lenslets.shape, np.array([[0, 0], [SIDE - 1, SIDE - 1]])
+    lattice = Lattice.square(PITCH, origin=((PITCH - 1) / 2,) * 2)
+    calibration = Calibration(lattice, shape, at, lattice.position(at), 0.0)
+    parted, whole = (Clusters.of(calibration, terms) for terms in (50, 49))
+    assert len(np.unique(whole.lenslets)) == 100
+    assert len(np.unique(parted.lenslets)) == 2500
+    assert (parted.lenslets // 25 == whole.lenslets).all()
+    assert len(np.unique(parted.places)) == 100
+
+
+def test_what_clusters_of_noise_scatter_by_chance_is_left_out(clusters, rng):
+    """In 9 of 10 drawings noise is what noise says; without the allowance in none."""
+    columns = rng.normal(size=(2, *clusters.lenslets.shape))
+    noise = np.tensordot(columns, columns, ((1, 2), (1, 2)))
+    found = [clusters.scatter(columns * rng.normal(size=columns.shape[1:]), noise) for _ in range(100)]
+    same = [np.allclose(one, noise, rtol=1e-9, atol=1e-9 * np.trace(noise)) for one in found]
+    assert np.mean(same) > 0.8
+    assert max(np.trace(one) / np.trace(noise) for one in found) < 2
+
+
 @pytest.mark.parametrize("kind", ["noise", "lenslets", "places"])
 def test_deviations_are_those_of_estimates_from_noise_that_is_alike(kind, clusters, rng):
     """Least squares of two columns in 400 drawings; noise alone says 3 times too little or less.

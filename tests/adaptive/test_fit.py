@@ -148,3 +148,18 @@ def test_beads_are_placed_through_a_wavefront_that_is_known(model):
     assert placed.coefficients == pytest.approx(start.coefficients)
     assert placed.objective == pytest.approx(free.objective)
     assert placed.steps == free.steps > 2
+
+
+def test_what_pixels_add_to_a_slope_adds_up_to_it(model):
+    at, rng = Fit(bead(LIGHT), np.full((1, 1), MOVED + 0.3)), np.random.default_rng(0)
+    mixed = rng.normal(size=(5, 2))
+    scores = model.scores(at, mixed)
+    assert scores.shape == (2, *X.shape)
+    assert scores.sum((1, 2)) == pytest.approx(mixed.T @ model.around(at).slope, rel=1e-3)
+
+
+def test_spread_stays_above_0(model):
+    balls = replace(model, unit=1.0)
+    found = balls._moved(Fit(bead(LIGHT), np.full((1, 1), 0.1)), np.append(np.zeros(4), -0.5))
+    assert found.coefficients == 0
+    assert model._moved(found, np.append(np.zeros(4), -0.5)).coefficients == -0.5

@@ -173,3 +173,25 @@ def test_no_aberration_of_a_picture_is_invented():
     found = estimate(raw, camera, (0.0,), (4, 6, 7, 11), exposure=EXPOSURE, object="picture")
     assert found.rms < 0.01
     assert (found.deviations > 1e-3).all()
+
+
+def test_what_pulls_is_how_far_slopes_of_noise_are_off_at_the_truth():
+    """Six drawings of 30 electrons and fine texture: 7 deviations from 0. Defocus alone."""
+    camera = CAMERA.replace(lenslets={"count": (7, 7)})
+    scene, c = Scene(camera, (0.0,), OF_PICTURE, None), np.array([0.1])
+    operator = (sight := scene.sight((4,))).operator(c)
+    texture = gaussian_filter(np.random.default_rng(1).normal(size=operator.shape[1]), (0, 2, 2))
+    light = np.maximum(operator.forward(np.maximum(1 + 6 * texture, 0.05).astype(np.float32)), 0)
+    light *= 30 / light.mean()
+    slopes, pulls = [], []
+    for seed in range(6):
+        raw = np.random.default_rng(seed).poisson(light + 0.01).astype(np.float32)
+        exposure = scene.counted(EXPOSURE)
+        voxels = Voxels(sight, raw, exposure, method=scene.method(sight), least=OF_PICTURE.least)
+        told = voxels.begun(c, OF_PICTURE.iterations[1])
+        slopes.append(voxels.around(told).slope[0])
+        if seed < 3:
+            pulls.append(voxels._pull(told)[0])
+    unsure = np.std(slopes) / math.sqrt(5)
+    assert np.mean(slopes) > 4 * unsure
+    assert np.mean(pulls) == pytest.approx(np.mean(slopes), abs=3 * unsure)

@@ -85,6 +85,20 @@ def test_one_radian_of_turbulence_is_found_below_what_a_shack_hartmann_leaves():
     assert 2 * math.pi * np.linalg.norm(found.values.ravel() - true) < 0.018
 
 
+@pytest.mark.long
+def test_deviations_hold_what_modes_that_were_not_asked_for_pull():
+    """Half a radian of them, three draws: by noise alone χ² of six is 40 on average."""
+    terms, chi = (4, 5, 6, 7, 8, 11), []
+    kept = np.isin(MODES, terms)
+    for seed in range(3):
+        true = turbulence(np.random.default_rng(seed)) * np.where(kept, 1.0, 0.5)
+        with pytest.warns(lg.SamplingWarning, match="a point with these modes leaves"):
+            found = sense(exposed(MODES, true, 3e4, seed), CAMERA, terms, exposure=EXPOSURE)
+        off = found.values.ravel() - true[kept]
+        chi.append(off @ np.linalg.solve(found.covariance, off))
+    assert np.mean(chi) < 14  # 1e-3 are above of three
+
+
 def test_what_is_no_point_is_warned_of():
     raw = exposed((4,), [0.0], 3e4) + np.random.default_rng(1).poisson(2.0, CAMERA.sensor.shape)
     with pytest.warns(lg.SamplingWarning, match="a point with these modes leaves"):

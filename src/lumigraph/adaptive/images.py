@@ -39,6 +39,10 @@ WEIGHTS = np.array([0, P**3 / 63, Q**3 / 630, S**3 / 2520])[KINDS]
 WEIGHTS[KINDS == 0] = 1 - WEIGHTS.sum()
 """Their parts of its light."""
 
+SMALL = np.concatenate([np.eye(3), -np.eye(3)]) * math.sqrt(3 / 5)
+"""Points, alike, that stand for a ball whose spread is no more than `STEP`: they have its moments up to the
+third order."""
+
 Seen = tuple[Part, np.ndarray]
 """Rows and columns of a raw image, and planes (k, rows, columns) there."""
 
@@ -105,18 +109,23 @@ def _together(
     images: Images, at: np.ndarray, unit: float, planes: Callable[[Lit], np.ndarray], along: np.ndarray | None
 ) -> Seen:
     """Planes of a bead's points, by directions as `Images.lit` takes them."""
-    radius = diameter(max(at[-1], 0), unit) / 2 if unit else 0.0
-    places = at[:PLACES] + radius * BALL if radius else at[None, :PLACES]
-    points = Points(places, np.ones(len(places)))
+    places, weights = _points(max(at[-1], 0) if unit else 0.0)
+    radius = diameter(max(at[-1], 0), unit) / 2
+    points = Points(at[:PLACES] + radius * places, np.ones(len(places)))
     lit = images.lit(points, at[PLACES : len(at) - bool(unit)], along)
     seen = [images.seen(planes(one), one.cell) for one in lit]
-    if not radius:
-        return seen[0]
     part = _around([one for one, _ in seen])
-    found = WEIGHTS[0] * _placed(seen[0], part)
-    for weight, one in zip(WEIGHTS[1:], seen[1:], strict=True):
+    found = weights[0] * _placed(seen[0], part)
+    for weight, one in zip(weights[1:], seen[1:], strict=True):
         found += weight * _placed(one, part)
     return part, found
+
+
+def _points(spread: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (k, 3) that stand for a ball, in radii, and their parts of its light."""
+    if spread > STEP:
+        return BALL, WEIGHTS
+    return (SMALL, np.full(6, 1 / 6)) if spread else (np.zeros((1, 3)), np.ones(1))
 
 
 def _beside(seen: Sequence[Seen]) -> Seen:

@@ -213,7 +213,7 @@ def _balls(known: _Known, model: Model, fit: Fit) -> tuple[Model, Fit]:
     """A model whose beads may be balls, and a fit of points in it."""
     nodes = replace(model.nodes, terms=model.nodes.terms + 1)
     balls = replace(model, unit=known.unit, nodes=nodes)
-    return balls, balls.known(balls.judged(fit.changed(coefficients=_with_none(fit.coefficients), beads=())))
+    return balls, balls.known(replace(fit, coefficients=_with_none(fit.coefficients), beads=()))
 
 
 def _points(balls: Model) -> Model:
