@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from tests.adaptive.test_estimate import SCOPE, UNIT
 
 import lumigraph as lg
 from lumigraph.adaptive import estimate
 from lumigraph.adaptive.images import BALL, SMALL, STEP, WEIGHTS, changes_of, diameter, image_of
 from lumigraph.deconvolution import Exposure
-from tests.adaptive.test_estimate import SCOPE, UNIT
 
 PLACE, UM = np.array([-8.3e-6, -7.1e-6, 7.7e-6]), 1e-6
 
@@ -81,7 +81,7 @@ def test_changes_of_a_ball_are_differences_of_its_images(spread):
 
 
 def test_a_wide_bead_is_found_with_its_width_and_does_not_pull():
-    """1.2 µm, 10⁵ photons: as a point the second term is 5.5 deviations off, with 1.06 times the noise left."""
+    """1.2 µm, 10⁵ photons: of a point, the second term is 5.5 deviations off."""
     true = np.array([0.2, -0.15])
     scope = SCOPE.replace(lenslets={"count": (5, 5)}, sensor={"shape": (97, 97)})
     images = scope.pupil_images((6, 8), farthest=8e-6, accuracy=2e-2)

@@ -8,6 +8,9 @@ both ways):
 
 .. math:: C = S^{-1} V S^{-1}, \quad V = V_{lenslets} + V_{places} - V_{both}
 
+What so few clusters of noise scatter by chance is left out; where there are few lenslets, their parts are
+clusters.
+
 H. White, Econometrica 50, 1 (1982); A. C. Cameron, J. B. Gelbach & D. L. Miller, J. Bus. Econ. Stat. 29, 238
 (2011).
 """

@@ -45,10 +45,11 @@ def estimate(
     Of beads: Richardson-Lucy finds them, through no wavefront or through the one that the shifts of views
     show (see `start`), whichever is likelier. Then their places and light and the Zernike coefficients are
     fitted together, by Levenberg and Marquardt's steps on the Poisson likelihood, and Richardson-Lucy looks
-    for more beads in what is left. A term stays if it gains more log-likelihood than ½ ln N for N pixels
-    (Schwarz's criterion), and than the part of the expected width that it leaves costs (Laplace's
-    approximation of the evidence); the others are 0. What is known before: a coefficient is of the order of 1
-    wave rms.
+    for more beads in what is left. Where balls of one width are worth it, beads are balls that shine evenly,
+    and the width is fitted, too: see `Wavefront.bead_width`. A term stays if it gains more log-likelihood
+    than ½ ln N for N pixels (Schwarz's criterion), and than the part of the expected width that it leaves
+    costs (Laplace's approximation of the evidence); the others are 0. What is known before: a coefficient is
+    of the order of 1 wave rms.
 
     Of any object with texture: the shifts of views give a start (see `start`), unless none is likelier. Then
     Richardson-Lucy's steps on a volume take turns with Gauss and Newton's on the coefficients, for which the
@@ -80,8 +81,8 @@ def estimate(
     pixels
         Calibration of a real camera.
     object
-        "beads", sparse points anywhere; "volume", anything, as samples of which three go into a lenslet;
-        "picture", anything flat. A volume and a picture have one region.
+        "beads", sparse points or balls anywhere; "volume", anything, as samples of which three go into a
+        lenslet; "picture", anything flat. A volume and a picture have one region.
     progress
         Called as ``progress(fraction)`` after each step; how many there will be is not known.
 

@@ -25,8 +25,8 @@ class Wavefront:
         Of each term at the nodes of the field (rows, columns, terms) [waves rms], beyond what the
         instrument's description holds; standard deviations from Fisher's information and from how pixels'
         scores scatter, over lenslets and over places behind them, where the object does not explain the raw
-        image. A term that explains no more than noise has the value 0, and its deviation holds the value
-        that it had.
+        image, as far as that is more than chance. A term that explains no more than noise has the value 0,
+        and its deviation holds the value that it had.
     nodes
         Places (y, x) of the rows and of the columns of nodes [m].
     untold
