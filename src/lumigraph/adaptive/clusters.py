@@ -98,8 +98,9 @@ def _numbered(places: np.ndarray) -> np.ndarray:
 
 
 def _summed(scores: np.ndarray, clusters: np.ndarray) -> np.ndarray:
-    """Sums (terms, clusters) of scores (terms, pixels)."""
-    return np.stack([np.bincount(clusters.ravel(), one) for one in scores])
+    """Sums (terms, clusters) of scores (terms, pixels), of clusters that have pixels."""
+    own = np.unique(clusters, return_inverse=True)[1].ravel()  # most pairs of lenslet and place have no pixel
+    return np.stack([np.bincount(own, one) for one in scores])
 
 
 def _free(sums: np.ndarray) -> float:
