@@ -122,8 +122,8 @@ def test_light_at_a_points_image_itself_does_not_change_across():
 
 
 def test_depths_share_what_lenslets_do_to_light(monkeypatch):
-    computed, of = [], Lines._computed
-    monkeypatch.setattr(Lines, "_computed", lambda self: computed.append(1) or of(self))
+    computed, of = [], Lines._along
+    monkeypatch.setattr(Lines, "_along", lambda self: computed.append(1) or of(self))
     camera = lg.load_camera("thesis-plenoptic-2-m050").replace(lenslets={**HEX, "pitch": "0.12 mm"})
     place = np.array([1e-4, -2e-4, 2e-3])
     points = source(camera, np.array([-6e-3, 2e-3]), 1e-2)
