@@ -1,6 +1,7 @@
 """`lumigraph deconvolve --adaptive`: what it is told, and what it reports."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -36,6 +37,14 @@ def test_terms_are_reported_with_their_deviations(wavefront):
     assert told["wavefront"]["rms_waves"] == pytest.approx(0.5)
     assert told["wavefront"]["terms"]["8"] == {"waves": -0.4, "deviation": 0.02, "explained": 0.25}
     assert told["Z6_interval"] == pytest.approx([0.29, 0.31])
+
+
+def test_the_width_of_beads_is_told_where_they_are_balls(wavefront):
+    wide = replace(wavefront, bead_width=2.3e-6, bead_width_deviation=0.1e-6)
+    found = with_wavefront(Result("Deconvolution", ""), wide)
+    assert found.headline[-1] == "beads are 2.3 µm (2.2 µm to 2.4 µm) wide"
+    assert found.values()["bead_width"] == 2.3e-6
+    assert "bead_width" not in with_wavefront(Result("Deconvolution", ""), wavefront).values()
 
 
 def test_the_report_has_a_map_of_the_wavefront(wavefront):

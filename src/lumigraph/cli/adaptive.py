@@ -195,14 +195,22 @@ class Modes:
 
 def with_wavefront(result: Result, found: "Wavefront") -> Result:
     """A result of the deconvolution with what was found of the wavefront."""
-    modes = Modes.of(found)
+    modes, wide = Modes.of(found), tuple(_widths(found))
 
     def figures() -> "Iterator[Figure]":
         yield from modes.figures()
         yield from result.figures()
 
     return replace(
-        result, headline=(*modes.lines(), *result.headline),
-        quantities=(*result.quantities, *modes.quantities()),
+        result,
+        headline=(*modes.lines(), *(f"beads are {width} wide" for width in wide), *result.headline),
+        quantities=(*result.quantities, *modes.quantities(), *wide),
         extra={**result.extra, "wavefront": modes.values()}, figures=figures,
     )  # fmt: skip
+
+
+def _widths(found: "Wavefront") -> "Iterator[Quantity]":
+    """Of beads that are balls, within one standard deviation."""
+    if width := found.bead_width:
+        deviation = found.bead_width_deviation
+        yield Quantity("bead_width", width, "m", (max(0.0, width - deviation), width + deviation))
