@@ -112,7 +112,7 @@ class Spill:
         """An edge (width, blur) that no such light makes, and the nearest that it does; None without one."""
         waves, apart = self._waves(_close(self.width(camera))), self._apart
         for edge in self.edges:
-            made = _edged(waves, edge, apart).edge(apart)
+            made = _nearest(waves, edge, apart)
             if np.abs(np.subtract(made, edge)).max() > _MADE:
                 return edge, made
         return None
@@ -211,6 +211,12 @@ def _edged(waves: Waves, edge: Pair, pitch: float) -> Waves:
         off, start, bounds=(_LEAST_EDGE, _MOST_EDGE), diff_step=0.02, xtol=_SETTLED, ftol=_SETTLED**2
     ).x
     return replace(waves, fill=float(fill), sharp=sign * float(sharp))
+
+
+@lru_cache(maxsize=16)
+def _nearest(waves: Waves, edge: Pair, pitch: float) -> Pair:
+    """To an edge, of those that such waves make."""
+    return _edged(waves, edge, pitch).edge(pitch)
 
 
 @lru_cache(maxsize=16)
