@@ -112,6 +112,7 @@ CHANGES = [  # what to replace in EXAMPLE, by what, which error, in which words
     ("pitch = ", "pitc = ", F, r"lenslets\.pitc is not a known key\. Did you mean 'lenslets\.pitch'"),
     ("wavelength =", "wave_length =", F, r"wave_length is not a known key\. Did you mean 'wavelength'"),
     ("[sensor]", "[detector]", F, r"detector is not a known key\. Known here: wavelength, "),
+    ("[sensor]", "[sensor.angular_response]\nangle = 3\n[sensor]", F, r"e\.angle is not .* 'sensor.*angles'"),
     ('pitch = "150 um"', 'pitch = "-150 um"', G, r"lenslets\.pitch: -150 um is not above zero\. Give"),
     ('pitch = "150 um"', 'pitch = "0 um"', G, r"lenslets\.pitch: 0 um is not above zero"),
     ('pitch = "150 um"', "pitch = 150", F, r"lenslets\.pitch: 150 has no unit\. Write .* '150 um'"),

@@ -51,5 +51,11 @@ def _keys(model: type[BaseModel], where: tuple[str, ...]) -> list[str]:
             current = get_args(current)[1]
             continue
         fields = {field.alias or name: field for name, field in current.model_fields.items()}
-        current = fields[part].annotation
+        current = _table(fields[part].annotation)
     return [field.alias or name for name, field in current.model_fields.items()]
+
+
+def _table(annotation: Any) -> Any:
+    """The part, or the dict of parts, that a key holds: also one that may be left out (``Angles | None``)."""
+    parts = (part for part in get_args(annotation) if part is not type(None))
+    return next(parts) if type(None) in get_args(annotation) else annotation
