@@ -120,6 +120,19 @@ def test_the_adjoint_of_a_moved_microscope_is_its_transpose(rng):
     np.testing.assert_allclose(wide.forward(inner), base.forward(moved), rtol=1e-4, atol=1e-6)
 
 
+def test_several_raw_images_of_a_microscope_are_deconvolved_wherever_the_object_was_moved(rng):
+    scope = lg.LightFieldMicroscope.from_catalogue("lfm-worm").replace(lenslets={"count": (3, 3)})
+    size = scope.lenslet_size
+    shifts = [(-size / 4, -size / 4), (0.3 * size, -0.21 * size)]
+    operator = lg.joint_operator(scope, None, 3, shifts=shifts, accuracy=1e-2)
+    for part in operator.maps:
+        wide = part.widened(0.05)[0].object_grid
+        assert wide.center == pytest.approx(operator.object_grid.center, abs=1e-12)
+    raws = operator.parted(operator.forward(rng.random(operator.shape[1]).astype(np.float32)))
+    found = lg.deconvolve([lg.RawImage(raw, 1e-5) for raw in raws], operator, 2)
+    assert found.data.shape == operator.shape[1]
+
+
 def test_the_common_grid_holds_what_each_sees_on_the_finest_samples():
     one, fine = Grid((4, 5), (2.0, 2.0)), Grid((7, 3), (1.0, 1.0), (0.25, 0.0))
     grid = common_grid([one, fine], [(0.0, 0.0), (1.0, 0.0)])

@@ -94,6 +94,7 @@ def test_fine_lines_that_pass_for_coarse_ones_are_warned_of(moved):
         (lambda raws: (raws[:1], CAMERA, None), lg.CalibrationError, "two or more"),
         (lambda raws: (raws, CAMERA, TOLD[:3]), lg.GeometryError, "3 shifts for 4"),
         (lambda raws: (raws, lg.load_camera("thesis-2f"), None), lg.GeometryError, 'kind "plenoptic"'),
+        (lambda raws: (raws, lg.load_camera("lfm-fourier"), None), lg.GeometryError, "configuration"),
         (
             lambda raws: ([lg.RawImage(raw.data, raw.pixel_pitch) for raw in raws], CAMERA, None),
             lg.CalibrationError,
@@ -126,6 +127,52 @@ def test_dark_raw_images_and_too_few_exposures_are_refused(moved):
     unlit = np.zeros(raws[0].data.shape)
     with pytest.raises(lg.CalibrationError, match="0 lenslets count"):
         lg.find_shifts(raws, CAMERA, exposure=Exposure(weights=unlit, gain=1.0))
+
+
+SCOPE = lg.LightFieldMicroscope(
+    wavelength="525 nm",
+    objective={"magnification": 20, "numerical_aperture": 0.5},
+    lenslets={"pitch": "100 um", "focal_length": "2 mm", "count": (9, 11)},
+    sensor={"pixel_pitch": "6.5 um", "full_well": 3e4, "read_noise": 2.0},
+)
+DEEP = (-20 * um, 0.0, 20 * um)
+
+
+@pytest.fixture(scope="module")
+def specimen():
+    """An operator that sees beyond the lenslets, on other samples than shifts are found with."""
+    return SCOPE.operator(DEEP, 15, accuracy=3e-3).widened(1e-3)[0]
+
+
+def scanned_volume(operator, volume, shifts):
+    """Raw images of a volume that was moved by shifts [lenslets]."""
+    rng, raws = np.random.default_rng(5), []
+    fy, fx = (np.fft.fftfreq(n, 1 / 15) for n in volume.shape[1:])
+    for y, x in shifts:
+        waves = np.fft.fft2(volume) * np.exp(-2j * np.pi * (fy[:, None] * y + fx * x))
+        light = np.maximum(operator.forward(np.fft.ifft2(waves).real.astype(np.float32)), 0)
+        raws.append(SCOPE.sensor.expose(light, photons=1000.0, rng=rng))
+    return raws
+
+
+def test_a_specimen_of_any_depth_is_found_before_a_microscope(specimen, rng):
+    drawn = gaussian_filter(rng.standard_normal(specimen.shape[1]), (0, 5, 5))
+    true = lg.scan(2, 1.0) + rng.uniform(-0.2, 0.2, (4, 2))
+    raws = scanned_volume(specimen, np.clip(0.5 + 0.15 * drawn / drawn.std(), 0, None), true)
+    found = lg.find_shifts(raws, SCOPE, lg.scan(2, SCOPE.lenslet_size))
+    off = between(found.shifts) / SCOPE.lenslet_size - between(true)
+    errors = found.errors[1:] / SCOPE.lenslet_size
+    assert (errors < 0.02).all()  # lenslets
+    assert np.sqrt(np.mean((off / errors) ** 2)) < 1.8  # told: 10 to 20
+
+
+@pytest.mark.filterwarnings("ignore:raw image")
+def test_beads_in_the_dark_are_warned_of(specimen, rng):
+    beads = np.zeros(specimen.shape[1])
+    beads[tuple(rng.integers(0, beads.shape, (60, 3)).T)] = rng.uniform(0.3, 1, 60)
+    raws = scanned_volume(specimen, gaussian_filter(beads, (0, 2, 2)), lg.scan(2, 1.0))
+    with pytest.warns(lg.SamplingWarning, match=r"bright spots \(excess kurtosis \d"):
+        lg.find_shifts(raws, SCOPE, lg.scan(2, SCOPE.lenslet_size))
 
 
 BOX = gaussian_filter(np.pad(np.ones((12, 12)), 18), 1.5)

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -14,7 +14,7 @@ from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
     from lumigraph.core.prepared import PreparedImage
-    from lumigraph.instruments import FoundShifts, Instrument, LensletCamera
+    from lumigraph.instruments import FoundShifts, Instrument
 
 MOST_STEPS = 30
 """Of a scan, along each axis."""
@@ -33,8 +33,9 @@ class Several:
         By which the object was moved: '3x3', thirds of a lenslet in the object, row after row from the least
         y and x; or a pair for each raw image, such as '0 um, 0 um; 33 um, 0 um', y first.
     find_shifts
-        Find the shifts from the raw images of a camera 1.0, whose noise is known, near those of --shifts: for
-        a flat object in focus with texture, moved by a stage that is off by some tenths of a lenslet.
+        Find the shifts from the raw images, whose noise is known, near those of --shifts: for an object with
+        texture, flat and in focus before a camera 1.0, of any depth before a microscope 1.0, moved by a stage
+        that is off by some tenths of a lenslet.
     light
         Of each raw image over the first one's, such as '1, 1, 4': exposure times. Left out, as the raw images
         of 'simulate' record it, else the same.
@@ -90,8 +91,7 @@ class Several:
         known = [Exposure.of(raw) for raw in raws]
         if self.light is not None:
             known = [replace(one, light=t) for one, t in zip(known, self.lights(), strict=True)]
-        of = cast("LensletCamera", camera)  # others are refused
-        found = find_shifts(raws, of, given, exposure=known, progress=shown)
+        found = find_shifts(raws, camera, given, exposure=known, progress=shown)
         return tuple((float(y), float(x)) for y, x in found.shifts.tolist()), found
 
     def lights(self) -> tuple[float, ...]:

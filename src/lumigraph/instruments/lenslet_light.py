@@ -1,4 +1,4 @@
-"""Light of each lenslet of a camera 1.0, and of which part of an object in focus it comes."""
+"""Light of each lenslet of a camera or microscope 1.0, and of which part of an object in focus it comes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,10 +7,12 @@ import numpy as np
 
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
+from lumigraph.core.linear import Linear
 from lumigraph.core.raw import RawImage
 from lumigraph.deconvolution import Exposure
 from lumigraph.errors import CalibrationError
 from lumigraph.instruments.lenslet_camera import LensletCamera
+from lumigraph.instruments.microscope import LightFieldMicroscope
 from lumigraph.instruments.texture import SAMPLES, Part, Textures
 
 FAINT = 0.5
@@ -25,6 +27,11 @@ NEAR = 2
 INNER = 0.4
 """Half of the part of micro-images that counts, along each axis, in pitches: towards their rims they hold
 light of neighbours, which lenslets at the array's border lack."""
+
+ACCURACY, SPILT = 1e-2, 1e-2
+"""Of images, and of a lenslet's light what is followed from beyond the microscope's lenslets."""
+
+Lensed = LensletCamera | LightFieldMicroscope
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +55,7 @@ class LensletLight:
     textures: Textures
 
     @classmethod
-    def of(cls, camera: LensletCamera) -> "LensletLight":
+    def of(cls, camera: Lensed) -> "LensletLight":
         """Of the camera's own pixels.
 
         Raises
@@ -56,12 +63,12 @@ class LensletLight:
         CalibrationError
             Fewer than 5 x 5 lenslets.
         """
-        pixels, grid = camera.calibration, _beyond(camera.operator_grid(SAMPLES))
+        pixels = camera.calibration
         if len(pixels.indices) < FEWEST:
             raise CalibrationError(
                 f"the camera has {len(pixels.indices)} lenslets, but shifts are told by {FEWEST} or more."
             )
-        operator = camera.operator_on(grid, accuracy=1e-2)
+        operator, grid = _flat(camera)
         y, x = np.meshgrid(*(np.arange(n) for n in pixels.shape), indexing="ij")
         whole = np.stack(pixels.index(y, x), -1).reshape(-1, 2)
         indices, labels = np.unique(whole, axis=0, return_inverse=True)
@@ -125,6 +132,15 @@ class LensletLight:
 
     def _sums(self, pixels: np.ndarray) -> np.ndarray:
         return np.bincount(self.labels.ravel(), (self.inner * pixels).ravel(), len(self.places))
+
+
+def _flat(camera: Lensed) -> tuple[Linear, Grid]:
+    """How it sees a flat object in focus that goes on beyond the lenslets, and the object's samples."""
+    if isinstance(camera, LensletCamera):
+        grid = _beyond(camera.operator_grid(SAMPLES))
+        return camera.operator_on(grid, accuracy=ACCURACY), grid
+    operator, _ = camera.operator(None, SAMPLES, accuracy=ACCURACY).widened(SPILT)
+    return operator, operator.object_grid
 
 
 def _beyond(grid: Grid) -> Grid:

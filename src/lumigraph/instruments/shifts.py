@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import kurtosis
 
 from lumigraph.core.brief import brief
 from lumigraph.core.progress import Progress, silent
@@ -20,9 +21,11 @@ from lumigraph.core.raw import RawImage
 from lumigraph.deconvolution import Exposure
 from lumigraph.errors import CalibrationError, GeometryError, SamplingWarning
 from lumigraph.instruments.capabilities import Decoded
+from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.joint import pairs_of
 from lumigraph.instruments.lenslet_camera import LensletCamera
-from lumigraph.instruments.lenslet_light import LensletLight
+from lumigraph.instruments.lenslet_light import Lensed, LensletLight
+from lumigraph.instruments.microscope import LightFieldMicroscope
 from lumigraph.instruments.texture import Part, Told
 
 REACH = 0.5
@@ -53,6 +56,10 @@ what is no Gaussian texture is told less. On other draws errors were then 0.70 t
 
 BRIGHTER = 0.1
 """Light of a raw image beyond that of all in the mean, above which it is warned of."""
+
+SPOTS = 4.0
+"""Excess kurtosis of lenslets' light above which it is warned of: beads of 7 to 20 were found 1.4 to 8 times
+as far off as told."""
 
 LINES = 0.9
 """Part of the texture's variance in lines of one period above which it is warned of."""
@@ -85,23 +92,24 @@ class FoundShifts:
 
 def find_shifts(
     raws: Sequence[RawImage],
-    camera: LensletCamera,
+    camera: Instrument,
     start: Sequence[Sequence[float]] | np.ndarray | None = None,
     *,
     exposure: Exposure | Sequence[Exposure] | None = None,
     progress: Progress | None = None,
 ) -> FoundShifts:
-    """By how much a flat object in focus was moved between raw images of a camera 1.0.
+    """By how much an object was moved between raw images of a camera or microscope 1.0.
 
     Works on the light of each lenslet, and takes the object for an unknown texture whose spectrum is fitted,
-    for each part of the picture apart. Any camera 1.0, of which the raw images show the pixels.
+    for each part of the picture apart. Any camera 1.0, of which the raw images show the pixels, and a flat
+    object in focus. Before a microscope 1.0 the object may be deep: light from all depths moves alike.
 
     Parameters
     ----------
     raws
         Two or more, of one object that was moved, or of a camera that was (minus the shifts).
     camera
-        That took them, of kind "plenoptic".
+        That took them, of kind "plenoptic", or a microscope of configuration "1.0".
     start
         Where the search begins (k, 2) as (y, x) [m], such as `scan`, within half a lenslet in the object
         (one standard deviation) of the truth; the first is kept. None for no shifts.
@@ -123,28 +131,41 @@ def find_shifts(
     SamplingWarning
         A shift that is not told to a tenth of a lenslet, such as that along lines; lines of one period, finer
         ones of which lenslets show as coarser ones that move otherwise; shifts that have not settled; a raw
-        image a tenth brighter or darker than the others.
+        image a tenth brighter or darker than the others; light of a few bright spots in the dark, such as
+        beads, which shifts are told by less than a texture's errors say.
 
     Examples
     --------
     >>> found = lg.find_shifts(raws, camera, lg.scan(3, camera.lenslet_size))  # doctest: +SKIP
     >>> picture = lg.deconvolve(raws, lg.joint_operator(camera, shifts=found.shifts))  # doctest: +SKIP
     """
-    if not (isinstance(camera, LensletCamera) and isinstance(camera, Decoded)):
-        raise GeometryError('shifts are found for cameras of kind "plenoptic". Give them for others.')
+    of = _gathering(camera)
     if not isinstance(raws, list | tuple) or len(raws) < 2:
         raise CalibrationError("shifts are between raw images. Give a list of two or more.")
     begun = np.array(pairs_of([(0.0, 0.0)] * len(raws) if start is None else start, len(raws)))
     known = [exposure] * len(raws) if exposure is None or isinstance(exposure, Exposure) else list(exposure)
     if len(known) != len(raws):
         raise CalibrationError(f"there are {len(known)} exposures for {len(raws)} raw images.")
-    size = camera.lenslet_size
-    whole = LensletLight.of(camera).seen(raws, known)
+    size = of.lenslet_size
+    whole = LensletLight.of(of).seen(raws, known)
     _warn_of_light(whole)
+    _warn_of_spots(whole)
     parts = _parts(whole)
     found = _judged(_fitted(parts, begun / size, progress or silent), size)
     _warn_of_lines(parts[0])
     return found
+
+
+def _gathering(camera: Instrument) -> Lensed:
+    """A camera each of whose lenslets gathers the light of one place, or the refusal of another."""
+    if isinstance(camera, LightFieldMicroscope) and camera.configuration == "1.0":
+        return camera
+    if isinstance(camera, LensletCamera) and isinstance(camera, Decoded):
+        return camera
+    raise GeometryError(
+        f'shifts are found for cameras of kind "plenoptic" and microscopes of configuration "1.0", not for '
+        f"a {camera.noun}. Give them."
+    )
 
 
 def _parts(whole: Part) -> list[Part]:
@@ -300,6 +321,17 @@ def _warn_of_light(whole: Part) -> None:
         _warn(
             f"raw image {k} is {means[k]:.3g} times as bright as all of them are in the mean: shifts may be "
             "wrong. Give its light, Exposure(light=...), or keep the object in the picture"
+        )
+
+
+def _warn_of_spots(whole: Part) -> None:
+    """Spots in the dark, which are no Gaussian texture."""
+    peaked = float(kurtosis(whole.values.ravel()))
+    if peaked > SPOTS:
+        _warn(
+            f"lenslets' light is that of some bright spots (excess kurtosis {peaked:.2g} > {SPOTS:g}): "
+            "shifts may be off by several times what is told. Use an object "
+            "with texture, or measure the shifts"
         )
 
 

@@ -1,7 +1,7 @@
 """An operator of an object that stands on another grid than its own: moved, or sampled more finely."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -83,7 +83,10 @@ class WideRegridded(Regridded):
         ]
         ny, nx = grid.shape
         larger = Grid((ny + 2 * more[0], nx + 2 * more[1]), grid.pitch, grid.center)
-        return on_grid(wide, larger), (slice(more[0], more[0] + ny), slice(more[1], more[1] + nx))
+        inside = slice(more[0], more[0] + ny), slice(more[1], more[1] + nx)
+        if (told := self.object_grid) is not None:  # where the object was before it was moved
+            told = Grid(larger.shape, told.pitch, told.center)
+        return replace(on_grid(wide, larger), object_grid=told), inside
 
 
 def on_grid(operator: Linear, grid: Grid) -> Regridded:
