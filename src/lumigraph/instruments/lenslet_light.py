@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from lumigraph.errors import CalibrationError
 from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.microscope import LightFieldMicroscope
 from lumigraph.instruments.texture import SAMPLES, Part, Textures
+from lumigraph.operators.microscope_operator import MicroscopeOperator
 
 FAINT = 0.5
 """Light of a lenslet, over the median's, below which it does not count."""
@@ -139,7 +141,8 @@ def _flat(camera: Lensed) -> tuple[Linear, Grid]:
     if isinstance(camera, LensletCamera):
         grid = _beyond(camera.operator_grid(SAMPLES))
         return camera.operator_on(grid, accuracy=ACCURACY), grid
-    operator, _ = camera.operator(None, SAMPLES, accuracy=ACCURACY).widened(SPILT)
+    own = cast(MicroscopeOperator, camera.operator(None, SAMPLES, accuracy=ACCURACY))
+    operator, _ = own.widened(SPILT)
     return operator, operator.object_grid
 
 
