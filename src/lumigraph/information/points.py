@@ -82,7 +82,8 @@ def source(instrument: Instrument, depths: np.ndarray, accuracy: float) -> Sourc
     if isinstance(instrument, Camera):
         for dz in depths:
             instrument.defocused(float(dz))
-        return CameraSource(_small(instrument, depths), accuracy, depths)
+        cut = small(instrument, depths) if isinstance(instrument, LensletCamera) else instrument
+        return CameraSource(cut, accuracy, depths)
     raise GeometryError(f"{type(instrument).__name__} has no images of points.")
 
 
@@ -158,13 +159,13 @@ class CameraSource:
             found, _ = single_lens.points_image(optics, points)
         else:
             found = points_image(optics, points, self.accuracy, self._relays)
-        return self._part(place) * np.asarray(found, np.float64)
+        return self.part(float(place[2])) * np.asarray(found, np.float64)
 
     def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
         """As `Source.lit`."""
         if has_changes(self._optics):
             found = place_changes(self._optics, place, self.accuracy, self._relays)
-            return self._part(place) * found.astype(np.float64), np.zeros(3)
+            return self.part(float(place[2])) * found.astype(np.float64), np.zeros(3)
         ratio = (self.camera.object_distance + place[2]) / self.camera.pupil_diameter
         across, along = ACROSS * self.camera.wavelength * ratio, ALONG * self.camera.wavelength * ratio**2
         return differences(self.image, place, np.array([across, across, along]), checked)
@@ -179,10 +180,10 @@ class CameraSource:
         distances = (optics.object_distance + self.depths).tolist()
         return Relays(max(distances, key=lambda z: cells.blur(optics, z)))
 
-    def _part(self, place: np.ndarray) -> float:
+    def part(self, dz: float) -> float:
         """Of the light through the main lens, in an image of 1: a sample of the object has more nearer by."""
         optics = self._optics
-        step = optics.object_pitch * optics.separation / (optics.object_distance + float(place[2]))
+        step = optics.object_pitch * optics.separation / (optics.object_distance + dz)
         return (optics.sensor.pixel_pitch / step) ** 2
 
 
@@ -193,10 +194,18 @@ def _cell(lattice: Lattice) -> np.ndarray:
     return cell
 
 
-def _small(camera: Camera, depths: np.ndarray) -> Camera:
-    """With only as many lenslets as light of these depths reaches, and some more."""
-    if not isinstance(camera, LensletCamera):
-        return camera
+def small(camera: LensletCamera, depths: np.ndarray, like: LensletCamera | None = None) -> LensletCamera:
+    """With only as many lenslets as light of these depths reaches, and some more; or as `like` another."""
+    if like is None:
+        shape, count = None, _reached(camera, depths)
+    else:
+        shape, count = like.sensor.shape, like.lenslets.count
+    return camera.replace(
+        lenslets={"count": count}, sensor={"shape": shape}, main_lens={"diameter": camera.pupil_diameter}
+    )
+
+
+def _reached(camera: LensletCamera, depths: np.ndarray) -> tuple[int, ...]:
     diameter, farthest = camera.pupil_diameter, 0.0
     for dz in depths:
         focus = 1 / camera.main_lens.focal_length - 1 / camera.defocused(float(dz))
@@ -205,8 +214,7 @@ def _small(camera: Camera, depths: np.ndarray) -> Camera:
         farthest = max(farthest, blur + 2 * waves * camera.wavelength * camera.separation / diameter)
     pitch = camera.lenslets.pitch * (3 if camera.lattice.kinds > 1 else 1)  # points move by a cell
     wanted = math.ceil((farthest + pitch) / camera.lenslets.row_pitch) + 2 * SPARE
-    count = tuple(min(n, wanted + (n - wanted) % 2) for n in camera.lenslets.count)
-    return camera.replace(lenslets={"count": count}, sensor={"shape": None}, main_lens={"diameter": diameter})
+    return tuple(min(n, wanted + (n - wanted) % 2) for n in camera.lenslets.count)
 
 
 def _of_microscope(scope: LightFieldMicroscope, depths: np.ndarray, accuracy: float) -> Source:

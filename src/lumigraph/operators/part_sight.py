@@ -17,7 +17,7 @@ from lumigraph.operators.lines import Lines
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.passed import Parted
 from lumigraph.operators.point_changes import PUPIL
-from lumigraph.operators.point_light import Sampled
+from lumigraph.operators.point_light import Sampled, by_distance
 from lumigraph.operators.points import SPARE, farthest, lit_cells, on_lenslets, share
 from lumigraph.operators.relay import Straight
 from lumigraph.operators.tiles import readout
@@ -32,8 +32,9 @@ Turn = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """A point's place (y, x, dz), its light, the cells that it lights, and their samples."""
+    """A point's number, its place (y, x, dz), its light, the cells that it lights, and their samples."""
 
+    number: int
     position: np.ndarray
     intensity: float
     cells: tuple[range, range]
@@ -43,6 +44,11 @@ class Spot:
     def dz(self) -> float:
         """[m]."""
         return float(self.position[2])
+
+    def before(self, points: Points) -> "Spot":
+        """Where it is among others, in the same cells."""
+        k = self.number
+        return replace(self, position=points.positions[k], intensity=float(points.intensities[k]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,14 +127,14 @@ class Sight:
         """Of each point, by depth."""
         found = []
         for k in np.argsort(points.positions[:, 2], kind="stable"):
-            position, intensity = points.positions[k], points.intensities[k]
+            position, intensity = points.positions[k], float(points.intensities[k])
             optics = self._at(float(position[2]))
             cells = lit_cells(optics, self._light(optics), self._place(optics, position))
             y, x = (
-                slice(mine.start * k, mine.stop * k)
-                for mine, k in zip(cells, optics.cells.samples, strict=True)
+                slice(mine.start * n, mine.stop * n)
+                for mine, n in zip(cells, optics.cells.samples, strict=True)
             )
-            found.append(Spot(position, float(intensity), cells, (y, x)))
+            found.append(Spot(int(k), position, intensity, cells, (y, x)))
         return found
 
     def turns(self, spot: Spot) -> tuple[Turn, Turn]:
@@ -138,6 +144,23 @@ class Sight:
         grid, place = self._light(optics).grid, self._place(optics, spot.position)
         y, x = self.lenslets.places(*spot.cells)
         return (turn * (y - place[0]), grid.y), (turn * (x - place[1]), grid.x)
+
+    def moves(self, spot: Spot) -> list[Turn]:
+        """Phases in the main lens as a point moves by y, x and dz, each one along y and one along x [rad/m].
+
+        How much light a sample of the object stands for, by its depth, stays as it is.
+        """
+        optics = self._at(spot.dz)
+        turn = 2 * np.pi / (optics.camera.wavelength * optics.camera.separation)
+        grid, place = self._light(optics).grid, self._place(optics, spot.position)
+        (y, x), found = (grid.y, grid.x), []
+        for move in np.eye(2):
+            down, across = turn * self._place(optics, move)
+            found.append((down * y, across * x))
+        nearer = -turn * place / optics.distance  # a deeper point's image is nearer to the axis
+        bent = (by_distance(optics.camera, optics.distance, nodes) for nodes in (y, x))
+        down, across = (n * nodes + more for n, nodes, more in zip(nearer, (y, x), bent, strict=True))
+        return [*found, (down, across)]
 
     @cached_property
     def _pupils(self) -> dict[float, np.ndarray]:

@@ -13,9 +13,9 @@ from lumigraph.core.result import Quantity
 from lumigraph.errors import FormatError, GeometryError, SamplingWarning
 from lumigraph.information import Bounds, Light, bounds
 from lumigraph.information.bounds import checked_depths, checked_places
+from lumigraph.information.followed import require_followed
 from lumigraph.information.points import collected
-from lumigraph.information.slopes import Bound, require_slopes, slopes
-from lumigraph.instruments import LightFieldMicroscope
+from lumigraph.information.slopes import Bound, slopes
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.metric.charts import check_camera
 
@@ -166,7 +166,7 @@ class Goal:
         """Changes (n,) of a bound from the first to the last of each pair of cameras around one."""
         light = self._light(instrument, first)
         return slopes(
-            cast(LightFieldMicroscope, instrument),
+            instrument,
             pairs,
             self.depths,
             light,
@@ -186,7 +186,7 @@ class Goal:
             raise GeometryError(
                 f"search 'gradient' is for {', '.join(BOUNDS)}, not {self.name!r}. Use 'local'."
             )
-        require_slopes(instrument)
+        require_followed(instrument)
 
     def checked(self, instrument: Instrument, first: float, rough: Mapping[str, Any]) -> Judged:
         """A bound at other places, by derivatives of two steps, and half-way between the depths.

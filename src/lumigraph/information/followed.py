@@ -1,0 +1,198 @@
+"""Images of points that are followed back to what differs between pairs of instruments a little apart."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Protocol, cast
+
+import numpy as np
+
+from lumigraph.errors import GeometryError
+from lumigraph.information.points import CameraSource, collected, small, source, spread
+from lumigraph.instruments import LensletCamera, LightFieldMicroscope
+from lumigraph.instruments.capabilities import WithObjective
+from lumigraph.instruments.instrument import Instrument
+from lumigraph.operators.fourier_changes import Behind, Pupil, Slopes, pupils
+from lumigraph.operators.fourier_microscope import Window, lit_ones, overlap
+from lumigraph.operators.part_points import PartPoints
+from lumigraph.scene import Points
+
+Pair = tuple[Instrument, Instrument]
+"""Instruments a little to either side."""
+
+Back = Callable[[np.ndarray], None]
+"""Takes slopes (4, ny, nx) by parts of a point's light and their derivatives."""
+
+
+class Followed(Protocol):
+    """Images of some points, one after the other."""
+
+    @property
+    def depths(self) -> Sequence[float]:
+        """Of each point [m]."""
+        ...
+
+    def lit(self, number: int) -> tuple[np.ndarray, Back]:
+        """As `Source.lit` (4, ny, nx), of a point; and the way back from there."""
+        ...
+
+    def along(self) -> np.ndarray:
+        """(n,), what the sum of all that went back changes by from the first to the last of each pair."""
+        ...
+
+
+def require_followed(instrument: Instrument) -> None:
+    """Refuse an instrument whose images of points are not followed back to its parts.
+
+    Raises
+    ------
+    GeometryError
+        A microscope other than a Fourier one, a camera without lenslets, or one without `part_images`.
+    """
+    if isinstance(instrument, LensletCamera):
+        instrument.part_images([])
+    elif not (isinstance(instrument, WithObjective) and instrument.in_pupil):
+        raise GeometryError(
+            "derivatives of bounds by an instrument's parts are of Fourier microscopes and of cameras with "
+            "lenslets. For others, use search 'local'."
+        )
+
+
+def followed(
+    instrument: Instrument, pairs: Sequence[Pair], depths: np.ndarray, numbers: range, accuracy: float
+) -> Iterator[Followed]:
+    """Of points at some places of each depth, as `bounds` takes them: parts of a cell, which may differ.
+
+    They shine alike before all, who collect as much of it as their apertures do.
+
+    Raises
+    ------
+    GeometryError
+        Another instrument, or pairs between which more differs than what images change with by little.
+    """
+    require_followed(instrument)
+    for one in (end for pair in pairs for end in pair):
+        require_followed(one)
+        _require_alike(instrument, one)
+    if isinstance(instrument, LensletCamera):
+        yield before_camera(instrument, cast(Sequence[Cameras], pairs), (depths, numbers), accuracy)
+        return
+    scope, scopes = cast(LightFieldMicroscope, instrument), cast(Sequence[Scopes], pairs)
+    for far in np.unique(np.abs(depths)):  # windows are as wide as in `bounds`
+        yield BeforeMicroscope(scope, scopes, depths[np.abs(depths) == far], numbers)
+
+
+OPTICAL = ("pixel_pitch", "shape"), ("pixel_pitch", "shape", "fill_factor", "angular_response")
+"""What of sensors images follow from, not their noise: of microscopes and of cameras."""
+
+
+def _require_alike(instrument: Instrument, other: Instrument) -> None:
+    own, names = instrument.sensor, OPTICAL[isinstance(instrument, LensletCamera)]
+    same = replace(other.sensor, **{name: getattr(own, name) for name in names})
+    counts = [cast(LensletCamera, one).lenslets.count for one in (instrument, other)]
+    if type(instrument) is not type(other) or same != own or counts[0] != counts[1]:
+        raise GeometryError(
+            "derivatives of bounds are by optics and by the pixels' pitch; two instruments have other "
+            "numbers of lenslets, or other sensors. Use search 'local' for these."
+        )
+
+
+Cameras = tuple[LensletCamera, LensletCamera]
+
+
+def before_camera(
+    camera: LensletCamera, pairs: Sequence[Cameras], where: tuple[np.ndarray, range], accuracy: float
+) -> "BeforeCamera":
+    """Of a camera with lenslets, cut to those that are lit; at depths, and numbers of places in a cell."""
+    depths, own = np.sort(where[0]), small(camera, where[0])
+    cut = [tuple(small(end, where[0], like=own) for end in pair) for pair in pairs]
+    images = own.part_images(cast(Sequence[Cameras], cut), accuracy=accuracy)
+
+    def points(end: LensletCamera, whole: LensletCamera) -> Points:
+        seen, share = CameraSource(end, accuracy), collected(whole) / collected(camera)
+        places = [
+            [*place, dz] for dz in depths.tolist() for place in spread(seen.cell(dz), where[1]).tolist()
+        ]
+        return Points(np.array(places), np.array([share * seen.part(dz) for *_, dz in places]))
+
+    ends = [
+        (points(low, pair[0]), points(high, pair[1])) for (low, high), pair in zip(cut, pairs, strict=True)
+    ]
+    return BeforeCamera(images, points(own, camera), ends)
+
+
+class BeforeCamera(PartPoints):
+    """`Followed` before a camera with lenslets."""
+
+    @property
+    def depths(self) -> Sequence[float]:
+        """As `Followed.depths`."""
+        return self.points.positions[:, 2].tolist()
+
+
+Scopes = tuple[LightFieldMicroscope, LightFieldMicroscope]
+
+
+class BeforeMicroscope:
+    """`Followed` before a Fourier microscope.
+
+    Parameters
+    ----------
+    scope, pairs
+        And others a little to either side.
+    depths
+        All as far from focus [m].
+    numbers
+        Of places in a cell, at each depth.
+    """
+
+    def __init__(
+        self, scope: LightFieldMicroscope, pairs: Sequence[Scopes], depths: np.ndarray, numbers: range
+    ) -> None:
+        self._scope, self._pairs, self._planes = scope, pairs, depths
+        points, cell = scope.fourier_points(), source(scope, depths, 1e-2).cell
+        self._lit = lit_ones(points.objectives[0], points.mosaic)
+        self._own = pupils(points, depths, self._lit)
+        self._by = [Slopes.none(one) for one in self._own]
+        self._places = [
+            (k, place) for k, dz in enumerate(depths.tolist()) for place in spread(cell(dz), numbers)
+        ]
+
+    @property
+    def depths(self) -> Sequence[float]:
+        """As `Followed.depths`."""
+        return [float(self._planes[k]) for k, _ in self._places]
+
+    def lit(self, number: int) -> tuple[np.ndarray, Back]:
+        """As `Followed.lit`."""
+        behind = [Behind.of(one, *self._places[number]) for one in self._own]
+        windows = [_window(one, self._scope.sensor.shape) for one in behind]
+        seen = np.zeros((4, *self._scope.sensor.shape))
+        for one, (raw, inside) in zip(behind, windows, strict=True):
+            seen[(slice(None), *raw)] += one.lit()[(slice(None), *inside)]
+        return seen, partial(self._back, behind, windows)
+
+    def _back(self, behind: list[Behind], windows: list[tuple[Window, Window]], by: np.ndarray) -> None:
+        for k, (one, (raw, inside)) in enumerate(zip(behind, windows, strict=True)):
+            size = 2 * one.pupil.half + 1
+            given = np.zeros((4, size, size))
+            given[(slice(None), *inside)] = by[(slice(None), *raw)]
+            self._by[k] = one.back(given, self._by[k])
+
+    def along(self) -> np.ndarray:
+        """As `Followed.along`."""
+        return np.array([self._between(pair) for pair in self._pairs])
+
+    def _between(self, pair: Scopes) -> float:
+        ends = [self._pupils(one) for one in pair]
+        return sum(one.along(low, high) for one, low, high in zip(self._by, *ends, strict=True))
+
+    def _pupils(self, scope: LightFieldMicroscope) -> list[Pupil]:
+        share = collected(scope) / collected(self._scope)
+        return pupils(scope.fourier_points(), self._planes, self._lit, share, self._own)
+
+
+def _window(one: Behind, shape: tuple[int, int]) -> tuple[Window, Window]:
+    corner = one.nearest - one.pupil.half + np.array(shape) // 2
+    size = 2 * one.pupil.half + 1
+    return overlap(corner.tolist(), (size, size), shape)

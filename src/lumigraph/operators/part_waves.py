@@ -1,0 +1,168 @@
+"""A point's light on its way through a camera with lenslets: how it changes, and the way back."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from lumigraph.operators.line_parts import Key
+from lumigraph.operators.part_sight import Sight, Spot, Turn
+from lumigraph.operators.passed import Passed, passed
+from lumigraph.operators.passed import Slopes as ByPieces
+from lumigraph.scene import Points
+
+Both = tuple[Sight, Sight]
+"""Of a pair."""
+
+Where = tuple[Points, Points]
+"""Where points are before both, and how bright."""
+
+Phases = Callable[[Sight, Spot], Sequence[Turn]]
+"""Phases of a point's light, each the product or the sum of two parts."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Waves:
+    """A point's light on its way.
+
+    Parameters
+    ----------
+    spot
+        The point's.
+    turns, phases
+        Along both axes, and the factors (places, nodes) of these.
+    pupil, right
+        Wave in the main lens (nodes, nodes), and from there along x: (nodes, places).
+    passed
+        Past the lenslets.
+    """
+
+    spot: Spot
+    turns: tuple[Turn, Turn]
+    phases: tuple[np.ndarray, ...]
+    pupil: np.ndarray
+    right: np.ndarray
+    passed: Passed
+
+    @classmethod
+    def of(cls, own: Sight, spot: Spot, change: Turn | None = None) -> "Waves":
+        """Those of a camera, or how they change with the wave's phase in the main lens (y, x) [rad]."""
+        turns, pupil = own.turns(spot), own.pupil(spot.dz)
+        if change is not None:
+            pupil = factor(change) * pupil
+        y, x = phases = tuple(np.exp(1j * np.outer(*turn)) for turn in turns)
+        right = pupil @ x.T
+        return cls(spot, turns, phases, pupil, right, passed(own.lenslets, y @ right, *spot.cells))
+
+    @property
+    def field(self) -> np.ndarray:
+        """On the samples (y, x)."""
+        return self.passed.field
+
+    def changed(self, by: "Change") -> np.ndarray:
+        """Change of the field with the camera."""
+        moved = []
+        for k, turn in enumerate(self.turns):
+            places, nodes = (by.sum(lambda one, k=k, j=j: one.turns(self.spot)[k][j]) for j in (0, 1))
+            moved.append(1j * (np.outer(places, turn[1]) + np.outer(turn[0], nodes)) * self.phases[k])
+        y, x = self.phases
+        light = moved[0] @ self.right + y @ (by.pupil(self.spot.dz) @ x.T + self.pupil @ moved[1].T)
+        return self.passed.changed(light, by.pieces.__getitem__)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Change:
+    """Of a camera: so many times from the first to the last of each pair.
+
+    Parameters
+    ----------
+    pairs
+        Times, and cameras.
+    pieces
+        Change of the lenslets' matrices.
+    """
+
+    pairs: tuple[tuple[float, Both], ...]
+    pieces: dict[Key, np.ndarray]
+    _pupils: dict[float, np.ndarray] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, own: Sight, pairs: Iterable[tuple[float, Both]], spots: Sequence[Spot]) -> "Change":
+        """For some points."""
+        lit = {key for spot in spots for key in own.lenslets.keys(*spot.cells)}
+        known, pieces = [], {key: np.zeros_like(own.lenslets.piece(key)) for key in lit}
+        for weight, both in pairs:
+            first, last = (one.lenslets for one in both)
+            for key in lit if first is not last else ():
+                pieces[key] += weight * (last.piece(key) - first.piece(key))
+            known.append((weight, (both[0].anew, both[1].anew)))
+        return cls(tuple(known), pieces)
+
+    def sum(self, of: Callable[[Sight], np.ndarray]) -> Any:
+        """Change of what is made of a camera."""
+        return sum(weight * (of(last) - of(first)) for weight, (first, last) in self.pairs)
+
+    def pupil(self, dz: float) -> np.ndarray:
+        """Of the wave in the main lens."""
+        if dz not in self._pupils:
+            self._pupils.clear()
+            self._pupils[dz] = self.sum(lambda one: one.anew.pupil(dz))
+        return self._pupils[dz]
+
+
+@dataclass(slots=True, eq=False)
+class Slopes:
+    """What a number made of images changes by as what cameras do to points (halved)."""
+
+    _pieces: ByPieces = field(default_factory=ByPieces)
+    _of: list[tuple[Phases, Spot, list[Turn]]] = field(default_factory=list)
+
+    def add(self, waves: Waves, by: np.ndarray) -> np.ndarray:
+        """Those by a point's field (y, x); returned, those by the wave in the main lens (nodes, nodes)."""
+        y, x = waves.phases
+        light = waves.passed.back(by, self._pieces)
+        above = y.T @ light
+        ways = light @ waves.right.T, above.T @ waves.pupil
+        self._of.append((Sight.turns, waves.spot, [self._turn(waves, k, way) for k, way in enumerate(ways)]))
+        return above @ x
+
+    def add_moves(self, spot: Spot, by: list[Turn]) -> None:
+        """Those by a point's `Sight.moves`."""
+        self._of.append((Sight.moves, spot, by))
+
+    @staticmethod
+    def _turn(waves: Waves, which: int, by: np.ndarray) -> Turn:
+        """By places and nodes along an axis, of those by the phases' factors."""
+        by, (places, nodes) = by * 1j * waves.phases[which], waves.turns[which]
+        return np.real(by @ nodes), np.real(places @ by)
+
+    def along(self, first: Sight, last: Sight, where: Where | None = None) -> float:
+        """From one camera to another close by, before which points are elsewhere."""
+        found, both = 0.0, (first, last)
+        if first.lenslets is not last.lenslets:
+            for key, by in self._pieces.of.items():
+                found += times(by, *(one.lenslets.piece(key) for one in both))
+        for of, spot, slopes in self._of:
+            spots = (spot, spot) if where is None else (spot.before(points) for points in where)
+            for by, *ends in zip(slopes, *map(of, both, spots), strict=True):
+                found += sum(times(*pieces) for pieces in zip(by, *ends, strict=True))
+        return found
+
+
+def factor(change: Turn) -> np.ndarray:
+    """By which a wave changes with a phase that is a sum of one along y and one along x [rad]."""
+    return 1j * (change[0][:, None] + change[1])
+
+
+def read_anew(both: Both, light: np.ndarray, weights: np.ndarray) -> float:
+    """What weighed pixels change by as what they take of the samples' light does."""
+    first, last = both
+    if first.read is last.read:
+        return 0.0
+    return times(weights, *(one.read.forward(light) for one in both))
+
+
+def times(by: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
+    """What a change from low to high comes to."""
+    return 0.0 if low is high else float(np.sum(by * (high - low)).real)
