@@ -398,12 +398,12 @@ def test_gradients_stay_within_ranges_and_around_what_cannot_be():
 @pytest.mark.parametrize(
     ("camera", "words", "match"),
     [
-        (CAMERA, {}, "are of Fourier microscopes"),
+        ("thesis-2f", {}, "are of Fourier microscopes and of cameras with lenslets"),
         (SCOPE, {"goal": "largest light caught"}, "search 'gradient' is for depth, lateral, brightness"),
         (SCOPE, {"against": "lateral"}, "search 'gradient' is for one goal"),
     ],
 )
 def test_what_has_no_gradients_is_refused(camera, words, match):
-    vary = VARY if camera == SCOPE else {"lenslets.magnification": "0.3:0.6:3"}
+    vary = VARY if camera == SCOPE else {"main_lens.diameter": "3 mm:6 mm:3"}
     with pytest.raises(GeometryError, match=match):
         lg.optimise(camera, vary, depths=DEPTHS, search="gradient", **words)

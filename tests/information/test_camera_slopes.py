@@ -1,0 +1,118 @@
+"""Derivatives of bounds by the parts of cameras with lenslets, beside central differences of bounds."""
+
+import json
+
+import pytest
+
+import lumigraph as lg
+from lumigraph.cli import main
+from lumigraph.errors import GeometryError
+from lumigraph.information import Light, bounds, slopes
+from lumigraph.information.points import collected
+from lumigraph.units import mm, nm, um
+
+DEPTHS, LIGHT = (3 * mm, -4 * mm), Light(20_000, 0.2)
+TWO = {
+    "object_distance": 120 * mm,
+    "wavelength": 633 * nm,
+    "main_lens": {"focal_length": 60 * mm, "diameter": 2.5 * mm, "aberrations": {4: 0.1, 6: 0.3}},
+    "lenslets": {
+        "pitch": 0.2 * mm, "focal_length": 5.2 * mm, "count": (9, 9), "magnification": 0.5,
+        "fill_factor": 0.95,
+    },
+    "sensor": {"pixel_pitch": 6 * um, "fill_factor": 0.9},
+}  # fmt: skip
+FREE = TWO | {"built": {"separation": 121 * mm, "lenslet_distance": 8 * mm}}
+TURNED = TWO | {"lenslets": TWO["lenslets"] | {"rotation": 0.03}}
+HEX = TWO | {
+    "lenslets": {
+        "pitch": 0.2 * mm, "focal_length": (5.2 * mm, 5.0 * mm, 5.4 * mm), "count": (8, 7),
+        "magnification": 0.5, "layout": "hex",
+    },
+}  # fmt: skip
+ONE = {
+    "object_distance": 240 * mm,
+    "wavelength": 633 * nm,
+    "main_lens": {"focal_length": 120 * mm},
+    "lenslets": {"pitch": 0.3 * mm, "focal_length": 12 * mm, "count": (9, 9)},
+    "sensor": {"pixel_pitch": 20 * um},
+}
+"""Whose main lens is matched to the lenslets, and so the light to their pitch."""
+KEYS = (
+    "object_distance", "wavelength", "main_lens.focal_length", "main_lens.diameter",
+    "main_lens.aberrations.6", "lenslets.pitch", "lenslets.focal_length", "lenslets.magnification",
+    "lenslets.fill_factor", "sensor.pixel_pitch", "sensor.fill_factor",
+)  # fmt: skip
+
+
+def camera(given):
+    of = lg.PlenopticCamera if given is ONE or "magnification" not in given["lenslets"] else None
+    return (of or lg.FocusedPlenopticCamera)(**given)
+
+
+def moved(given, key, by):
+    """The description with one number that is so much larger, relative."""
+    first, _, rest = key.partition(".")
+    first = int(first) if first.isdigit() else first
+    if isinstance(given, tuple):
+        return (*given[:first], given[first] * (1 + by), *given[first + 1 :])
+    return given | {first: moved(given[first], rest, by) if rest else given[first] * (1 + by)}
+
+
+def ends(given, key, step):
+    return camera(moved(given, key, -step)), camera(moved(given, key, step))
+
+
+@pytest.mark.parametrize(
+    ("given", "keys", "name"),
+    [
+        (TWO, KEYS, "depth"),
+        (FREE, ("built.lenslet_distance",), "lateral"),
+        (HEX, ("lenslets.pitch", "lenslets.focal_length.1"), "lateral"),
+        (ONE, ("lenslets.pitch", "object_distance"), "brightness"),
+    ],
+    ids=["squares", "built", "hexagons of three kinds", "1.0"],
+)
+def test_slopes_are_central_differences_of_bounds(given, keys, name):
+    """Of cameras twice as far to either side, each sampled as it asks for, in double precision."""
+    step, one, depths = 1e-6, camera(given), DEPTHS if given is ONE else DEPTHS[:1]
+    found = slopes(one, [ends(given, key, step) for key in keys], depths, LIGHT, name=name, places=1)
+
+    def bound(end):
+        light = Light(LIGHT.photons * collected(end) / collected(one), LIGHT.background)
+        return slopes(end, [], depths, light, name=name, places=1).bound
+
+    for key, change in zip(keys, found.changes, strict=True):
+        low, high = map(bound, ends(given, key, 2 * step))
+        assert 2 * change == pytest.approx(high - low, rel=1e-4), key
+
+
+@pytest.mark.parametrize("given", [TURNED, HEX, ONE], ids=["turned squares", "hexagons", "1.0"])
+def test_the_bound_is_that_of_bounds(given):
+    """Which are of single precision; behind a plain lens of a sharp stop, which is sampled here."""
+    known = bounds(camera(given), DEPTHS, LIGHT, places=range(1, 2))
+    found = slopes(camera(given), [], DEPTHS, LIGHT, places=range(1, 2)).bound
+    assert found == pytest.approx(known.depth, rel=2e-3 if given is ONE else 1e-6)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"sensor": {"read_noise": 1.0}}, {"sensor": {"full_well": 5e3}}, {"lenslets": {"count": (9, 8)}}],
+)
+def test_what_has_no_derivatives_is_refused(change):
+    with pytest.raises(GeometryError, match="Use search 'local' for these"):
+        slopes(camera(TWO), [(camera(TWO), camera(TWO).replace(**change))], DEPTHS, LIGHT)
+    with pytest.raises(GeometryError, match="model = 'paraxial'"):
+        slopes(camera(TWO).replace(model="exact"), [], DEPTHS, LIGHT)
+
+
+def test_the_command_goes_downhill_along_them(tmp_path, capsys):
+    """Two keys, five cameras: to a wider stop, which gathers more light and tells depths better."""
+    file, best = tmp_path / "camera.toml", tmp_path / "best.toml"
+    file.write_text(camera(TWO).to_toml())
+    words = ["--vary", "main_lens.aberrations.6=0:1:1", "--vary", "main_lens.diameter=2 mm:3 mm:1"]
+    words += ["--depths", "-4 mm, 3 mm", "--places", "1", "--search", "gradient", "--evaluations", "3"]
+    assert main(["optimise", str(file), *words, "-o", str(best), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["best"]["depth"] < 0.95 * told["start"]["depth"]
+    assert lg.load_camera(best).pupil_diameter > 2.6 * mm
