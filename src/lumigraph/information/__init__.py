@@ -1,7 +1,8 @@
 """What a raw image tells of points of light: Fisher information, and the least errors of any estimate.
 
 - `bounds`: `bounds`, errors of place, depth and light over a volume; `Bounds`, the result
-- `slopes`: `slopes`, how a bound changes with the parts of a Fourier microscope
+- `slopes`: `slopes`, how a bound changes with the parts of an instrument; `followed`, images of points that
+  are followed back to these
 - `points`: images of points and their derivatives by place, of any instrument
 - `noise`: information of a pixel with photon and read noise
 - `trials`: `trials`, errors of the most likely places in drawn noise, to set beside the bounds

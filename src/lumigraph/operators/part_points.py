@@ -51,11 +51,12 @@ class PartPoints:
         As of `place_changes`: how much light a sample stands for, by its depth, is not differentiated.
         """
         own, spot = self._own, self._spots[number]
-        waves = [Waves.of(own, spot), *(Waves.of(own, spot, move) for move in own.moves(spot))]
+        still = Waves.of(own, spot)
+        waves = [still, *(still.turned(own, move) for move in own.moves(spot))]
         light = np.zeros((4, *own.shape))
         for k, one in enumerate(waves):
-            both = waves[0].field.conj() * one.field
-            light[(k, *spot.window)] = spot.intensity * (2 if k else 1) * both.real
+            both = np.real(still.field.conj() * one.field)
+            light[(k, *spot.window)] = spot.intensity * (2 if k else 1) * both
         pixels = np.stack([own.read.forward(one) for one in light])
         return pixels, partial(self._back, spot, waves, light, pixels)
 
@@ -75,7 +76,7 @@ class PartPoints:
     ) -> None:
         seen = [spot.intensity * self._own.read.adjoint(one)[spot.window] for one in given]
         fields = [one.field.conj() for one in waves]
-        by_own = self._slopes.add(waves[0], sum(s * u for s, u in zip(seen, fields, strict=True)))
+        by_own = self._slopes.add(waves[0], np.multiply(seen, fields).sum(0))
         moves = []
         for one, part, move in zip(waves[1:], seen[1:], self._own.moves(spot), strict=True):
             by = self._slopes.add(one, part * fields[0])

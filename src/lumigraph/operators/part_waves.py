@@ -46,14 +46,21 @@ class Waves:
     passed: Passed
 
     @classmethod
-    def of(cls, own: Sight, spot: Spot, change: Turn | None = None) -> "Waves":
-        """Those of a camera, or how they change with the wave's phase in the main lens (y, x) [rad]."""
-        turns, pupil = own.turns(spot), own.pupil(spot.dz)
-        if change is not None:
-            pupil = factor(change) * pupil
-        y, x = phases = tuple(np.exp(1j * np.outer(*turn)) for turn in turns)
+    def of(cls, own: Sight, spot: Spot) -> "Waves":
+        """Of a point before a camera."""
+        turns = own.turns(spot)
+        phases = tuple(np.exp(1j * np.outer(*turn)) for turn in turns)
+        return cls._of(own, spot, (turns, phases), own.pupil(spot.dz))
+
+    def turned(self, own: Sight, phase: Turn) -> "Waves":
+        """How they change with a phase in the main lens, a sum of one along y and one along x [rad]."""
+        return self._of(own, self.spot, (self.turns, self.phases), factor(phase) * self.pupil)
+
+    @classmethod
+    def _of(cls, own: Sight, spot: Spot, ways: Any, pupil: np.ndarray) -> "Waves":
+        turns, (y, x) = ways
         right = pupil @ x.T
-        return cls(spot, turns, phases, pupil, right, passed(own.lenslets, y @ right, *spot.cells))
+        return cls(spot, turns, (y, x), pupil, right, passed(own.lenslets, y @ right, *spot.cells))
 
     @property
     def field(self) -> np.ndarray:

@@ -180,7 +180,7 @@ class Goal:
         Raises
         ------
         GeometryError
-            No bound, or no Fourier microscope.
+            No bound, or an instrument without `slopes`.
         """
         if self.name not in BOUNDS:
             raise GeometryError(

@@ -111,9 +111,10 @@ def optimise(
 
     All combinations of the first values are computed. From the best of them a simplex goes downhill
     ("local"), and from the camera as given where it lies within the ranges; or a population by differential
-    evolution looks over all of the ranges ("global"). Bounds of Fourier microscopes have gradients
-    ("gradient"): each step takes the time of some five cameras, however many keys vary, such as the places
-    of single lenslets. Values of a stock stay as the combination has them.
+    evolution looks over all of the ranges ("global"). Bounds of Fourier microscopes and of
+    paraxial cameras with lenslets have gradients ("gradient"): each step takes the time of some five
+    cameras, however many keys vary, such as the places of single lenslets. Values of a stock stay as
+    the combination has them.
     What no camera can be is left out, with its reason. Bounds are judged at other places than those of the
     search, for where pixels are coarse a search finds the places' luck, and half-way between its depths,
     for lenslets may be sharp at these alone.
@@ -153,7 +154,7 @@ def optimise(
         An unknown key or number, a range that does not go up, an output of another search.
     GeometryError
         A goal that the instrument has not, or none of the first values gives a camera. Gradients of another
-        instrument or goal than bounds of a Fourier microscope, by its sensor, or with a second goal.
+        instrument or goal than bounds of those, by its sensor, or with a second goal.
 
     Warns
     -----
