@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
@@ -10,11 +11,13 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import line, progress
 from lumigraph.cli.deconvolve_options import depths as planes_of
-from lumigraph.cli.options import Output
+from lumigraph.cli.options import Output, length
 from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.core.result import Figure, Result
+from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
+    from lumigraph.information import Scenes
     from lumigraph.instruments import Instrument
     from lumigraph.optimisation import Goal, Optimum
 
@@ -30,7 +33,9 @@ class Aim:
     Parameters
     ----------
     goal
-        depth, lateral or brightness: bounds of a point's errors over --depths. Or 'largest' or 'least' and a
+        depth, lateral or brightness: bounds of a point's errors over --depths. picture error: what the best
+        linear reconstruction of scenes leaves, at each of --depths; volume error: the same with scenes at all
+        depths at once. Or 'largest' or 'least' and a
         number's name: light caught, one that 'lumigraph design' prints, or a simulated one of 'lumigraph
         sweep', such as 'largest mtf@10/mm'.
     against
@@ -39,12 +44,21 @@ class Aim:
     depths
         From the focused plane, such as '-5 mm:5 mm:5 mm'.
     photons
-        Of a point, that enter the camera as it is given; others get theirs by their aperture.
+        Of a point, or of a sample of a scene in the mean, that enter the camera as it is given; others get
+        theirs by their aperture.
     background
         Photons of even light on each pixel.
     places
         Of points at each depth; left out, as many as leave 1 % of the bound unknown, up to 16. More make
         it smoother over what varies, and take longer.
+    scenes
+        Pictures, whose contrast and power over frequency scenes have, for the errors of reconstruction;
+        values count as light. Left out, 30 % of contrast and power 1/f².
+    scene_pitch
+        Of the pictures' pixels in the object, such as '10 um': half the finest period of scenes. Left out,
+        half of what the camera as given resolves in focus.
+    scene_samples
+        Across a scene, which is as wide as so many pixels; the time grows with them.
     """
 
     goal: str = "depth"
@@ -53,14 +67,39 @@ class Aim:
     photons: Annotated[float, Parameter(allow_leading_hyphen=True)] = 10_000.0
     background: Annotated[float, Parameter(allow_leading_hyphen=True)] = 0.0
     places: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
+    scenes: Annotated[list[Path] | None, Parameter(consume_multiple=True, negative="")] = None
+    scene_pitch: str | None = None
+    scene_samples: Annotated[int, Parameter(allow_leading_hyphen=True)] = 32
 
-    def read(self) -> "Goal":
-        """The goal; refuses nonsense."""
+    def read(self, given: "Instrument") -> "Goal":
+        """The goal, of a camera to begin with; refuses nonsense."""
         from lumigraph.information import Light
         from lumigraph.optimisation import Goal
 
         planes = () if self.depths is None else planes_of("--depths", self.depths)
-        return Goal.parse(self.goal, planes, Light(self.photons, self.background), self.places)
+        light = Light(self.photons, self.background)
+        goal = Goal.parse(self.goal, planes, light, self.places)
+        return replace(goal, scenes=self._scenes(goal.ready(given).scenes))
+
+    def _scenes(self, usual: "Scenes | None") -> "Scenes | None":
+        """Those that pictures and numbers ask for; None where the goal needs none."""
+        from lumigraph.information import Scenes
+        from lumigraph.metric.planes import grey
+        from lumigraph.preparation import read_raw
+
+        asked = bool(self.scenes) or self.scene_pitch is not None or self.scene_samples != Aim.scene_samples
+        if usual is None and asked:
+            raise FormatError(
+                f"--scenes, --scene-pitch and --scene-samples are for the goals 'picture error' and 'volume "
+                f"error', not {self.goal!r}."
+            )
+        if usual is None:
+            return None
+        pitch = length("--scene-pitch", self.scene_pitch) or usual.pitch
+        if self.scenes:
+            pictures = [grey(read_raw(one, "picture of a scene").data) for one in self.scenes]
+            return Scenes.of(pictures, pitch, self.scene_samples)
+        return Scenes(pitch, self.scene_samples)
 
 
 @Parameter(name="*")
@@ -121,8 +160,8 @@ def optimise(
 
     common.check()
     files.check_output(output, (".toml",))
-    goal = aim.read()
     given = load_camera(camera)
+    goal = aim.read(given)
     with progress("optimise") as shown:
         found = best_of(
             given, vary, goal, against=aim.against, search=how.search, evaluations=how.evaluations,
@@ -176,19 +215,9 @@ def _changed(found: "Optimum") -> dict[str, Any]:
 
 def _notes(found: "Optimum") -> Iterator[str]:
     if "best" in found.checked:
-        best, error, *_ = found.checked["best"]
-        beside = ", ".join(
-            f"{words} {found.goal.told(found.checked[which].value)}"
-            for which, words in NAMES.items()
-            if which in found.checked
-        )
-        yield (
-            "at other places than the search's, by two steps where derivatives are not exact, the best bound "
-            f"is {found.goal.told(best)} within {error:.1%} "
-            f"(searched: {found.goal.told(found.best[found.goal.name])}), {beside}"
-        )
+        yield _elsewhere(found)
         if math.isfinite(found.checked["best"].between):
-            yield f"half-way between the depths the best bound is {_between(found)}"
+            yield f"half-way between the depths the best {found.goal.label} is {_between(found)}"
     if found.gain(found.start) < 0:
         yield "the camera as given is better than all of these: give other ranges"
     if found.active:
@@ -197,6 +226,28 @@ def _notes(found: "Optimum") -> Iterator[str]:
     bad = [row["error"] for row in found.rows if "error" in row]
     if bad:
         yield f"{len(bad)} of {len(found.rows)} cameras cannot be, such as: {bad[0]}"
+
+
+def _elsewhere(found: "Optimum") -> str:
+    """What is known of the best anew, or how well."""
+    best, error, *_ = found.checked["best"]
+    if found.goal.scenes is not None:
+        scenes = found.goal.scenes
+        kind = "their pictures'" if scenes.spectrum else "1/f²"
+        return (
+            f"scenes are {scenes.samples} x {scenes.samples} samples {scenes.pitch * 1e6:.4g} µm apart, with "
+            f"{scenes.contrast:.1%} of contrast and {kind} power; the error is known within {error:.1%}"
+        )
+    beside = ", ".join(
+        f"{words} {found.goal.told(found.checked[which].value)}"
+        for which, words in NAMES.items()
+        if which in found.checked
+    )
+    return (
+        "at other places than the search's, by two steps where derivatives are not exact, the best bound "
+        f"is {found.goal.told(best)} within {error:.1%} "
+        f"(searched: {found.goal.told(found.best[found.goal.name])}), {beside}"
+    )
 
 
 def _between(found: "Optimum") -> str:
@@ -219,20 +270,13 @@ def _before_and_after(found: "Optimum", given: "Instrument") -> list[tuple[str, 
 
     changes, goal = _changed(found), found.goal
     own = {key: value(given, key) for key in changes}
-    rows: list[tuple[str, ...]] = [("", *changes, _label(found))]
+    rows: list[tuple[str, ...]] = [("", *changes, found.goal.label)]
     for name, some in (("as given", found.start), ("first values", found.swept), ("best", found.best)):
         values = (some.get(key, own[key]) for key in changes)
         reached = some.get(goal.name)
         told = "not known" if reached is None else goal.told(reached)
         rows.append((name, *("-" if one is None else str(one) for one in values), told))
     return rows
-
-
-def _label(found: "Optimum") -> str:
-    """The goal's number, in words."""
-    from lumigraph.optimisation.goals import BOUNDS
-
-    return f"{found.goal.name} bound" if found.goal.name in BOUNDS else found.goal.name
 
 
 def _over_depth(found: "Optimum") -> Iterator[Figure]:
@@ -246,9 +290,10 @@ def _over_depth(found: "Optimum") -> Iterator[Figure]:
     curves = {
         words: found.checked[which].over_depths for words, which in shown.items() if which in found.checked
     }
-    lengths = BOUNDS[found.goal.name] == "m"
-    drawn = plots.over_depth(found.goal.depths, curves, _label(found), lengths=lengths)
-    yield Figure(drawn, "At other places than those of the search.", "Before and after")
+    lengths = BOUNDS.get(found.goal.name) == "m"
+    drawn = plots.over_depth(found.goal.depths, curves, found.goal.label, lengths=lengths)
+    said = "At other places than those of the search." if found.goal.name in BOUNDS else ""
+    yield Figure(drawn, said, "Before and after")
 
 
 def _front(found: "Optimum", given: "Instrument") -> Iterator[Figure]:
@@ -296,6 +341,6 @@ def _search(found: "Optimum") -> Iterator[Figure]:
     lengths = BOUNDS.get(found.goal.name) == "m"
     size, unit = length_unit(max(so_far)) if lengths else (1.0, "")
     curve = {"best so far": ([float(k) for k in range(len(so_far))], [sign * cost / size for cost in so_far])}
-    label = f"{_label(found)} [{unit}]" if unit else _label(found)
+    label = f"{found.goal.label} [{unit}]" if unit else found.goal.label
     drawn = plots.curves([], curve, xlabel="cameras computed", ylabel=label)
     yield Figure(drawn, "The best camera so far; the first one is the camera as given.", "Search")

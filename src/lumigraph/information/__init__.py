@@ -5,12 +5,31 @@
   are followed back to these
 - `points`: images of points and their derivatives by place, of any instrument
 - `noise`: information of a pixel with photon and read noise
+- `reconstruction`: `reconstruction_error`, what the best linear reconstruction of scenes leaves
+- `reconstruction_trials`: `reconstruction_trials`, errors of drawn scenes' reconstructions
+- `scenes`: `Scenes`, what pictures have in common; `imaging`, their raw images and the noise
 - `trials`: `trials`, errors of the most likely places in drawn noise, to set beside the bounds
 """
 
 from lumigraph.information.bounds import Bounds, Light, bounds
 from lumigraph.information.noise import pixel_information
+from lumigraph.information.reconstruction import ReconstructionError, reconstruction_error
+from lumigraph.information.reconstruction_trials import ReconstructionTrials, reconstruction_trials
+from lumigraph.information.scenes import Scenes
 from lumigraph.information.slopes import slopes
 from lumigraph.information.trials import Trials, trials
 
-__all__ = ["Bounds", "Light", "Trials", "bounds", "pixel_information", "slopes", "trials"]
+__all__ = [
+    "Bounds",
+    "Light",
+    "ReconstructionError",
+    "ReconstructionTrials",
+    "Scenes",
+    "Trials",
+    "bounds",
+    "pixel_information",
+    "reconstruction_error",
+    "reconstruction_trials",
+    "slopes",
+    "trials",
+]

@@ -194,10 +194,22 @@ def _cell(lattice: Lattice) -> np.ndarray:
     return cell
 
 
-def small(camera: LensletCamera, depths: np.ndarray, like: LensletCamera | None = None) -> LensletCamera:
+def near_axis(camera: Camera, depths: np.ndarray, width: float) -> Camera:
+    """With only as many lenslets, or pixels, as light of planes of a width [m] around the axis reaches."""
+    if isinstance(camera, LensletCamera):
+        return small(camera, depths, width)
+    widest, pitch = _reached(camera, depths, width), camera.sensor.pixel_pitch
+    wanted = math.ceil(widest / pitch) + 2 * SPARE
+    shape = tuple(min(n, wanted + (n - wanted) % 2) for n in camera.sensor.shape)
+    return camera.replace(sensor={"shape": shape})
+
+
+def small(
+    camera: LensletCamera, depths: np.ndarray, width: float = 0.0, like: LensletCamera | None = None
+) -> LensletCamera:
     """With only as many lenslets as light of these depths reaches, and some more; or as `like` another."""
     if like is None:
-        shape, count = None, _reached(camera, depths)
+        shape, count = None, _lit(camera, depths, width)
     else:
         shape, count = like.sensor.shape, like.lenslets.count
     return camera.replace(
@@ -205,16 +217,24 @@ def small(camera: LensletCamera, depths: np.ndarray, like: LensletCamera | None 
     )
 
 
-def _reached(camera: LensletCamera, depths: np.ndarray) -> tuple[int, ...]:
+def _lit(camera: LensletCamera, depths: np.ndarray, width: float) -> tuple[int, ...]:
+    """How many lenslets that is."""
+    pitch = camera.lenslets.pitch * (3 if camera.lattice.kinds > 1 else 1)  # points move by a cell
+    wanted = math.ceil((_reached(camera, depths, width) + pitch) / camera.lenslets.row_pitch) + 2 * SPARE
+    return tuple(min(n, wanted + (n - wanted) % 2) for n in camera.lenslets.count)
+
+
+def _reached(camera: Camera, depths: np.ndarray, width: float) -> float:
+    """How wide the light of planes of a width is before lenslets, or on the sensor without them [m]."""
     diameter, farthest = camera.pupil_diameter, 0.0
     for dz in depths:
-        focus = 1 / camera.main_lens.focal_length - 1 / camera.defocused(float(dz))
+        distance = camera.defocused(float(dz))
+        focus = 1 / camera.main_lens.focal_length - 1 / distance
         blur = diameter * abs(1 - camera.separation * focus)
         waves = 2.44 + 12 * sum(map(abs, camera.main_lens.aberrations.values()))
-        farthest = max(farthest, blur + 2 * waves * camera.wavelength * camera.separation / diameter)
-    pitch = camera.lenslets.pitch * (3 if camera.lattice.kinds > 1 else 1)  # points move by a cell
-    wanted = math.ceil((farthest + pitch) / camera.lenslets.row_pitch) + 2 * SPARE
-    return tuple(min(n, wanted + (n - wanted) % 2) for n in camera.lenslets.count)
+        edge = 2 * waves * camera.wavelength * camera.separation / diameter
+        farthest = max(farthest, blur + edge + width * camera.separation / distance)
+    return farthest
 
 
 def _of_microscope(scope: LightFieldMicroscope, depths: np.ndarray, accuracy: float) -> Source:

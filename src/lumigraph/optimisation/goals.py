@@ -3,7 +3,7 @@
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -11,9 +11,11 @@ import numpy as np
 from lumigraph import metric
 from lumigraph.core.result import Quantity
 from lumigraph.errors import FormatError, GeometryError, SamplingWarning
-from lumigraph.information import Bounds, Light, bounds
+from lumigraph.information import Bounds, Light, ReconstructionError, Scenes, bounds, reconstruction_error
 from lumigraph.information.bounds import checked_depths, checked_places
 from lumigraph.information.followed import require_followed
+from lumigraph.information.imaging import check as check_scenes
+from lumigraph.information.imaging import usual_scenes
 from lumigraph.information.points import collected
 from lumigraph.information.slopes import Bound, slopes
 from lumigraph.instruments.instrument import Instrument
@@ -21,6 +23,11 @@ from lumigraph.metric.charts import check_camera
 
 BOUNDS = {"depth": "m", "lateral": "m", "brightness": "1"}
 """Bounds of a point over the volume, and their units."""
+
+ERRORS = ("picture error", "volume error")
+"""Expected errors of reconstructed scenes: at each depth alone, and at all depths at once."""
+
+UNCERTAIN = "uncertain"
 
 LIGHT, PLACES = "light caught", "places"
 
@@ -62,18 +69,22 @@ class Goal:
     Parameters
     ----------
     name
-        "depth", "lateral" or "brightness", bounds of a point over the depths; or "light caught", a number
-        that the camera's description prints, or one that `lumigraph.metric.simulated` measures, such as
-        "mtf@10/mm".
+        "depth", "lateral" or "brightness", bounds of a point over the depths; "picture error" or "volume
+        error", expected errors of reconstructed scenes, at each depth alone or at all at once; or "light
+        caught", a number that the camera's description prints, or one that `lumigraph.metric.simulated`
+        measures, such as "mtf@10/mm".
     largest
         Whether large is good.
     depths
         Of the volume [m].
     light
-        Of a point, as the first camera collects it; others get theirs by their aperture.
+        Of a point, or of a sample of a scene, as the first camera collects it; others get theirs by their
+        aperture.
     places
         At each depth; None for as many as leave a bound unknown by 1 %, two to 16: more where pixels are as
         coarse as spots.
+    scenes
+        Of the errors of reconstruction; None for power 1/f² and what the first camera resolves.
     """
 
     name: str = "depth"
@@ -81,6 +92,7 @@ class Goal:
     depths: tuple[float, ...] = ()
     light: Light = field(default_factory=Light)
     places: int | None = None
+    scenes: Scenes | None = None
 
     @classmethod
     def parse(
@@ -89,6 +101,8 @@ class Goal:
         depths: Sequence[float] = (),
         light: Light | None = None,
         places: int | None = None,
+        *,
+        scenes: Scenes | None = None,
     ) -> "Goal":
         """From words such as "depth", "largest views per axis" or "least cross-talk".
 
@@ -102,14 +116,14 @@ class Goal:
         """
         word, _, rest = text.strip().partition(" ")
         light, planes = Light() if light is None else light, tuple(float(dz) for dz in depths)
-        if text.strip() in BOUNDS:
-            return cls(text.strip(), False, planes, light, places)
+        if text.strip() in (*BOUNDS, *ERRORS):
+            return cls(text.strip(), False, planes, light, places, scenes)
         if word not in ("largest", "least") or not rest.strip():
             raise FormatError(
-                f"--goal is {text!r} but must be {', '.join(BOUNDS)}, or 'largest' or 'least' and a number's "
-                "name, such as 'largest views per axis'."
+                f"--goal is {text!r} but must be {', '.join((*BOUNDS, *ERRORS))}, or 'largest' or 'least' "
+                "and a number's name, such as 'largest views per axis'."
             )
-        return cls(rest.strip(), word == "largest", planes, light, places)
+        return cls(rest.strip(), word == "largest", planes, light, places, scenes)
 
     def told(self, value: float) -> str:
         """A value in words: lengths with a unit that suits them."""
@@ -119,6 +133,22 @@ class Goal:
     def of_points(self) -> bool:
         """Whether it follows from images of points."""
         return self.name in BOUNDS or self.name == LIGHT
+
+    @property
+    def judged(self) -> bool:
+        """Whether the best camera is judged anew, beside where it was searched."""
+        return self.name in BOUNDS or self.name in ERRORS
+
+    @property
+    def label(self) -> str:
+        """The number in words."""
+        return f"{self.name} bound" if self.name in BOUNDS else self.name
+
+    def ready(self, instrument: Instrument) -> "Goal":
+        """With scenes that the first camera resolves, where it needs some and has none."""
+        if self.name not in ERRORS or self.scenes is not None:
+            return self
+        return replace(self, scenes=usual_scenes(instrument))
 
     def check(self, instrument: Instrument) -> None:
         """Refuse what a kind of instrument has not.
@@ -130,11 +160,13 @@ class Goal:
         GeometryError
             No depths where they are needed, or a measure of another kind of camera.
         """
+        if (self.of_points or self.name in ERRORS) and not self.depths:
+            raise GeometryError(f"goal {self.name!r} needs depths, such as depths=(-5e-3, 0.0, 5e-3).")
         if self.of_points:
-            if not self.depths:
-                raise GeometryError(f"goal {self.name!r} needs depths, such as depths=(-5e-3, 0.0, 5e-3).")
             checked_depths(self.depths)
             self._rounds()
+        elif self.name in ERRORS:
+            check_scenes(instrument, checked_depths(self.depths), self._scenes)
         elif metric.is_measure(self.name):
             check_camera(instrument)
         else:
@@ -156,6 +188,8 @@ class Goal:
         """
         if self.of_points:
             return self._bounds(instrument, first)
+        if self.name in ERRORS:
+            return self._left(instrument, first)
         if metric.is_measure(self.name):
             rng = np.random.default_rng(0)  # the same noise for all: differences are the camera's
             found = metric.simulated(check_camera(instrument), [self.name], rng=rng)[self.name].value
@@ -191,6 +225,8 @@ class Goal:
     def checked(self, instrument: Instrument, first: float, rough: Mapping[str, Any]) -> Judged:
         """A bound at other places, by derivatives of two steps, and half-way between the depths.
 
+        Errors of reconstruction have no places: they are those of the search, at each depth and between.
+
         Parameters
         ----------
         instrument, first
@@ -198,6 +234,12 @@ class Goal:
         rough
             What `values` has found, at its places and by one step.
         """
+        if self.name in ERRORS:
+            found = self.reconstructions(instrument, first)
+            between = math.nan
+            if self.name == ERRORS[0] and len(halves := self._halves()):  # a volume of others is another
+                between = replace(self, depths=halves).reconstructions(instrument, first).value
+            return Judged(found.value, found.uncertain, found.errors, between)
         light, used = self._light(instrument, first), int(rough[PLACES])
         others = range(used, used + max(used, OTHERS))
         found = bounds(instrument, self.depths, light, places=others)
@@ -206,12 +248,39 @@ class Goal:
         return Judged(value, error, found.of(self.name), self._between(instrument, light, others))
 
     def _between(self, instrument: Instrument, light: Light, places: range) -> float:
-        depths = np.unique(self.depths)
-        if len(depths) < 2:
+        halves = self._halves()
+        if not halves:
             return math.nan
-        halves = ((depths[1:] + depths[:-1]) / 2).tolist()
         found = bounds(instrument, halves, light, places=places, checked=False)
         return float(getattr(found, self.name))
+
+    def _halves(self) -> tuple[float, ...]:
+        """Half-way between neighbouring depths."""
+        depths = np.unique(self.depths)
+        return tuple(float(dz) for dz in (depths[1:] + depths[:-1]) / 2)
+
+    def reconstructions(self, instrument: Instrument, first: float) -> ReconstructionError:
+        """Expected errors of reconstructed scenes, by an instrument; `first` as of `values`."""
+        return reconstruction_error(
+            instrument,
+            self.depths,
+            self._scenes,
+            self._light(instrument, first),
+            volume=self.name == ERRORS[1],
+        )
+
+    @property
+    def _scenes(self) -> Scenes:
+        if self.scenes is None:
+            raise GeometryError(f"goal {self.name!r} needs scenes, such as lg.information.Scenes(10e-6).")
+        return self.scenes
+
+    def _left(self, instrument: Instrument, first: float) -> dict[str, float]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", SamplingWarning)
+            found = self.reconstructions(instrument, first)
+        light = self._light(instrument, first)
+        return {self.name: found.value, UNCERTAIN: found.uncertain, "photons": light.photons}
 
     def _light(self, instrument: Instrument, first: float) -> Light:
         return Light(self.light.photons * collected(instrument) / first, self.light.background)

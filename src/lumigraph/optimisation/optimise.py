@@ -51,9 +51,10 @@ class Optimum:
     rows
         All cameras, in the order of the search; those that cannot be have an "error".
     checked
-        Of bounds: by "start", "swept" and "best", the bound at other places than those of the search, by
-        derivatives of two steps where they are not exact, its relative error, at least what it differs
-        by from the searched one, the bound over depth, and half-way between the depths. Empty of other goals.
+        Of bounds and errors of reconstruction: by "start", "swept" and "best", the bound at other places than
+        those of the search, by derivatives of two steps where they are not exact, its relative error, at
+        least what it differs by from the searched one, the bound over depth, and half-way between the depths.
+        Empty of other goals.
     against
         The goal that was weighed against it; None for none.
     front
@@ -127,8 +128,8 @@ def optimise(
         By keys of the camera file: "0.3:0.6:4" or "4 mm:6 mm:3" is a range, of which so many values are tried
         first; "100 um, 150 um" a stock.
     goal
-        `Goal`, or its text: "depth" (default), "lateral", "brightness", "largest light caught", "largest
-        views per axis", "largest mtf@10/mm", ...
+        `Goal`, or its text: "depth" (default), "lateral", "brightness", "picture error", "largest light
+        caught", "largest views per axis", "largest mtf@10/mm", ...
     depths
         Of the volume, for a goal that is a text [m].
     against
@@ -172,7 +173,9 @@ def optimise(
     """
     start = instrument if isinstance(instrument, Instrument) else load_camera(instrument)
     aim = Goal.parse(goal, depths) if isinstance(goal, str) else goal
+    aim = aim.ready(start)
     other = replace(aim, **_other(against)) if isinstance(against, str) else against
+    other = None if other is None else other.ready(start)
     checks.choice("search", search, get_args(Search))
     most = checks.whole("evaluations", evaluations, 0)
     if most > MOST:
@@ -247,7 +250,7 @@ def _refined(
 
 def _elsewhere(cameras: Evaluations, items: Mapping[str, Mapping[str, Any]]) -> dict[str, Judged]:
     """Bounds of some items at places where they were not searched."""
-    if cameras.goal.name not in BOUNDS:
+    if not cameras.goal.judged:
         return {}
     known: dict[str, Judged] = {}
     for which, item in items.items():
@@ -264,19 +267,19 @@ def _warn_of_luck(found: Optimum) -> None:
     """Say where a bound is of the places or depths at which it was searched, not of the camera."""
     if "best" not in found.checked:
         return
-    name, told = found.goal.name, found.goal.told
+    name, told, label = found.goal.name, found.goal.told, found.goal.label
     here, there = found.best[name], found.checked["best"].value
     said = list(_luck_of_depths(found))
     if there > here * (1 + LUCK):
         said.append(
-            f"the {name} bound of the best is {told(here)} at the {found.best[PLACES]} places a depth "
+            f"the {label} of the best is {told(here)} at the {found.best[PLACES]} places a depth "
             f"where it was searched, but {told(there)} at others: {there / here - 1:.1%} are chance"
         )
     for which, words in BEFORE.items():
         other = found.checked[which].value if which in found.checked else math.inf
         if other < there and found.gain(getattr(found, which)) > 0:
             said.append(
-                f"{words} has a {name} bound of {told(other)} at other places, the best {told(there)}: "
+                f"{words} has a {label} of {told(other)} at other places, the best {told(there)}: "
                 "it is better only where it was searched"
             )
     for words in said:
@@ -286,18 +289,18 @@ def _warn_of_luck(found: Optimum) -> None:
 
 def _luck_of_depths(found: Optimum) -> Iterator[str]:
     """Where a bound is worse half-way between its depths, ends left out, or others are better in all."""
-    name, told, best = found.goal.name, found.goal.told, found.checked["best"]
+    label, told, best = found.goal.label, found.goal.told, found.checked["best"]
     both = math.hypot(best.value, best.between)
     if best.between > best.value * (1 + LUCK):
         yield (
-            f"the {name} bound of the best is {told(best.value)} over the depths where it was searched, but "
+            f"the {label} of the best is {told(best.value)} over the depths where it was searched, but "
             f"{told(best.between)} half-way between them"
         )
     for which, words in BEFORE.items():
         other = found.checked.get(which, best)
         if other.between < best.between and math.hypot(other.value, other.between) < both:
             yield (
-                f"half-way between the depths {words} has a {name} bound of {told(other.between)}, the best "
+                f"half-way between the depths {words} has a {label} of {told(other.between)}, the best "
                 f"{told(best.between)}: it is better only where it was searched"
             )
 
