@@ -95,12 +95,16 @@ def test_the_command_takes_pictures_and_says_what_scenes_it_judged(line, tmp_pat
         "12 um",
         "--report",
         str(tmp_path / "r.html"),
+        "--trials",
+        "8",
     ]
     assert main([*line, *words]) == 0
     said = capsys.readouterr().out
     assert "picture error: 0." in said
     assert "scenes are 16 x 16 samples 12 µm apart, with 1" in said
     assert "their pictures' power" in said
+    assert "as given: reconstructions of drawn scenes err by 0." in said
+    assert "best: reconstructions of drawn scenes err by 0." in said
     assert "half-way between the depths the best picture error is" in said
     assert "picture error" in (tmp_path / "r.html").read_text()
 
@@ -112,6 +116,9 @@ def test_the_command_takes_pictures_and_says_what_scenes_it_judged(line, tmp_pat
         (["--goal", "picture error", "--scene-pitch", "12"], "--scene-pitch"),
         (["--goal", "picture error", "--scene-pitch", "nan um"], "pitch"),
         (["--goal", "volume error", "--scene-samples", "1000"], "samples of scenes are 1000"),
+        (["--goal", "picture error", "--trials", "1"], "trials are 1"),
+        (["--goal", "picture error", "--trials", "-1"], "trials"),
+        (["--goal", "largest f-number", "--trials", "8"], "trials are of depth, lateral"),
         (["--goal", "depth", "--scene-samples", "16"], "--scene-samples are for the goals 'picture error'"),
     ],
 )
@@ -120,3 +127,25 @@ def test_nonsense_on_the_line_is_refused_in_one_line(line, words, said, capsys):
     error = capsys.readouterr().err.strip()
     assert said in error
     assert error.count("\n") == 0
+
+
+@pytest.mark.filterwarnings("ignore:half-way between the depths")
+def test_drawn_scenes_are_reconstructed_before_and_after_as_well_as_expected():
+    found = lg.optimise(plain(), {"main_lens.diameter": "4 mm"}, goal(), trials=12)
+    assert found.tried.keys() == {"start", "best"}
+    for which, values in (("start", found.start), ("best", found.best)):
+        one = found.tried[which]
+        assert one.bound == values["picture error"]
+        assert one.reached == pytest.approx(one.bound, abs=3 * one.error + 0.02 * one.bound)
+        assert 0 < one.error < 0.05 * one.reached
+    scenes = [one.pictures[0] for one in found.tried.values()]
+    assert np.array_equal(*scenes)
+
+
+def test_fits_to_drawn_points_stand_beside_their_bound():
+    given = Goal("depth", depths=(10e-6,), light=Light(5000), places=1)
+    found = lg.optimise("lfm-fourier", {"fourier_lens": "70 mm"}, given, trials=60)
+    assert len(found.tried) == 2
+    for one in found.tried.values():
+        assert one.bound == pytest.approx(one.reached, abs=3 * one.error)
+        assert one.error == pytest.approx(one.reached / np.sqrt(2 * 60), rel=0.4)

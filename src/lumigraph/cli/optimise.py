@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from lumigraph.information import Scenes
     from lumigraph.instruments import Instrument
     from lumigraph.optimisation import Goal, Optimum
+    from lumigraph.optimisation.tried import Tried
 
 NAMES = {"start": "as given", "swept": "the best of the first values"}
 """Of what stands beside the best."""
@@ -117,12 +118,17 @@ class How:
     evaluations
         Cameras at most, beyond the first values.
     seed
-        Of --search global.
+        Of --search global, and of the --trials.
+    trials
+        Raw images that are drawn with noise at each depth, before the camera as given and the best: points
+        are fitted in them, or scenes reconstructed, and their errors stand beside what was expected. 0 for
+        none; 200 are right for points, 8 for scenes.
     """
 
     search: Literal["local", "global", "gradient", "grid"] = "local"
     evaluations: Annotated[int, Parameter(allow_leading_hyphen=True)] = 200
     seed: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0
+    trials: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0
 
 
 def optimise(
@@ -165,7 +171,7 @@ def optimise(
     with progress("optimise") as shown:
         found = best_of(
             given, vary, goal, against=aim.against, search=how.search, evaluations=how.evaluations,
-            seed=how.seed, output=output, progress=shown,
+            seed=how.seed, trials=how.trials, output=output, progress=shown,
             estimated=lambda seconds, count: line(_estimate(seconds, count)),
         )  # fmt: skip
     store.write_bytes(output, found.camera.to_toml().encode())
@@ -195,9 +201,30 @@ def _lines(found: "Optimum") -> Iterator[str]:
     )
     yield f"better by {gains[0]}, by {gains[1]}"
     yield ", ".join(f"{key} = {value}" for key, value in _changed(found).items())
+    for which, one in found.tried.items():
+        yield _reached(found, which, one)
     if found.against is not None and found.front:
         yield f"{len(found.front)} cameras that no other beats in both goals, from {_both(found, 0)}"
         yield f"to {_both(found, -1)}"
+
+
+def _reached(found: "Optimum", which: str, one: "Tried") -> str:
+    """What reconstruction reaches of what was expected, in words."""
+    words, told = NAMES.get(which, which), found.goal.told
+    if one.reason:
+        return f"{words}: no raw images were drawn, for {one.reason}"
+    what, beside = _kinds(found)
+    return (
+        f"{words}: {what} err by {told(one.reached)}, within {told(one.error)} by their number, where the "
+        f"{beside} is {told(one.bound)}"
+    )
+
+
+def _kinds(found: "Optimum") -> tuple[str, str]:
+    """What is done with drawn raw images, and what stands beside it."""
+    if found.goal.scenes is not None:
+        return "reconstructions of drawn scenes", "expected error"
+    return f"fits ({found.goal.name}) in drawn raw images", "bound of the same points"
 
 
 def _both(found: "Optimum", k: int) -> str:
@@ -259,6 +286,7 @@ def _between(found: "Optimum") -> str:
 
 def _figures(found: "Optimum", given: "Instrument") -> Iterator[Figure]:
     yield Figure(_before_and_after(found, given), section="Before and after")
+    yield from _trials(found)
     yield from _over_depth(found)
     yield from _front(found, given)
     yield from _search(found)
@@ -277,6 +305,25 @@ def _before_and_after(found: "Optimum", given: "Instrument") -> list[tuple[str, 
         told = "not known" if reached is None else goal.told(reached)
         rows.append((name, *("-" if one is None else str(one) for one in values), told))
     return rows
+
+
+def _trials(found: "Optimum") -> Iterator[Figure]:
+    """Bound or expected error against what reconstruction reaches, before and after."""
+    some = {which: one for which, one in found.tried.items() if not one.reason}
+    if not some:
+        return
+    (what, beside), told = _kinds(found), found.goal.told
+    rows: list[tuple[str, ...]] = [("", beside, f"{what}, rms", "standard error")]
+    for which, one in some.items():
+        rows.append((NAMES.get(which, which), told(one.bound), told(one.reached), told(one.error)))
+    yield Figure(rows, section="Before and after")
+    pictures = {NAMES.get(which, which): one.pictures for which, one in some.items() if one.pictures}
+    if pictures:
+        from lumigraph import plots
+
+        scene = next(iter(pictures.values()))[0]
+        drawn = plots.images([(scene, "scene"), *((one[1], words) for words, one in pictures.items())])
+        yield Figure(drawn, "A drawn scene and its reconstructions at the first depth.", "Before and after")
 
 
 def _over_depth(found: "Optimum") -> Iterator[Figure]:

@@ -28,7 +28,7 @@ class ReconstructionTrials:
     errors
         (draws, nz): rms of what is reconstructed less the scene, the mean left out, over `Scenes.contrast`.
     scene, raw, reconstructed
-        Of the last one: (nz, n, n), (ny, nx) [electrons], (nz, n, n); raw is of the last depth, or of all.
+        Of the first one: (nz, n, n), (ny, nx) [electrons], (nz, n, n); raw is of the first depth, or of all.
     """
 
     errors: np.ndarray
@@ -87,17 +87,17 @@ def reconstruction_trials(
     light = Light() if light is None else light
     planes = checked_depths(depths)
     some, errors = [planes] if volume else list(planes[:, None]), []
-    given, last = _given(draws, scenes), []
+    given, begun = _given(draws, scenes), []
     for group in some:
         seen = imaging(instrument, group, scenes, light, accuracy)
         found = [_trial(seen, scene, reading(instrument.sensor), rng)
                  for scene in _each(given, scenes, len(group), rng)]  # fmt: skip
         off = [seen_as - scene for scene, _, seen_as in found]
         errors.append(np.array([one.std(axis=(1, 2)) for one in off]) / scenes.contrast)
-        last.append(found[-1])
+        begun.append(found[0])
     return ReconstructionTrials(
-        np.concatenate(errors, axis=1), np.concatenate([one[0] for one in last]), last[-1][1],
-        np.concatenate([one[2] for one in last]),
+        np.concatenate(errors, axis=1), np.concatenate([one[0] for one in begun]), begun[0][1],
+        np.concatenate([one[2] for one in begun]),
     )  # fmt: skip
 
 

@@ -166,7 +166,7 @@ class Goal:
             checked_depths(self.depths)
             self._rounds()
         elif self.name in ERRORS:
-            check_scenes(instrument, checked_depths(self.depths), self._scenes)
+            check_scenes(instrument, checked_depths(self.depths), self.judged_scenes)
         elif metric.is_measure(self.name):
             check_camera(instrument)
         else:
@@ -198,7 +198,7 @@ class Goal:
 
     def slopes(self, instrument: Instrument, pairs: Sequence[Any], first: float, places: int) -> np.ndarray:
         """Changes (n,) of a bound from the first to the last of each pair of cameras around one."""
-        light = self._light(instrument, first)
+        light = self.light_of(instrument, first)
         return slopes(
             instrument,
             pairs,
@@ -240,7 +240,7 @@ class Goal:
             if self.name == ERRORS[0] and len(halves := self._halves()):  # a volume of others is another
                 between = replace(self, depths=halves).reconstructions(instrument, first).value
             return Judged(found.value, found.uncertain, found.errors, between)
-        light, used = self._light(instrument, first), int(rough[PLACES])
+        light, used = self.light_of(instrument, first), int(rough[PLACES])
         others = range(used, used + max(used, OTHERS))
         found = bounds(instrument, self.depths, light, places=others)
         value = float(getattr(found, self.name))
@@ -264,13 +264,20 @@ class Goal:
         return reconstruction_error(
             instrument,
             self.depths,
-            self._scenes,
-            self._light(instrument, first),
+            self.judged_scenes,
+            self.light_of(instrument, first),
             volume=self.name == ERRORS[1],
         )
 
     @property
-    def _scenes(self) -> Scenes:
+    def judged_scenes(self) -> Scenes:
+        """The scenes.
+
+        Raises
+        ------
+        GeometryError
+            None.
+        """
         if self.scenes is None:
             raise GeometryError(f"goal {self.name!r} needs scenes, such as lg.information.Scenes(10e-6).")
         return self.scenes
@@ -279,17 +286,18 @@ class Goal:
         with warnings.catch_warnings():
             warnings.simplefilter("error", SamplingWarning)
             found = self.reconstructions(instrument, first)
-        light = self._light(instrument, first)
+        light = self.light_of(instrument, first)
         return {self.name: found.value, UNCERTAIN: found.uncertain, "photons": light.photons}
 
-    def _light(self, instrument: Instrument, first: float) -> Light:
+    def light_of(self, instrument: Instrument, first: float) -> Light:
+        """What an instrument gets by its aperture; `first` as of `values`."""
         return Light(self.light.photons * collected(instrument) / first, self.light.background)
 
     def _rounds(self) -> tuple[range, ...]:
         return ROUNDS if self.places is None else (checked_places(self.places),)
 
     def _bounds(self, instrument: Instrument, first: float) -> dict[str, float]:
-        light = self._light(instrument, first)
+        light = self.light_of(instrument, first)
         with warnings.catch_warnings():
             warnings.simplefilter("error", SamplingWarning)
             found = self._even(instrument, light)

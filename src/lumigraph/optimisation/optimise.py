@@ -23,6 +23,8 @@ from lumigraph.optimisation.front import front, trace
 from lumigraph.optimisation.goals import BOUNDS, PLACES, Goal, Judged
 from lumigraph.optimisation.search import Search, grid, refined
 from lumigraph.optimisation.space import Space
+from lumigraph.optimisation.tried import Tried, tried
+from lumigraph.optimisation.tried import check as check_trials
 
 MOST = 100_000
 """Evaluations."""
@@ -59,6 +61,8 @@ class Optimum:
         The goal that was weighed against it; None for none.
     front
         With two goals: the rows that no other beats in both, from the best in the first on.
+    tried
+        By "start" and "best", what fits or reconstructions reach in drawn raw images; empty without trials.
     """
 
     goal: Goal
@@ -71,6 +75,7 @@ class Optimum:
     checked: Mapping[str, Judged] = field(default_factory=dict)
     against: Goal | None = None
     front: list[dict[str, Any]] = field(default_factory=list)
+    tried: Mapping[str, Tried] = field(default_factory=dict)
 
     __repr__ = brief
 
@@ -104,6 +109,7 @@ def optimise(
     search: Search = "local",
     evaluations: int = 200,
     seed: int = 0,
+    trials: int = 0,
     output: str | PathLike[str] | None = None,
     progress: Progress | None = None,
     estimated: Callable[[float, int], None] | None = None,
@@ -140,7 +146,10 @@ def optimise(
     evaluations
         Cameras at most, beyond the grid.
     seed
-        Of the population.
+        Of the population, and of the trials.
+    trials
+        Raw images that are drawn with noise at each depth, before the camera as given and the best: their
+        points are fitted, or their scenes reconstructed, to set the errors beside what was expected.
     output
         File, beside which each camera is noted as it is done: the same call goes on after a kill, to the same
         result. None for nowhere. The best camera is not written.
@@ -174,6 +183,7 @@ def optimise(
     start = instrument if isinstance(instrument, Instrument) else load_camera(instrument)
     aim = Goal.parse(goal, depths) if isinstance(goal, str) else goal
     aim = aim.ready(start)
+    check_trials(aim, trials)
     other = replace(aim, **_other(against)) if isinstance(against, str) else against
     other = None if other is None else other.ready(start)
     checks.choice("search", search, get_args(Search))
@@ -219,6 +229,7 @@ def optimise(
         aim, changed(start, best), given, first, last, space.active(best), cameras.rows,
         _elsewhere(cameras, {"start": {}, "swept": swept, "best": best}),
         other, [] if other is None else front(cameras.rows, (aim, other)),
+        _tried(cameras, {"start": {}, "best": best}, (trials, seed)),
     )  # fmt: skip
     _warn_of_luck(found)
     return found
@@ -261,6 +272,19 @@ def _elsewhere(cameras: Evaluations, items: Mapping[str, Mapping[str, Any]]) -> 
         elif math.isfinite(cameras.goal.cost(row)):
             known[which] = cameras.goal.checked(changed(cameras.start, item), cameras.first, row)
     return known
+
+
+def _tried(
+    cameras: Evaluations, items: Mapping[str, Mapping[str, Any]], how: tuple[int, int]
+) -> dict[str, Tried]:
+    """What reconstruction reaches before some items."""
+    goal, found = cameras.goal, {}
+    for which, item in items.items() if how[0] else ():
+        row = cameras.row(item)
+        if math.isfinite(goal.cost(row)):
+            camera = changed(cameras.start, item)
+            found[which] = tried(goal, camera, cameras.first, int(row.get(PLACES, 0)), how)
+    return found
 
 
 def _warn_of_luck(found: Optimum) -> None:
