@@ -38,7 +38,7 @@ class Aim:
         linear reconstruction of scenes leaves, at each of --depths; volume error: the same with scenes at all
         depths at once. Or 'largest' or 'least' and a
         number's name: light caught, one that 'lumigraph design' prints, or a simulated one of 'lumigraph
-        sweep', such as 'largest mtf@10/mm'.
+        sweep', such as 'largest mtf@10/mm', the least over --depths.
     against
         A second goal, as --goal: prints and draws the cameras that no other beats in both. Searches for it
         may take as many --evaluations again.

@@ -7,11 +7,14 @@ import numpy as np
 
 from lumigraph.analysis import Chart, find_chart
 from lumigraph.calibration import calibrate
+from lumigraph.core import checks
+from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.result import Quantity
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import LensletCamera
 from lumigraph.instruments.capabilities import Rendered
 from lumigraph.metric import planes
+from lumigraph.metric.charts import check_camera
 from lumigraph.metric.exposures import mean_image
 from lumigraph.metric.lights import Lights
 from lumigraph.preparation import decode, prepare
@@ -34,12 +37,16 @@ def is_measure(name: str) -> bool:
 
 
 def simulated(
-    camera: LensletCamera, names: Sequence[str], *, rng: np.random.Generator | None = None
+    camera: LensletCamera,
+    names: Sequence[str],
+    *,
+    depths: Sequence[float] = (0.0,),
+    rng: np.random.Generator | None = None,
 ) -> dict[str, Quantity]:
-    """Measures of a simulated picture of the plane in focus, as the data sheet makes them; None if none is.
+    """Measures of simulated pictures, as the data sheet makes them, the worst over depths; None if none is.
 
-    A white image and a chessboard are simulated by wave optics with the sensor's noise; the lattice is found
-    on the former, the latter decoded or rendered.
+    A white image and a chessboard at each depth are simulated by wave optics with the sensor's noise; the
+    lattice is found on the former, the latter decoded and refocused to its depth, or rendered.
 
     Parameters
     ----------
@@ -47,33 +54,67 @@ def simulated(
         A plenoptic camera 1.0 or 2.0.
     names
         Of `MEASURES`, or ``mtf@F/mm``.
+    depths
+        Of the chessboard, from the plane in focus [m]: frequencies and contrasts are the least, widths and
+        distortions the largest of all; None where one of them cannot be measured.
     rng
         Random numbers of the noise.
 
     Raises
     ------
     GeometryError
-        Another kind of camera, or an unknown name.
+        Another kind of camera, an unknown name, or no depths.
     SamplingError, CalibrationError
         A picture without a chart, or a white image without a lattice.
     """
     for name in names:
         if not is_measure(name):
             raise GeometryError(f"{name!r} is not measured. Give {', '.join(MEASURES)} or mtf@10/mm.")
-    lights = Lights.of(camera, (0.0,), textured=False, accuracy=_ACCURACY)
+    if not len(depths):
+        raise GeometryError("there are no depths. Give one at least, such as 0.")
+    planned = [checks.finite("a depth", float(dz)) for dz in depths]
+    for dz in planned:
+        check_camera(camera).defocused(dz)
+    lights = Lights.of(camera, planned, textured=False, accuracy=_ACCURACY)
     charts = lights.exposed(np.random.default_rng(0) if rng is None else rng, exposures=1)
-    assert charts.spacing is not None  # it is simulated
     white, dark = mean_image(charts.whites), mean_image(charts.darks)
     lattice = calibrate(white)
-    ready = prepare(charts.boards[0].boards[0], lattice, white=white, dark=dark, camera=camera)
+    seen = []
+    for dz, board in zip(planned, charts.boards, strict=True):
+        ready = prepare(board.boards[0], lattice, white=white, dark=dark, camera=camera)
+        seen.append(_measured(camera, ready, dz, (names, charts.spacing)))
+    return {name: _worst([one[name] for one in seen]) for name in names}
+
+
+def _measured(
+    camera: LensletCamera, ready: PreparedImage, dz: float, what: tuple[Sequence[str], float | None]
+) -> dict[str, Quantity]:
+    """Names of a chessboard at a depth, whose spacing is known."""
+    names, spacing = what
+    assert ready.calibration is not None  # prepared with a white image
+    assert spacing is not None  # it is simulated
     if isinstance(camera, Rendered) and planes.is_rendered(camera, ready):
-        tried = planes.straightest(ready, camera.patch_at(0.0), camera)
+        tried = planes.straightest(ready, camera.patch_at(dz), camera)
     else:
-        tried = planes.Tried(find_chart(planes.grey(refocus(decode(ready, lattice), 1.0))))
-    found = {entry.name: entry for entry in planes.of_chart(tried, charts.spacing)}
-    return {
-        name: found[name] if name in found else _contrast(tried.chart, charts.spacing, name) for name in names
-    }
+        views = decode(ready, ready.calibration)
+        tried = planes.Tried(find_chart(planes.grey(refocus(views, _alpha(camera, dz)))))
+    found = {entry.name: entry for entry in planes.of_chart(tried, spacing)}
+    return {name: found[name] if name in found else _contrast(tried.chart, spacing, name) for name in names}
+
+
+def _alpha(camera: LensletCamera, dz: float) -> float:
+    """Of a refocused picture: the lenslets' distance behind the main lens, over that of a depth's image."""
+    focus = 1 / camera.main_lens.focal_length
+    return (focus - 1 / camera.defocused(dz)) / (focus - 1 / camera.object_distance)
+
+
+def _worst(some: Sequence[Quantity]) -> Quantity:
+    """The least contrast or frequency, the largest width or distortion; None where one is not known."""
+    unknown = [one for one in some if one.value is None]
+    if unknown:
+        return unknown[0]
+    pick = min if some[0].name.startswith("mtf") else max
+    return pick(some, key=lambda one: abs(float(one.value)))
 
 
 def _contrast(chart: Chart, spacing: float, name: str) -> Quantity:

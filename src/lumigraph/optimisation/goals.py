@@ -168,7 +168,9 @@ class Goal:
         elif self.name in ERRORS:
             check_scenes(instrument, checked_depths(self.depths), self.judged_scenes)
         elif metric.is_measure(self.name):
-            check_camera(instrument)
+            camera = check_camera(instrument)
+            for dz in checked_depths(self.depths or (0.0,)):
+                camera.defocused(float(dz))
         else:
             names = [row.name for row in instrument.quantities() if _is_number(row.value)]
             if self.name not in names:
@@ -192,7 +194,9 @@ class Goal:
             return self._left(instrument, first)
         if metric.is_measure(self.name):
             rng = np.random.default_rng(0)  # the same noise for all: differences are the camera's
-            found = metric.simulated(check_camera(instrument), [self.name], rng=rng)[self.name].value
+            depths = self.depths or (0.0,)
+            seen = metric.simulated(check_camera(instrument), [self.name], depths=depths, rng=rng)
+            found = seen[self.name].value
             return {self.name: math.nan if found is None else float(found)}
         return {row.name: float(row.value) for row in instrument.quantities() if row.name == self.name}
 
