@@ -8,7 +8,6 @@ import numpy as np
 from lumigraph.analysis import Chart, find_chart
 from lumigraph.calibration import calibrate
 from lumigraph.core import checks
-from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.result import Quantity
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import LensletCamera
@@ -75,27 +74,25 @@ def simulated(
     planned = [checks.finite("a depth", float(dz)) for dz in depths]
     for dz in planned:
         check_camera(camera).defocused(dz)
-    lights = Lights.of(camera, planned, textured=False, accuracy=_ACCURACY)
-    charts = lights.exposed(np.random.default_rng(0) if rng is None else rng, exposures=1)
-    white, dark = mean_image(charts.whites), mean_image(charts.darks)
-    lattice = calibrate(white)
-    seen = []
-    for dz, board in zip(planned, charts.boards, strict=True):
-        ready = prepare(board.boards[0], lattice, white=white, dark=dark, camera=camera)
-        seen.append(_measured(camera, ready, dz, (names, charts.spacing)))
+    rng = np.random.default_rng(0) if rng is None else rng
+    seen = [_measured(camera, names, dz, rng) for dz in planned]
     return {name: _worst([one[name] for one in seen]) for name in names}
 
 
 def _measured(
-    camera: LensletCamera, ready: PreparedImage, dz: float, what: tuple[Sequence[str], float | None]
+    camera: LensletCamera, names: Sequence[str], dz: float, rng: np.random.Generator
 ) -> dict[str, Quantity]:
-    """Names of a chessboard at a depth, whose spacing is known."""
-    names, spacing = what
-    assert ready.calibration is not None  # prepared with a white image
+    """Of a chessboard at a depth; its squares suit that alone."""
+    charts = Lights.of(camera, (dz,), textured=False, accuracy=_ACCURACY).exposed(rng, exposures=1)
+    spacing = charts.spacing
     assert spacing is not None  # it is simulated
+    white, dark = mean_image(charts.whites), mean_image(charts.darks)
+    lattice = calibrate(white)
+    ready = prepare(charts.boards[0].boards[0], lattice, white=white, dark=dark, camera=camera)
     if isinstance(camera, Rendered) and planes.is_rendered(camera, ready):
         tried = planes.straightest(ready, camera.patch_at(dz), camera)
     else:
+        assert ready.calibration is not None  # prepared with one; in lengths, as refocusing needs them
         views = decode(ready, ready.calibration)
         tried = planes.Tried(find_chart(planes.grey(refocus(views, _alpha(camera, dz)))))
     found = {entry.name: entry for entry in planes.of_chart(tried, spacing)}
