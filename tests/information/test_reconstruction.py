@@ -107,7 +107,7 @@ def test_scenes_at_once_are_harder_than_one_after_the_other():
     assert at_once > 1.1 * alone
 
 
-@pytest.mark.parametrize(("camera", "pitch"), [(plain(2.0, read_noise=2.0), 8 * UM), (small(), 40 * UM)])
+@pytest.mark.parametrize(("camera", "pitch"), [(plain(2.0, read_noise=2.0), 20 * UM), (small(), 40 * UM)])
 def test_finer_samples_of_the_same_scenes_change_nothing(camera, pitch):
     powers = tuple(1 / k**2 if k <= 7 else 0.0 for k in range(1, 40))
     coarse = reconstruction_error(camera, [2e-3], Scenes(pitch, 16, 0.3, powers), Light(4000))
