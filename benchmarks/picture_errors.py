@@ -6,6 +6,7 @@ prints a table: cameras 1.0 and 2.0 and one without lenslets, of the same main l
 """
 
 import time
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from lumigraph.deconvolution import Exposure, RichardsonLucy
 from lumigraph.information import Light, Scenes, reconstruction_error, reconstruction_trials
 from lumigraph.information.bounds import reading
 from lumigraph.information.imaging import Imaging, imaging
-from lumigraph.instruments import Camera
 
 SCENES = Scenes(30e-6, 24)
 PHOTONS, DRAWS, DEPTHS = 3000, 6, (0.0, 4e-3)
@@ -22,15 +22,18 @@ COUNTS = (10, 40, 160)
 """Iterations of deconvolutions, the best of which counts."""
 
 
-def cameras() -> dict[str, Camera]:
+def cameras() -> dict[str, Any]:
     """Of one main lens, by name."""
-    focused = lg.load_camera("thesis-plenoptic-2-m050")
+    focused: Any = lg.load_camera("thesis-plenoptic-2-m050")
     lens = {"focal_length": "60 mm", "diameter": focused.pupil_diameter}
-    common = {"wavelength": focused.wavelength, "object_distance": focused.object_distance, "main_lens": lens}
+    common: dict[str, Any] = {
+        "wavelength": focused.wavelength,
+        "object_distance": focused.object_distance,
+        "main_lens": lens,
+    }
+    pixels: Any = {"pixel_pitch": "6.6668 um", "shape": (401, 401)}
     return {
-        "without lenslets, 6.7 µm pixels": lg.SingleLensCamera(
-            **common, sensor={"pixel_pitch": "6.6668 um", "shape": (401, 401)}
-        ),
+        "without lenslets, 6.7 µm pixels": lg.SingleLensCamera(**common, sensor=pixels),
         "2.0, m = 0.5, 6.7 µm pixels": focused.replace(sensor={"pixel_pitch": "6.6668 um", "shape": None}),
         "2.0, m = 0.25, 6.7 µm pixels": focused.replace(
             lenslets={"magnification": 0.25}, sensor={"pixel_pitch": "6.6668 um", "shape": None}
