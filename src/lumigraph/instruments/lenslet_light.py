@@ -143,7 +143,7 @@ def _flat(camera: Lensed) -> tuple[Linear, Grid]:
         return camera.operator_on(grid, accuracy=ACCURACY), grid
     own = cast(MicroscopeOperator, camera.operator(None, SAMPLES, accuracy=ACCURACY))
     operator, _ = own.widened(SPILT)
-    return operator, operator.object_grid
+    return operator, cast(Grid, operator.object_grid)  # a microscope's own
 
 
 def _beyond(grid: Grid) -> Grid:
