@@ -338,7 +338,7 @@ def test_the_verb_writes_a_camera_and_says_before_and_after(tmp_path, capsys):
     )  # lengths have a unit that suits
     assert "as given" in said
     assert "fourier_lens = " in said
-    assert "half-way between the depths the best bound is " in " ".join(said.split())
+    assert "half-way between the depths the best depth bound is " in " ".join(said.split())
     assert main([*words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     camera = lg.load_camera(best)
