@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
@@ -23,6 +23,9 @@ ENOUGH = 1e-3
 
 STEPS = 500
 """Of conjugate gradients, at most."""
+
+Seeing = tuple[Linear, np.ndarray, Sensor]
+"""Operator of planes, the object's area whose light is 1 in a pixel (nz,) [m²], and the sensor."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,16 +169,13 @@ def _usual(seen: Imaging) -> np.ndarray:
     return np.maximum(np.stack(found), 0) * seen.power * n**2
 
 
-def _operator(
-    instrument: Instrument, depths: np.ndarray, scenes: Scenes, accuracy: float
-) -> tuple[Linear, np.ndarray, Sensor]:
-    """Operator of planes, the object's area whose light is 1 in a pixel (nz,) [m²], and the sensor."""
+def _operator(instrument: Instrument, depths: np.ndarray, scenes: Scenes, accuracy: float) -> Seeing:
     if isinstance(instrument, WithPupil):
         return _of_microscope(cast(LightFieldMicroscope, instrument), depths, scenes, accuracy)
     return _of_camera(cast(Camera, instrument), depths, scenes, accuracy)
 
 
-def _of_camera(camera: Camera, depths: np.ndarray, scenes: Scenes, accuracy: float) -> Any:
+def _of_camera(camera: Camera, depths: np.ndarray, scenes: Scenes, accuracy: float) -> Seeing:
     nearest = min(camera.defocused(float(dz)) for dz in depths)
     small = near_axis(camera, depths, scenes.size)
     finest = camera.wavelength * nearest / camera.pupil_diameter
@@ -193,7 +193,9 @@ def _grid(scenes: Scenes, finest: float) -> Grid:
     return Grid((n, n), (pitch, pitch), (middle, middle))
 
 
-def _of_microscope(scope: LightFieldMicroscope, depths: np.ndarray, scenes: Scenes, accuracy: float) -> Any:
+def _of_microscope(
+    scope: LightFieldMicroscope, depths: np.ndarray, scenes: Scenes, accuracy: float
+) -> Seeing:
     if scope.configuration == "fourier":
         operator, points = scope.operator(depths.tolist()), scope.fourier_points()
         whole = points.whole
