@@ -8,14 +8,28 @@ from typing import Protocol, cast
 import numpy as np
 
 from lumigraph.errors import GeometryError
-from lumigraph.information.points import CameraSource, collected, small, source, spread
+from lumigraph.information.points import (
+    CameraSource,
+    MicroscopeSource,
+    collected,
+    has_phase,
+    small,
+    source,
+    spread,
+)
 from lumigraph.instruments import LensletCamera, LightFieldMicroscope
 from lumigraph.instruments.capabilities import WithObjective
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.operators.fourier_changes import Behind, Pupil, Slopes, pupils
 from lumigraph.operators.fourier_microscope import Window, lit_ones, overlap
+from lumigraph.operators.microscope_building import Layout
+from lumigraph.operators.microscope_layout import Behind as Beneath
+from lumigraph.operators.microscope_layout import interpolated, laid_out
+from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.part_points import PartPoints
+from lumigraph.operators.pupil_points import Lit, PupilPoints
 from lumigraph.scene import Points
+from lumigraph.simulation.microscope_scene import SAMPLES
 
 Pair = tuple[Instrument, Instrument]
 """Instruments a little to either side."""
@@ -47,14 +61,19 @@ def require_followed(instrument: Instrument) -> None:
     Raises
     ------
     GeometryError
-        A microscope other than a Fourier one, a camera without lenslets, or one without `part_images`.
+        A camera without lenslets, one without `part_images`, or a microscope without `pupil_images`.
     """
     if isinstance(instrument, LensletCamera):
         instrument.part_images([])
-    elif not (isinstance(instrument, WithObjective) and instrument.in_pupil):
+    elif not isinstance(instrument, WithObjective):
         raise GeometryError(
-            "derivatives of bounds by an instrument's parts are of Fourier microscopes and of cameras with "
-            "lenslets. For others, use search 'local'."
+            "derivatives of bounds by an instrument's parts are of microscopes and of cameras with lenslets. "
+            "For others, use search 'local'."
+        )
+    elif not instrument.in_pupil and not has_phase(cast(LightFieldMicroscope, instrument)):
+        raise GeometryError(
+            "derivatives of bounds by a microscope's parts need square lenslets and a model other than "
+            "'rays'. Use these, or search 'local'."
         )
 
 
@@ -78,6 +97,9 @@ def followed(
         yield before_camera(instrument, cast(Sequence[Cameras], pairs), (depths, numbers), accuracy)
         return
     scope, scopes = cast(LightFieldMicroscope, instrument), cast(Sequence[Scopes], pairs)
+    if not scope.in_pupil:
+        yield before_lenslets(scope, scopes, (depths, numbers), accuracy)
+        return
     for far in np.unique(np.abs(depths)):  # windows are as wide as in `bounds`
         yield BeforeMicroscope(scope, scopes, depths[np.abs(depths) == far], numbers)
 
@@ -131,6 +153,46 @@ class BeforeCamera(PartPoints):
 
 
 Scopes = tuple[LightFieldMicroscope, LightFieldMicroscope]
+
+
+def before_lenslets(
+    scope: LightFieldMicroscope, pairs: Sequence[Scopes], where: tuple[np.ndarray, range], accuracy: float,
+    *, double: bool = False,
+) -> "BeforeLenslets":  # fmt: skip
+    """Of a microscope whose lenslets stand in its image; at depths, and numbers of places in a cell."""
+    depths, numbers = where
+    far = float(np.abs(depths).max())
+
+    def lit(end: LightFieldMicroscope, like: Layout | None = None) -> Lit:
+        layout = _interpolated(end, far, accuracy, None if like is None else like.sampling.pixels)
+        if like is not None and end.calibration.lattice == scope.calibration.lattice:
+            layout = replace(layout, placement=like.placement)
+        images = PupilImages(end.objectives, end.lenslet, layout, (), accuracy, double or like is not None)
+        seen = MicroscopeSource(end, accuracy)
+        light = collected(end) / collected(scope) / seen.whole
+        places = [[*place, dz] for dz in depths.tolist() for place in spread(seen.cell(dz), numbers).tolist()]
+        return Lit(images, Points(np.array(places), np.full(len(places), light)))
+
+    own = lit(scope)
+    layout = own.images.layout
+    return BeforeLenslets(own, [(lit(low, layout), lit(high, layout)) for low, high in pairs])
+
+
+def _interpolated(scope: LightFieldMicroscope, far: float, accuracy: float, samples: int | None) -> Layout:
+    """With pixels that may stand anywhere, so that they may move."""
+    shortest = min(scope.objectives, key=lambda one: one.wavelength)
+    pixels = Beneath(scope.calibration, scope.pixels.fill_factor)
+    sampling = interpolated(shortest, scope.lenslet, pixels, SAMPLES, (far, -far), accuracy, samples)
+    return laid_out(sampling, scope.calibration, scope.lenslet_size, np.float64)
+
+
+class BeforeLenslets(PupilPoints):
+    """`Followed` before a microscope whose lenslets stand in its image."""
+
+    @property
+    def depths(self) -> Sequence[float]:
+        """As `Followed.depths`."""
+        return self.own.points.positions[:, 2].tolist()
 
 
 class BeforeMicroscope:

@@ -237,10 +237,15 @@ def _reached(camera: Camera, depths: np.ndarray, width: float) -> float:
     return farthest
 
 
+def has_phase(scope: LightFieldMicroscope) -> bool:
+    """Whether images of points are known by the pupil: behind square lenslets, not traced by rays."""
+    return scope.objective.model != "rays" and scope.lenslets.shape != "round"
+
+
 def _of_microscope(scope: LightFieldMicroscope, depths: np.ndarray, accuracy: float) -> Source:
     if scope.configuration == "fourier":
         return FourierSource(scope, scope.fourier_points())
-    if scope.objective.model == "rays" or scope.lenslets.shape == "round":
+    if not has_phase(scope):
         return MicroscopeSource(scope, accuracy)
     farthest = float(np.abs(depths).max())
     return PupilSource(scope, scope.pupil_images((), farthest=farthest, accuracy=accuracy))

@@ -65,7 +65,8 @@ def slopes(
     Parameters
     ----------
     scope
-        A Fourier microscope, or a camera with lenslets that has `part_images`.
+        A camera with lenslets that has `part_images`, or a microscope: a Fourier one, or one that has
+        `pupil_images`.
     pairs
         (n,), instruments a little to either side of it: by a focal length, a lenslet's place, a term of the
         pupil's phase.
@@ -74,13 +75,13 @@ def slopes(
     name
         Of the bound.
     accuracy
-        Of a camera's images of points, relative, rms.
+        Of images of points, relative, rms; not of Fourier microscopes.
 
     Raises
     ------
     GeometryError
-        Another instrument, another number of lenslets, a sensor that differs by more than its pixels' optics,
-        or a bound that raw images do not tell.
+        Another instrument, another number of lenslets or of those before the pixels, a sensor that differs by
+        more than its pixels' optics, or a bound that raw images do not tell.
 
     Examples
     --------

@@ -294,12 +294,16 @@ def responses(count: int, fine: int, sampling: CellSampling) -> tuple[np.ndarray
     that pixels average and that samples hold, the latter squared.
     """
     f = np.fft.fftfreq(count) * fine  # in periods of a pitch
-    shift = np.exp(1j * np.pi * f * (1 / sampling.pixels - 1 / fine))
     averaged = np.sinc(f * sampling.width)
-    if sampling.degree == 0:
-        return (averaged * shift).astype(np.complex64), averaged, averaged**2
-    own, held = spline_response(f / sampling.pixels, sampling.degree)
-    return (averaged * own * shift).astype(np.complex64), averaged, averaged**2 * held
+    held = spline_response(f / sampling.pixels, sampling.degree)[1] if sampling.degree else 1.0
+    return factors(count, fine, sampling).astype(np.complex64), averaged, averaged**2 * held
+
+
+def factors(count: int, fine: int, sampling: CellSampling) -> np.ndarray:
+    """The first of `responses`, in double precision."""
+    f = np.fft.fftfreq(count) * fine
+    own = spline_response(f / sampling.pixels, sampling.degree)[0] if sampling.degree else 1.0
+    return np.sinc(f * sampling.width) * own * np.exp(1j * np.pi * f * (1 / sampling.pixels - 1 / fine))
 
 
 def _averaged(light: np.ndarray, factors: np.ndarray, count: int) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from lumigraph.core.calibration import Calibration
 from lumigraph.elements.objective import Objective
 from lumigraph.operators.microscope_bench import DEGREE
@@ -31,14 +33,24 @@ def cell_sampling(
     calibration, fill = behind
     if N := whole_pixels(calibration, accuracy):
         return CellSampling(points, N, fill / N, 0, fill**2)
-    width = fill / calibration.lattice.pitch
-    N = samples_needed(objective, lenslet, width, depths, PIXELS * accuracy)
-    return CellSampling(points, N, width, DEGREE, fill**2)
+    return interpolated(objective, lenslet, behind, points, depths, accuracy)
 
 
-def laid_out(sampling: CellSampling, calibration: Calibration, size: float) -> Layout:
+def interpolated(
+    objective: Objective, lenslet: Lenslet, behind: Behind, points: int, depths: tuple[float, ...],
+    accuracy: float, samples: int | None = None,
+) -> CellSampling:  # fmt: skip
+    """Of pixels wherever they stand: with so many samples along a lenslet, or as many as are needed."""
+    width = behind.fill / behind.calibration.lattice.pitch
+    N = samples or samples_needed(objective, lenslet, width, depths, PIXELS * accuracy)
+    return CellSampling(points, N, width, DEGREE, behind.fill**2)
+
+
+def laid_out(
+    sampling: CellSampling, calibration: Calibration, size: float, dtype: type = np.float32
+) -> Layout:
     """Lenslets that are seen, each so large in the object [m], with their pixels."""
-    placed, cells, middle = placement(calibration, sampling.pixels, sampling.degree)
+    placed, cells, middle = placement(calibration, sampling.pixels, sampling.degree, dtype)
     step = size / calibration.lattice.pitch
     y, x = ((middle[k] - calibration.shape[k] // 2) * step for k in (0, 1))
     return Layout(cells, sampling, placed, (float(y), float(x)))

@@ -56,7 +56,7 @@ def on_lattice(calibration: Calibration) -> np.ndarray:
 
 
 def placement(
-    calibration: Calibration, pixels: int, degree: int
+    calibration: Calibration, pixels: int, degree: int, dtype: type = np.float32
 ) -> tuple[Linear | None, tuple[int, int], np.ndarray]:
     """From the micro-images of a raw image, with N samples along each side of a cell.
 
@@ -68,6 +68,8 @@ def placement(
         N.
     degree
         Of the B-splines whose coefficients the samples are; 0 where they are the pixels (`whole_pixels`).
+    dtype
+        Of the map's numbers.
 
     Returns
     -------
@@ -86,34 +88,36 @@ def placement(
     at = (place - first + FRAME + 0.5) * pixels - 0.5
     middle = calibration.position((first + last) / 2)
     if degree:
-        return _interpolation(at, samples, degree, STRAIGHT * pixels), cells, middle
+        return _interpolation(at, samples, degree, STRAIGHT * pixels, dtype), cells, middle
     at = np.rint(at)
     if at[0, 0].tolist() == [FRAME * pixels] * 2 and at.shape[:2] == (cells[0] * pixels, cells[1] * pixels):
         return None, cells, middle
-    return _interpolation(at, samples, 1, 0.0), cells, middle
+    return _interpolation(at, samples, 1, 0.0, dtype), cells, middle
 
 
-def _interpolation(at: np.ndarray, samples: tuple[int, int], degree: int, straight: float) -> Linear:
+def _interpolation(
+    at: np.ndarray, samples: tuple[int, int], degree: int, straight: float, dtype: type
+) -> Linear:
     """B-splines at places (ny, nx, 2) among samples; what lies outside them is dark.
 
     All weights are at least 0: an operator that rings below zero makes Richardson-Lucy explode.
     """
     y, x = at[:, 0, 0], at[0, :, 1]
     if max(np.ptp(at[..., 0], axis=1).max(), np.ptp(at[..., 1], axis=0).max()) > straight:
-        return Matrix(_splines(at.reshape(-1, 2), samples, degree), (len(y), len(x)), samples)
-    return Resampling(*(_spline(places, n, degree) for places, n in zip((y, x), samples, strict=True)))
+        return Matrix(_splines(at.reshape(-1, 2), samples, degree, dtype), (len(y), len(x)), samples)
+    return Resampling(*(_spline(places, n, degree, dtype) for places, n in zip((y, x), samples, strict=True)))
 
 
-def _spline(at: np.ndarray, samples: int, degree: int) -> Banded:
+def _spline(at: np.ndarray, samples: int, degree: int, dtype: type) -> Banded:
     """B-splines at places along one axis."""
 
     def weights(d: np.ndarray) -> np.ndarray:
         return b_spline(d, degree)
 
-    return banded(at, np.arange(samples), weights, (degree + 1) / 2, ROWS, np.float32)
+    return banded(at, np.arange(samples), weights, (degree + 1) / 2, ROWS, dtype)
 
 
-def _splines(at: np.ndarray, samples: tuple[int, int], degree: int) -> csr_array:
+def _splines(at: np.ndarray, samples: tuple[int, int], degree: int, dtype: type) -> csr_array:
     """Matrix of B-splines at places (pixels, 2) among samples."""
     columns, weights, taps = [], [], degree + 1
     for axis in (0, 1):
@@ -123,7 +127,7 @@ def _splines(at: np.ndarray, samples: tuple[int, int], degree: int) -> csr_array
         weight = b_spline(places[:, None] - index, degree)
         weight[(index < 0) | (index >= n)] = 0
         columns.append(np.clip(index, 0, n - 1))
-        weights.append(weight.astype(np.float32))
+        weights.append(weight.astype(dtype))
     index = columns[0][:, :, None] * samples[1] + columns[1][:, None, :]
     weight = weights[0][:, :, None] * weights[1][:, None, :]
     start, shape = np.arange(len(at) + 1) * taps**2, (len(at), math.prod(samples))

@@ -26,7 +26,7 @@ from lumigraph.operators.microscope_bench import fineness
 from lumigraph.operators.microscope_building import Layout
 from lumigraph.operators.microscope_cell import Lenslet
 from lumigraph.operators.microscope_kernels import Demand, margin_of, reach_of
-from lumigraph.operators.microscope_pupil_waves import Waves, waves_of
+from lumigraph.operators.microscope_pupil_waves import Told, Waves, waves_of
 from lumigraph.operators.resampling import Part, Resampling
 from lumigraph.scene import Points
 
@@ -116,10 +116,11 @@ class PupilImages:
         if self.layout.placement is not None:
             ny, nx = self.layout.placement.shape[0]
             return ny, nx
-        return self._samples
+        return self.samples
 
     @property
-    def _samples(self) -> tuple[int, int]:
+    def samples(self) -> tuple[int, int]:
+        """Of the layout, along y and x."""
         N = self.layout.sampling.pixels
         return self.layout.cells[0] * N, self.layout.cells[1] * N
 
@@ -136,17 +137,17 @@ class PupilImages:
 
     def forward(self, points: Points, coefficients: np.ndarray) -> np.ndarray:
         """Raw image (ny, nx) of points, for coefficients (terms,) [waves rms]."""
-        whole = np.zeros(self._samples)
+        whole = np.zeros(self.samples)
         for light, lit in self._each(points, coefficients, np.zeros((0, 0))):
-            self._add(whole, light * lit.image, lit.cell)
+            self.add(whole, light * lit.image, lit.cell)
         return self.placed(whole)
 
     def derivative(self, points: Points, coefficients: np.ndarray, change: np.ndarray) -> np.ndarray:
         """Change (ny, nx) of `forward` per unit of a change (terms,) of the coefficients."""
         direction = np.append(self._checked("change", change), np.zeros(PLACES))
-        whole = np.zeros(self._samples)
+        whole = np.zeros(self.samples)
         for light, lit in self._each(points, coefficients, direction[None]):
-            self._add(whole, light * lit.changes[0], lit.cell)
+            self.add(whole, light * lit.changes[0], lit.cell)
         return self.placed(whole)
 
     def gradient(self, points: Points, coefficients: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -159,12 +160,12 @@ class PupilImages:
             for p in numbers:
                 place, cell = self._place(points.positions[p])
                 own = _moved(pupil, phases, np.append(coefficients, place))
-                seen = self._cut(plane, cell, waves.sampled.shape[0])
+                seen = self.cut(plane, cell, waves.sampled.shape[0])
                 fields = waves.fields(own)
                 fields *= waves.spread(seen.astype(np.real(fields).dtype))
                 # Re(conj(G) i φ P) = φ Im(G conj(P)): the phases are real.
                 turned = np.imag(waves.back(fields) * own.conj()).sum(0, dtype=np.float64)
-                light = 2 * self._unit * points.intensities[p]
+                light = 2 * self.unit * points.intensities[p]
                 found += light * np.tensordot(phases[: len(found)], turned, 2)
         return found
 
@@ -183,13 +184,13 @@ class PupilImages:
 
         Its image's window, and its pupil's nodes, are those of a point `away` [m] from the focused plane.
         """
-        whole, (place, cell) = np.zeros(self._samples), self._place(position)
+        whole, (place, cell) = np.zeros(self.samples), self._place(position)
         for objective in self.objectives:
             size = self._size(objective, away)
-            waves, phases = self._waves(objective, *size), self._phases(objective, size)
+            waves, phases = self._waves(objective, *size), self.phases(objective, size[2])
             pupil = objective.pupil(*waves.q, 0.0) * waves.area * factor(objective, *waves.q)
             own = _moved(pupil.astype(waves.across.even.dtype), phases, place)
-            self._add(whole, self._one(waves, own, phases[:0])[0] * self._unit, cell)
+            self.add(whole, self._one(waves, own, phases[:0])[0] * self.unit, cell)
         return whole
 
     def cells_at(self, dz: float) -> int:
@@ -215,7 +216,7 @@ class PupilImages:
             return (rows, columns), own
         if isinstance(placement, Resampling):
             return placement.of_part((rows, columns), own)
-        planes = np.zeros((len(own), *self._samples))
+        planes = np.zeros((len(own), *self.samples))
         planes[:, rows, columns] = own
         pixels = np.stack([placement.forward(plane) for plane in planes])
         lit = np.abs(pixels).sum(0)
@@ -233,7 +234,7 @@ class PupilImages:
                 place, cell = self._place(points.positions[p])
                 own = _moved(pupil, phases, np.append(coefficients, place))
                 one = self._one(waves, own, combined)
-                image, changes = (part * self._unit for part in one)
+                image, changes = (part * self.unit for part in one)
                 before = found[p]
                 if before is not None:
                     image, changes = before.image + image, before.changes + changes
@@ -263,8 +264,8 @@ class PupilImages:
                 alike.setdefault(self._size(bent, float(dz)), []).append(p)
             for size, numbers in alike.items():
                 waves = self._waves(objective, *size)
-                pupil = _pupil(objective, size[2], str(waves.across.even.dtype))
-                yield waves, pupil, self._phases(objective, size), numbers
+                pupil = self.pupil(objective, size[2])
+                yield waves, pupil, self.phases(objective, size[2]), numbers
 
     def _size(self, objective: Objective, dz: float) -> tuple[int, int, int]:
         """Cells along a window, samples of the light along a lenslet, nodes along the pupil's diameter.
@@ -278,8 +279,26 @@ class PupilImages:
         margin = margin_of(objective, self.lenslet, dz, Demand(self.accuracy, 1))
         return cells, fineness(objective, self.lenslet, margin), 24 * math.ceil(nodes / 24)
 
+    def sampled(self, objective: Objective, dz: float) -> tuple[Told, Waves]:
+        """How a window of a point at a depth is sampled, and its waves."""
+        cells, fine, nodes = self._size(objective, dz)
+        return (cells, fine, nodes, self._dtype), self._waves(objective, cells, fine, nodes)
+
+    @property
+    def _dtype(self) -> str:
+        return "complex128" if self.double else "complex64"
+
+    def pupil(self, objective: Objective, nodes: int) -> np.ndarray:
+        """Amplitudes (modes, rows, nodes), their areas in them."""
+        return _pupil(objective, nodes, self._dtype)
+
+    def phases(self, objective: Objective, nodes: int) -> np.ndarray:
+        """Phase [rad] per unit of each term, of y, x and dz (k, rows, nodes)."""
+        plain = replace(objective, aberrations=())
+        return _phases(plain, nodes, self.terms, "float64" if self.double else "float32")
+
     def _waves(self, objective: Objective, cells: int, fine: int, nodes: int) -> Waves:
-        dtype = "complex128" if self.double else "complex64"
+        dtype = self._dtype
         terms, fields = len(self.terms) + PLACES, objective.modes * (cells * fine) ** 2
         needed = np.dtype(dtype).itemsize * ((12.0 + terms) * nodes**2 + 4.0 * (fields + BLOCK))
         what = f"the pupil's waves behind {cells} x {cells} lenslets"
@@ -287,40 +306,48 @@ class PupilImages:
         plain = replace(objective, aberrations=())
         return waves_of(plain, self.lenslet, self.layout.sampling, (cells, fine, nodes, dtype))
 
-    def _phases(self, objective: Objective, size: tuple[int, int, int]) -> np.ndarray:
-        """Phase [rad] per unit of each term, of y, x and dz (k, rows, nodes)."""
-        plain = replace(objective, aberrations=())
-        return _phases(plain, size[2], self.terms, "float64" if self.double else "float32")
-
     @property
-    def _unit(self) -> float:
+    def unit(self) -> float:
         """Area of a sample of the object, shared among wavelengths, that pixels take light of [m²]."""
         sampling = self.layout.sampling
         pitch = self.lenslet.pitch / self.lenslet.magnification / sampling.points
         return sampling.light * pitch**2 / len(self.objectives)
 
     def _place(self, position: np.ndarray) -> tuple[np.ndarray, tuple[int, int]]:
-        """A point (y, x) from its cell's middle and dz [m], and that cell's (row, column)."""
+        cell = self.cell_of(position)
+        return self.within(position, cell), cell
+
+    def cell_of(self, position: np.ndarray) -> tuple[int, int]:
+        """Row and column of the cell that a point (y, x, dz) stands in."""
+        y, x = np.floor(self._cells(position) + 0.5).astype(int).tolist()
+        return y, x
+
+    def within(self, position: np.ndarray, cell: tuple[int, int]) -> np.ndarray:
+        """A point (y, x) from a cell's middle, and dz [m]."""
+        size = self.lenslet.pitch / self.lenslet.magnification
+        return np.append((self._cells(position) - cell) * size, position[2])
+
+    def _cells(self, position: np.ndarray) -> np.ndarray:
+        """A point's (y, x), from the first cell's middle [cells]."""
         size, center = self.lenslet.pitch / self.lenslet.magnification, np.array(self.layout.center)
-        cells = (position[:2] - center) / size + (np.array(self.layout.cells) - 1) / 2
-        own = np.floor(cells + 0.5)
-        return np.append((cells - own) * size, position[2]), (int(own[0]), int(own[1]))
+        return (position[:2] - center) / size + (np.array(self.layout.cells) - 1) / 2
 
     def _window(self, cell: tuple[int, int], count: int) -> list[tuple[slice, slice]]:
         """Of a window around a cell, along y and x: which of the layout's samples, which of its own."""
         found, N = [], self.layout.sampling.pixels
-        for k, n in zip(cell, self._samples, strict=True):
+        for k, n in zip(cell, self.samples, strict=True):
             first = k * N - (count - N) // 2
             start, stop = (min(max(at, 0), n) for at in (first, first + count))
             found.append((slice(start, stop), slice(start - first, stop - first)))
         return found
 
-    def _add(self, whole: np.ndarray, image: np.ndarray, cell: tuple[int, int]) -> None:
+    def add(self, whole: np.ndarray, image: np.ndarray, cell: tuple[int, int]) -> None:
+        """Adds images of a window (..., count, count) around a cell to samples of the layout."""
         (rows, own_rows), (columns, own_columns) = self._window(cell, image.shape[-1])
         whole[..., rows, columns] += image[..., own_rows, own_columns]
 
-    def _cut(self, whole: np.ndarray, cell: tuple[int, int], count: int) -> np.ndarray:
-        """Transpose of `_add`."""
+    def cut(self, whole: np.ndarray, cell: tuple[int, int], count: int) -> np.ndarray:
+        """Transpose of `add`."""
         (rows, own_rows), (columns, own_columns) = self._window(cell, count)
         found = np.zeros((count, count))
         found[own_rows, own_columns] = whole[rows, columns]

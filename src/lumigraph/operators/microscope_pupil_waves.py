@@ -22,7 +22,7 @@ from lumigraph.core.cache import remembered
 from lumigraph.core.mirrored import Mirrored
 from lumigraph.elements.disc import disc
 from lumigraph.elements.objective import Objective
-from lumigraph.operators.microscope_bench import guard, responses
+from lumigraph.operators.microscope_bench import factors, guard
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
 from lumigraph.operators.microscope_waves import bloch, centred, over_cells
 
@@ -71,14 +71,14 @@ class Waves:
 
     def fields(self, pupils: np.ndarray) -> np.ndarray:
         """On the fine grid (k, n, n), of pupils (k, rows, nodes)."""
-        even = _of_each(self.onto, pupils, self.across.shape[1])
+        even = of_each(self.onto, pupils, self.across.shape[1])
         return self.down.down(self.across.right(even))
 
     def back(self, fields: np.ndarray) -> np.ndarray:
         """Conjugate transpose of `fields`."""
         down, across = Mirrored.of(self.down.whole.T), Mirrored.of(self.across.whole.T)
         rows = across.right(down.down(fields.conj()))  # the waves are large: not they are conjugated
-        return _of_each(self.onto.T, rows, self.area.shape[1]).conj()
+        return of_each(self.onto.T, rows, self.area.shape[1]).conj()
 
     def samples(self, light: np.ndarray) -> np.ndarray:
         """Of intensities (..., n, n) on the fine grid: (..., count, count)."""
@@ -90,7 +90,7 @@ class Waves:
         return back.right(back.down(samples))
 
 
-def _of_each(matrix: csr_array, planes: np.ndarray, columns: int) -> np.ndarray:
+def of_each(matrix: csr_array, planes: np.ndarray, columns: int) -> np.ndarray:
     """A real matrix times complex planes (k, rows, n): (k, rows, columns)."""
     k, rows, _ = planes.shape
     flat = np.ascontiguousarray(planes.reshape(k, -1).T).view(np.real(planes).dtype)
@@ -98,52 +98,78 @@ def _of_each(matrix: csr_array, planes: np.ndarray, columns: int) -> np.ndarray:
     return np.ascontiguousarray(found.T).reshape(k, rows, columns)
 
 
+Told = tuple[int, int, int, str]
+"""Cells of a window, samples of the light along a lenslet, nodes along a diameter, precision."""
+
+
 @remembered
-def waves_of(
-    objective: Objective, lenslet: Lenslet, sampling: CellSampling, told: tuple[int, int, int, str]
-) -> Waves:
-    """For (cells, samples of the light along a lenslet, nodes along a diameter, precision) of a window."""
+def waves_of(objective: Objective, lenslet: Lenslet, sampling: CellSampling, told: Told) -> Waves:
+    """Of a window."""
     cells, fine, count, dtype = told
     real = "float64" if dtype == "complex128" else "float32"
     qy, qx, area = disc(count, count)
-    turns = objective.aperture * lenslet.pitch / (objective.wavelength * lenslet.magnification)
-    steepest = objective.numerical_aperture / lenslet.magnification / objective.wavelength * lenslet.pitch
-    finest = math.floor(fine / 2 - steepest)
-
-    def waves(at: np.ndarray) -> np.ndarray:
-        behind = bloch(lenslet, objective.wavelength, at, finest, centred(fine))
-        return over_cells(behind.astype(dtype), at, cells)
-
-    grid, onto = _even(turns * qx, cells / 2 + guard(objective, lenslet) + EDGES)
+    onto = _onto(_turns(objective, lenslet) * qx, *_even(objective, lenslet, told))
+    down, across = behind((objective, lenslet), (objective, lenslet), told)
     a = objective.aperture
     places = np.broadcast_to(a * qy, qx.shape), a * qx
     return Waves(
-        (places[0], places[1]), area * a**2, csr_array(onto, dtype=real),
-        Mirrored.of(waves(turns * qy[:, 0]).T), Mirrored.of(waves(grid).T),
-        Mirrored.of(_sampling(cells, fine, sampling).astype(real)),
+        (places[0], places[1]), area * a**2, csr_array(onto, dtype=real), Mirrored.of(down),
+        Mirrored.of(across), Mirrored.of(sampling_matrix(cells, fine, sampling).astype(real)),
     )  # fmt: skip
 
 
-def _even(turns: np.ndarray, extent: float) -> tuple[np.ndarray, csr_array]:
-    """An even grid of turns in a pitch, and what spreads amplitudes (rows, nodes) onto it, row by row."""
-    step, near = 1 / (2 * FINER * extent), np.arange(NEAR)
-    count = 2 * (math.ceil(float(np.abs(turns).max()) / step) + NEAR // 2) + 1
-    at = turns.ravel() / step + count // 2
+def behind(
+    own: tuple[Objective, Lenslet], like: tuple[Objective, Lenslet], told: Told
+) -> tuple[np.ndarray, np.ndarray]:
+    """Bloch waves (samples, rows) and (samples, grid) of an objective and lenslets.
+
+    At places in the pupil, and with as fine a series of a lenslet, as `like` others ask for, which hardly
+    differ.
+    """
+    (objective, lenslet), (cells, fine, count, dtype) = own, told
+    step, number = _even(*like, told)
+    steepest = like[0].numerical_aperture / like[1].magnification / like[0].wavelength * like[1].pitch
+    turns = _turns(objective, lenslet)
+    grid = (np.arange(number) - number // 2) * step * (turns / _turns(*like))
+    rows = turns * disc(count, count)[0][:, 0]
+
+    def waves(at: np.ndarray) -> np.ndarray:
+        found = bloch(lenslet, objective.wavelength, at, math.floor(fine / 2 - steepest), centred(fine))
+        return over_cells(found.astype(dtype), at, cells).T
+
+    return waves(rows), waves(grid)
+
+
+def _turns(objective: Objective, lenslet: Lenslet) -> float:
+    """Periods in a pitch of the wave at the pupil's rim."""
+    return objective.aperture * lenslet.pitch / (objective.wavelength * lenslet.magnification)
+
+
+def _even(objective: Objective, lenslet: Lenslet, told: Told) -> tuple[float, int]:
+    """Step of an even grid of turns in a pitch, and how many they are."""
+    cells, _, count, _ = told
+    step = 1 / (2 * FINER * (cells / 2 + guard(objective, lenslet) + EDGES))
+    most = float(np.abs(_turns(objective, lenslet) * disc(count, count)[1]).max())
+    return step, 2 * (math.ceil(most / step) + NEAR // 2) + 1
+
+
+def _onto(turns: np.ndarray, step: float, count: int) -> csr_array:
+    """What spreads amplitudes of nodes of some turns (rows, nodes) in a pitch onto a grid, row by row."""
+    near, at = np.arange(NEAR), turns.ravel() / step + count // 2
     first = np.floor(at).astype(int) - NEAR // 2 + 1
     alike = np.sinc((near[:, None] - near) / FINER)
     weights = np.linalg.solve(alike, np.sinc((at - first - near[:, None]) / FINER))
     row, node = np.repeat(np.arange(len(turns)), turns.shape[1]), np.arange(turns.size)
     places = (row * count + first + near[:, None]).ravel(), np.tile(node, NEAR)
-    onto = csr_array((weights.ravel(), places), (len(turns) * count, turns.size))
-    return (np.arange(count) - count // 2) * step, onto
+    return csr_array((weights.ravel(), places), (len(turns) * count, turns.size))
 
 
 @lru_cache(maxsize=8)
-def _sampling(cells: int, fine: int, sampling: CellSampling) -> np.ndarray:
+def sampling_matrix(cells: int, fine: int, sampling: CellSampling) -> np.ndarray:
     """Matrix (cells N, cells fine) of what samples make of light; dark beyond the window."""
     wide = cells + 2
     n, count = wide * fine, wide * sampling.pixels
-    spectrum = responses(n, fine, sampling)[0][:, None] * np.fft.fft(np.eye(n), axis=0)
+    spectrum = factors(n, fine, sampling)[:, None] * np.fft.fft(np.eye(n), axis=0)
     folded = np.zeros((count, n), np.complex128)
     np.add.at(folded, np.rint(np.fft.fftfreq(n) * n).astype(int) % count, spectrum)
     whole = np.fft.ifft(folded, axis=0).real * (count / n)

@@ -1,0 +1,164 @@
+"""Derivatives of bounds by the parts of a microscope with lenslets, beside central differences."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import lumigraph as lg
+from lumigraph.errors import GeometryError
+from lumigraph.information import Light, bounds, slopes
+from lumigraph.information.bounds import Seen, deviations
+from lumigraph.information.followed import BeforeLenslets, before_lenslets
+from lumigraph.operators.microscope_pupil_waves import behind, sampling_matrix
+from lumigraph.operators.pupil_points import Mirrored, Parts
+
+UM = 1e-6
+DEPTHS, LIGHT, PLACES = (-9 * UM, 12 * UM), Light(4000, 0.5), range(2)
+
+
+def scope(aperture=0.5, magnification=20, waves=0.1, pixel=6.5 * UM, **changes) -> lg.LightFieldMicroscope:
+    lenslets = {"pitch": 125 * UM, "focal_length": 2.5e-3, "count": (9, 9), "fill_factor": 0.98}
+    objective = {
+        "magnification": magnification,
+        "numerical_aperture": aperture,
+        "aberrations": {5: waves, 6: 0.1, 8: -0.1},
+    }
+    return lg.LightFieldMicroscope.model_validate(
+        {
+            "wavelength": 525e-9,
+            "objective": {"tube_lens": 0.2, **objective, **changes.pop("objective", {})},
+            "lenslets": {**lenslets, **changes.pop("lenslets", {})},
+            "sensor": {"pixel_pitch": pixel, "shape": (150, 150), "read_noise": 1.0},
+            **changes,
+        }
+    )
+
+
+class Key(NamedTuple):
+    """A value, a step, and the microscope that has it."""
+
+    at: float
+    step: float
+    of: Callable[[float], lg.LightFieldMicroscope]
+
+
+PLAIN = {
+    "aperture, and so the light": Key(0.5, 2e-5, lambda v: scope(aperture=v)),
+    "magnification": Key(20, 4e-4, lambda v: scope(magnification=v)),
+    "wavelength": Key(525e-9, 1e-11, lambda v: scope(wavelength=v)),
+    "pitch": Key(125 * UM, 1e-9, lambda v: scope(lenslets={"pitch": v})),
+    "focal length of lenslets": Key(2.5e-3, 1e-7, lambda v: scope(lenslets={"focal_length": v})),
+    "fill factor": Key(0.98, 1e-5, lambda v: scope(lenslets={"fill_factor": v})),
+    "a turn": Key(0.01, 1e-6, lambda v: scope(lenslets={"rotation": v})),
+    "phase of the pupil": Key(0.1, 3e-4, lambda v: scope(waves=v)),
+    "pixels": Key(6.5 * UM, 1e-10, lambda v: scope(pixel=v)),
+}
+OTHER = {
+    "lenslets before the image": Key(
+        1e-3,
+        2e-7,
+        lambda v: scope(configuration="2.0", sensor_distance=3.4e-3, lenslet_offset=v),
+    ),
+    "the sensor": Key(
+        3.4e-3,
+        2e-7,
+        lambda v: scope(configuration="2.0", sensor_distance=v, lenslet_offset=1e-3),
+    ),
+    "aperture, three polarised wavelengths": Key(
+        0.35,
+        2e-5,
+        lambda v: scope(aperture=v, bandwidth=30e-9, objective={"model": "vector"}),
+    ),
+}
+
+
+def sampled_alike(one, other) -> BeforeLenslets:
+    """Points before the first, with all that is sampled as the other one asks for."""
+    before = before_lenslets(other, [(one, one)], (np.array(DEPTHS), PLACES), 1e-2, double=True)
+    own, like, parts = before.pairs[0][0], before.own.images, {}
+    for which, objective in enumerate(like.objectives):
+        for dz in DEPTHS:
+            told, waves = like.sampled(objective, dz)
+            ways = [
+                (replace(each.objectives[which], aberrations=()), each.lenslet) for each in (own.images, like)
+            ]
+            samples = sampling_matrix(told[0], told[1], own.images.layout.sampling)
+            down, across, samples = map(Mirrored.of, (*behind(ways[0], ways[1], told), samples))
+            same = replace(waves, down=down, across=across, sampled=samples)
+            parts[which, own.images.sampled(own.images.objectives[which], dz)[0]] = Parts(
+                which, told, same, False
+            )
+    return BeforeLenslets(own, [], parts)
+
+
+def bound(before: BeforeLenslets, sensor, part: slice) -> float:
+    """Of points before a microscope, rms."""
+    found = [Seen.of(sensor, LIGHT, before.lit(k)[0]) for k in range(len(before.depths))]
+    return float(np.sqrt(np.mean([deviations(one.fisher)[part] ** 2 for one in found])))
+
+
+def check(key: Key, name, part):
+    """Within 1e-4 of differences of four steps, in double precision."""
+    at, step, of = key
+
+    def value(k):
+        one = of(at + k * step)
+        return bound(sampled_alike(one, of(at)), one.sensor, part)
+
+    found = slopes(of(at), [(of(at - step), of(at + step))], DEPTHS, LIGHT, name=name, places=2)
+    near, far = (value(k) - value(-k) for k in (1, 2))
+    assert found.bound == pytest.approx(value(0), rel=1e-5)
+    assert found.changes[0] == pytest.approx((8 * near - far) / 6, rel=1e-4)
+
+
+@pytest.mark.parametrize("key", ["pitch", "phase of the pupil", "pixels"])
+def test_slopes_are_central_differences(key):
+    check(PLAIN[key], "depth", slice(2, 3))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("key", PLAIN | OTHER)
+def test_slopes_of_all_parts_are_central_differences(key):
+    check((PLAIN | OTHER)[key], "depth", slice(2, 3))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "part"), [("lateral", slice(0, 2)), ("brightness", slice(3, 4))])
+@pytest.mark.parametrize("key", PLAIN)
+def test_slopes_of_other_bounds_are_central_differences(key, name, part):
+    check(PLAIN[key], name, part)
+
+
+def test_the_bound_is_that_of_bounds():
+    """Whose pixels are interpolated from other samples where lenslets are whole pixels wide."""
+    for one, error in ((scope(), 1e-5), (scope(pixel=6.25 * UM), 5e-3)):
+        known = bounds(one, DEPTHS, LIGHT, places=2)
+        assert slopes(one, [], DEPTHS, LIGHT, places=2).bound == pytest.approx(known.depth, rel=error)
+
+
+@pytest.mark.long
+def test_slopes_show_where_a_bound_changes():
+    """Beside differences of bounds themselves, which sample each microscope as it asks for."""
+    at, step, of = PLAIN["focal length of lenslets"]
+    low, high = of(at - 20 * step), of(at + 20 * step)
+    found = slopes(of(at), [(low, high)], DEPTHS, LIGHT, places=2)
+    known = [bounds(one, DEPTHS, LIGHT, places=2).depth for one in (low, high)]
+    assert found.changes[0] == pytest.approx(known[1] - known[0], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [scope(lenslets={"shape": "round"}), scope(objective={"model": "rays", "aberrations": {}})],
+    ids=["round", "rays"],
+)
+def test_microscopes_without_waves_of_square_lenslets_are_refused(other):
+    with pytest.raises(GeometryError, match="square lenslets and a model other than 'rays'"):
+        slopes(other, [], DEPTHS, LIGHT)
+
+
+def test_pairs_with_other_lenslets_are_refused():
+    with pytest.raises(GeometryError, match="other numbers of lenslets"):
+        slopes(scope(), [(scope(), scope(lenslets={"count": (11, 9)}))], DEPTHS, LIGHT)
