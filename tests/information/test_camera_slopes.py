@@ -88,7 +88,7 @@ def test_slopes_are_central_differences_of_bounds(given, keys, name):
 
     for key, change in zip(keys, found.changes, strict=True):
         low, high = map(bound, ends(given, key, 2 * step))
-        assert 2 * change == pytest.approx(high - low, rel=1e-4), key
+        assert 2 * change == pytest.approx(high - low, rel=1e-4, abs=0), key
 
 
 @pytest.mark.parametrize("given", [TURNED, HEX, ONE], ids=["turned squares", "hexagons", "1.0"])
