@@ -36,10 +36,14 @@ class Linear(ABC):
         Samples of the object, of every plane of it; None where it is not known.
     depths
         Of an object's planes from the focused one (z,) [m]; None for one plane (y, x).
+    resolved_pitch
+        Of samples that hold all that a raw image shows of the focused plane [m]: half the shortest period
+        that the instrument resolves; None where it is not known.
     """
 
     object_grid: Grid | None = None
     depths: tuple[float, ...] | None = None
+    resolved_pitch: float | None = None
 
     title: ClassVar[str] = "Linear map"
 

@@ -5,6 +5,7 @@
 - `side_by_side`: runs of several raw images that share each product of the operator
 - `together`: several raw images of one object
 - `beyond`: objects that reach beyond the picture, as far as light comes from
+- `coarse`: a warning where samples are too coarse to explain a raw image
 - `exposure`: `Exposure`, what is known of the raw image besides its values
 - `problem`: the three put together: model, sensitivity, deviance
 - `methods`: `Stop`, and what methods share

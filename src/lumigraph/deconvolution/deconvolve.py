@@ -15,6 +15,7 @@ from lumigraph.core.threads import single_products
 from lumigraph.core.volume import Volume
 from lumigraph.deconvolution.beyond import BESIDE, beyond, least_seen, looks_beyond
 from lumigraph.deconvolution.checkpoint import Checkpoint, fingerprint
+from lumigraph.deconvolution.coarse import warn_of_coarse_samples
 from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.methods import Method, Stop, check_offers
 from lumigraph.deconvolution.problem import Problem, Scale, values
@@ -140,7 +141,9 @@ def deconvolve(
     Warns
     -----
     SamplingWarning
-        One of several raw images is brighter or darker than the object that explains all of them sends.
+        One of several raw images is brighter or darker than the object that explains all of them sends. The
+        gain is known, what is left is twice what noise explains, more iterations would leave as much, and
+        samples are coarser than the instrument resolves.
     """
     engine = Deconvolver(operator, iterations, method=method)
     return engine(raw, exposure, progress=progress, checkpoint=checkpoint)
@@ -250,6 +253,7 @@ class Deconvolver:
         """The result of one raw image, or of several; parameters and errors are those of `deconvolve`."""
         run, like = self._run(raw, exposure, progress, checkpoint)
         state = finished(run, like)
+        warn_of_coarse_samples(run, state)
         if isinstance(self.operator, Joint):
             warn_of_brightness(run.problem, state.model, self.operator)
         self._last = state.estimate if self.warm else None
@@ -265,6 +269,7 @@ class Deconvolver:
         problem = Problem.of(raw, exposure, self._scaled(exposure, data))
         wanted = self.operator, self._inside, self._pictured
         run = Run(problem, self.method, self.limits, progress, wanted, start=self._begun(problem))
+        run.counted = exposure.gain is not None
         if checkpoint is not None:
             run.checkpoint = Checkpoint.of(checkpoint)
             run.key = fingerprint(data, exposure, self.method, run.start)
@@ -304,7 +309,9 @@ class Deconvolver:
 
         def result(operator: Linear) -> Result:
             run.problem = replace(run.problem, scale=replace(run.problem.scale, operator=operator))
-            return run.result(finished(run, like), like)
+            state = finished(run, like)
+            warn_of_coarse_samples(run, state)
+            return run.result(state, like)
 
         return result
 

@@ -63,7 +63,10 @@ class Interrupted(KeyboardInterrupt):
 
 @dataclass(slots=True)
 class Run:
-    """A problem, a method and when to stop; `wanted` is the operator and what of the object is asked for."""
+    """A problem, a method and when to stop; `wanted` is the operator and what of the object is asked for.
+
+    `counted` says whether deviances are in electrons; `fall` is by how much the last step lowered it.
+    """
 
     problem: Problem
     method: Method
@@ -74,6 +77,8 @@ class Run:
     key: str = ""
     began: float = 0.0
     start: Array | None = None
+    counted: bool = False
+    fall: float = math.inf
 
     def states(self) -> Iterator[State]:
         """The first state and each that follows, until it is time to stop."""
@@ -83,6 +88,7 @@ class Run:
         yield state
         while not self.limits.reached(state.done, state.deviance, change):
             before, state = state, self.method.step(self.problem, state)
+            self.fall = before.deviance - state.deviance
             if self.progress is not None or self.limits.change is not None:
                 change = _change(before.estimate, state.estimate)
             if self.checkpoint is not None:

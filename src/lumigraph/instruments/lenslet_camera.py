@@ -200,10 +200,16 @@ class LensletCamera(Camera):
     def _planes(
         self, optics: CameraOptics, depths: Sequence[float] | None, grid: Grid, making: Making
     ) -> Linear:
-        return periodic_operator(
+        operator = periodic_operator(
             optics, grid, 0.0 if depths is None else depths,
             accuracy=making.accuracy, folder=making.folder, progress=making.progress,
         )  # fmt: skip
+        return replace(operator, resolved_pitch=self._finest * self.object_scale)
+
+    @property
+    def _finest(self) -> float:
+        """Half the shortest period in the main lens' image [m], λ L/(2D)."""
+        return self.wavelength * self.separation / (2 * self.pupil_diameter)
 
     def _in_light_of(self, wavelength: float) -> Self:
         """Also with the focal length that lenslets of glass have, behind the same main lens and pixels."""
@@ -276,8 +282,11 @@ class LensletCamera(Camera):
     def operator_grid(self, samples: int | None = None) -> Grid:
         """Object samples of its `operator` over the array's field, so many along a lenslet's pitch."""
         scale, pitch = self.object_scale, self.lenslets.pitch
-        finest = self.wavelength * self.separation / (2 * self.pupil_diameter)
-        n = math.ceil(pitch / finest) if samples is None else checks.whole("samples_per_lenslet", samples)
+        n = (
+            math.ceil(pitch / self._finest)
+            if samples is None
+            else checks.whole("samples_per_lenslet", samples)
+        )
         shape = tuple(max(1, round(2 * reach * n / pitch)) for reach in self.lenslets.reach)
         step = pitch * scale / n
         center = tuple(0.0 if k % 2 else step / 2 for k in shape)

@@ -141,6 +141,7 @@ def microscope_operator(
         tuple(kernels), layout.cells, layout.placement, -layout.frame,
         suits_frequencies(kernels, layout.cells, -layout.frame, left_out), left_out,
         object_grid=_object_grid(lenslet, layout), depths=None if depths is None else planes,
+        resolved_pitch=min(one.wavelength / (4 * one.numerical_aperture) for one in objectives),
     )  # fmt: skip
 
 
