@@ -41,9 +41,9 @@ def warn_of_coarse_samples(run: Run, state: State) -> None:
             f"image. Its samples are {picture.length(max(grid.pitch))} apart, the instrument resolves those "
             f"of {picture.length(resolved)}. Ask its operator for more samples_per_lenslet, up to "
             f"{max(grid.pitch) / resolved:.2g} times as many. If that changes little, check depths, "
-            "calibration, gain and prior.",
+            "calibration, aberrations, gain and prior.",
             SamplingWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
 
 
