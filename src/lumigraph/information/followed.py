@@ -92,7 +92,7 @@ def followed(
     require_followed(instrument)
     for one in (end for pair in pairs for end in pair):
         require_followed(one)
-        _require_alike(instrument, one)
+        require_alike(instrument, one)
     if isinstance(instrument, LensletCamera):
         yield before_camera(instrument, cast(Sequence[Cameras], pairs), (depths, numbers), accuracy)
         return
@@ -108,13 +108,20 @@ OPTICAL = ("pixel_pitch", "shape"), ("pixel_pitch", "shape", "fill_factor", "ang
 """What of sensors images follow from, not their noise: of microscopes and of cameras."""
 
 
-def _require_alike(instrument: Instrument, other: Instrument) -> None:
+def require_alike(instrument: Instrument, other: Instrument) -> None:
+    """Refuse an instrument that differs by more than optics.
+
+    Raises
+    ------
+    GeometryError
+        Other sensors or numbers of lenslets.
+    """
     own, names = instrument.sensor, OPTICAL[isinstance(instrument, LensletCamera)]
     same = replace(other.sensor, **{name: getattr(own, name) for name in names})
     counts = [cast(LensletCamera, one).lenslets.count for one in (instrument, other)]
     if type(instrument) is not type(other) or same != own or counts[0] != counts[1]:
         raise GeometryError(
-            "derivatives of bounds are by optics and by the pixels' pitch; two instruments have other "
+            "derivatives of bounds and errors are by optics and by the pixels' pitch; two instruments have other "
             "numbers of lenslets, or other sensors. Use search 'local' for these."
         )
 

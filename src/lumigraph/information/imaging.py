@@ -95,10 +95,9 @@ class Imaging:
             "Use fewer photons."
         )
 
-    def left(self, z: np.ndarray) -> np.ndarray:
-        """Share of each wave of z (nz, n, n) in zᵀ P z over the number of samples (nz, n, n)."""
-        found = coloured(self.solved(coloured(z, self.power)), self.power)
-        return (np.conj(np.fft.fft2(z)) * np.fft.fft2(found)).real / z.shape[-1] ** 4
+    def covered(self, z: np.ndarray) -> np.ndarray:
+        """P z, what is left times an object (nz, n, n)."""
+        return coloured(self.solved(coloured(z, self.power)), self.power)
 
     def reconstructed(self, raw: np.ndarray) -> np.ndarray:
         """Scenes (nz, n, n) that explain a raw image (ny, nx) [electrons] best, by a linear rule."""
@@ -114,6 +113,11 @@ class Imaging:
         return np.fft.ifft2(np.fft.fft2(rest) / (1 + self.usual)).real
 
 
+def shares(z: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Share of each wave of z (nz, n, n) in zᵀ P z over the number of samples; `found` is P z."""
+    return (np.conj(np.fft.fft2(z)) * np.fft.fft2(found)).real / z.shape[-1] ** 4
+
+
 def imaging(
     instrument: Instrument, depths: np.ndarray, scenes: Scenes, light: Light, accuracy: float
 ) -> Imaging:
@@ -123,8 +127,7 @@ def imaging(
     grid = operator.object_grid
     assert grid is not None
     across = waves_between(grid.y, scenes), waves_between(grid.x, scenes)
-    per_area = sensor.quantum_efficiency * light.photons / scenes.pitch**2
-    electrons = per_area * area
+    electrons = _electrons(sensor, scenes, light) * area
     even = np.ones((len(depths), scenes.samples, scenes.samples))
     mean = np.maximum(_forward(operator, across, electrons, even), 0)
     mean = mean + sensor.dark_signal + sensor.quantum_efficiency * light.background
@@ -175,14 +178,28 @@ def _operator(instrument: Instrument, depths: np.ndarray, scenes: Scenes, accura
     return _of_camera(cast(Camera, instrument), depths, scenes, accuracy)
 
 
+def _electrons(sensor: Sensor, scenes: Scenes, light: Light) -> float:
+    """Of an area of the mean scene [1/m²]."""
+    return sensor.quantum_efficiency * light.photons / scenes.pitch**2
+
+
+def camera_electrons(camera: Camera, depths: np.ndarray, scenes: Scenes, light: Light) -> np.ndarray:
+    """`Imaging.light` of a camera."""
+    return _electrons(camera.sensor, scenes, light) * _area(camera, depths)
+
+
+def _area(camera: Camera, depths: np.ndarray) -> np.ndarray:
+    """As of `Seeing`."""
+    optics = camera.optics()
+    return (optics.sensor.pixel_pitch * (optics.object_distance + depths) / optics.separation) ** 2
+
+
 def _of_camera(camera: Camera, depths: np.ndarray, scenes: Scenes, accuracy: float) -> Seeing:
     nearest = min(camera.defocused(float(dz)) for dz in depths)
     small = near_axis(camera, depths, scenes.size)
     finest = camera.wavelength * nearest / camera.pupil_diameter
     operator = small.operator_on(_grid(scenes, finest), depths.tolist(), accuracy=accuracy)
-    optics = small.optics()
-    scale = (optics.object_distance + depths) / optics.separation
-    return operator, (optics.sensor.pixel_pitch * scale) ** 2, small.sensor
+    return operator, _area(small, depths), small.sensor
 
 
 def _grid(scenes: Scenes, finest: float) -> Grid:

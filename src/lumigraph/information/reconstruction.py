@@ -17,7 +17,7 @@ import math
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from lumigraph.core.progress import Progress
 from lumigraph.core.result import Quantity
 from lumigraph.errors import SamplingWarning
 from lumigraph.information.bounds import Light, checked_depths
-from lumigraph.information.imaging import Imaging, imaging
+from lumigraph.information.imaging import Imaging, imaging, shares
 from lumigraph.information.scenes import Scenes, frequencies, ring_means, rings
 from lumigraph.instruments.instrument import Instrument
 
@@ -154,7 +154,7 @@ def reconstruction_error(
     found, brightest = [], 0.0
     for number, group in enumerate(some):
         seen = imaging(instrument, group, scenes, light, accuracy)
-        found.append(_probed(seen, scenes.samples))
+        found.append(probed(seen, scenes.samples)[:2])
         brightest = max(brightest, float(seen.mean.max()))
         if progress is not None:
             progress((number + 1) / len(some))
@@ -186,16 +186,25 @@ def _summed(
     )  # fmt: skip
 
 
-def _probed(seen: Imaging, samples: int) -> tuple[np.ndarray, float]:
-    """What is left of each wave (nz, n, n), and the standard error of the sum."""
+class Probed(NamedTuple):
+    """What is left of each wave (nz, n, n), the standard error of the sum, and P z (nz, n, n) of each z."""
+
+    left: np.ndarray
+    off: float
+    found: list[np.ndarray]
+
+
+def probed(seen: Imaging, samples: int) -> Probed:
+    """By as many objects z as leave the sum even."""
     rng = np.random.default_rng(0)  # alike for all cameras: differences are theirs
-    found, sums = [], np.zeros(0)
+    left, found, sums = [], [], np.zeros(0)
     for z in _objects(rng, (seen.planes, samples, samples)):
-        found.append(seen.left(z))
-        sums = np.array([one.sum() for one in found])
-        if len(found) >= FEW and sums.std(ddof=1) / math.sqrt(len(found)) < 2 * EVEN * sums.mean():
+        found.append(seen.covered(z))
+        left.append(shares(z, found[-1]))
+        sums = np.array([one.sum() for one in left])
+        if len(left) >= FEW and sums.std(ddof=1) / math.sqrt(len(left)) < 2 * EVEN * sums.mean():
             break
-    return np.mean(found, axis=0), float(sums.std(ddof=1) / math.sqrt(len(found)))
+    return Probed(np.mean(left, axis=0), float(sums.std(ddof=1) / math.sqrt(len(left))), found)
 
 
 def _objects(rng: np.random.Generator, shape: tuple[int, int, int]) -> Iterator[np.ndarray]:

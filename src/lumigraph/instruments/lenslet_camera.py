@@ -31,6 +31,7 @@ from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.tolerances import Tolerances
 from lumigraph.operators import CameraOptics, Model, is_possible, periodic_operator
 from lumigraph.operators.part_images import PartImages
+from lumigraph.operators.part_plane import PartPlane
 from lumigraph.propagation import Propagate
 
 
@@ -278,6 +279,52 @@ class LensletCamera(Camera):
         (1,)
         """
         return PartImages.of(self, pairs, accuracy)
+
+    def part_plane(
+        self,
+        pairs: Sequence[tuple[Self, Self]],
+        grid: Grid | None = None,
+        dz: float = 0.0,
+        *,
+        accuracy: float = 1e-2,
+    ) -> PartPlane:
+        """Raw images of a plane, with derivatives by whatever differs between pairs of cameras.
+
+        The object stays where it is before all cameras, and as bright for each area: how it falls onto their
+        lenslets is part of what is differentiated.
+
+        Parameters
+        ----------
+        pairs
+            As of `part_images`.
+        grid
+            Samples of the object; those of `operator` if left out.
+        dz
+            Depth from the focused plane [m], positive farther.
+        accuracy
+            Relative rms error of raw images, 1e-3 to 1e-2, of objects inside the array's field; light that
+            misses the array's cells is left out.
+
+        Raises
+        ------
+        GeometryError
+            As of `part_images`; a depth that is not imaged.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import lumigraph as lg
+        >>> camera = lg.load_camera("thesis-plenoptic-2-m050").replace(
+        ...     lenslets={"count": (5, 5)}, sensor={"shape": (61, 61)}, main_lens={"diameter": "1 mm"}
+        ... )
+        >>> pair = (camera.replace(lenslets={"focal_length": f}) for f in ("5.1999 mm", "5.2001 mm"))
+        >>> plane = camera.part_plane([tuple(pair)], lg.Grid.square(20, 50e-6))
+        >>> raw = plane.forward(np.ones((20, 20)))
+        >>> plane.gradient(np.ones((20, 20)), raw).shape
+        (1,)
+        """
+        self.defocused(float(dz))
+        return PartPlane(self.part_images(pairs, accuracy=accuracy), grid or self.operator_grid(), float(dz))
 
     def operator_grid(self, samples: int | None = None) -> Grid:
         """Object samples of its `operator` over the array's field, so many along a lenslet's pitch."""

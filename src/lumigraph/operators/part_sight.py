@@ -70,15 +70,15 @@ class Sight:
     like: "Sight | None" = None
 
     @classmethod
-    def of(cls, camera: CameraOptics, points: Points, accuracy: float) -> "Sight":
-        """As finely as the accuracy and the points ask for."""
+    def of(cls, camera: CameraOptics, points: Points, accuracy: float, fewest: int = PUPIL) -> "Sight":
+        """As finely as the accuracy and the points ask for, by so many nodes across the lens at least."""
         distances = camera.object_distance + points.positions[:, 2]
         blurred = max(distances.tolist(), key=lambda z: _cells.blur(camera, z))
         optics = Optics.of(camera, blurred, SPARE * accuracy)
         places = on_lenslets(optics, points.positions[:, :2], distances)
         least = 3 * farthest(optics, places) / _cells.airy(camera), EDGE / accuracy
         # Even: the stop's edge then touches no sample's side, on one or the other side of it by rounding.
-        return cls(optics.alike(camera), max(PUPIL, *(2 * math.ceil(count / 2) for count in least)))
+        return cls(optics.alike(camera), max(fewest, *(2 * math.ceil(count / 2) for count in least)))
 
     def alike(self, camera: CameraOptics) -> "Sight":
         """Of a camera that hardly differs, as finely sampled."""

@@ -70,8 +70,7 @@ class Waves:
     def changed(self, by: "Change") -> np.ndarray:
         """Change of the field with the camera."""
         moved = []
-        for k, turn in enumerate(self.turns):
-            places, nodes = (by.sum(lambda one, k=k, j=j: one.turns(self.spot)[k][j]) for j in (0, 1))
+        for k, (turn, (places, nodes)) in enumerate(zip(self.turns, by.turns(self.spot), strict=True)):
             moved.append(1j * (np.outer(places, turn[1]) + np.outer(turn[0], nodes)) * self.phases[k])
         y, x = self.phases
         light = moved[0] @ self.right + y @ (by.pupil(self.spot.dz) @ x.T + self.pupil @ moved[1].T)
@@ -88,14 +87,23 @@ class Change:
         Times, and cameras.
     pieces
         Change of the lenslets' matrices.
+    moved
+        Where points are before the cameras of each pair; empty where they stay.
     """
 
     pairs: tuple[tuple[float, Both], ...]
     pieces: dict[Key, np.ndarray]
+    moved: Sequence[Where] = ()
     _pupils: dict[float, np.ndarray] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, own: Sight, pairs: Iterable[tuple[float, Both]], spots: Sequence[Spot]) -> "Change":
+    def of(
+        cls,
+        own: Sight,
+        pairs: Iterable[tuple[float, Both]],
+        spots: Sequence[Spot],
+        moved: Sequence[Where] = (),
+    ) -> "Change":
         """For some points."""
         lit = {key for spot in spots for key in own.lenslets.keys(*spot.cells)}
         known, pieces = [], {key: np.zeros_like(own.lenslets.piece(key)) for key in lit}
@@ -104,11 +112,21 @@ class Change:
             for key in lit if first is not last else ():
                 pieces[key] += weight * (last.piece(key) - first.piece(key))
             known.append((weight, (both[0].anew, both[1].anew)))
-        return cls(tuple(known), pieces)
+        return cls(tuple(known), pieces, moved)
 
     def sum(self, of: Callable[[Sight], np.ndarray]) -> Any:
         """Change of what is made of a camera."""
         return sum(weight * (of(last) - of(first)) for weight, (first, last) in self.pairs)
+
+    def turns(self, spot: Spot) -> list[Turn]:
+        """Of a point's `Sight.turns`, along y and along x."""
+        found = [[np.zeros(len(part)) for part in turn] for turn in self.pairs[0][1][0].turns(spot)]
+        for k, (weight, both) in enumerate(self.pairs):
+            spots = [spot.before(points) for points in self.moved[k]] if self.moved else [spot, spot]
+            ends = [one.turns(mine) for one, mine in zip(both, spots, strict=True)]
+            for axis, part in np.ndindex(2, 2):
+                found[axis][part] += weight * (ends[1][axis][part] - ends[0][axis][part])
+        return [(places, nodes) for places, nodes in found]
 
     def pupil(self, dz: float) -> np.ndarray:
         """Of the wave in the main lens."""
@@ -143,6 +161,12 @@ class Slopes:
         """By places and nodes along an axis, of those by the phases' factors."""
         by, (places, nodes) = by * 1j * waves.phases[which], waves.turns[which]
         return np.real(by @ nodes), np.real(places @ by)
+
+    def between(self, both: Both, pupil: np.ndarray, where: Where | None = None) -> float:
+        """From one camera to the other (not halved); `pupil`, slopes by the wave there of the only depth."""
+        dz = self._of[0][1].dz
+        found = times(pupil, *(one.anew.pupil(dz) for one in both))
+        return 2 * (found + self.along(both[0].anew, both[1].anew, where))
 
     def along(self, first: Sight, last: Sight, where: Where | None = None) -> float:
         """From one camera to another close by, before which points are elsewhere."""

@@ -84,7 +84,7 @@ class Evaluations:
             pairs.append((ends[0][0], ends[1][0]))
             widths.append(ends[1][1] - ends[0][1])
         camera = changed(self.start, item)
-        found = self.goal.slopes(camera, pairs, self.first, int(self.row(item)[PLACES]))
+        found = self.goal.slopes(camera, pairs, self.first, int(self.row(item).get(PLACES, 0)))
         return np.divide(found, widths, out=np.zeros(len(found)), where=np.array(widths) > 0)
 
     def _near(

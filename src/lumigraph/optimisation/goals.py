@@ -11,12 +11,21 @@ import numpy as np
 from lumigraph import metric
 from lumigraph.core.result import Quantity
 from lumigraph.errors import FormatError, GeometryError, SamplingWarning
-from lumigraph.information import Bounds, Light, ReconstructionError, Scenes, bounds, reconstruction_error
+from lumigraph.information import (
+    Bounds,
+    Light,
+    ReconstructionError,
+    Scenes,
+    bounds,
+    reconstruction_error,
+    reconstruction_slopes,
+)
 from lumigraph.information.bounds import checked_depths, checked_places
 from lumigraph.information.followed import require_followed
 from lumigraph.information.imaging import check as check_scenes
 from lumigraph.information.imaging import usual_scenes
 from lumigraph.information.points import collected
+from lumigraph.information.reconstruction_slopes import require_camera
 from lumigraph.information.slopes import Bound, slopes
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.metric.charts import check_camera
@@ -201,8 +210,10 @@ class Goal:
         return {row.name: float(row.value) for row in instrument.quantities() if row.name == self.name}
 
     def slopes(self, instrument: Instrument, pairs: Sequence[Any], first: float, places: int) -> np.ndarray:
-        """Changes (n,) of a bound from the first to the last of each pair of cameras around one."""
+        """Changes (n,) of a bound or an error from the first to the last of each pair of cameras."""
         light = self.light_of(instrument, first)
+        if self.name == ERRORS[0]:
+            return reconstruction_slopes(instrument, pairs, self.depths, self.judged_scenes, light).changes
         return slopes(
             instrument,
             pairs,
@@ -218,11 +229,14 @@ class Goal:
         Raises
         ------
         GeometryError
-            No bound, or an instrument without `slopes`.
+            No bound and no error of pictures, or an instrument without derivatives of them.
         """
+        if self.name == ERRORS[0]:
+            require_camera(instrument)
+            return
         if self.name not in BOUNDS:
             raise GeometryError(
-                f"search 'gradient' is for {', '.join(BOUNDS)}, not {self.name!r}. Use 'local'."
+                f"search 'gradient' is for {', '.join((*BOUNDS, ERRORS[0]))}, not {self.name!r}. Use 'local'."
             )
         require_followed(instrument)
 

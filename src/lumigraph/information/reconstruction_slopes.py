@@ -1,0 +1,141 @@
+r"""`reconstruction_slopes`: how the error of reconstructed scenes changes with the camera.
+
+With u = P z, the covariance that is left times one of the objects z of `reconstruction_error`,
+
+.. math:: \delta(z^T P z) = -2 (N^{-1} A u)^T \delta A\, u + \left((A u)^2 / N^2\right)^T \delta A\, 1
+
+the latter since photons of the mean scene are noise. No system of equations is solved anew, and all objects
+go backwards through the camera at once.
+"""
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+
+from lumigraph.core import checks
+from lumigraph.errors import GeometryError
+from lumigraph.information.bounds import Light, checked_depths
+from lumigraph.information.followed import Cameras, Pair, require_alike, require_followed
+from lumigraph.information.imaging import Imaging, camera_electrons, imaging
+from lumigraph.information.points import collected, small
+from lumigraph.information.reconstruction import probed
+from lumigraph.information.scenes import Scenes
+from lumigraph.information.slopes import Sloping
+from lumigraph.instruments import LensletCamera
+from lumigraph.instruments.instrument import Instrument
+from lumigraph.operators.part_plane import PartPlane
+
+
+def reconstruction_slopes(
+    camera: Instrument,
+    pairs: Sequence[Pair],
+    depths: Sequence[float],
+    scenes: Scenes,
+    light: Light | None = None,
+    *,
+    accuracy: float = 1e-2,
+) -> Sloping:
+    """`reconstruction_error` over depths, each alone, and how it changes with a camera's parts.
+
+    The scenes stay as they are before all cameras, who collect as much of their light as their apertures do.
+
+    Parameters
+    ----------
+    camera
+        With lenslets, one that has `part_plane`.
+    pairs
+        (n,), cameras a little to either side of it.
+    depths, scenes, light
+        As of `reconstruction_error`.
+    accuracy
+        Of raw images, relative, rms: the camera's, and of those that are differentiated.
+
+    Raises
+    ------
+    GeometryError
+        As of `reconstruction_error`; another instrument; cameras between which the sensor's noise or a number
+        of parts differs.
+
+    Examples
+    --------
+    >>> import lumigraph as lg
+    >>> camera = lg.load_camera("thesis-plenoptic-2-m050").replace(main_lens={"diameter": "1 mm"})
+    >>> pair = (camera.replace(lenslets={"focal_length": f}) for f in ("5.1999 mm", "5.2001 mm"))
+    >>> scenes = lg.information.Scenes(100e-6, 8)
+    >>> error, changes = lg.information.reconstruction_slopes(camera, [tuple(pair)], [2e-3], scenes)
+    >>> 0 < error < 1, len(changes)
+    (True, 1)
+    """
+    light = Light() if light is None else light
+    checks.instance("light", light, Light)
+    checks.instance("scenes", scenes, Scenes)
+    require_camera(camera)
+    for end in (end for pair in pairs for end in pair):
+        require_camera(end)
+        require_alike(camera, end)
+    own, planes = cast(LensletCamera, camera), checked_depths(depths)
+    found = [_at(own, cast(Sequence[Cameras], pairs), dz, (scenes, light), accuracy) for dz in planes]
+    value = float(np.sqrt(np.mean([square for square, _ in found])))
+    return Sloping(value, np.mean([changes for _, changes in found], axis=0) / (2 * value))
+
+
+def require_camera(instrument: Instrument) -> None:
+    """Refuse an instrument whose raw images of planes have no derivatives by its parts.
+
+    Raises
+    ------
+    GeometryError
+        No camera with lenslets, or one without `part_images`.
+    """
+    if not isinstance(instrument, LensletCamera):
+        raise GeometryError(
+            "derivatives of the error of pictures are of cameras with lenslets. For others, use search "
+            "'local'."
+        )
+    require_followed(instrument)
+
+
+def _at(
+    camera: LensletCamera, pairs: Sequence[Cameras], dz: float, of: tuple[Scenes, Light], accuracy: float
+) -> tuple[float, np.ndarray]:
+    """Square of the error at a depth, and its changes (n,)."""
+    (scenes, light), depths = of, np.array([dz])
+    seen = imaging(camera, depths, scenes, light, accuracy)
+    assert seen.operator.object_grid is not None  # as imaging has it
+    own = small(camera, depths, scenes.size)
+    cut = [tuple(small(end, depths, scenes.size, own) for end in pair) for pair in pairs]
+    plane = own.part_plane(cast(Sequence[Cameras], cut), seen.operator.object_grid, dz, accuracy=accuracy)
+    brighter = []
+    for pair in cut:
+        low, high = (_electrons(end, camera, depths, of) for end in pair)
+        brighter.append(high - low)
+    left, _, found = probed(seen, scenes.samples)
+    share = scenes.contrast**2
+    return float(left.sum()) / share, sloped(seen, plane, found, np.array(brighter)) / share
+
+
+def _electrons(
+    end: LensletCamera, camera: LensletCamera, depths: np.ndarray, of: tuple[Scenes, Light]
+) -> float:
+    """Of a pixel for 1 of the operator: a camera gets its light by its aperture."""
+    scenes, light = of
+    photons = light.photons * collected(end) / collected(camera)
+    return float(camera_electrons(end, depths, scenes, Light(photons, light.background))[0])
+
+
+def sloped(seen: Imaging, plane: PartPlane, found: Sequence[np.ndarray], brighter: np.ndarray) -> np.ndarray:
+    """Changes (n,) of the mean of zᵀ P z over the number of samples; `found`, P z (1, n, n) of each z.
+
+    `brighter`, by how many electrons more a pixel has for 1 of the operator (n,).
+    """
+    even, noise, count = np.ones_like(found[0]), seen.noise**2, len(found)
+    raws = [seen.electrons(one) for one in found]
+    weights = [-2 * raw / noise / count for raw in raws]
+    weights.append(np.mean([raw**2 for raw in raws], axis=0) / noise**2)
+    raws.append(seen.electrons(even))
+    (electrons,), (y, x) = seen.light, seen.across
+    objects = np.stack([electrons * (y @ one[0] @ x.T) for one in (*found, even)])
+    by_light = sum(float(np.vdot(weight, raw)) for weight, raw in zip(weights, raws, strict=True))
+    changes = plane.gradient(objects, np.stack(weights)) + brighter / electrons * by_light
+    return changes / even.size
