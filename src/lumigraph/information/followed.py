@@ -121,8 +121,8 @@ def require_alike(instrument: Instrument, other: Instrument) -> None:
     counts = [cast(LensletCamera, one).lenslets.count for one in (instrument, other)]
     if type(instrument) is not type(other) or same != own or counts[0] != counts[1]:
         raise GeometryError(
-            "derivatives of bounds and errors are by optics and by the pixels' pitch; two instruments have other "
-            "numbers of lenslets, or other sensors. Use search 'local' for these."
+            "derivatives of bounds and errors are by optics and by the pixels' pitch; two instruments have "
+            "other numbers of lenslets, or other sensors. Use search 'local' for these."
         )
 
 
