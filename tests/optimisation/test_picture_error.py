@@ -66,8 +66,25 @@ def test_nonsense_is_refused_before_any_camera():
         lg.optimise(plain(), VARY, "picture error")
     with pytest.raises(GeometryError, match="wide but the field of view is"):
         lg.optimise(plain(), VARY, goal(scenes=Scenes(1e-3)))
-    with pytest.raises(GeometryError, match="search 'gradient' is for depth"):
+    with pytest.raises(GeometryError, match="error of pictures are of cameras with lenslets"):
         lg.optimise(plain(), VARY, goal(), search="gradient")
+    with pytest.raises(GeometryError, match=r"gradient' is for depth.*, not 'volume error'"):
+        lg.optimise(plain(), VARY, goal(name="volume error"), search="gradient")
+
+
+def test_gradients_lead_to_a_better_camera_with_lenslets():
+    start = lg.FocusedPlenopticCamera(
+        wavelength="633 nm", object_distance="120 mm",
+        main_lens={"focal_length": "60 mm", "diameter": "1 mm"},
+        lenslets={"pitch": "200 um", "focal_length": "5.2 mm", "count": (9, 9), "magnification": 0.5},
+        sensor={"pixel_pitch": "15 um"},
+    )  # fmt: skip
+    vary = {"lenslets.magnification": "0.3:0.6:1", "lenslets.focal_length": "5 mm:6 mm:1"}
+    aim = goal(depths=(-3e-3,), scenes=Scenes(70 * UM, 8), light=Light(500))
+    found = lg.optimise(start, vary, aim, search="gradient", evaluations=4)
+    assert found.best["picture error"] < 0.995 * min(
+        found.start["picture error"], found.swept["picture error"]
+    )
 
 
 @pytest.fixture

@@ -1,0 +1,98 @@
+"""Derivatives of the error of reconstructed scenes, beside central differences of it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import lumigraph as lg
+from lumigraph.core.linear import Linear
+from lumigraph.errors import GeometryError
+from lumigraph.information import Light, Scenes, imaging, reconstruction_slopes
+from lumigraph.information.points import small
+from lumigraph.information.reconstruction import probed
+from lumigraph.information.reconstruction_slopes import sloped
+from lumigraph.units import mm, nm, um
+
+DZ, SCENES, LIGHT = -3 * mm, Scenes(45 * um, 8), Light(2000)
+
+
+def camera(focal_length=5.2 * mm, pixel_pitch=10 * um, object_distance=120 * mm, **changes):
+    given = {
+        "object_distance": object_distance,
+        "wavelength": 633 * nm,
+        "main_lens": {"focal_length": 60 * mm, "diameter": 0.8 * mm},
+        "lenslets": {
+            "pitch": 0.2 * mm, "focal_length": focal_length, "count": (3, 3), "magnification": 0.5,
+        },
+        "sensor": {"pixel_pitch": pixel_pitch},
+    }  # fmt: skip
+    return lg.FocusedPlenopticCamera(**(given | changes))
+
+
+@dataclass(frozen=True, eq=False)
+class Matrix(Linear):
+    """What a camera's `part_plane` does to each sample."""
+
+    of: np.ndarray = None
+
+    @property
+    def shape(self):
+        return self.of.shape[1:], (1, *self.object_grid.shape)
+
+    def _forward(self, x):
+        return np.tensordot(x.ravel(), self.of, axes=1)
+
+    def _adjoint(self, raw):
+        return np.tensordot(self.of, raw, axes=2).reshape(self.shape[1])
+
+    @property
+    def memory_bytes(self):
+        return self.of.nbytes
+
+
+def seen_by(cut, pairs=()):
+    """Raw images by the camera's `part_plane` in double precision, and the plane."""
+    known = imaging.imaging(cut, np.array([DZ]), SCENES, LIGHT, 1e-2)
+    grid = known.operator.object_grid
+    plane = cut.part_plane(list(pairs), grid, DZ)
+    raws = plane.forward(np.eye(grid.shape[0] ** 2).reshape(-1, *grid.shape))
+    operator, sensor = Matrix(object_grid=grid, depths=(DZ,), of=raws), cut.sensor
+    mean = imaging._forward(operator, known.across, known.light, np.ones((1, 8, 8))) + sensor.dark_signal
+    noise = np.sqrt(mean + imaging.reading(sensor) ** 2)
+    return replace(known, operator=operator, mean=mean, noise=noise), plane
+
+
+def cut(one, like=None):
+    return small(one, np.array([DZ]), SCENES.size, like)
+
+
+@pytest.mark.parametrize("key", ["object_distance", "pixel_pitch"])
+def test_slopes_are_central_differences_of_the_same_estimate(key, monkeypatch):
+    """The pixels' pitch changes a pixel's light, too."""
+    monkeypatch.setattr(imaging, "ENOUGH", 1e-10)
+    own, value = cut(camera()), {"object_distance": 120 * mm, "pixel_pitch": 10 * um}[key]
+    ends = {h: [cut(camera(**{key: value * (1 + s * h)}), own) for s in (-1, 1)] for h in (1e-6, 1e-4)}
+    seen, plane = seen_by(own, [tuple(ends[1e-6])])
+    light = [imaging.camera_electrons(end, np.array([DZ]), SCENES, LIGHT)[0] for end in ends[1e-6]]
+    slope = sloped(seen, plane, probed(seen, 8).found, np.array([light[1] - light[0]]))[0]
+    low, high = (probed(seen_by(end)[0], 8).left.sum() for end in ends[1e-4])
+    assert 100 * slope == pytest.approx(high - low, rel=2e-3)
+
+
+def test_slopes_are_told_with_the_error_and_over_depths():
+    pair = camera(5.1999 * mm), camera(5.2001 * mm)
+    each = [reconstruction_slopes(camera(), [pair], [dz], SCENES, LIGHT) for dz in (DZ, 2 * mm)]
+    both = reconstruction_slopes(camera(), [pair], (DZ, 2 * mm), SCENES, LIGHT)
+    alone = lg.information.reconstruction_error(camera(), (DZ, 2 * mm), SCENES, LIGHT)
+    assert both.bound == pytest.approx(alone.value, rel=1e-6)
+    whole = sum(one.bound * one.changes for one in each) / (2 * both.bound)
+    assert both.changes == pytest.approx(whole, rel=1e-6)
+
+
+def test_other_instruments_and_sensors_are_refused():
+    with pytest.raises(GeometryError, match="error of pictures are of cameras with lenslets"):
+        reconstruction_slopes(lg.load_camera("lfm-fourier"), [], [0.0], SCENES)
+    other = camera(sensor={"pixel_pitch": 10 * um, "read_noise": 7.0})
+    with pytest.raises(GeometryError, match="by optics and by the pixels' pitch"):
+        reconstruction_slopes(camera(), [(camera(), other)], [DZ], SCENES)

@@ -1,0 +1,110 @@
+"""Raw images of planes by a camera's parts: against the camera's operator, and their derivatives."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from tests.operators.test_part_images import HEX, KEYS, START, camera, off, pair
+
+import lumigraph as lg
+from lumigraph.core.grid import Grid
+from lumigraph.errors import GeometryError
+from lumigraph.units import mm, um
+
+DZ = -3 * mm
+
+
+def slow(given, diameter=0.8 * mm):
+    """With a small stop, few lenslets and few pixels: few points stand in a cell."""
+    return given | {
+        "main_lens": given["main_lens"] | {"diameter": diameter},
+        "lenslets": given["lenslets"] | {"count": (4, 3)},
+        "sensor": given["sensor"] | {"pixel_pitch": 10 * um, "shape": (80, 70)},
+    }
+
+
+ONE = {
+    "object_distance": 240 * mm,
+    "wavelength": 633e-9,
+    "main_lens": {"focal_length": 120 * mm, "diameter": 2 * mm},
+    "lenslets": {"pitch": 0.2 * mm, "focal_length": 8 * mm, "count": (4, 3)},
+    "sensor": {"pixel_pitch": 20 * um, "shape": (40, 30)},
+}
+DISCS = slow(HEX | {"lenslets": HEX["lenslets"] | {"shape": "round", "fill_factor": 0.95}}, 0.4 * mm)
+GRID = Grid((9, 8), (60 * um, 60 * um))
+
+
+def plane(one, pairs=()):
+    return one.part_plane(list(pairs), GRID, DZ)
+
+
+@pytest.fixture
+def scene(rng):
+    return rng.random(GRID.shape)
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "keys"),
+    [
+        ("2.0", slow(START), ("object_distance", "wavelength", "lenslets.pitch")),
+        ("2.0", DISCS, ("lenslets.focal_length.1",)),
+        ("1.0", ONE, ("main_lens.focal_length",)),
+    ],
+    ids=["2.0", "discs", "1.0"],
+)
+def test_slopes_are_central_differences_of_raw_images(kind, given, keys, scene, rng):
+    """Of cameras farther to either side than the pair is, and each with its own cells.
+
+    Ten times as far: the kernel that spreads samples ends where it is 1e-9, on one side or the other of them.
+    """
+    seen = plane(camera(given, kind), [pair(given, key, kind) for key in keys])
+    weights = rng.standard_normal(seen.shape[0])
+    for key, slope in zip(keys, seen.gradient(scene, weights), strict=True):
+        low, high = (plane(one).forward(scene) for one in pair(given, key, kind, 1e-5))
+        assert 10 * slope == pytest.approx(np.vdot(weights, high - low), rel=1e-4), key
+
+
+def test_the_gradient_is_the_derivatives_transpose_and_adds_up_objects(rng):
+    given = slow(START)
+    seen = plane(camera(given), [pair(given, key) for key in KEYS])
+    objects, weights = rng.random((2, *GRID.shape)), rng.standard_normal((2, *seen.shape[0]))
+    change = rng.standard_normal(len(KEYS))
+    moved = np.stack([seen.derivative(one, change) for one in objects])
+    assert seen.gradient(objects, weights) @ change == pytest.approx(np.vdot(weights, moved), rel=1e-9)
+    assert np.allclose(seen.forward(objects)[1], seen.forward(objects[1]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("given", [slow(START), ONE], ids=["2.0", "1.0"])
+def test_raw_images_are_those_of_the_operator(given, scene):
+    """To the accuracy, with light up to the array's border."""
+    one = camera(given, "1.0" if given is ONE else "2.0")
+    wide = one.operator_grid(4)
+    x = np.random.default_rng(0).random(wide.shape)
+    true = one.operator_on(wide, [DZ], accuracy=2e-3).forward(x[None])
+    assert off(one.part_plane([], wide, DZ).forward(x), true) < 1e-2
+
+
+def test_a_gradient_takes_less_than_three_times_the_memory_of_an_image(scene, rng):
+    given = slow(START)
+    seen = plane(camera(given), [pair(given, key) for key in KEYS[1:6:2]])
+    weights, peaks = rng.random(seen.shape[0]), []
+    for run in (lambda: seen.forward(scene), lambda: seen.gradient(scene, weights)):
+        run()
+        tracemalloc.start()
+        run()
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 3 * peaks[0]
+
+
+def test_other_objects_weights_and_changes_are_refused(scene):
+    given = slow(START)
+    seen = plane(camera(given), [pair(given, "lenslets.pitch")])
+    with pytest.raises(GeometryError, match=r"object has shape \(2, 2\) but the grid \(9, 8\)"):
+        seen.forward(np.ones((2, 2)))
+    with pytest.raises(GeometryError, match=r"weights have shape \(2, 2\)"):
+        seen.gradient(scene, np.ones((2, 2)))
+    with pytest.raises(GeometryError, match=r"change has shape \(2,\) but must be \(1,\)"):
+        seen.derivative(scene, np.ones(2))
+    with pytest.raises(lg.LumigraphError, match="inside its focal length"):
+        camera(given).part_plane([], GRID, -0.2)
