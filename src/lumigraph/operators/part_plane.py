@@ -161,7 +161,9 @@ class PartPlane:
     def _amid(self) -> PartImages:
         """Of arrays around the points of one cell, as wide as their light is followed."""
         camera, finer = self.images.camera, SPARE * self.images.accuracy
-        count = [2 * n + 1 for n in Optics.of(camera, camera.object_distance + self.dz, finer).reach]
+        optics = Optics.of(camera, camera.object_distance + self.dz, finer)
+        # As even as the array: its cells' edges are where no rounding moves them by a cell.
+        count = [2 * n + 1 + (k + 1) % 2 for n, k in zip(optics.reach, optics.cells.count, strict=True)]
         own, *ends = (
             _amid(one, count, finer) for one in (camera, *(end for pair in self.images.pairs for end in pair))
         )
