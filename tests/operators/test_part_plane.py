@@ -30,7 +30,14 @@ ONE = {
     "lenslets": {"pitch": 0.2 * mm, "focal_length": 8 * mm, "count": (4, 3)},
     "sensor": {"pixel_pitch": 20 * um, "shape": (40, 30)},
 }
-DISCS = slow(HEX | {"lenslets": HEX["lenslets"] | {"shape": "round", "fill_factor": 0.95}}, 0.4 * mm)
+DISCS = slow(
+    HEX
+    | {
+        "lenslets": HEX["lenslets"]
+        | {"shape": "round", "fill_factor": 0.95, "focal_length": HEX["lenslets"]["focal_length"][0]}
+    },
+    0.4 * mm,
+)
 GRID = Grid((9, 8), (60 * um, 60 * um))
 
 
@@ -47,10 +54,10 @@ def scene(rng):
     ("kind", "given", "keys"),
     [
         ("2.0", slow(START), ("object_distance", "wavelength", "lenslets.pitch")),
-        ("2.0", DISCS, ("lenslets.focal_length.1",)),
         ("1.0", ONE, ("main_lens.focal_length",)),
+        pytest.param("2.0", DISCS, ("lenslets.focal_length",), marks=pytest.mark.long),
     ],
-    ids=["2.0", "discs", "1.0"],
+    ids=["2.0", "1.0", "discs"],
 )
 def test_slopes_are_central_differences_of_raw_images(kind, given, keys, scene, rng):
     """Of cameras farther to either side than the pair is, and each with its own cells.
@@ -74,14 +81,22 @@ def test_the_gradient_is_the_derivatives_transpose_and_adds_up_objects(rng):
     assert np.allclose(seen.forward(objects)[1], seen.forward(objects[1]), rtol=1e-12)
 
 
-@pytest.mark.parametrize("given", [slow(START), ONE], ids=["2.0", "1.0"])
-def test_raw_images_are_those_of_the_operator(given, scene):
-    """To the accuracy, with light up to the array's border."""
-    one = camera(given, "1.0" if given is ONE else "2.0")
+@pytest.mark.parametrize(
+    ("given", "count", "most"),
+    [
+        (slow(START), (6, 6), 1e-2),
+        pytest.param(slow(START), (4, 3), 3e-2, marks=pytest.mark.long),
+        (ONE, (8, 7), 1e-2),
+    ],
+    ids=["2.0", "2.0, with the array's border", "1.0"],
+)
+def test_raw_images_are_those_of_the_operator(given, count, most):
+    """To the accuracy; light of lenslets that are not there is missed by those at the border."""
+    one = camera(given | {"lenslets": given["lenslets"] | {"count": count}}, "1.0" if given is ONE else "2.0")
     wide = one.operator_grid(4)
     x = np.random.default_rng(0).random(wide.shape)
     true = one.operator_on(wide, [DZ], accuracy=2e-3).forward(x[None])
-    assert off(one.part_plane([], wide, DZ).forward(x), true) < 1e-2
+    assert off(one.part_plane([], wide, DZ).forward(x), true) < most
 
 
 def test_a_gradient_takes_less_than_three_times_the_memory_of_an_image(scene, rng):

@@ -302,8 +302,8 @@ class LensletCamera(Camera):
         dz
             Depth from the focused plane [m], positive farther.
         accuracy
-            Relative rms error of raw images, 1e-3 to 1e-2, of objects inside the array's field; light that
-            misses the array's cells is left out.
+            Relative rms error of raw images, 1e-3 to 1e-2, of objects inside the array's field; images of
+            the outermost lenslets are some 3 % off, and light that misses the array's cells is left out.
 
         Raises
         ------

@@ -70,7 +70,7 @@ class Waves:
     def changed(self, by: "Change") -> np.ndarray:
         """Change of the field with the camera."""
         moved = []
-        for k, (turn, (places, nodes)) in enumerate(zip(self.turns, by.turns(self.spot), strict=True)):
+        for k, (turn, (places, nodes)) in enumerate(zip(self.turns, by.turns(self), strict=True)):
             moved.append(1j * (np.outer(places, turn[1]) + np.outer(turn[0], nodes)) * self.phases[k])
         y, x = self.phases
         light = moved[0] @ self.right + y @ (by.pupil(self.spot.dz) @ x.T + self.pupil @ moved[1].T)
@@ -118,9 +118,9 @@ class Change:
         """Change of what is made of a camera."""
         return sum(weight * (of(last) - of(first)) for weight, (first, last) in self.pairs)
 
-    def turns(self, spot: Spot) -> list[Turn]:
+    def turns(self, waves: Waves) -> list[Turn]:
         """Of a point's `Sight.turns`, along y and along x."""
-        found = [[np.zeros(len(part)) for part in turn] for turn in self.pairs[0][1][0].turns(spot)]
+        found, spot = [[np.zeros(len(part)) for part in turn] for turn in waves.turns], waves.spot
         for k, (weight, both) in enumerate(self.pairs):
             spots = [spot.before(points) for points in self.moved[k]] if self.moved else [spot, spot]
             ends = [one.turns(mine) for one, mine in zip(both, spots, strict=True)]
