@@ -67,17 +67,21 @@ def cut(one, like=None):
     return small(one, np.array([DZ]), SCENES.size, like)
 
 
-@pytest.mark.parametrize("key", ["object_distance", "pixel_pitch"])
-def test_slopes_are_central_differences_of_the_same_estimate(key, monkeypatch):
-    """The pixels' pitch changes a pixel's light, too."""
+@pytest.mark.parametrize(
+    ("key", "value", "step"),
+    [("object_distance", 120 * mm, 1e-4), ("pixel_pitch", 10 * um, 1e-4), ("focal_length", 5.2 * mm, 1e-3)],
+    ids=["object_distance", "pixel_pitch", "focal_length"],
+)
+def test_slopes_are_central_differences_of_the_same_estimate(key, value, step, monkeypatch):
+    """The pixels' pitch changes a pixel's light, too; lenslets' focal length hardly changes the error."""
     monkeypatch.setattr(imaging, "ENOUGH", 1e-10)
-    own, value = cut(camera()), {"object_distance": 120 * mm, "pixel_pitch": 10 * um}[key]
-    ends = {h: [cut(camera(**{key: value * (1 + s * h)}), own) for s in (-1, 1)] for h in (1e-6, 1e-4)}
+    own = cut(camera())
+    ends = {h: [cut(camera(**{key: value * (1 + s * h)}), own) for s in (-1, 1)] for h in (1e-6, step)}
     seen, plane = seen_by(own, [tuple(ends[1e-6])])
     light = [imaging.camera_electrons(end, np.array([DZ]), SCENES, LIGHT)[0] for end in ends[1e-6]]
     slope = sloped(seen, plane, probed(seen, 8).found, np.array([light[1] - light[0]]))[0]
-    low, high = (probed(seen_by(end)[0], 8).left.sum() for end in ends[1e-4])
-    assert 100 * slope == pytest.approx(high - low, rel=2e-3)
+    low, high = (probed(seen_by(end)[0], 8).left.sum() for end in ends[step])
+    assert step / 1e-6 * slope == pytest.approx(high - low, rel=2e-3)
 
 
 def test_slopes_are_told_with_the_error_and_over_depths():
