@@ -22,6 +22,7 @@ from lumigraph.errors import GeometryError
 from lumigraph.operators.microscope_cell import Lenslet
 from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.microscope_pupil_waves import Told, Waves, behind, of_each, sampling_matrix
+from lumigraph.operators.part_waves import times
 from lumigraph.scene import Points
 
 Back = Callable[[np.ndarray], None]
@@ -83,12 +84,10 @@ class Parts:
         found, (low, high) = 0.0, ends
         if self._behind(low) != self._behind(high):
             both = (behind(self._behind(one), self._behind(own), self._exact) for one in ends)
-            found += sum(
-                _times(by, *pair) for by, pair in zip(self.by, zip(*both, strict=True), strict=False)
-            )
+            found += sum(times(by, *pair) for by, pair in zip(self.by, zip(*both, strict=True), strict=False))
         if low.layout.sampling != high.layout.sampling:
             cells, fine, *_ = self.told
-            found += _times(self.by[2], *(sampling_matrix(cells, fine, one.layout.sampling) for one in ends))
+            found += times(self.by[2], *(sampling_matrix(cells, fine, one.layout.sampling) for one in ends))
         return found
 
     @property
@@ -248,8 +247,8 @@ def _between(
     first, last = (one.images.objectives[which] for one in pair)
     if first == last and np.array_equal(low, high):
         return 0.0
-    found = _times(by[0], *(one.wave(which, nodes, number, cell) for one in pair))
-    return found + _times(by[1], *(one.phases(which, nodes) for one in pair))
+    found = times(by[0], *(one.wave(which, nodes, number, cell) for one in pair))
+    return found + times(by[1], *(one.phases(which, nodes) for one in pair))
 
 
 def _placed_anew(ends: tuple[PupilImages, PupilImages], whole: np.ndarray, given: np.ndarray) -> float:
@@ -258,7 +257,7 @@ def _placed_anew(ends: tuple[PupilImages, PupilImages], whole: np.ndarray, given
     if low.layout.placement is high.layout.placement:
         return 0.0
     return sum(
-        _times(weights, low.placed(one), high.placed(one)) for weights, one in zip(given, whole, strict=True)
+        times(weights, low.placed(one), high.placed(one)) for weights, one in zip(given, whole, strict=True)
     )
 
 
@@ -269,8 +268,3 @@ def _require_alike(one: PupilImages, own: PupilImages) -> None:
             f"microscopes have {counts[0]} and {counts[1]} wavelengths, lenslets before the pixels and "
             "pixels, but derivatives need as many. Use search 'local', or fewer lenslets."
         )
-
-
-def _times(by: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
-    """What a change from low to high comes to."""
-    return 0.0 if low is high else float(np.sum(by * (high - low)).real)
