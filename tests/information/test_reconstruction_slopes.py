@@ -15,6 +15,7 @@ from lumigraph.information.reconstruction_slopes import sloped
 from lumigraph.units import mm, nm, um
 
 DZ, SCENES, LIGHT = -3 * mm, Scenes(45 * um, 8), Light(2000)
+ALONE, BOTH = (DZ,), (DZ, 2 * mm)
 
 
 def camera(focal_length=5.2 * mm, pixel_pitch=10 * um, object_distance=120 * mm, **changes):
@@ -32,13 +33,13 @@ def camera(focal_length=5.2 * mm, pixel_pitch=10 * um, object_distance=120 * mm,
 
 @dataclass(frozen=True, eq=False)
 class Matrix(Linear):
-    """What a camera's `part_plane` does to each sample."""
+    """What a camera's `part_volume` does to each sample."""
 
     of: np.ndarray = None
 
     @property
     def shape(self):
-        return self.of.shape[1:], (1, *self.object_grid.shape)
+        return self.of.shape[1:], (len(self.depths), *self.object_grid.shape)
 
     def _forward(self, x):
         return np.tensordot(x.ravel(), self.of, axes=1)
@@ -51,37 +52,47 @@ class Matrix(Linear):
         return self.of.nbytes
 
 
-def seen_by(cut, pairs=()):
-    """Raw images by the camera's `part_plane` in double precision, and the plane."""
-    known = imaging.imaging(cut, np.array([DZ]), SCENES, LIGHT, 1e-2)
-    grid = known.operator.object_grid
-    plane = cut.part_plane(list(pairs), grid, DZ)
-    raws = plane.forward(np.eye(grid.shape[0] ** 2).reshape(-1, *grid.shape))
-    operator, sensor = Matrix(object_grid=grid, depths=(DZ,), of=raws), cut.sensor
-    mean = imaging._forward(operator, known.across, known.light, np.ones((1, 8, 8))) + sensor.dark_signal
+def seen_by(cut, depths, pairs=()):
+    """Raw images by the camera's `part_volume` in double precision, and the planes."""
+    known = imaging.imaging(cut, np.array(depths), SCENES, LIGHT, 1e-2)
+    grid, planes = known.operator.object_grid, len(depths)
+    part = cut.part_volume(list(pairs), grid, depths)
+    each = np.eye(grid.shape[0] ** 2).reshape(-1, *grid.shape)
+    raws = np.concatenate([plane.forward(each) for plane in part.planes])
+    operator, sensor = Matrix(object_grid=grid, depths=depths, of=raws), cut.sensor
+    mean = imaging._forward(operator, known.across, known.light, np.ones((planes, 8, 8)))
+    mean = mean + sensor.dark_signal
     noise = np.sqrt(mean + imaging.reading(sensor) ** 2)
-    return replace(known, operator=operator, mean=mean, noise=noise), plane
+    return replace(known, operator=operator, mean=mean, noise=noise), part
 
 
-def cut(one, like=None):
-    return small(one, np.array([DZ]), SCENES.size, like)
+def cut(one, depths, like=None):
+    return small(one, np.array(depths), SCENES.size, like)
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "step"),
-    [("object_distance", 120 * mm, 1e-4), ("pixel_pitch", 10 * um, 1e-4), ("focal_length", 5.2 * mm, 1e-3)],
-    ids=["object_distance", "pixel_pitch", "focal_length"],
+    ("depths", "key", "value", "step"),
+    [
+        (ALONE, "object_distance", 120 * mm, 1e-4),
+        (ALONE, "pixel_pitch", 10 * um, 1e-4),
+        (ALONE, "focal_length", 5.2 * mm, 1e-3),
+        (BOTH, "object_distance", 120 * mm, 1e-4),
+        (BOTH, "pixel_pitch", 10 * um, 1e-3),
+    ],
+    ids=["object_distance", "pixel_pitch", "focal_length", "volume, object_distance", "volume, pixel_pitch"],
 )
-def test_slopes_are_central_differences_of_the_same_estimate(key, value, step, monkeypatch):
+def test_slopes_are_central_differences_of_the_same_estimate(depths, key, value, step, monkeypatch):
     """The pixels' pitch changes a pixel's light, too; lenslets' focal length hardly changes the error."""
     monkeypatch.setattr(imaging, "ENOUGH", 1e-10)
-    own = cut(camera())
-    ends = {h: [cut(camera(**{key: value * (1 + s * h)}), own) for s in (-1, 1)] for h in (1e-6, step)}
-    seen, plane = seen_by(own, [tuple(ends[1e-6])])
-    light = [imaging.camera_electrons(end, np.array([DZ]), SCENES, LIGHT)[0] for end in ends[1e-6]]
-    slope = sloped(seen, plane, probed(seen, 8).found, np.array([light[1] - light[0]]))[0]
-    low, high = (probed(seen_by(end)[0], 8).left.sum() for end in ends[step])
-    assert step / 1e-6 * slope == pytest.approx(high - low, rel=2e-3)
+    own = cut(camera(), depths)
+    ends = {
+        h: [cut(camera(**{key: value * (1 + s * h)}), depths, own) for s in (-1, 1)] for h in (1e-6, step)
+    }
+    seen, part = seen_by(own, depths, [tuple(ends[1e-6])])
+    low, high = (imaging.camera_electrons(end, np.array(depths), SCENES, LIGHT) for end in ends[1e-6])
+    slope = sloped(seen, part, probed(seen, 8).found, (high - low)[None])[0]
+    low, high = (probed(seen_by(end, depths)[0], 8).left.sum() for end in ends[step])
+    assert step / 1e-6 * slope == pytest.approx(high - low, rel=2e-3, abs=0)
 
 
 def test_slopes_are_told_with_the_error_and_over_depths():
@@ -94,8 +105,16 @@ def test_slopes_are_told_with_the_error_and_over_depths():
     assert both.changes == pytest.approx(whole, rel=1e-6)
 
 
+def test_slopes_of_a_volume_are_of_the_error_of_all_depths_together():
+    pair = camera(5.1999 * mm), camera(5.2001 * mm)
+    both = reconstruction_slopes(camera(), [pair], BOTH, SCENES, LIGHT, volume=True)
+    error = lg.information.reconstruction_error(camera(), BOTH, SCENES, LIGHT, volume=True)
+    assert both.bound == pytest.approx(error.value, rel=1e-6)
+    assert both.bound > reconstruction_slopes(camera(), [pair], BOTH, SCENES, LIGHT).bound
+
+
 def test_other_instruments_and_sensors_are_refused():
-    with pytest.raises(GeometryError, match="error of pictures are of cameras with lenslets"):
+    with pytest.raises(GeometryError, match="error of scenes are of cameras with lenslets"):
         reconstruction_slopes(lg.load_camera("lfm-fourier"), [], [0.0], SCENES)
     other = camera(sensor={"pixel_pitch": 10 * um, "read_noise": 7.0})
     with pytest.raises(GeometryError, match="by optics and by the pixels' pitch"):

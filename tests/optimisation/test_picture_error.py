@@ -66,10 +66,9 @@ def test_nonsense_is_refused_before_any_camera():
         lg.optimise(plain(), VARY, "picture error")
     with pytest.raises(GeometryError, match="wide but the field of view is"):
         lg.optimise(plain(), VARY, goal(scenes=Scenes(1e-3)))
-    with pytest.raises(GeometryError, match="error of pictures are of cameras with lenslets"):
-        lg.optimise(plain(), VARY, goal(), search="gradient")
-    with pytest.raises(GeometryError, match=r"gradient' is for depth.*, not 'volume error'"):
-        lg.optimise(plain(), VARY, goal(name="volume error"), search="gradient")
+    for name in ("picture error", "volume error"):
+        with pytest.raises(GeometryError, match="error of scenes are of cameras with lenslets"):
+            lg.optimise(plain(), VARY, goal(name=name), search="gradient")
 
 
 def test_gradients_lead_to_a_better_camera_with_lenslets():

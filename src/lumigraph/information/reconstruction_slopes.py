@@ -24,7 +24,7 @@ from lumigraph.information.scenes import Scenes
 from lumigraph.information.slopes import Sloping
 from lumigraph.instruments import LensletCamera
 from lumigraph.instruments.instrument import Instrument
-from lumigraph.operators.part_plane import PartPlane
+from lumigraph.operators.part_volume import PartVolume
 
 
 def reconstruction_slopes(
@@ -34,9 +34,10 @@ def reconstruction_slopes(
     scenes: Scenes,
     light: Light | None = None,
     *,
+    volume: bool = False,
     accuracy: float = 1e-2,
 ) -> Sloping:
-    """`reconstruction_error` over depths, each alone, and how it changes with a camera's parts.
+    """`reconstruction_error` over depths, and how it changes with a camera's parts.
 
     The scenes stay as they are before all cameras, who collect as much of their light as their apertures do.
 
@@ -46,7 +47,7 @@ def reconstruction_slopes(
         With lenslets, one that has `part_plane`.
     pairs
         (n,), cameras a little to either side of it.
-    depths, scenes, light
+    depths, scenes, light, volume
         As of `reconstruction_error`.
     accuracy
         Of raw images, relative, rms: the camera's, and of those that are differentiated.
@@ -75,9 +76,10 @@ def reconstruction_slopes(
         require_camera(end)
         require_alike(camera, end)
     own, planes = cast(LensletCamera, camera), checked_depths(depths)
-    found = [_at(own, cast(Sequence[Cameras], pairs), dz, (scenes, light), accuracy) for dz in planes]
-    value = float(np.sqrt(np.mean([square for square, _ in found])))
-    return Sloping(value, np.mean([changes for _, changes in found], axis=0) / (2 * value))
+    some = [planes] if volume else list(planes[:, None])
+    found = [_at(own, cast(Sequence[Cameras], pairs), group, (scenes, light), accuracy) for group in some]
+    value = float(np.sqrt(sum(square for square, _ in found) / len(planes)))
+    return Sloping(value, np.sum([changes for _, changes in found], axis=0) / len(planes) / (2 * value))
 
 
 def require_camera(instrument: Instrument) -> None:
@@ -90,52 +92,53 @@ def require_camera(instrument: Instrument) -> None:
     """
     if not isinstance(instrument, LensletCamera):
         raise GeometryError(
-            "derivatives of the error of pictures are of cameras with lenslets. For others, use search "
-            "'local'."
+            "derivatives of the error of scenes are of cameras with lenslets. For others, use search 'local'."
         )
     require_followed(instrument)
 
 
 def _at(
-    camera: LensletCamera, pairs: Sequence[Cameras], dz: float, of: tuple[Scenes, Light], accuracy: float
+    camera: LensletCamera,
+    pairs: Sequence[Cameras],
+    depths: np.ndarray,
+    of: tuple[Scenes, Light],
+    accuracy: float,
 ) -> tuple[float, np.ndarray]:
-    """Square of the error at a depth, and its changes (n,)."""
-    (scenes, light), depths = of, np.array([dz])
+    """Sum of the squares of errors at depths that shine at once, and its changes (n,)."""
+    scenes, light = of
     seen = imaging(camera, depths, scenes, light, accuracy)
-    assert seen.operator.object_grid is not None  # as imaging has it
+    grid = seen.operator.object_grid
+    assert grid is not None  # as imaging has it
     own = small(camera, depths, scenes.size)
     cut = [tuple(small(end, depths, scenes.size, own) for end in pair) for pair in pairs]
-    plane = own.part_plane(cast(Sequence[Cameras], cut), seen.operator.object_grid, dz, accuracy=accuracy)
-    brighter = []
-    for pair in cut:
-        low, high = (_electrons(end, camera, depths, of) for end in pair)
-        brighter.append(high - low)
+    part = own.part_volume(cast(Sequence[Cameras], cut), grid, depths.tolist(), accuracy=accuracy)
+    ends = ([_electrons(end, camera, depths, of) for end in pair] for pair in cut)
+    brighter = np.array([high - low for low, high in ends]).reshape(-1, len(depths))
     left, _, found = probed(seen, scenes.samples)
     share = scenes.contrast**2
-    return float(left.sum()) / share, sloped(seen, plane, found, np.array(brighter)) / share
+    return float(left.sum()) / share, sloped(seen, part, found, brighter) / share
 
 
 def _electrons(
     end: LensletCamera, camera: LensletCamera, depths: np.ndarray, of: tuple[Scenes, Light]
-) -> float:
-    """Of a pixel for 1 of the operator: a camera gets its light by its aperture."""
+) -> np.ndarray:
+    """Of a pixel for 1 of the operator (nz,): a camera gets its light by its aperture."""
     scenes, light = of
     photons = light.photons * collected(end) / collected(camera)
-    return float(camera_electrons(end, depths, scenes, Light(photons, light.background))[0])
+    return camera_electrons(end, depths, scenes, Light(photons, light.background))
 
 
-def sloped(seen: Imaging, plane: PartPlane, found: Sequence[np.ndarray], brighter: np.ndarray) -> np.ndarray:
-    """Changes (n,) of the mean of zᵀ P z over the number of samples; `found`, P z (1, n, n) of each z.
+def sloped(seen: Imaging, part: PartVolume, found: Sequence[np.ndarray], brighter: np.ndarray) -> np.ndarray:
+    """Changes (n,) of the mean of zᵀ P z over the samples of a plane; `found`, P z (nz, n, n) of each z.
 
-    `brighter`, by how many electrons more a pixel has for 1 of the operator (n,).
+    `brighter`, by how many electrons more a pixel has for 1 of the operator (n, nz).
     """
-    even, noise, count = np.ones_like(found[0]), seen.noise**2, len(found)
+    scenes, noise, (y, x) = [*found, np.ones_like(found[0])], seen.noise**2, seen.across
     raws = [seen.electrons(one) for one in found]
-    weights = [-2 * raw / noise / count for raw in raws]
+    weights = [-2 * raw / noise / len(found) for raw in raws]
     weights.append(np.mean([raw**2 for raw in raws], axis=0) / noise**2)
-    raws.append(seen.electrons(even))
-    (electrons,), (y, x) = seen.light, seen.across
-    objects = np.stack([electrons * (y @ one[0] @ x.T) for one in (*found, even)])
-    by_light = sum(float(np.vdot(weight, raw)) for weight, raw in zip(weights, raws, strict=True))
-    changes = plane.gradient(objects, np.stack(weights)) + brighter / electrons * by_light
-    return changes / even.size
+    both = zip(weights, scenes, strict=True)
+    by_light = np.sum([np.sum(seen.returned(weight) * one, axis=(1, 2)) for weight, one in both], axis=0)
+    objects = np.stack([seen.light[:, None, None] * (y @ one @ x.T) for one in scenes])
+    changes = part.gradient(objects, np.stack(weights)) + brighter @ (by_light / seen.light)
+    return changes / scenes[0][0].size

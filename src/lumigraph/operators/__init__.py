@@ -9,7 +9,8 @@
 - `points`, `white`: single points, and the evenly lit main lens, before lenslets; `relay`, any light through
   lenslets, cell by cell; `point_light`, a point's light in their plane
 - `part_images`: points by a camera's parts; `part_points`, one by one, with derivatives by place;
-  `part_sight`, `part_waves`, `passed`, `line_parts`, what both are made of
+  `part_plane`, `part_volume`, whole planes; `part_sight`, `part_waves`, `passed`, `line_parts`, what all
+  are made of
 - `screens`: opaque sheets before the main lens; `partly`, planes whose points they hide in part
 - `regrid`: an operator of an object on another grid, moved or finer
 - `resampling`, `turning`: from an object's samples to points and from the image's samples to pixels

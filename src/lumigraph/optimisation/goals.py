@@ -212,8 +212,9 @@ class Goal:
     def slopes(self, instrument: Instrument, pairs: Sequence[Any], first: float, places: int) -> np.ndarray:
         """Changes (n,) of a bound or an error from the first to the last of each pair of cameras."""
         light = self.light_of(instrument, first)
-        if self.name == ERRORS[0]:
-            return reconstruction_slopes(instrument, pairs, self.depths, self.judged_scenes, light).changes
+        if self.name in ERRORS:
+            scenes, volume = self.judged_scenes, self.name == ERRORS[1]
+            return reconstruction_slopes(instrument, pairs, self.depths, scenes, light, volume=volume).changes
         return slopes(
             instrument,
             pairs,
@@ -229,14 +230,14 @@ class Goal:
         Raises
         ------
         GeometryError
-            No bound and no error of pictures, or an instrument without derivatives of them.
+            No bound and no error of scenes, or an instrument without derivatives of them.
         """
-        if self.name == ERRORS[0]:
+        if self.name in ERRORS:
             require_camera(instrument)
             return
         if self.name not in BOUNDS:
             raise GeometryError(
-                f"search 'gradient' is for {', '.join((*BOUNDS, ERRORS[0]))}, not {self.name!r}. Use 'local'."
+                f"search 'gradient' is for {', '.join((*BOUNDS, *ERRORS))}, not {self.name!r}. Use 'local'."
             )
         require_followed(instrument)
 
