@@ -1,8 +1,7 @@
 """Derivatives of bounds by the parts of a microscope with lenslets, beside central differences."""
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from lumigraph.information import Light, bounds, slopes
 from lumigraph.information.bounds import Seen, deviations
 from lumigraph.information.followed import BeforeLenslets, before_lenslets
 from lumigraph.information.points import collected
-from lumigraph.operators.microscope_pupil_waves import behind, sampling_matrix
+from lumigraph.operators.microscope_pupil_waves import behind, sampling_matrix, window_of
 from lumigraph.operators.pupil_points import Mirrored, Parts
 
 UM = 1e-6
@@ -38,7 +37,8 @@ def scope(aperture=0.5, magnification=20, waves=0.1, pixel=6.5 * UM, **changes) 
     )
 
 
-class Key(NamedTuple):
+@dataclass(frozen=True)
+class Key:
     """A value, a step, and the microscope that has it."""
 
     at: float
@@ -76,6 +76,18 @@ OTHER = {
 }
 
 
+ROUND = {
+    f"{name}, round": replace(
+        key, of=lambda v, key=key: key.of(v).replace(lenslets={"shape": "round", "fill_factor": 0.93})
+    )
+    for name, key in (PLAIN | OTHER).items()
+    if name not in ("fill factor", "pixels")  # which come after lenslets of any shape
+}
+ROUND["fill factor, round"] = replace(
+    PLAIN["fill factor"], at=0.93, of=lambda v: scope(lenslets={"shape": "round", "fill_factor": v})
+)
+
+
 def sampled_alike(one, other) -> BeforeLenslets:
     """Points before the first, with all that is sampled as the other one asks for."""
     before = before_lenslets(other, [(one, one)], (np.array(DEPTHS), PLACES), 1e-2, double=True)
@@ -88,7 +100,8 @@ def sampled_alike(one, other) -> BeforeLenslets:
             ]
             samples = sampling_matrix(told[0], told[1], own.images.layout.sampling)
             down, across, samples = map(Mirrored.of, (*behind(ways[0], ways[1], told), samples))
-            same = replace(waves, down=down, across=across, sampled=samples)
+            window = window_of(ways[0], ways[1], told)
+            same = replace(waves, down=down, across=across, sampled=samples, window=window)
             parts[which, own.images.sampled(own.images.objectives[which], dz)[0]] = Parts(
                 which, told, same, False
             )
@@ -103,7 +116,7 @@ def bound(before: BeforeLenslets, sensor, part: slice) -> float:
 
 def check(key: Key, name, part):
     """Within 1e-4 of differences of four steps, in double precision."""
-    at, step, of = key
+    at, step, of = key.at, key.step, key.of
 
     def value(k):
         one = of(at + k * step)
@@ -115,15 +128,15 @@ def check(key: Key, name, part):
     assert found.changes[0] == pytest.approx((8 * near - far) / 6, rel=1e-4, abs=0)
 
 
-@pytest.mark.parametrize("key", ["pitch", "phase of the pupil", "pixels"])
+@pytest.mark.parametrize("key", ["pitch", "phase of the pupil", "pixels", "focal length of lenslets, round"])
 def test_slopes_are_central_differences(key):
-    check(PLAIN[key], "depth", slice(2, 3))
+    check((PLAIN | ROUND)[key], "depth", slice(2, 3))
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("key", PLAIN | OTHER)
+@pytest.mark.parametrize("key", PLAIN | OTHER | ROUND)
 def test_slopes_of_all_parts_are_central_differences(key):
-    check((PLAIN | OTHER)[key], "depth", slice(2, 3))
+    check((PLAIN | OTHER | ROUND)[key], "depth", slice(2, 3))
 
 
 @pytest.mark.long
@@ -145,7 +158,7 @@ def test_the_bound_is_that_of_bounds():
 )
 def test_slopes_show_where_a_bound_changes(key):
     """Beside differences of bounds themselves, which sample each microscope as it asks for."""
-    at, step, of = PLAIN[key]
+    at, step, of = PLAIN[key].at, PLAIN[key].step, PLAIN[key].of
     low, high = of(at - 5 * step), of(at + 5 * step)
     found = slopes(of(at), [(low, high)], DEPTHS, LIGHT, places=2)
     lights = [
@@ -157,14 +170,9 @@ def test_slopes_show_where_a_bound_changes(key):
     assert found.changes[0] == pytest.approx(known[1] - known[0], rel=1e-3, abs=0)
 
 
-@pytest.mark.parametrize(
-    "other",
-    [scope(lenslets={"shape": "round"}), scope(objective={"model": "rays", "aberrations": {}})],
-    ids=["round", "rays"],
-)
-def test_microscopes_without_waves_of_square_lenslets_are_refused(other):
-    with pytest.raises(GeometryError, match="square lenslets and a model other than 'rays'"):
-        slopes(other, [], DEPTHS, LIGHT)
+def test_microscopes_without_waves_are_refused():
+    with pytest.raises(GeometryError, match="need a model other than 'rays'"):
+        slopes(scope(objective={"model": "rays", "aberrations": {}}), [], DEPTHS, LIGHT)
 
 
 def test_pairs_with_other_lenslets_are_refused():

@@ -21,6 +21,7 @@ SCOPE = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
     lenslets={"pitch": "125 um", "count": (5, 5)},
     sensor={"shape": (95, 95)},
 )  # fmt: skip
+ROUND = SCOPE.replace(lenslets={"shape": "round", "fill_factor": 0.95})
 POINTS = lg.Points(np.array([[1e-6, -3e-6, 5e-6], [8.2e-6, 5e-6, -7e-6]]), np.array([1.0, 2.0]))
 SOME = 0.4 * np.random.default_rng(0).normal(size=len(TERMS)) / np.sqrt(len(TERMS))
 
@@ -42,10 +43,11 @@ def test_images_are_those_of_the_simulation_which_propagates_on_a_grid(waves):
     assert off(images(accuracy=1e-2, double=False).forward(POINTS, waves * SOME), true) < 1.5e-2
 
 
-def test_images_of_an_aberrated_point_are_those_of_the_simulation():
-    bent, one = SCOPE.replace(objective={"aberrations": {7: 0.2, 9: -0.1}}), POINTS.positions[:1]
+@pytest.mark.parametrize("scope", [SCOPE, ROUND], ids=["square", "round"])
+def test_images_of_an_aberrated_point_are_those_of_the_simulation(scope):
+    bent, one = scope.replace(objective={"aberrations": {7: 0.2, 9: -0.1}}), POINTS.positions[:1]
     true = bent.point_image(*one[0], accuracy=3e-2)
-    found = images(terms=(7, 9), accuracy=3e-2).forward(lg.Points(one, np.ones(1)), np.array([0.2, -0.1]))
+    found = images(scope, (7, 9), accuracy=3e-2).forward(lg.Points(one, np.ones(1)), np.array([0.2, -0.1]))
     assert off(found, true) < 4e-2
 
 
@@ -112,9 +114,10 @@ def test_coefficients_that_are_fixed_give_the_same_image_and_no_derivatives():
     np.testing.assert_allclose(ours, theirs[-PLACES:], rtol=1e-9, atol=1e-12 * np.abs(theirs).max())
 
 
-def test_every_terms_derivative_is_that_of_central_differences():
-    model, h = images(), 1e-4
-    for direction in np.eye(len(TERMS)):
+@pytest.mark.parametrize("scope", [SCOPE, ROUND], ids=["square", "round"])
+def test_every_terms_derivative_is_that_of_central_differences(scope):
+    model, h = images(scope), 1e-4
+    for direction in np.eye(len(TERMS))[:: 1 if scope is SCOPE else 4]:
         ahead, behind = (model.forward(POINTS, SOME + s * h * direction) for s in (1, -1))
         # The differences' own error is h² times the third derivative, 1e-6 here.
         assert off(model.derivative(POINTS, SOME, direction), (ahead - behind) / (2 * h)) < 1e-5
@@ -133,17 +136,22 @@ def test_derivatives_by_a_points_place_are_those_of_central_differences(axis):
 
 
 @pytest.mark.parametrize(
-    "objective",
-    [{}, {"model": "vector"}, {"numerical_aperture": 1.2, "immersion_index": 1.33, "magnification": 60.0}],
-    ids=["scalar", "vector", "60x/1.2"],
+    "scope",
+    [
+        SCOPE,
+        SCOPE.replace(objective={"model": "vector"}),
+        SCOPE.replace(objective={"numerical_aperture": 1.2, "immersion_index": 1.33, "magnification": 60.0}),
+        ROUND,
+    ],
+    ids=["scalar", "vector", "60x/1.2", "round"],
 )
-def test_gradient_is_the_derivatives_transpose(objective):
-    scope, rng = SCOPE.replace(objective=objective, bandwidth="30 nm"), np.random.default_rng(1)
+def test_gradient_is_the_derivatives_transpose(scope):
+    scope, rng = scope.replace(bandwidth="30 nm"), np.random.default_rng(1)
     model = images(scope, (4, 6, 8))
     points = lg.Points(POINTS.positions / 4, POINTS.intensities)
     c, change, weights = rng.normal(size=3) / 10, rng.normal(size=3), rng.normal(size=model.shape)
     there = float((model.derivative(points, c, change) * weights).sum())
-    assert float(model.gradient(points, c, weights) @ change) == pytest.approx(there, rel=1e-9)
+    assert float(model.gradient(points, c, weights) @ change) == pytest.approx(there, rel=1e-9, abs=0)
 
 
 def test_piston_changes_nothing_and_tilt_is_a_place():
@@ -170,7 +178,6 @@ def test_light_beside_the_sensor_is_cut():
 @pytest.mark.parametrize(
     ("scope", "terms", "message"),
     [
-        (SCOPE.replace(lenslets={"shape": "round"}), (4,), "lenslets are round"),
         (SCOPE.replace(objective={"model": "rays"}), (4,), "model 'rays' has no phase"),
         (SCOPE, (4, 4), r"terms are \(4, 4\) but each"),
         (SCOPE, (0,), "Noll's index is 0"),

@@ -72,8 +72,8 @@ def require_followed(instrument: Instrument) -> None:
         )
     elif not instrument.in_pupil and not has_phase(cast(LightFieldMicroscope, instrument)):
         raise GeometryError(
-            "derivatives of bounds by a microscope's parts need square lenslets and a model other than "
-            "'rays'. Use these, or search 'local'."
+            "derivatives of bounds by a microscope's parts need a model other than 'rays'. Use one, or "
+            "search 'local'."
         )
 
 

@@ -238,8 +238,8 @@ def _reached(camera: Camera, depths: np.ndarray, width: float) -> float:
 
 
 def has_phase(scope: LightFieldMicroscope) -> bool:
-    """Whether images of points are known by the pupil: behind square lenslets, not traced by rays."""
-    return scope.objective.model != "rays" and scope.lenslets.shape != "round"
+    """Whether images of points are known by the pupil: not traced by rays."""
+    return scope.objective.model != "rays"
 
 
 def _of_microscope(scope: LightFieldMicroscope, depths: np.ndarray, accuracy: float) -> Source:

@@ -123,32 +123,67 @@ def spline_response(f: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]
 @remembered
 def transmission(lenslet: Lenslet, wavelength: float, finest: int, samples: int) -> np.ndarray:
     """Of a lenslet (samples, samples), of its Fourier series up to `finest` periods in a pitch."""
-    if not lenslet.is_round:
-        line = series(lenslet, wavelength, finest)
-        line = _waves(finest, samples) @ line
-        return np.outer(line, line)
-    n = 4 * 2 ** math.ceil(math.log2(4 * finest + 64))
-    at = ((np.arange(n) + 0.5) / n - 0.5) * lenslet.pitch
-    r2 = at[:, None] ** 2 + at**2
-    inside = np.clip((lenslet.width / 2 - np.sqrt(r2)) / lenslet.pitch * n + 0.5, 0, 1)
-    whole = inside * np.exp(-1j * np.pi * r2 / (wavelength * lenslet.focal_length))
-    back = _waves(finest, n).conj().T / n
-    return _waves(finest, samples) @ (back @ whole @ back.T) @ _waves(finest, samples).T
+    waves = _waves(finest, samples)
+    if lenslet.is_round:
+        return waves @ round_series(lenslet, wavelength, finest) @ waves.T
+    line = waves @ series(lenslet, wavelength, finest)
+    return np.outer(line, line)
 
 
 def series(lenslet: Lenslet, wavelength: float, finest: int) -> np.ndarray:
-    """Fourier series (2 finest + 1,) of a square lenslet along an axis, by quadrature with its edges."""
-    turns = finest + lenslet.pitch**2 / (wavelength * abs(lenslet.focal_length))
-    unit, weight = np.polynomial.legendre.leggauss(math.ceil(4 * turns) + 32)
-    at, weight = unit * lenslet.width / 2, weight * lenslet.width / (2 * lenslet.pitch)
-    wave = weight * np.exp(-1j * np.pi * at**2 / (wavelength * lenslet.focal_length))
-    return np.exp(-2j * np.pi * np.outer(np.arange(-finest, finest + 1), at / lenslet.pitch)) @ wave
+    """Fourier series (2 finest + 1,) of a square lenslet along an axis."""
+    return next(_lines(lenslet, wavelength, finest, [lenslet.width / 2]))
+
+
+def round_series(lenslet: Lenslet, wavelength: float, finest: int) -> np.ndarray:
+    """Fourier series (2 finest + 1, 2 finest + 1) of a round lenslet, of chords, each a line with edges.
+
+    They stand at R cos θ: over even steps of θ a smooth function's mean errs by less than any power of these.
+    """
+    count = 2 * (math.ceil(2 * _turns(lenslet, wavelength, finest)) + 16)
+    angle, radius = (np.arange(count // 2) + 0.5) * np.pi / count, lenslet.width / 2
+    at, half = radius * np.cos(angle), radius * np.sin(angle)
+    lines = np.stack(list(_lines(lenslet, wavelength, finest, half.tolist())))
+    wave = half * np.exp(-1j * np.pi * at**2 / (wavelength * lenslet.focal_length))
+    orders = np.arange(-finest, finest + 1)
+    down = np.cos(2 * np.pi * np.outer(orders, at / lenslet.pitch)) * wave  # of chords on both sides
+    return down @ lines * (2 * np.pi / count / lenslet.pitch)
+
+
+def _lines(lenslet: Lenslet, wavelength: float, finest: int, halves: Sequence[float]) -> Iterator[np.ndarray]:
+    """Fourier series (2 finest + 1,) along lines through a lens, of some half widths, by quadrature."""
+    unit, weight = np.polynomial.legendre.leggauss(math.ceil(4 * _turns(lenslet, wavelength, finest)) + 32)
+    orders, curve = np.arange(-finest, finest + 1), np.pi / (wavelength * lenslet.focal_length)
+    for half in halves:
+        at = unit * half
+        wave = weight * half / lenslet.pitch * np.exp(-1j * curve * at**2)
+        yield np.exp(-2j * np.pi * np.outer(orders, at / lenslet.pitch)) @ wave
+
+
+def _turns(lenslet: Lenslet, wavelength: float, finest: int) -> float:
+    """Of the phase that a lenslet's series is made of, over its width."""
+    return finest + lenslet.pitch**2 / (wavelength * abs(lenslet.focal_length))
 
 
 def _waves(finest: int, samples: int) -> np.ndarray:
     """Waves (samples, 2 finest + 1) over a pitch."""
     at = (np.arange(samples) - (samples - 1) / 2) / samples
     return np.exp(2j * np.pi * np.outer(at, np.arange(-finest, finest + 1)))
+
+
+def finest_of(objective: Objective, lenslet: Lenslet, fine: int) -> int:
+    """Periods in a pitch up to which lenslets are followed on so many samples, without aliases."""
+    steepest = objective.numerical_aperture / lenslet.magnification / objective.wavelength
+    return math.floor(fine / 2 - steepest * lenslet.pitch)
+
+
+def faded(cells: int, fine: int) -> np.ndarray:
+    """(cells fine,), 1 but half a cell at each border.
+
+    Light that goes out on one side comes in on the other, without an edge.
+    """
+    at = np.arange(cells * fine) + 0.5
+    return np.sin(np.pi / 2 * np.minimum(2 * np.minimum(at, at[::-1]) / fine, 1)) ** 2
 
 
 class Bench:
@@ -178,13 +213,9 @@ class Bench:
         Light that a lenslet's border sends steeper than that goes far, and makes fringes that are finer than
         pixels with what is brighter: it is better left out than where it does not belong.
         """
-        steepest = self.objective.numerical_aperture / self.lenslet.magnification / self.objective.wavelength
-        finest = math.floor(self.fine / 2 - steepest * self.lenslet.pitch)
+        finest = finest_of(self.objective, self.lenslet, self.fine)
         own = transmission(self.lenslet, self.objective.wavelength, finest, self.fine)
-        taper = (
-            np.sin(np.pi / 2 * np.clip((np.arange(self.cells * self.fine) + 0.5) / self.fine * 2, 0, 1)) ** 2
-        )
-        taper *= taper[::-1]  # light that goes out on one side comes in on the other, without an edge
+        taper = faded(self.cells, self.fine)
         return (np.tile(own, (self.cells, self.cells)) * np.outer(taper, taper)).astype(np.complex64)
 
     def images(self, dz: float, points: Sequence[tuple[float, float]]) -> Iterator[tuple[np.ndarray, float]]:

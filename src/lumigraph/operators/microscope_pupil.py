@@ -7,7 +7,8 @@ Before a lattice of square lenslets a plane wave of the pupil becomes a Bloch wa
 
 with T_n a lenslet's Fourier series. The field on the sensor is then one product of small matrices with the
 pupil, U = B_y P B_x, and so is what follows when the pupil's phase changes by φ: dU = B_y (i φ P) B_x, and
-d|U|² = 2 Re(U* dU). Moving a point changes the phase as well, so that its place has derivatives too.
+d|U|² = 2 Re(U* dU). Before round lenslets b are plane waves, from which `microscope_round` goes on. Moving a
+point changes the phase as well, so that its place has derivatives too.
 """
 
 import math
@@ -26,7 +27,7 @@ from lumigraph.operators.microscope_bench import fineness
 from lumigraph.operators.microscope_building import Layout
 from lumigraph.operators.microscope_cell import Lenslet
 from lumigraph.operators.microscope_kernels import Demand, margin_of, reach_of
-from lumigraph.operators.microscope_pupil_waves import Told, Waves, waves_of
+from lumigraph.operators.microscope_pupil_waves import Told, Waves, margin_cells, waves_of
 from lumigraph.operators.resampling import Part, Resampling
 from lumigraph.scene import Points
 
@@ -79,7 +80,7 @@ class PupilImages:
     objectives
         One for each wavelength, with the aberrations that are known already.
     lenslet, layout
-        The array, of square lenslets, and the pixels.
+        The array, and the pixels.
     terms
         Noll indices of the coefficients.
     accuracy
@@ -90,7 +91,7 @@ class PupilImages:
     Raises
     ------
     GeometryError
-        Round lenslets, rays, terms that repeat.
+        Rays, terms that repeat.
     """
 
     objectives: tuple[Objective, ...]
@@ -101,8 +102,6 @@ class PupilImages:
     double: bool = False
 
     def __post_init__(self) -> None:
-        if self.lenslet.is_round:
-            raise GeometryError("lenslets are round but derivatives by the pupil's phase need square ones.")
         if any(one.model == "rays" for one in self.objectives):
             raise GeometryError("model 'rays' has no phase. Use 'scalar', 'vector' or 'paraxial'.")
         for j in self.terms:
@@ -299,7 +298,8 @@ class PupilImages:
 
     def _waves(self, objective: Objective, cells: int, fine: int, nodes: int) -> Waves:
         dtype = self._dtype
-        terms, fields = len(self.terms) + PLACES, objective.modes * (cells * fine) ** 2
+        wide = cells + 2 * margin_cells(objective, self.lenslet)
+        terms, fields = len(self.terms) + PLACES, objective.modes * (wide * fine) ** 2
         needed = np.dtype(dtype).itemsize * ((12.0 + terms) * nodes**2 + 4.0 * (fields + BLOCK))
         what = f"the pupil's waves behind {cells} x {cells} lenslets"
         memory.require(needed, what, "Use points nearer to the focused plane.", SamplingError)

@@ -1,4 +1,4 @@
-r"""Sums of a pupil's plane waves behind a lattice of square lenslets, as products of small matrices.
+r"""Sums of a pupil's plane waves behind a lattice of lenslets, as products of small matrices.
 
 A sum over the nodes of a disc, of amplitudes times Bloch waves b(X; q), is one product along y and one along
 x. The nodes of each row stand elsewhere along x. But b changes with q no faster than light comes from within
@@ -8,7 +8,8 @@ which all rows share,
 .. math:: b(X; q) \approx \sum_g w_g(q)\, b(X; q_g), \quad G w = v, \quad G_{gh} = \mathrm{sinc}((g - h) / s),
           \quad v_g = \mathrm{sinc}((q / \Delta - g) / s)
 
-with weights of least squares over all waves of half the grid's band (s = 2).
+with weights of least squares over all waves of half the grid's band (s = 2). Where lenslets are not square
+waves have no axes behind them: b are plane waves before them, whose sum goes on from there.
 """
 
 import math
@@ -22,8 +23,9 @@ from lumigraph.core.cache import remembered
 from lumigraph.core.mirrored import Mirrored
 from lumigraph.elements.disc import disc
 from lumigraph.elements.objective import Objective
-from lumigraph.operators.microscope_bench import factors, guard
+from lumigraph.operators.microscope_bench import factors, faded, finest_of, guard, transmission
 from lumigraph.operators.microscope_cell import CellSampling, Lenslet
+from lumigraph.operators.microscope_round import LensletWindow
 from lumigraph.operators.microscope_waves import bloch, centred, over_cells
 
 FINER = 2.0
@@ -49,9 +51,12 @@ class Waves:
     onto
         From the nodes of all rows to an even grid of each, (rows grid, rows nodes).
     down, across
-        Bloch waves (samples, rows) and (samples, grid), alike from both ends as the window and the nodes are.
+        Waves (samples, rows) and (samples, grid), alike from both ends as the window and the nodes are: Bloch
+        waves behind lenslets, or plane ones before a wider `window` of them.
     sampled
         From the fine grid to samples of the image (count, samples), along an axis.
+    window
+        Of lenslets that are not square.
     """
 
     q: tuple[np.ndarray, np.ndarray]
@@ -60,6 +65,7 @@ class Waves:
     down: Mirrored
     across: Mirrored
     sampled: Mirrored
+    window: LensletWindow | None
 
     @property
     def nbytes(self) -> int:
@@ -67,17 +73,22 @@ class Waves:
         return (
             self.down.nbytes + self.across.nbytes + self.sampled.nbytes + 3 * self.area.nbytes
             + self.onto.data.nbytes + self.onto.indices.nbytes
+            + (self.window.nbytes if self.window else 0)
         )  # fmt: skip
 
     def fields(self, pupils: np.ndarray) -> np.ndarray:
         """On the fine grid (k, n, n), of pupils (k, rows, nodes)."""
         even = of_each(self.onto, pupils, self.across.shape[1])
-        return self.down.down(self.across.right(even))
+        light = self.down.down(self.across.right(even))
+        return light if self.window is None else self.window.forward(light)
 
     def back(self, fields: np.ndarray) -> np.ndarray:
         """Conjugate transpose of `fields`."""
         down, across = Mirrored.of(self.down.whole.T), Mirrored.of(self.across.whole.T)
-        rows = across.right(down.down(fields.conj()))  # the waves are large: not they are conjugated
+        seen = fields.conj()  # the waves are large: not they are conjugated
+        if self.window is not None:
+            seen = self.window.transposed(seen)
+        rows = across.right(down.down(seen))
         return of_each(self.onto.T, rows, self.area.shape[1]).conj()
 
     def samples(self, light: np.ndarray) -> np.ndarray:
@@ -115,29 +126,55 @@ def waves_of(objective: Objective, lenslet: Lenslet, sampling: CellSampling, tol
     return Waves(
         (places[0], places[1]), area * a**2, csr_array(onto, dtype=real), Mirrored.of(down),
         Mirrored.of(across), Mirrored.of(sampling_matrix(cells, fine, sampling).astype(real)),
+        window_of((objective, lenslet), (objective, lenslet), told),
     )  # fmt: skip
 
 
 def behind(
     own: tuple[Objective, Lenslet], like: tuple[Objective, Lenslet], told: Told
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bloch waves (samples, rows) and (samples, grid) of an objective and lenslets.
+    """Waves (samples, rows) and (samples, grid) of an objective and lenslets, as `Waves` has them.
 
     At places in the pupil, and with as fine a series of a lenslet, as `like` others ask for, which hardly
     differ.
     """
     (objective, lenslet), (cells, fine, count, dtype) = own, told
     step, number = _even(*like, told)
-    steepest = like[0].numerical_aperture / like[1].magnification / like[0].wavelength * like[1].pitch
+    wide = cells + 2 * margin_cells(*like)
     turns = _turns(objective, lenslet)
     grid = (np.arange(number) - number // 2) * step * (turns / _turns(*like))
     rows = turns * disc(count, count)[0][:, 0]
 
     def waves(at: np.ndarray) -> np.ndarray:
-        found = bloch(lenslet, objective.wavelength, at, math.floor(fine / 2 - steepest), centred(fine))
-        return over_cells(found.astype(dtype), at, cells).T
+        if lenslet.is_round:
+            found = np.exp(2j * np.pi * np.outer(at, centred(fine)))
+        else:
+            found = bloch(lenslet, objective.wavelength, at, finest_of(*like, fine), centred(fine))
+        return over_cells(found.astype(dtype), at, wide).T
 
     return waves(rows), waves(grid)
+
+
+def window_of(
+    own: tuple[Objective, Lenslet], like: tuple[Objective, Lenslet], told: Told
+) -> LensletWindow | None:
+    """Lenslets that are not square, as finely as `behind` has it."""
+    (objective, lenslet), (cells, fine, _, dtype) = own, told
+    if not lenslet.is_round:
+        return None
+    margin = margin_cells(*like)
+    wide = cells + 2 * margin
+    border = faded(wide, fine)
+    one = transmission(lenslet, objective.wavelength, finest_of(*like, fine), fine)
+    lenslets = np.tile(one, (wide, wide)) * np.outer(border, border)
+    curve = np.pi * objective.wavelength * lenslet.distance / lenslet.pitch**2
+    path = np.exp(-1j * curve * np.fft.fftfreq(wide * fine, 1 / fine) ** 2)
+    return LensletWindow(lenslets.astype(dtype), path.astype(dtype), margin * fine)
+
+
+def margin_cells(objective: Objective, lenslet: Lenslet) -> int:
+    """Cells beyond, to each side, whose light is followed on a grid."""
+    return guard(objective, lenslet) + EDGES if lenslet.is_round else 0
 
 
 def _turns(objective: Objective, lenslet: Lenslet) -> float:

@@ -22,7 +22,9 @@ from lumigraph.core import arrays
 from lumigraph.core.threads import each
 from lumigraph.elements.objective import Objective
 from lumigraph.operators.microscope_bench import (
+    faded,
     fineness,
+    finest_of,
     guard,
     refined,
     require_finer,
@@ -221,14 +223,12 @@ class Crossed:
 
     def _waves(self, turns: np.ndarray) -> np.ndarray:
         """Behind the lenslets (m, nodes × samples): of each of a pixel's nodes, or on a grid for splines."""
-        N, finest = self.sampling.pixels, math.floor(self.fine / 2 - self.steepest)
+        N, finest = self.sampling.pixels, finest_of(self.objective, self.lenslet, self.fine)
         told = self.lenslet, self.objective.wavelength, turns, finest
         if self.sampling.degree:
             cells = 2 * (self.reach + self.guard) + 1
-            at = np.arange(cells * self.fine) + 0.5
-            border = np.minimum(at, at[::-1]) / self.fine  # no edge where the last cell meets the first
             waves = over_cells(bloch(*told, centred(self.fine)), turns, cells)
-            return (waves * np.sin(np.pi / 2 * np.minimum(2 * border, 1)) ** 2).astype(np.complex64)
+            return (waves * faded(cells, self.fine)).astype(np.complex64)
         nodes, weights = np.polynomial.legendre.leggauss(self._nodes)
         places = centred(N) + nodes[:, None] * self.sampling.width / 2
         own = bloch(*told, places.ravel()).reshape(len(turns), *places.shape)

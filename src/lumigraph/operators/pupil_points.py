@@ -5,7 +5,8 @@ With P the wave of a point in the pupil and φ_k what turns it as the point move
 .. math:: U_0 = B_y P B_x, \quad U_k = B_y (i \varphi_k P) B_x, \quad
           I_0 = S |U_0|^2 S^T, \quad I_k = S\, 2 \mathrm{Re}(U_0^* U_k) S^T
 
-A number that is made of them is followed back once, to P, φ, B and S. How these change with a length, the
+and U goes through a window of lenslets, T, where these are not square. A number that is made of them is
+followed back once, to P, φ, B, S and T. How these change with a length, the
 wavelength or a term of the phase is the difference of two microscopes a little apart, sampled alike.
 """
 
@@ -21,9 +22,19 @@ from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError
 from lumigraph.operators.microscope_cell import Lenslet
 from lumigraph.operators.microscope_pupil import PupilImages
-from lumigraph.operators.microscope_pupil_waves import Told, Waves, behind, of_each, sampling_matrix
+from lumigraph.operators.microscope_pupil_waves import (
+    Told,
+    Waves,
+    behind,
+    of_each,
+    sampling_matrix,
+    window_of,
+)
 from lumigraph.operators.part_waves import times
 from lumigraph.scene import Points
+
+Place = tuple[Objective, Lenslet]
+"""What waves behind lenslets follow from."""
 
 Back = Callable[[np.ndarray], None]
 """Takes slopes (4, ny, nx) of a number by an image and its derivatives."""
@@ -78,17 +89,24 @@ class Parts:
         w = self.waves
         self.down, self.across, self.spread = (Mirrored.of(m.whole.T) for m in (w.down, w.across, w.sampled))
         self.by = [np.zeros(m.shape, m.even.dtype) for m in (w.down, w.across, w.sampled)]
+        self.by_window = [np.zeros_like(m) for m in (w.window.lenslets, w.window.path)] if w.window else []
 
     def along(self, ends: tuple[PupilImages, PupilImages], own: PupilImages) -> float:
         """What a number changes by from one microscope to another close by, as the matrices do."""
         found, (low, high) = 0.0, ends
         if self._behind(low) != self._behind(high):
-            both = (behind(self._behind(one), self._behind(own), self._exact) for one in ends)
-            found += sum(times(by, *pair) for by, pair in zip(self.by, zip(*both, strict=True), strict=False))
+            both = zip(*(self._made(self._behind(one), self._behind(own)) for one in ends), strict=True)
+            by = (*self.by[:2], *self.by_window)
+            found += sum(times(slopes, *pair) for slopes, pair in zip(by, both, strict=True))
         if low.layout.sampling != high.layout.sampling:
             cells, fine, *_ = self.told
             found += times(self.by[2], *(sampling_matrix(cells, fine, one.layout.sampling) for one in ends))
         return found
+
+    def _made(self, own: Place, like: Place) -> tuple[np.ndarray, ...]:
+        """All that light between the pupil and the sensor is multiplied by."""
+        window = window_of(own, like, self._exact)
+        return (*behind(own, like, self._exact), *((window.lenslets, window.path) if window else ()))
 
     @property
     def _exact(self) -> Told:
@@ -96,20 +114,23 @@ class Parts:
         cells, fine, nodes, _ = self.told
         return cells, fine, nodes, "complex128"
 
-    def _behind(self, images: PupilImages) -> tuple[Objective, Lenslet]:
+    def _behind(self, images: PupilImages) -> Place:
         """What waves behind lenslets follow from."""
         return replace(images.objectives[self.which], aberrations=()), images.lenslet
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Way:
-    """A point's waves on their way: pupils (4 modes, rows, nodes), U and its derivatives (4, modes, n, n)."""
+    """A point's waves on their way: pupils (4 modes, rows, nodes), what stands before a window of lenslets
+    (4 modes, n, n), U and its derivatives (4, modes, n, n).
+    """
 
     parts: Parts
     wave: np.ndarray
     phases: np.ndarray
     even: np.ndarray
     right: np.ndarray
+    before: np.ndarray
     fields: np.ndarray
 
     @classmethod
@@ -117,8 +138,9 @@ class _Way:
         turned = np.concatenate([wave[None], 1j * phases[:, None] * wave]).reshape(-1, *wave.shape[1:])
         even = of_each(parts.waves.onto, turned, parts.waves.across.shape[1])
         right = parts.waves.across.right(even)
-        fields = parts.waves.down.down(right)
-        return cls(parts, wave, phases, even, right, fields.reshape(4, len(wave), *fields.shape[1:]))
+        before = parts.waves.down.down(right)
+        fields = before if parts.waves.window is None else parts.waves.window.forward(before)
+        return cls(parts, wave, phases, even, right, before, fields.reshape(4, len(wave), *fields.shape[1:]))
 
     @property
     def light(self) -> np.ndarray:
@@ -144,6 +166,10 @@ class _Way:
         by = seen * fields[0]
         by[0] += (seen[1:] * fields[1:]).sum(0)
         by = by.reshape(len(self.even), *fields.shape[2:])
+        if (window := parts.waves.window) is not None:
+            for slopes, more in zip(parts.by_window, window.slopes(self.before, by), strict=True):
+                slopes += more
+            by = window.transposed(by)
         rows = parts.down.down(by)
         parts.by[0] += np.tensordot(by, self.right, ([0, 2], [0, 2]))
         parts.by[1] += np.tensordot(rows, self.even, ([0, 1], [0, 1]))

@@ -1,0 +1,71 @@
+r"""What lenslets that are not square do to the light of a window, and the way from there to the sensor.
+
+A field V before them, on the even grid of a window of cells, becomes
+
+.. math:: U = F^{-1} \left( h_y h_x \, F (t V) \right), \quad h = e^{-i \pi \lambda b \nu^2}
+
+with t a lattice of lenslets, each of its Fourier series. t V and h bring no light of one border to the other
+where the window is so much wider than what is wanted as light goes on its way.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lumigraph.core import arrays
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LensletWindow:
+    """Lenslets of a window, and the way behind them.
+
+    Parameters
+    ----------
+    lenslets
+        t (n, n), which is even.
+    path
+        h (n,), of each frequency along an axis.
+    margin
+        Samples at each border that are not wanted.
+    """
+
+    lenslets: np.ndarray
+    path: np.ndarray
+    margin: int
+
+    @property
+    def nbytes(self) -> int:
+        """Of the arrays."""
+        return self.lenslets.nbytes + self.path.nbytes
+
+    def forward(self, fields: np.ndarray) -> np.ndarray:
+        """Fields (k, n, n) before the lenslets to those on the sensor, without the margins."""
+        return self._cut(self._gone(fields * self.lenslets))
+
+    def transposed(self, fields: np.ndarray) -> np.ndarray:
+        """The transpose of `forward`, without conjugates."""
+        return self._gone(self._whole(fields)) * self.lenslets
+
+    def slopes(self, before: np.ndarray, given: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """By `lenslets` and `path` of a number, from those by `forward` of fields (k, n, n)."""
+        seen = arrays.ifft2(self._whole(given))
+        by_path = (seen * arrays.fft2(before * self.lenslets)).sum(0)
+        by_lenslets = (before * self._back(seen)).sum(0)
+        return by_lenslets, by_path @ self.path + self.path @ by_path
+
+    def _gone(self, fields: np.ndarray) -> np.ndarray:
+        return self._back(arrays.ifft2(fields))
+
+    def _back(self, waves: np.ndarray) -> np.ndarray:
+        """F (h h W): as h is even, F h F⁻¹ and F⁻¹ h F are the same, and symmetric."""
+        waves *= self.path[:, None]
+        waves *= self.path
+        return arrays.fft2(waves, overwrite=True)
+
+    def _cut(self, fields: np.ndarray) -> np.ndarray:
+        inner = slice(self.margin, fields.shape[-1] - self.margin)
+        return fields[..., inner, inner]
+
+    def _whole(self, fields: np.ndarray) -> np.ndarray:
+        wide = ((0, 0), (self.margin,) * 2, (self.margin,) * 2)
+        return np.pad(fields, wide)
