@@ -31,8 +31,8 @@ UNIT = 14.6
 """Photons of a point of intensity 1."""
 
 
-def exposed(aberrations, photons, beads=BEADS, seed=0, accuracy=2e-2):
-    bent = SCOPE.replace(objective={"aberrations": aberrations})
+def exposed(aberrations, photons, beads=BEADS, seed=0, accuracy=2e-2, scope=SCOPE):
+    bent = scope.replace(objective={"aberrations": aberrations})
     light = sum(bent.point_image(*place, accuracy=accuracy) for place in beads)
     return np.random.default_rng(seed).poisson(light * photons / UNIT + 1).astype(np.float32)
 
@@ -49,6 +49,16 @@ def test_aberrations_come_back_with_the_beads(bent):
     assert away.shape == (2, 2)
     assert away.min(0).max() < 0.15e-6
     np.testing.assert_allclose(bent.beads.intensities * UNIT, 2e4, rtol=0.03)
+
+
+@pytest.mark.long
+def test_aberrations_come_back_behind_round_lenslets():
+    """Square ones of the same width have images of points that are off by 0.2."""
+    scope = SCOPE.replace(lenslets={"shape": "round"})
+    raw = exposed({6: 0.2, 8: -0.15}, 2e4, scope=scope)
+    found = estimate(raw, scope, DEPTHS, (6, 8, 9), exposure=EXPOSURE)
+    assert found.coefficients == pytest.approx({6: 0.2, 8: -0.15, 9: 0}, abs=0.01)
+    assert found.pearson == pytest.approx(1, abs=0.1)
 
 
 def test_what_explains_the_picture_is_stated(bent):

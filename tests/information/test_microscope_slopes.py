@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
+from lumigraph.core.mirrored import Mirrored
 from lumigraph.errors import GeometryError
 from lumigraph.information import Light, bounds, slopes
 from lumigraph.information.bounds import Seen, deviations
 from lumigraph.information.followed import BeforeLenslets, before_lenslets
 from lumigraph.information.points import collected
 from lumigraph.operators.microscope_pupil_waves import behind, sampling_matrix, window_of
-from lumigraph.operators.pupil_points import Mirrored, Parts
+from lumigraph.operators.pupil_points import Parts
 
 UM = 1e-6
 DEPTHS, LIGHT, PLACES = (-9 * UM, 12 * UM), Light(4000, 0.5), range(2)
@@ -128,7 +129,7 @@ def check(key: Key, name, part):
     assert found.changes[0] == pytest.approx((8 * near - far) / 6, rel=1e-4, abs=0)
 
 
-@pytest.mark.parametrize("key", ["pitch", "phase of the pupil", "pixels", "focal length of lenslets, round"])
+@pytest.mark.parametrize("key", ["pitch", "phase of the pupil", "focal length of lenslets, round"])
 def test_slopes_are_central_differences(key):
     check((PLAIN | ROUND)[key], "depth", slice(2, 3))
 

@@ -24,7 +24,9 @@ def apart(found, expected):
     return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
 
 
-def test_a_medium_that_does_nothing_changes_nothing(scope):
+@pytest.mark.parametrize("shape", [None, "round"])
+def test_a_medium_that_does_nothing_changes_nothing(scope, shape):
+    scope = scope.replace(lenslets={"shape": shape})
     grid = lg.Grid.square(8, 2 * um)
     medium = lg.Medium(np.zeros((2, 8, 8)), grid, (-20 * um, 60 * um))
     scene = lg.targets.points([(2 * um, -1 * um, 10 * um)])

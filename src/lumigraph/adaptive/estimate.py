@@ -65,8 +65,8 @@ def estimate(
     raw
         As it was read.
     microscope
-        Of configuration "1.0", or a `PlenopticCamera`, with square lenslets. Aberrations of its
-        description are taken as known.
+        Of configuration "1.0", or a `PlenopticCamera` with square lenslets. Aberrations of its description
+        are taken as known.
     depths
         Planes in which beads are looked for, or of the volume [m], such as each 6 µm; the one of a picture.
     terms

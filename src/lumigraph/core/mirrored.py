@@ -44,6 +44,16 @@ class Mirrored:
         return self.down(np.eye(self.shape[1], dtype=self.even.dtype))
 
     @property
+    def transposed(self) -> "Mirrored":
+        """The transpose, which is alike from both ends as well."""
+        (rows, columns), even = self.shape, self.even.T.copy()
+        if rows % 2:
+            even[:, 0] /= 2  # as `of` has what stands in the middle of a row
+        if columns % 2:
+            even[0] *= 2
+        return Mirrored((columns, rows), even, self.odd.T)
+
+    @property
     def nbytes(self) -> int:
         """Of the halves."""
         return self.even.nbytes + self.odd.nbytes

@@ -1,8 +1,7 @@
 """Images of points of light and their derivatives by place, of any instrument, as parts of the light.
 
-Derivatives are exact before microscopes with square lenslets, Fourier microscopes, and paraxial cameras with
-lenslets behind a thin lens. Those of others, and of microscopes whose lenslets are round or whose images are
-traced by rays, are central differences.
+Derivatives are exact before microscopes whose images are not traced by rays, and paraxial cameras with
+lenslets behind a thin lens. Those of others are central differences.
 """
 
 import math

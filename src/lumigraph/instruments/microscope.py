@@ -237,7 +237,7 @@ class LightFieldMicroscope(DescribedMicroscope):
         Raises
         ------
         GeometryError
-            A Fourier microscope, round lenslets, rays, a term that is no Noll index.
+            A Fourier microscope, rays, a term that is no Noll index.
         """
         if self.configuration == "fourier":
             raise GeometryError(

@@ -84,11 +84,10 @@ class Waves:
 
     def back(self, fields: np.ndarray) -> np.ndarray:
         """Conjugate transpose of `fields`."""
-        down, across = Mirrored.of(self.down.whole.T), Mirrored.of(self.across.whole.T)
         seen = fields.conj()  # the waves are large: not they are conjugated
         if self.window is not None:
             seen = self.window.transposed(seen)
-        rows = across.right(down.down(seen))
+        rows = self.across.transposed.right(self.down.transposed.down(seen))
         return of_each(self.onto.T, rows, self.area.shape[1]).conj()
 
     def samples(self, light: np.ndarray) -> np.ndarray:
@@ -97,7 +96,7 @@ class Waves:
 
     def spread(self, samples: np.ndarray) -> np.ndarray:
         """Transpose of `samples`."""
-        back = Mirrored.of(self.sampled.whole.T)
+        back = self.sampled.transposed
         return back.right(back.down(samples))
 
 

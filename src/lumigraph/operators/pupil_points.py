@@ -16,7 +16,6 @@ from functools import partial
 
 import numpy as np
 
-from lumigraph.core.mirrored import Mirrored
 from lumigraph.core.threads import single_products
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError
@@ -87,7 +86,7 @@ class Parts:
 
     def __post_init__(self) -> None:
         w = self.waves
-        self.down, self.across, self.spread = (Mirrored.of(m.whole.T) for m in (w.down, w.across, w.sampled))
+        self.down, self.across, self.spread = (m.transposed for m in (w.down, w.across, w.sampled))
         self.by = [np.zeros(m.shape, m.even.dtype) for m in (w.down, w.across, w.sampled)]
         self.by_window = [np.zeros_like(m) for m in (w.window.lenslets, w.window.path)] if w.window else []
 

@@ -93,7 +93,7 @@ def medium_image(
     Raises
     ------
     GeometryError
-        Something else than a `Medium`; a Fourier microscope, round lenslets or rays.
+        Something else than a `Medium`; a Fourier microscope or rays.
     """
     checks.instance("medium", medium, Medium)
     farthest = max(abs(float(dz)) for dz in (*points.positions[:, 2], *medium.depths))
