@@ -53,7 +53,7 @@ def test_aberrations_come_back_with_the_beads(bent):
 
 @pytest.mark.long
 def test_aberrations_come_back_behind_round_lenslets():
-    """Square ones of the same width have images of points that are off by 0.2."""
+    """Square ones of the same width have images of points that are off by 0.5."""
     scope = SCOPE.replace(lenslets={"shape": "round"})
     raw = exposed({6: 0.2, 8: -0.15}, 2e4, scope=scope)
     found = estimate(raw, scope, DEPTHS, (6, 8, 9), exposure=EXPOSURE)
