@@ -9,6 +9,7 @@ from lumigraph.core.linear import Linear
 from lumigraph.elements import ThinLens
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.instruments import LightFieldMicroscope
+from lumigraph.operators.fourier_microscope import fourier_operator
 from lumigraph.propagation import propagate
 
 
@@ -51,6 +52,18 @@ def test_moving_a_point_moves_every_image_alike(operator):
     n = operator.object_grid.shape[0] // 2
     first, second = operator.psf((2, n, n)), operator.psf((2, n + 2, n - 3))
     np.testing.assert_allclose(second[2:, :-3], first[:-2, 3:], atol=1e-5 * first.max())
+
+
+def test_a_small_object_is_the_same_as_one_in_a_dark_field(scope, operator, rng):
+    points, n, across = scope.fourier_points(), operator.plane[0], 15
+    small = fourier_operator(points.objectives, points.mosaic, operator.depths, across)
+    volume, first = np.zeros(operator.shape[1]), n // 2 - across // 2
+    part = np.s_[:, first : first + across, first : first + across]
+    volume[part] = rng.random(small.shape[1])
+    raw = operator.forward(volume)
+    np.testing.assert_allclose(small.forward(volume[part]), raw, atol=1e-7 * raw.max())
+    np.testing.assert_allclose(small.adjoint(raw), operator.adjoint(raw)[part], rtol=1e-6)
+    assert small.object_grid.center == operator.object_grid.center
 
 
 def test_an_even_plane_of_one_reads_one_behind_the_middle_lenslet(operator):

@@ -15,6 +15,7 @@ from lumigraph.information.scenes import Scenes, coloured, frequencies, ring_mea
 from lumigraph.instruments import Camera, LightFieldMicroscope
 from lumigraph.instruments.capabilities import WithPupil
 from lumigraph.instruments.instrument import Instrument
+from lumigraph.operators.fourier_microscope import fourier_operator
 from lumigraph.sensor import Sensor
 from lumigraph.simulation.microscope_scene import SAMPLES
 
@@ -214,7 +215,9 @@ def _of_microscope(
     scope: LightFieldMicroscope, depths: np.ndarray, scenes: Scenes, accuracy: float
 ) -> Seeing:
     if scope.configuration == "fourier":
-        operator, points = scope.operator(depths.tolist()), scope.fourier_points()
+        points, pitch = scope.fourier_points(), scope.object_grid.pitch[0]
+        across = min(scope.object_grid.shape[0], 2 * math.ceil(scenes.size / pitch / 2) + 1)
+        operator = fourier_operator(points.objectives, points.mosaic, depths.tolist(), across)
         whole = points.whole
     else:
         finest = scope.wavelength / (2 * scope.objective.numerical_aperture)

@@ -121,7 +121,8 @@ class FourierMicroscopeOperator(Linear):
     @property
     def memory_bytes(self) -> float:
         """Of the points' images and their spectra [bytes]."""
-        return self.images.nbytes + 8.0 * math.prod(self.images.shape[:2]) * math.prod(self._size)
+        ny, nx = self._size
+        return self.images.nbytes + 8.0 * math.prod(self.images.shape[:2]) * ny * (nx // 2 + 1)
 
     @property
     def error(self) -> float:
@@ -133,9 +134,8 @@ class FourierMicroscopeOperator(Linear):
         xp, spectra = arrays.namespace(volume), self._of(volume)
         spectrum = 0.0
         for k in range(len(self.images)):
-            wide = arrays.as_complex(arrays.framed(volume[k, ...], (0, 0), self._size))
-            spectrum = spectrum + spectra[k, ...] * arrays.fft2(wide)
-        pieces = xp.real(arrays.ifft2(spectrum))
+            spectrum = spectrum + spectra[k, ...] * arrays.rfft2(volume[k, ...], self._size)
+        pieces = arrays.irfft2(spectrum, self._size)
         raw = xp.zeros(self.raw_shape, dtype=volume.dtype, device=arrays.device(volume))
         for j, (inside, own) in enumerate(self._windows()):
             window = raw[inside]
@@ -148,11 +148,11 @@ class FourierMicroscopeOperator(Linear):
         pieces = xp.zeros((len(self.corners), *size), dtype=raw.dtype, device=arrays.device(raw))
         for j, (inside, own) in enumerate(self._windows()):
             pieces[(j, *own)] = raw[inside]
-        given = arrays.fft2(arrays.as_complex(pieces))
+        given = arrays.rfft2(pieces, size)
         planes = []
         for k in range(len(self.images)):
             spectrum = xp.sum(xp.conj(spectra[k, ...]) * given, axis=0)
-            planes.append(xp.real(arrays.ifft2(spectrum))[: shape[0], : shape[1]])
+            planes.append(arrays.irfft2(spectrum, size)[: shape[0], : shape[1]])
         return planes[0] if self.depths is None else xp.stack(planes)
 
     @property
@@ -165,10 +165,8 @@ class FourierMicroscopeOperator(Linear):
     def _of(self, like: Array) -> Array:
         key = arrays.placement(like)
         if key not in self._spectra:
-            size, (nz, nj, w, _) = self._size, self.images.shape
-            padded = np.zeros((nz, nj, *size))
-            padded[:, :, :w, :w] = self.images
-            self._spectra[key] = arrays.like(arrays.fft2(padded), like)
+            spectra = arrays.rfft2(self.images.astype(np.float64), self._size)
+            self._spectra[key] = arrays.like(spectra, like)
         return self._spectra[key]
 
     def _windows(self) -> list[tuple[Window, Window]]:
@@ -189,11 +187,15 @@ def overlap(corner: Sequence[int], size: tuple[int, int], shape: tuple[int, int]
 
 
 def fourier_operator(
-    objectives: Sequence[Objective], mosaic: Mosaic, depths: Sequence[float] | None = None
+    objectives: Sequence[Objective],
+    mosaic: Mosaic,
+    depths: Sequence[float] | None = None,
+    across: int | None = None,
 ) -> FourierMicroscopeOperator:
     """Operator from slices at `depths`, or from the focused plane, to a Fourier microscope's raw image.
 
-    Light is scalar here: each lenslet accepts a small cone.
+    Light is scalar here: each lenslet accepts a small cone. The object has `across` samples along either
+    side, around the axis; as many as the field for None.
 
     Raises
     ------
@@ -207,8 +209,9 @@ def fourier_operator(
         raise GeometryError("there are no depths. Give at least one, such as 0.0 for the focused plane.")
     mosaic = lit_lenslets(objectives[0], mosaic)
     half, lit = half_window(objectives[0], mosaic, planes), mosaic.centers
-    # Three times: as complex spectra of a window that holds the field too.
-    needed = 24.0 * len(planes) * len(lit) * (2 * half + 1 + mosaic.field) ** 2
+    n = mosaic.field if across is None else across
+    # With their spectra, in double precision at first, of a window that holds the object too.
+    needed = 24.0 * len(planes) * len(lit) * (2 * half + 1 + n) ** 2
     memory.require(needed, "the images of points", "Use fewer slices or larger pixels.", SamplingError)
     images = np.zeros((len(planes), len(lit), 2 * half + 1, 2 * half + 1), np.float32)
     middle = np.asarray(mosaic.shape) // 2
@@ -220,7 +223,6 @@ def fourier_operator(
             view = View.of(objective, mosaic, j, half)
             for k, dz in enumerate(planes):
                 images[k, j] += image_behind(view, objective, rest, dz) / len(objectives)
-    n = mosaic.field
     pitch = mosaic.pixel_pitch / mosaic.total_magnification
     # Sample n // 2 of the object stands on the axis, and its image on the lenslet's pixel.
     corners = nearest - half - n // 2
