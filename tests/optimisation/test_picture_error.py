@@ -6,10 +6,11 @@ import pytest
 import lumigraph as lg
 from lumigraph.cli import main
 from lumigraph.core.picture import png
-from lumigraph.errors import FormatError, GeometryError
+from lumigraph.errors import FormatError, GeometryError, SamplingWarning
 from lumigraph.information import Light, Scenes, reconstruction_error
 from lumigraph.information.points import collected
 from lumigraph.optimisation import Goal
+from lumigraph.optimisation.tried import Tried
 
 UM = 1e-6
 VARY = {"main_lens.diameter": "1 mm:8 mm:4"}
@@ -113,6 +114,8 @@ def test_the_command_takes_pictures_and_says_what_scenes_it_judged(line, tmp_pat
         str(tmp_path / "r.html"),
         "--trials",
         "8",
+        "--held-out",
+        *names,
     ]
     assert main([*line, *words]) == 0
     said = capsys.readouterr().out
@@ -121,8 +124,12 @@ def test_the_command_takes_pictures_and_says_what_scenes_it_judged(line, tmp_pat
     assert "their pictures' power" in said
     assert "as given: reconstructions of drawn scenes err by 0." in said
     assert "best: reconstructions of drawn scenes err by 0." in said
+    assert "as given: 16 held-out scenes err by 0." in said
+    assert "% ±" in said
     assert "half-way between the depths the best picture error is" in said
-    assert "picture error" in (tmp_path / "r.html").read_text()
+    report = (tmp_path / "r.html").read_text()
+    assert "picture error" in report
+    assert "error of held-out scenes, rms" in report
 
 
 @pytest.mark.parametrize(
@@ -135,10 +142,14 @@ def test_the_command_takes_pictures_and_says_what_scenes_it_judged(line, tmp_pat
         (["--goal", "picture error", "--trials", "1"], "trials are 1"),
         (["--goal", "picture error", "--trials", "-1"], "trials"),
         (["--goal", "largest f-number", "--trials", "8"], "trials are of depth, lateral"),
+        (["--goal", "picture error", "--held-out", "nowhere.png"], "nowhere.png"),
+        (["--goal", "depth", "--held-out", "{picture}"], "held-out pictures are for picture error"),
         (["--goal", "depth", "--scene-samples", "16"], "--scene-samples are for the goals 'picture error'"),
     ],
 )
-def test_nonsense_on_the_line_is_refused_in_one_line(line, words, said, capsys):
+def test_nonsense_on_the_line_is_refused_in_one_line(line, words, said, capsys, tmp_path):
+    (tmp_path / "some.png").write_bytes(png(np.full((40, 40), 100, np.uint8)))
+    words = [word.format(picture=tmp_path / "some.png") for word in words]
     assert main([*line, *words]) != 0
     error = capsys.readouterr().err.strip()
     assert said in error
@@ -156,6 +167,64 @@ def test_drawn_scenes_are_reconstructed_before_and_after_as_well_as_expected():
         assert 0 < one.error < 0.05 * one.reached
     scenes = [one.pictures[0] for one in found.tried.values()]
     assert np.array_equal(*scenes)
+
+
+def held_out(contrast=0.3, samples=40):
+    """Pictures of the search's kind, that it has not seen."""
+    rng = np.random.default_rng(5)
+    return [np.maximum(Scenes(12 * UM, samples, contrast).drawn(rng), 0) for _ in range(2)]
+
+
+@pytest.mark.filterwarnings("ignore:half-way between the depths")
+def test_held_out_scenes_are_reconstructed_as_well_as_expected_and_better_before_the_best():
+    found = lg.optimise(plain(), {"main_lens.diameter": "3 mm, 4 mm"}, goal(), held_out=held_out())
+    start, swept, best = (found.held_out[which] for which in ("start", "swept", "best"))
+    assert swept is best
+    assert len(best.squares) == 2 * 2 * 2
+    gain, error = best.gain(start)
+    assert gain == pytest.approx(1 - best.reached / start.reached)
+    assert gain == pytest.approx(found.gain(found.start), abs=3 * error)
+    assert 0 < error < 0.03
+    first = held_out()[0][:16, :16]
+    for one in (best, start):
+        np.testing.assert_allclose(one.pictures[0], first / first.mean())
+
+
+def test_a_best_that_is_no_better_on_held_out_scenes_is_warned_of():
+    """A stop wider by half a thousandth changes nothing that 8 scenes can tell."""
+    vary = {"main_lens.diameter": "2.001 mm"}
+    with pytest.warns(
+        SamplingWarning, match=r"camera as given reconstructs held-out scenes within .* chance"
+    ):
+        lg.optimise(plain(), vary, goal(depths=(1e-3,)), held_out=held_out())
+
+
+def test_the_error_of_a_gain_is_that_of_the_differences():
+    rng = np.random.default_rng(2)
+    common, own = rng.normal(1, 0.2, (2000, 400)), rng.normal(0, 0.02, (2, 2000, 400))
+    gains, errors = [], []
+    for shared, (here, there) in zip(common, own.swapaxes(0, 1), strict=True):
+        both = [0.81 * (shared + here), shared + there]
+        one, other = (Tried(reached=np.sqrt(each.mean()), squares=each) for each in both)
+        gain, error = one.gain(other)
+        gains.append(gain)
+        errors.append(error)
+    assert np.mean(gains) == pytest.approx(0.1, abs=1e-3)
+    assert np.mean(errors) == pytest.approx(np.std(gains), rel=0.07)
+
+
+def test_squares_of_pictures_stand_side_by_side_and_evenly_over_all():
+    scenes = Scenes(12 * UM, 8)
+    pictures = [np.full((16, 24), 1.0 + k) + np.arange(24) for k in range(2)]
+    pictures[0][:8, :8] = 0
+    found = scenes.squares(pictures, 100)
+    assert len(found) == 11
+    assert all(one.shape == (8, 8) and one.mean() == pytest.approx(1) for one in found)
+    assert len(scenes.squares(pictures, 4)) == 4
+    np.testing.assert_array_equal(scenes.squares(pictures, 4)[0], found[0])
+    np.testing.assert_array_equal(scenes.squares(pictures, 4)[-1], found[-1])
+    with pytest.raises(FormatError, match="no pictures of scenes"):
+        scenes.squares([], 4)
 
 
 def test_fits_to_drawn_points_stand_beside_their_bound():

@@ -97,7 +97,7 @@ class Scenes:
         count = rings(samples)
         total, number = np.zeros((samples, samples)), 0
         for picture in pictures:
-            for square in _squares(_checked(picture, samples), samples):
+            for square in _squares(_checked(picture, samples), samples, samples // 2):
                 total, number = total + _periodogram(square), number + 1
         if not number or total.sum() <= 0:
             raise FormatError("the pictures are even: they have no contrast. Give pictures of something.")
@@ -121,6 +121,23 @@ class Scenes:
             found = np.maximum(at, 1.0) ** NATURAL
         found *= self.contrast**2 / (found.sum() - found[0, 0])
         return found
+
+    def squares(self, pictures: Sequence[Any], most: int) -> list[np.ndarray]:
+        """Squares (n, n) of pictures (ny, nx), side by side and over their mean; dark ones are left out.
+
+        Of more than `most` those are taken that stand evenly over all.
+
+        Raises
+        ------
+        FormatError
+            As of `of`; no picture.
+        """
+        n = self.samples
+        found = [square for one in pictures for square in _squares(_checked(one, n), n, n) if square.any()]
+        if not found:
+            raise FormatError("there are no pictures of scenes. Give one at least.")
+        kept = np.unique(np.linspace(0, len(found) - 1, min(most, len(found))).round().astype(int))
+        return [found[k] / found[k].mean() for k in kept]
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
         """A scene (n, n), its brightness over the mean of all, drawn by chance."""
@@ -171,8 +188,7 @@ def _checked(picture: Any, samples: int) -> np.ndarray:
     return found / found.mean()
 
 
-def _squares(picture: np.ndarray, samples: int) -> Iterator[np.ndarray]:
-    step = samples // 2
+def _squares(picture: np.ndarray, samples: int, step: int) -> Iterator[np.ndarray]:
     for y in range(0, picture.shape[0] - samples + 1, step):
         for x in range(0, picture.shape[1] - samples + 1, step):
             yield picture[y : y + samples, x : x + samples]

@@ -135,7 +135,9 @@ class Goal:
         return cls(rest.strip(), word == "largest", planes, light, places, scenes)
 
     def told(self, value: float) -> str:
-        """A value in words: lengths with a unit that suits them."""
+        """A value in words: lengths with a unit that suits them, errors no finer than they are known."""
+        if self.name in ERRORS:
+            return f"{value:.3g}"
         return str(Quantity(self.name, float(value), BOUNDS.get(self.name, "")))
 
     @property

@@ -23,7 +23,7 @@ from lumigraph.optimisation.front import front, trace
 from lumigraph.optimisation.goals import BOUNDS, PLACES, Goal, Judged
 from lumigraph.optimisation.search import Search, grid, refined
 from lumigraph.optimisation.space import Space
-from lumigraph.optimisation.tried import Tried, tried
+from lumigraph.optimisation.tried import Tried, held_out_squares, reached, tried
 from lumigraph.optimisation.tried import check as check_trials
 
 MOST = 100_000
@@ -63,6 +63,8 @@ class Optimum:
         With two goals: the rows that no other beats in both, from the best in the first on.
     tried
         By "start" and "best", what fits or reconstructions reach in drawn raw images; empty without trials.
+    held_out
+        By "start", "swept" and "best", errors of scenes that took no part in the search; empty without any.
     """
 
     goal: Goal
@@ -76,6 +78,7 @@ class Optimum:
     against: Goal | None = None
     front: list[dict[str, Any]] = field(default_factory=list)
     tried: Mapping[str, Tried] = field(default_factory=dict)
+    held_out: Mapping[str, Tried] = field(default_factory=dict)
 
     __repr__ = brief
 
@@ -110,6 +113,7 @@ def optimise(
     evaluations: int = 200,
     seed: int = 0,
     trials: int = 0,
+    held_out: Sequence[Any] = (),
     output: str | PathLike[str] | None = None,
     progress: Progress | None = None,
     estimated: Callable[[float, int], None] | None = None,
@@ -150,6 +154,10 @@ def optimise(
     trials
         Raw images that are drawn with noise at each depth, before the camera as given and the best: their
         points are fitted, or their scenes reconstructed, to set the errors beside what was expected.
+    held_out
+        Pictures (ny, nx) of scenes that the search does not see, of the scenes' pitch, for the errors of
+        reconstruction: 16 squares of them at most are seen with noise by the camera as given, the best of the
+        grid and the best, and reconstructed as if they were the goal's scenes.
     output
         File, beside which each camera is noted as it is done: the same call goes on after a kill, to the same
         result. None for nowhere. The best camera is not written.
@@ -170,7 +178,7 @@ def optimise(
     -----
     SamplingWarning
         At other places, or half-way between the depths, the best bound is larger by more than 3 %, or others
-        are better than it.
+        are better than it. Held-out scenes are reconstructed as well, or better, before others.
 
     Examples
     --------
@@ -184,6 +192,7 @@ def optimise(
     aim = Goal.parse(goal, depths) if isinstance(goal, str) else goal
     aim = aim.ready(start)
     check_trials(aim, trials)
+    squares = held_out_squares(aim, held_out)
     other = replace(aim, **_other(against)) if isinstance(against, str) else against
     other = None if other is None else other.ready(start)
     checks.choice("search", search, get_args(Search))
@@ -230,8 +239,10 @@ def optimise(
         _elsewhere(cameras, {"start": {}, "swept": swept, "best": best}),
         other, [] if other is None else front(cameras.rows, (aim, other)),
         _tried(cameras, {"start": {}, "best": best}, (trials, seed)),
+        _reached(cameras, {"start": {}, "swept": swept, "best": best}, squares, seed),
     )  # fmt: skip
     _warn_of_luck(found)
+    _warn_of_held_out(found)
     return found
 
 
@@ -285,6 +296,39 @@ def _tried(
             camera = changed(cameras.start, item)
             found[which] = tried(goal, camera, cameras.first, int(row.get(PLACES, 0)), how)
     return found
+
+
+def _reached(
+    cameras: Evaluations, items: Mapping[str, Mapping[str, Any]], squares: Sequence[Any], seed: int
+) -> dict[str, Tried]:
+    """Errors of held-out scenes before some items."""
+    found: dict[str, Tried] = {}
+    for which, item in items.items() if squares else ():
+        same = next((one for one in found if items[one] == item), None)
+        if same is not None:
+            found[which] = found[same]
+        elif math.isfinite(cameras.cost(item)):
+            camera = changed(cameras.start, item)
+            found[which] = reached(cameras.goal, camera, cameras.first, squares, seed)
+    return found
+
+
+def _warn_of_held_out(found: Optimum) -> None:
+    """Say where others reconstruct held-out scenes as well as the best."""
+    best, told = found.held_out.get("best", Tried(reason="there are none")), found.goal.told
+    for which, words in BEFORE.items():
+        other = found.held_out.get(which, best)
+        if other is best or other.reason or best.reason:
+            continue
+        gain, error = best.gain(other)
+        if not gain > 2 * error:
+            warnings.warn(
+                f"{words} reconstructs held-out scenes within {told(other.reached)}, the best within "
+                f"{told(best.reached)}: a gain of {gain:.1%} ± {error:.1%}, no more than chance. Search with "
+                "scenes that are more like those.",
+                SamplingWarning,
+                stacklevel=3,
+            )
 
 
 def _warn_of_luck(found: Optimum) -> None:

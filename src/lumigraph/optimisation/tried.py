@@ -1,7 +1,9 @@
 """What reconstruction reaches of a bound or an expected error: in drawn noise, of one camera."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +20,9 @@ ACCURACY = 1e-2
 
 MOST = 10_000
 """Raw images at each depth."""
+
+HELD_OUT = 16
+"""Scenes of held-out pictures, at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,6 +41,8 @@ class Tried:
     pictures
         Of reconstructed scenes: the first scene that was drawn, and what was made of it (n, n), at the first
         depth.
+    squares
+        Of each reconstructed scene (draws,): its error's square, in the mean over depths.
     reason
         Why there are none; empty where there are.
     """
@@ -44,7 +51,14 @@ class Tried:
     reached: float = math.nan
     error: float = math.nan
     pictures: tuple[np.ndarray, ...] = field(default=())
+    squares: np.ndarray = field(default_factory=lambda: np.zeros(0))
     reason: str = ""
+
+    def gain(self, beside: "Tried") -> tuple[float, float]:
+        """By what part the rms is less than that of the same scenes otherwise, and its standard error."""
+        ratio = self.reached / beside.reached
+        off = (self.squares - ratio**2 * beside.squares) / beside.reached**2
+        return 1 - ratio, float(off.std(ddof=1)) / math.sqrt(len(off)) / 2 / ratio
 
 
 def check(goal: Goal, draws: int) -> None:
@@ -77,21 +91,57 @@ def tried(goal: Goal, camera: Instrument, first: float, places: int, how: tuple[
     """
     try:
         if goal.name in ERRORS:
-            return _scenes(goal, camera, first, how)
+            return _scenes(goal, camera, first, *how)
         return _points(goal, camera, first, places, how)
     except LumigraphError as error:
         return Tried(reason=" ".join(str(error).split()))
 
 
-def _scenes(goal: Goal, camera: Instrument, first: float, how: tuple[int, int]) -> Tried:
-    draws, seed = how
+def held_out_squares(goal: Goal, pictures: Sequence[Any]) -> list[np.ndarray]:
+    """Scenes (n, n) of pictures, as the goal's scenes are wide.
+
+    Raises
+    ------
+    GeometryError
+        Pictures for a goal without scenes.
+    FormatError
+        A picture that has no such square.
+    """
+    if not len(pictures):
+        return []
+    if goal.name not in ERRORS:
+        raise GeometryError(f"held-out pictures are for {', '.join(ERRORS)}, not for {goal.name!r}.")
+    return goal.judged_scenes.squares(pictures, HELD_OUT)
+
+
+def reached(goal: Goal, camera: Instrument, first: float, squares: Sequence[np.ndarray], seed: int) -> Tried:
+    """Errors of scenes (n, n) that took no part in a search, reconstructed as if they were those of the goal.
+
+    Parameters
+    ----------
+    goal, camera, first
+        As of `tried`.
+    squares
+        The scenes.
+    seed
+        Of the noise.
+    """
+    try:
+        return _scenes(goal, camera, first, squares, seed)
+    except LumigraphError as error:
+        return Tried(reason=" ".join(str(error).split()))
+
+
+def _scenes(
+    goal: Goal, camera: Instrument, first: float, draws: int | Sequence[np.ndarray], seed: int
+) -> Tried:
     expected, light = goal.reconstructions(camera, first), goal.light_of(camera, first)
     found = reconstruction_trials(
         camera, goal.depths, goal.judged_scenes, light,
         draws=draws, volume=goal.name == ERRORS[1], rng=np.random.default_rng(seed),
     )  # fmt: skip
     shown = found.scene[0], found.reconstructed[0]
-    return Tried(expected.value, found.rms, found.rms_error, shown)
+    return Tried(expected.value, found.rms, found.rms_error, shown, np.mean(found.errors**2, axis=1))
 
 
 def _points(goal: Goal, camera: Instrument, first: float, places: int, how: tuple[int, int]) -> Tried:
