@@ -62,9 +62,16 @@ def _reached(found: "Optimum", which: str, one: "Tried") -> str:
         return f"{words}: no raw images were drawn, for {one.reason}"
     what, beside = _kinds(found)
     return (
-        f"{words}: {what} err by {told(one.reached)}, within {told(one.error)} by their number, where the "
+        f"{words}: {what} err by {told(one.reached)}, within {_off(found, one)} by their number, where the "
         f"{beside} is {told(one.bound)}"
     )
+
+
+def _off(found: "Optimum", one: "Tried") -> str:
+    """A standard error, in two digits where it has no unit."""
+    from lumigraph.optimisation.goals import ERRORS
+
+    return f"{one.error:.2g}" if found.goal.name in ERRORS else found.goal.told(one.error)
 
 
 def _held_out(found: "Optimum") -> Iterator[str]:
@@ -78,7 +85,7 @@ def _held_out(found: "Optimum") -> Iterator[str]:
         by = "" if one is best else "; the best is better by {:.1%} ± {:.1%}".format(*best.gain(one))
         yield (
             f"{words}: {len(one.squares)} held-out scenes err by {found.goal.told(one.reached)}, within "
-            f"{found.goal.told(one.error)} by their number{by}"
+            f"{_off(found, one)} by their number{by}"
         )
 
 
@@ -148,8 +155,8 @@ def _between(found: "Optimum") -> str:
 
 def _figures(found: "Optimum", given: "Instrument") -> Iterator[Figure]:
     yield Figure(_before_and_after(found, given), section="Before and after")
+    yield from _over_depth(found)  # before pictures, whose width would leave it a column of theirs
     yield from _trials(found)
-    yield from _over_depth(found)
     yield from _front(found, given)
     yield from _search(found)
 
@@ -178,11 +185,11 @@ def _trials(found: "Optimum") -> Iterator[Figure]:
     (what, beside), told = _kinds(found), found.goal.told
     rows: list[tuple[str, ...]] = [("", beside, f"{what}, rms", "standard error")]
     for which, one in some.items():
-        rows.append((NAMES.get(which, which), told(one.bound), told(one.reached), told(one.error)))
+        rows.append((NAMES.get(which, which), told(one.bound), told(one.reached), _off(found, one)))
     yield Figure(rows, section="Before and after")
     pictures = {NAMES.get(which, which): one.pictures for which, one in some.items() if one.pictures}
     if pictures:
-        yield _pictures("A drawn scene", pictures)
+        yield _pictures(found, "A drawn scene", pictures)
 
 
 def _of_held_out(found: "Optimum") -> Iterator[Figure]:
@@ -192,17 +199,21 @@ def _of_held_out(found: "Optimum") -> Iterator[Figure]:
         return
     told = found.goal.told
     rows: list[tuple[str, ...]] = [("", "error of held-out scenes, rms", "standard error")]
-    rows.extend((words, told(one.reached), told(one.error)) for words, one in some.items())
+    rows.extend((words, told(one.reached), _off(found, one)) for words, one in some.items())
     yield Figure(rows, section="Before and after")
-    yield _pictures("A held-out scene", {words: one.pictures for words, one in some.items()})
+    yield _pictures(found, "A held-out scene", {words: one.pictures for words, one in some.items()})
 
 
-def _pictures(what: str, pictures: "Mapping[str, tuple[np.ndarray, ...]]") -> Figure:
-    """A scene and its reconstructions."""
+def _pictures(found: "Optimum", what: str, pictures: "Mapping[str, tuple[np.ndarray, ...]]") -> Figure:
+    """A scene and its reconstructions, from black to white alike."""
     from lumigraph import plots
+    from lumigraph.core.grid import Grid
 
-    scene = next(iter(pictures.values()))[0]
-    drawn = plots.images([(scene, "scene"), *((one[1], words) for words, one in pictures.items())])
+    scene, pitch = next(iter(pictures.values()))[0], found.goal.judged_scenes.pitch
+    some = [(scene, "scene"), *((one[1], words) for words, one in pictures.items())]
+    drawn = plots.images(
+        some, columns=len(some), grid=Grid(scene.shape, (pitch, pitch)), limits=(scene.min(), scene.max())
+    )
     return Figure(drawn, f"{what} and its reconstructions at the first depth.", "Before and after")
 
 

@@ -137,7 +137,7 @@ class Goal:
     def told(self, value: float) -> str:
         """A value in words: lengths with a unit that suits them, errors no finer than they are known."""
         if self.name in ERRORS:
-            return f"{value:.3g}"
+            return f"{value:#.3g}"
         return str(Quantity(self.name, float(value), BOUNDS.get(self.name, "")))
 
     @property

@@ -324,8 +324,9 @@ def _warn_of_held_out(found: Optimum) -> None:
         if not gain > 2 * error:
             warnings.warn(
                 f"{words} reconstructs held-out scenes within {told(other.reached)}, the best within "
-                f"{told(best.reached)}: a gain of {gain:.1%} ± {error:.1%}, no more than chance. Search with "
-                "scenes that are more like those.",
+                f"{told(best.reached)}: a gain of {gain:.1%} ± {error:.1%}, no more than chance, where the "
+                f"search has {found.gain(getattr(found, which)):.1%}. Search with scenes more like those, or "
+                "with more light.",
                 SamplingWarning,
                 stacklevel=3,
             )

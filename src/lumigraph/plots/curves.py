@@ -117,7 +117,7 @@ def over_depth(depths: Any, values: Mapping[str, Any], label: str, *, lengths: b
 
 def images(
     pictures: Sequence[tuple[Any, str]], *, columns: int = 3, grid: Grid | None = None,
-    cmap: str | None = None, label: str = "",
+    cmap: str | None = None, label: str = "", limits: tuple[float | None, float | None] = (None, None),
 ) -> Figure:  # fmt: skip
     """Figure of several images with their titles, row by row.
 
@@ -133,6 +133,8 @@ def images(
         Colours of grey images, a name that matplotlib knows.
     label
         Beside a colour bar for each grey image; empty for none.
+    limits
+        Values of a grey image that are black and white; None for each image's own.
 
     Raises
     ------
@@ -150,7 +152,7 @@ def images(
     count = max(1, min(columns, len(pictures)))
     figure, panels = canvas(-(-len(pictures) // count), count)
     for panel, (image, title) in zip(panels, pictures, strict=False):
-        draw(panel, check_image(image), grid, label=label, cmap=cmap)
+        draw(panel, check_image(image), grid, label=label, cmap=cmap, limits=limits)
         panel.set_title(title, fontsize=10)
     for panel in panels[len(pictures) :]:
         panel.set_axis_off()
