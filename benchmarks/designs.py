@@ -138,9 +138,15 @@ def search(name: str) -> None:
     print("  " + ", ".join(f"{key}={value}" for key, value in found.best.items() if key in vary), flush=True)
 
 
+def microscope(name: str) -> LightFieldMicroscope:
+    """A microscope that a search found."""
+    begun, *how = SEARCHES[name]
+    return changed(begun(*how)[0], FOUND[name])
+
+
 def judge(name: str) -> None:
     """Print bounds of a microscope that was found, and errors of fits."""
-    scope = changed(SEARCHES[name][0](*SEARCHES[name][1:])[0], FOUND[name])
+    scope = microscope(name)
     lasting = bounds(scope, GOAL.depths, LIGHT, places=OTHERS).depth
     between = bounds(scope, BETWEEN, LIGHT, places=4)
     each = ", ".join(f"{one * 1e9:.0f}" for one in between.of("depth"))
