@@ -22,14 +22,10 @@ from lumigraph.instruments.capabilities import WithObjective
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.operators.fourier_changes import Behind, Pupil, Slopes, pupils
 from lumigraph.operators.fourier_microscope import Window, lit_ones, overlap
-from lumigraph.operators.microscope_building import Layout
-from lumigraph.operators.microscope_layout import Behind as Beneath
-from lumigraph.operators.microscope_layout import interpolated, laid_out
 from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.part_points import PartPoints
 from lumigraph.operators.pupil_points import Lit, PupilPoints
 from lumigraph.scene import Points
-from lumigraph.simulation.microscope_scene import SAMPLES
 
 Pair = tuple[Instrument, Instrument]
 """Instruments a little to either side."""
@@ -170,27 +166,17 @@ def before_lenslets(
     depths, numbers = where
     far = float(np.abs(depths).max())
 
-    def lit(end: LightFieldMicroscope, like: Layout | None = None) -> Lit:
-        layout = _interpolated(end, far, accuracy, None if like is None else like.sampling.pixels)
-        if like is not None and end.calibration.lattice == scope.calibration.lattice:
-            layout = replace(layout, placement=like.placement)
-        images = PupilImages(end.objectives, end.lenslet, layout, (), accuracy, double or like is not None)
+    def lit(end: LightFieldMicroscope, images: PupilImages) -> Lit:
         seen = MicroscopeSource(end, accuracy)
         light = collected(end) / collected(scope) / seen.whole
         places = [[*place, dz] for dz in depths.tolist() for place in spread(seen.cell(dz), numbers).tolist()]
         return Lit(images, Points(np.array(places), np.full(len(places), light)))
 
-    own = lit(scope)
-    layout = own.images.layout
-    return BeforeLenslets(own, [(lit(low, layout), lit(high, layout)) for low, high in pairs])
-
-
-def _interpolated(scope: LightFieldMicroscope, far: float, accuracy: float, samples: int | None) -> Layout:
-    """With pixels that may stand anywhere, so that they may move."""
-    shortest = min(scope.objectives, key=lambda one: one.wavelength)
-    pixels = Beneath(scope.calibration, scope.pixels.fill_factor)
-    sampling = interpolated(shortest, scope.lenslet, pixels, SAMPLES, (far, -far), accuracy, samples)
-    return laid_out(sampling, scope.calibration, scope.lenslet_size, np.float64)
+    own, ends = scope.images_alike(pairs, far, accuracy=accuracy, double=double)
+    moved = [
+        (lit(low, first), lit(high, last)) for (low, high), (first, last) in zip(pairs, ends, strict=True)
+    ]
+    return BeforeLenslets(lit(scope, own), moved)
 
 
 class BeforeLenslets(PupilPoints):

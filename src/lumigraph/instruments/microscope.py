@@ -13,11 +13,11 @@ from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import describe_microscope, microscope_design, trade_offs
-from lumigraph.instruments.described_microscope import DescribedMicroscope
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.parameters import Parameter
 from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.row import Row
+from lumigraph.instruments.scope_with_parts import ScopeWithParts
 from lumigraph.operators.fourier_microscope import fourier_operator
 from lumigraph.operators.fourier_points import FourierPoints
 from lumigraph.operators.microscope_building import Layout, microscope_operator, require_accuracy
@@ -35,7 +35,7 @@ FINER = 1.5
 """Samples of light that is traced by rays, over whole pixels: those between are interpolated."""
 
 
-class LightFieldMicroscope(DescribedMicroscope):
+class LightFieldMicroscope(ScopeWithParts):
     """A microscope with lenslets in front of its sensor.
 
     Parameters

@@ -140,7 +140,7 @@ def microscope_operator(
     return MicroscopeOperator(
         tuple(kernels), layout.cells, layout.placement, -layout.frame,
         suits_frequencies(kernels, layout.cells, -layout.frame, left_out), left_out,
-        object_grid=_object_grid(lenslet, layout), depths=None if depths is None else planes,
+        object_grid=points_grid(lenslet, layout), depths=None if depths is None else planes,
         resolved_pitch=min(one.wavelength / (4 * one.numerical_aperture) for one in objectives),
     )  # fmt: skip
 
@@ -171,9 +171,10 @@ def _check_order(depths: tuple[float, ...]) -> None:
         raise GeometryError("depths must ascend or descend, and differ. Sort them, and leave out duplicates.")
 
 
-def _object_grid(lenslet: Lenslet, layout: Layout) -> Grid:
+def points_grid(lenslet: Lenslet, layout: Layout, margin: int = 0) -> Grid:
+    """Points in the object of the lenslets that are seen, and of a margin of so many more on all sides."""
     s = layout.sampling.points
-    shape = (layout.seen[0] * s, layout.seen[1] * s)
+    shape = ((layout.seen[0] + 2 * margin) * s, (layout.seen[1] + 2 * margin) * s)
     pitch = lenslet.pitch / lenslet.magnification / s
     # Cells are centred as a whole: with an even number of samples the middle lies between two.
     center = [c + (0.0 if n % 2 else pitch / 2) for c, n in zip(layout.center, shape, strict=True)]

@@ -38,6 +38,9 @@ Place = tuple[Objective, Lenslet]
 Back = Callable[[np.ndarray], None]
 """Takes slopes (4, ny, nx) of a number by an image and its derivatives."""
 
+Both = tuple[PupilImages, PupilImages]
+"""Of a pair."""
+
 
 @dataclass(frozen=True, eq=False)
 class Lit:
@@ -88,24 +91,33 @@ class Parts:
         w = self.waves
         self.down, self.across, self.spread = (m.transposed for m in (w.down, w.across, w.sampled))
         self.by = [np.zeros(m.shape, m.even.dtype) for m in (w.down, w.across, w.sampled)]
-        self.by_window = [np.zeros_like(m) for m in (w.window.lenslets, w.window.path)] if w.window else []
+        self.by += [np.zeros_like(m) for m in (w.window.lenslets, w.window.path)] if w.window else []
 
-    def along(self, ends: tuple[PupilImages, PupilImages], own: PupilImages) -> float:
+    def along(self, ends: Both, own: PupilImages) -> float:
         """What a number changes by from one microscope to another close by, as the matrices do."""
-        found, (low, high) = 0.0, ends
+        return sum(times(self.by[k], *pair) for k, pair in self.ends(ends, own).items())
+
+    def ends(self, ends: Both, own: PupilImages) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+        """Those of the matrices, by number, that differ between two microscopes: B_y 0, B_x 1, S 2; T 3 and 4."""
+        found, (low, high) = {}, ends
         if self._behind(low) != self._behind(high):
             both = zip(*(self._made(self._behind(one), self._behind(own)) for one in ends), strict=True)
-            by = (*self.by[:2], *self.by_window)
-            found += sum(times(slopes, *pair) for slopes, pair in zip(by, both, strict=True))
+            found |= dict(zip((0, 1, 3, 4), both, strict=False))
         if low.layout.sampling != high.layout.sampling:
             cells, fine, *_ = self.told
-            found += times(self.by[2], *(sampling_matrix(cells, fine, one.layout.sampling) for one in ends))
+            first, last = (sampling_matrix(cells, fine, one.layout.sampling) for one in ends)
+            found[2] = first, last
         return found
 
     def _made(self, own: Place, like: Place) -> tuple[np.ndarray, ...]:
         """All that light between the pupil and the sensor is multiplied by."""
         window = window_of(own, like, self._exact)
         return (*behind(own, like, self._exact), *((window.lenslets, window.path) if window else ()))
+
+    def add_sampled(self, given: np.ndarray, across: np.ndarray, light: np.ndarray) -> None:
+        """Slopes by S of those G by samples of light (k, n, n), of which `across` is G S."""
+        for one, lit, mine in zip(given, across, light, strict=True):
+            self.by[2] += lit @ mine.T + one.T @ self.waves.sampled.down(mine)
 
     @property
     def _exact(self) -> Told:
@@ -160,13 +172,13 @@ class _Way:
         parts, fields = self.parts, self.fields.conj()
         across = parts.spread.right(given)
         if parts.resampled:
-            self._add_sampled(given, across)
+            parts.add_sampled(given, across, self.light)
         seen = 2 * parts.spread.down(across)[:, None]
         by = seen * fields[0]
         by[0] += (seen[1:] * fields[1:]).sum(0)
         by = by.reshape(len(self.even), *fields.shape[2:])
         if (window := parts.waves.window) is not None:
-            for slopes, more in zip(parts.by_window, window.slopes(self.before, by), strict=True):
+            for slopes, more in zip(parts.by[3:], window.slopes(self.before, by), strict=True):
                 slopes += more
             by = window.transposed(by)
         rows = parts.down.down(by)
@@ -176,11 +188,6 @@ class _Way:
         still, moved = nodes[: len(self.wave)], nodes[len(self.wave) :].reshape(3, *self.wave.shape)
         turned = 1j * moved
         return still + (turned * self.phases[:, None]).sum(0), np.real(turned * self.wave).sum(1)
-
-    def _add_sampled(self, given: np.ndarray, across: np.ndarray) -> None:
-        """Slopes by S of those by samples, of which `across` is G S."""
-        for one, lit, light in zip(given, across, self.light, strict=True):
-            self.parts.by[2] += lit @ light.T + one.T @ self.parts.waves.sampled.down(light)
 
 
 @dataclass(eq=False)
@@ -210,7 +217,7 @@ class PupilPoints:
     def __post_init__(self) -> None:
         self._found = np.zeros(len(self.pairs))
         for end in (one.images for pair in self.pairs for one in pair):
-            _require_alike(end, self.own.images)
+            require_alike(end, self.own.images)
 
     @single_products()
     def lit(self, number: int) -> tuple[np.ndarray, Back]:
@@ -286,7 +293,14 @@ def _placed_anew(ends: tuple[PupilImages, PupilImages], whole: np.ndarray, given
     )
 
 
-def _require_alike(one: PupilImages, own: PupilImages) -> None:
+def require_alike(one: PupilImages, own: PupilImages) -> None:
+    """Refuse microscopes between which more differs than numbers that change by little.
+
+    Raises
+    ------
+    GeometryError
+        Other numbers of wavelengths, of lenslets before the pixels, or of pixels.
+    """
     counts = [(len(each.objectives), each.layout.cells, each.shape) for each in (one, own)]
     if counts[0] != counts[1]:
         raise GeometryError(

@@ -54,15 +54,18 @@ class Resampling(Linear):
         return held + 4.0 * (between + self.y.rows * self.x.rows)
 
 
-def represented(source: Grid, points: Grid, half_width: float = HALF_WIDTH) -> Resampling:
-    """Samples of an object as band-limited light on points turned by 180°; what they sum up to is kept.
+def represented(
+    source: Grid, points: Grid, half_width: float = HALF_WIDTH, *, upright: bool = False
+) -> Resampling:
+    """Samples of an object as band-limited light on points; what they sum up to is kept.
 
-    The closer the points stand to what the band asks for, the longer the kernel must be.
+    The points are turned by 180° but for those that are `upright`. The closer they stand to what the band
+    asks for, the longer the kernel must be.
     """
 
     def matrix(axis: int) -> Banded:
         pitch = points.pitch[axis]
-        at = _descending(points, axis) / pitch
+        at = ((points.y, points.x)[axis] if upright else _descending(points, axis)) / pitch
         samples = (source.y, source.x)[axis] / pitch
         scale = source.pitch[axis] / pitch
         return banded(at, samples, lambda d: kernel(d, half_width) * scale, half_width)
