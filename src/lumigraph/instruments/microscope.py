@@ -19,7 +19,6 @@ from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.row import Row
 from lumigraph.instruments.scope_with_parts import ScopeWithParts
 from lumigraph.operators.fourier_microscope import fourier_operator
-from lumigraph.operators.fourier_points import FourierPoints
 from lumigraph.operators.microscope_building import Layout, microscope_operator, require_accuracy
 from lumigraph.operators.microscope_cell import CellSampling
 from lumigraph.operators.microscope_layout import Behind, cell_sampling, laid_out
@@ -199,18 +198,6 @@ class LightFieldMicroscope(ScopeWithParts):
         if any(abs(at) > size / 2 for at, size in zip((y, x), grid.size, strict=True)):
             return np.zeros(self.sensor.shape)
         return self.fourier_points().image(y, x, dz)
-
-    def fourier_points(self) -> FourierPoints:
-        """Images of points anywhere as a Fourier microscope sees them, with derivatives by their place.
-
-        Raises
-        ------
-        GeometryError
-            Another configuration.
-        """
-        if self.configuration != "fourier":
-            raise GeometryError(f"fourier_points needs configuration 'fourier', not {self.configuration!r}.")
-        return FourierPoints(self.objectives, self._mosaic())
 
     def pupil_images(
         self,

@@ -11,10 +11,13 @@ from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 from lumigraph.instruments.described_microscope import DescribedMicroscope
+from lumigraph.operators.fourier_plane import FourierPlane
+from lumigraph.operators.fourier_points import FourierPoints
 from lumigraph.operators.microscope_building import require_accuracy
 from lumigraph.operators.microscope_layout import Behind, interpolated, laid_out
 from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.pupil_plane import PupilPlane
+from lumigraph.operators.whole_planes import WholePlane
 from lumigraph.simulation.microscope_scene import SAMPLES
 
 RESOLVED = 0.21
@@ -61,6 +64,18 @@ class ScopeWithParts(DescribedMicroscope):
         ]
         return replace(own, double=double), [(low, high) for low, high in ends]
 
+    def fourier_points(self) -> FourierPoints:
+        """Images of points anywhere as a Fourier microscope sees them, with derivatives by their place.
+
+        Raises
+        ------
+        GeometryError
+            Another configuration.
+        """
+        if self.configuration != "fourier":
+            raise GeometryError(f"fourier_points needs configuration 'fourier', not {self.configuration!r}.")
+        return FourierPoints(self.objectives, self._mosaic())
+
     def _alike(
         self, like: tuple[Self, PupilImages] | None, told: tuple[float, int], accuracy: float
     ) -> PupilImages:
@@ -84,7 +99,7 @@ class ScopeWithParts(DescribedMicroscope):
         dz: float = 0.0,
         *,
         accuracy: float = 1e-2,
-    ) -> PupilPlane:
+    ) -> WholePlane:
         """Raw images of a plane, with derivatives by whatever differs between pairs of microscopes.
 
         The object stays where it is before all microscopes, along the lenslets' rows and columns, and as
@@ -122,6 +137,9 @@ class ScopeWithParts(DescribedMicroscope):
         (1,)
         """
         wanted, depth = grid or self.object_grid, checks.finite("dz", dz)
+        if self.in_pupil:
+            points = [(low.fourier_points(), high.fourier_points()) for low, high in pairs]
+            return FourierPlane(self.fourier_points(), points, wanted, depth)
         shortest = min(self.objectives, key=lambda one: one.wavelength)
         finest = RESOLVED * shortest.wavelength / shortest.aperture
         points = math.ceil(self.lenslet_size / max(finest, min(wanted.pitch)) * (1 - 1e-9))

@@ -199,10 +199,22 @@ class Behind:
 
     def lit(self) -> np.ndarray:
         """Pixels (4, w, w): the image, and its derivatives by y, x and dz."""
-        own, count, weights = self.fields[0], 2 * self.pupil.half + 1, self._weights
-        light = (own.conj() * self.fields).real * np.array([1, 2, 2, 2])[:, None, None]
-        nodes = light.reshape(4, count, len(weights), count, len(weights))
+        light = (self.fields[0].conj() * self.fields).real * np.array([1, 2, 2, 2])[:, None, None]
+        return self._pixels(light)
+
+    def _pixels(self, light: np.ndarray) -> np.ndarray:
+        """(k, w, w) of light on the nodes (k, m, m)."""
+        count, weights = 2 * self.pupil.half + 1, self._weights
+        nodes = light.reshape(-1, count, len(weights), count, len(weights))
         return np.einsum("kyixj,i,j->kyx", nodes, weights, weights, optimize=True)
+
+    def changed(self, first: Pupil, last: Pupil) -> np.ndarray:
+        """Change of the image (w, w) of a point on the axis from one pupil to another close by."""
+        pupil, s, (down, right) = self.pupil, self.pupil.across, last.at - first.at
+        moved = 1j * pupil.turn * (down * s[:, None] + right * s) * self.tilted
+        moved += (last.waves[self.k] - first.waves[self.k]) * self.tilts
+        light = 2 * (self.fields[0].conj() * (self.ways @ moved @ self.ways.T)).real
+        return self._pixels(light)[0] + (last.turn - first.turn) * self._turned()[0]
 
     def back(self, given: np.ndarray, slopes: Slopes) -> Slopes:
         """Slopes by the pupil of a number whose slopes by `lit` (4, w, w) are given, beside those of others.
@@ -227,7 +239,11 @@ class Behind:
         )  # fmt: skip
 
     def _by_turn(self, given: np.ndarray) -> float:
+        return float(np.sum(given * self._turned()))
+
+    def _turned(self) -> np.ndarray:
+        """Change of `lit` with the waves' turn."""
         step = APART * self.pupil.turn
         sides = (replace(self.pupil, turn=self.pupil.turn + one) for one in (-step, step))
-        lit = [Behind.of(one, self.k, self.across, self.nearest).lit() for one in sides]
-        return float(np.sum(given * (lit[1] - lit[0]))) / (2 * step)
+        low, high = (Behind.of(one, self.k, self.across, self.nearest).lit() for one in sides)
+        return (high - low) / (2 * step)

@@ -155,6 +155,14 @@ class FourierMicroscopeOperator(Linear):
             planes.append(arrays.irfft2(spectrum, size)[: shape[0], : shape[1]])
         return planes[0] if self.depths is None else xp.stack(planes)
 
+    def by_images(self, plane: np.ndarray, raw: np.ndarray) -> np.ndarray:
+        """Slopes by the points' images (lenslets, w, w) of a plane's raw image whose slopes are given."""
+        pieces, w = np.zeros((len(self.corners), *self._size)), self.images.shape[-1]
+        for j, (inside, own) in enumerate(self._windows()):
+            pieces[(j, *own)] = raw[inside]
+        given = np.conj(np.fft.rfft2(plane, self._size)) * np.fft.rfft2(pieces)
+        return np.fft.irfft2(given, self._size)[:, :w, :w]
+
     @property
     def _size(self) -> tuple[int, int]:
         """Of the convolutions: field and image together, rounded up to a smooth number."""
