@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from lumigraph.information import Light, bounds, slopes
 from lumigraph.information.bounds import Seen, deviations
 from lumigraph.information.followed import BeforeLenslets, before_lenslets
 from lumigraph.information.points import collected
-from lumigraph.operators.microscope_pupil_waves import behind, sampling_matrix, window_of
+from lumigraph.operators.microscope_pupil_waves import Waves, behind, sampling_matrix, window_of
 from lumigraph.operators.pupil_points import Parts
 
 UM = 1e-6
@@ -89,23 +90,24 @@ ROUND["fill factor, round"] = replace(
 )
 
 
+def waves_alike(images, like, which: int, dz: float) -> tuple[tuple, Waves]:
+    """How an objective's window is sampled in images like others, and its waves sampled so."""
+    told, waves = like.sampled(like.objectives[which], dz)
+    ways = [(replace(each.objectives[which], aberrations=()), each.lenslet) for each in (images, like)]
+    samples = sampling_matrix(told[0], told[1], images.layout.sampling)
+    down, across, samples = map(Mirrored.of, (*behind(*ways, told), samples))
+    window = window_of(*ways, told)
+    return told, replace(waves, down=down, across=across, sampled=samples, window=window)
+
+
 def sampled_alike(one, other) -> BeforeLenslets:
     """Points before the first, with all that is sampled as the other one asks for."""
     before = before_lenslets(other, [(one, one)], (np.array(DEPTHS), PLACES), 1e-2, double=True)
     own, like, parts = before.pairs[0][0], before.own.images, {}
-    for which, objective in enumerate(like.objectives):
-        for dz in DEPTHS:
-            told, waves = like.sampled(objective, dz)
-            ways = [
-                (replace(each.objectives[which], aberrations=()), each.lenslet) for each in (own.images, like)
-            ]
-            samples = sampling_matrix(told[0], told[1], own.images.layout.sampling)
-            down, across, samples = map(Mirrored.of, (*behind(ways[0], ways[1], told), samples))
-            window = window_of(ways[0], ways[1], told)
-            same = replace(waves, down=down, across=across, sampled=samples, window=window)
-            parts[which, own.images.sampled(own.images.objectives[which], dz)[0]] = Parts(
-                which, told, same, False
-            )
+    for which, dz in product(range(len(like.objectives)), DEPTHS):
+        told, waves = waves_alike(own.images, like, which, dz)
+        mine = own.images.sampled(own.images.objectives[which], dz)[0]
+        parts[which, mine] = Parts(which, told, waves, False)
     return BeforeLenslets(own, [], parts)
 
 

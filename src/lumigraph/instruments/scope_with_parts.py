@@ -15,7 +15,7 @@ from lumigraph.operators.fourier_plane import FourierPlane
 from lumigraph.operators.fourier_points import FourierPoints
 from lumigraph.operators.microscope_building import require_accuracy
 from lumigraph.operators.microscope_layout import Behind, interpolated, laid_out
-from lumigraph.operators.microscope_pupil import PupilImages
+from lumigraph.operators.microscope_pupil import PupilImages, require_phase
 from lumigraph.operators.pupil_plane import PupilPlane
 from lumigraph.operators.whole_planes import WholePlane
 from lumigraph.simulation.microscope_scene import SAMPLES
@@ -83,6 +83,7 @@ class ScopeWithParts(DescribedMicroscope):
             raise GeometryError(
                 "images of points by the pupil are of configuration '1.0' or '2.0', not 'fourier'."
             )
+        require_phase(self.objectives, self.lenslet)
         (far, points), N = told, None if like is None else like[1].layout.sampling.pixels
         shortest = min(self.objectives, key=lambda one: one.wavelength)
         pixels = Behind(self.calibration, self.pixels.fill_factor)

@@ -12,7 +12,7 @@ point changes the phase as well, so that its place has derivatives too.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -102,8 +102,7 @@ class PupilImages:
     double: bool = False
 
     def __post_init__(self) -> None:
-        if any(one.model == "rays" for one in self.objectives):
-            raise GeometryError("model 'rays' has no phase. Use 'scalar', 'vector' or 'paraxial'.")
+        require_phase(self.objectives)
         for j in self.terms:
             noll_to_nm(j)
         if len(set(self.terms)) < len(self.terms):
@@ -359,6 +358,18 @@ class PupilImages:
             raise GeometryError(f"{name} have shape {found.shape} but there are {len(self.terms)} terms.")
         checks.finite_array(name, found, GeometryError)
         return found
+
+
+def require_phase(objectives: Sequence[Objective]) -> None:
+    """Refuse microscopes whose images are no products of waves of the pupil.
+
+    Raises
+    ------
+    GeometryError
+        Rays.
+    """
+    if any(one.model == "rays" for one in objectives):
+        raise GeometryError("model 'rays' has no phase. Use 'scalar', 'vector' or 'paraxial'.")
 
 
 @remembered

@@ -1,8 +1,8 @@
 r"""Raw images of a plane before a microscope with lenslets, and how they change with whatever changes of it.
 
-As `whole_planes` has them, K the images of points of one cell: a microscope is telecentric, and those of all others
-are the same. With P the wave of a point in the pupil, B_y and B_x the Bloch waves behind the
-lenslets, and S what samples take (`pupil_points`),
+As `whole_planes` has them, K the images of points of one cell: a microscope is telecentric, and those of all
+others are the same. With P the wave of a point in the pupil, B_y and B_x the Bloch waves behind the lenslets,
+and S what samples take (`pupil_points`),
 
 .. math:: U = B_y t_y (P t_x B_x), \quad K = S |U|^2 S^T
 

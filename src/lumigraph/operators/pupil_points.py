@@ -98,7 +98,7 @@ class Parts:
         return sum(times(self.by[k], *pair) for k, pair in self.ends(ends, own).items())
 
     def ends(self, ends: Both, own: PupilImages) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        """Those of the matrices, by number, that differ between two microscopes: B_y 0, B_x 1, S 2; T 3 and 4."""
+        """Those that differ between two microscopes, by number: B_y 0, B_x 1, S 2; T 3 and 4."""
         found, (low, high) = {}, ends
         if self._behind(low) != self._behind(high):
             both = zip(*(self._made(self._behind(one), self._behind(own)) for one in ends), strict=True)
