@@ -89,7 +89,7 @@ def test_slopes_are_central_differences_of_the_same_estimate(depths, key, value,
         h: [cut(camera(**{key: value * (1 + s * h)}), depths, own) for s in (-1, 1)] for h in (1e-6, step)
     }
     seen, part = seen_by(own, depths, [tuple(ends[1e-6])])
-    low, high = (imaging.camera_electrons(end, np.array(depths), SCENES, LIGHT) for end in ends[1e-6])
+    low, high = (imaging.electrons(end, np.array(depths), SCENES, LIGHT) for end in ends[1e-6])
     slope = sloped(seen, part, probed(seen, 8).found, (high - low)[None])[0]
     low, high = (probed(seen_by(end, depths)[0], 8).left.sum() for end in ends[step])
     assert step / 1e-6 * slope == pytest.approx(high - low, rel=2e-3, abs=0)
@@ -114,8 +114,8 @@ def test_slopes_of_a_volume_are_of_the_error_of_all_depths_together():
 
 
 def test_other_instruments_and_sensors_are_refused():
-    with pytest.raises(GeometryError, match="error of scenes are of cameras with lenslets"):
-        reconstruction_slopes(lg.load_camera("lfm-fourier"), [], [0.0], SCENES)
+    with pytest.raises(GeometryError, match="error of scenes are of instruments with lenslets"):
+        reconstruction_slopes(lg.load_camera("thesis-2f"), [], [0.0], SCENES)
     other = camera(sensor={"pixel_pitch": 10 * um, "read_noise": 7.0})
     with pytest.raises(GeometryError, match="by optics and by the pixels' pitch"):
         reconstruction_slopes(camera(), [(camera(), other)], [DZ], SCENES)

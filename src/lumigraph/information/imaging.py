@@ -184,14 +184,21 @@ def _electrons(sensor: Sensor, scenes: Scenes, light: Light) -> float:
     return sensor.quantum_efficiency * light.photons / scenes.pitch**2
 
 
-def camera_electrons(camera: Camera, depths: np.ndarray, scenes: Scenes, light: Light) -> np.ndarray:
-    """`Imaging.light` of a camera."""
-    return _electrons(camera.sensor, scenes, light) * _area(camera, depths)
+def electrons(instrument: Instrument, depths: np.ndarray, scenes: Scenes, light: Light) -> np.ndarray:
+    """`Imaging.light` of an instrument."""
+    return _electrons(instrument.sensor, scenes, light) * _area(instrument, depths)
 
 
-def _area(camera: Camera, depths: np.ndarray) -> np.ndarray:
+def _area(instrument: Instrument, depths: np.ndarray) -> np.ndarray:
     """As of `Seeing`."""
-    optics = camera.optics()
+    if isinstance(instrument, WithPupil):
+        scope = cast(LightFieldMicroscope, instrument)
+        area = (scope.lenslet_size * scope.sensor.pixel_pitch / scope.micro_image_pitch) ** 2
+        if scope.in_pupil:
+            points = scope.fourier_points()
+            area = math.prod(scope.object_grid.pitch) / points.whole
+        return np.full(len(depths), area)
+    optics = cast(Camera, instrument).optics()
     return (optics.sensor.pixel_pitch * (optics.object_distance + depths) / optics.separation) ** 2
 
 
@@ -218,15 +225,11 @@ def _of_microscope(
         points, pitch = scope.fourier_points(), scope.object_grid.pitch[0]
         across = min(scope.object_grid.shape[0], 2 * math.ceil(scenes.size / pitch / 2) + 1)
         operator = fourier_operator(points.objectives, points.mosaic, depths.tolist(), across)
-        whole = points.whole
     else:
         finest = scope.wavelength / (2 * scope.objective.numerical_aperture)
         samples = math.ceil(scope.lenslet_size * (1 / finest + 1 / (2 * scenes.pitch)))
         operator = scope.operator(depths.tolist(), max(samples, SAMPLES), accuracy=accuracy)
-        whole = (scope.micro_image_pitch / scope.sensor.pixel_pitch / max(samples, SAMPLES)) ** 2
-    grid = operator.object_grid
-    assert grid is not None
-    return operator, np.full(len(depths), math.prod(grid.pitch) / whole), scope.sensor
+    return operator, _area(scope, depths), scope.sensor
 
 
 def check(instrument: Instrument, depths: np.ndarray, scenes: Scenes) -> None:

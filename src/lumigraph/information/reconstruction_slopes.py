@@ -1,11 +1,11 @@
-r"""`reconstruction_slopes`: how the error of reconstructed scenes changes with the camera.
+r"""`reconstruction_slopes`: how the error of reconstructed scenes changes with the instrument.
 
 With u = P z, the covariance that is left times one of the objects z of `reconstruction_error`,
 
 .. math:: \delta(z^T P z) = -2 (N^{-1} A u)^T \delta A\, u + \left((A u)^2 / N^2\right)^T \delta A\, 1
 
 the latter since photons of the mean scene are noise. No system of equations is solved anew, and all objects
-go backwards through the camera at once.
+go backwards through the instrument at once.
 """
 
 from collections.abc import Sequence
@@ -17,13 +17,14 @@ from lumigraph.core import checks
 from lumigraph.errors import GeometryError
 from lumigraph.information.bounds import Light, checked_depths
 from lumigraph.information.followed import Cameras, Pair, require_alike, require_followed
-from lumigraph.information.imaging import Imaging, camera_electrons, imaging
+from lumigraph.information.imaging import Imaging, electrons, imaging
 from lumigraph.information.points import collected, small
 from lumigraph.information.reconstruction import probed
 from lumigraph.information.scenes import Scenes
 from lumigraph.information.slopes import Sloping
 from lumigraph.instruments import LensletCamera
 from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.sees_volumes import SeesVolumes
 from lumigraph.operators.part_volume import PartVolume
 
 
@@ -37,16 +38,17 @@ def reconstruction_slopes(
     volume: bool = False,
     accuracy: float = 1e-2,
 ) -> Sloping:
-    """`reconstruction_error` over depths, and how it changes with a camera's parts.
+    """`reconstruction_error` over depths, and how it changes with an instrument's parts.
 
-    The scenes stay as they are before all cameras, who collect as much of their light as their apertures do.
+    The scenes stay as they are before all instruments, who collect as much of their light as their apertures
+    do.
 
     Parameters
     ----------
     camera
-        With lenslets, one that has `part_plane`.
+        With lenslets, or a microscope: one that has `part_plane`.
     pairs
-        (n,), cameras a little to either side of it.
+        (n,), cameras or microscopes a little to either side of it.
     depths, scenes, light, volume
         As of `reconstruction_error`.
     accuracy
@@ -71,48 +73,54 @@ def reconstruction_slopes(
     light = Light() if light is None else light
     checks.instance("light", light, Light)
     checks.instance("scenes", scenes, Scenes)
-    require_camera(camera)
+    require_planes(camera)
     for end in (end for pair in pairs for end in pair):
-        require_camera(end)
+        require_planes(end)
         require_alike(camera, end)
-    own, planes = cast(LensletCamera, camera), checked_depths(depths)
+    planes = checked_depths(depths)
     some = [planes] if volume else list(planes[:, None])
-    found = [_at(own, cast(Sequence[Cameras], pairs), group, (scenes, light), accuracy) for group in some]
+    found = [_at(camera, pairs, group, (scenes, light), accuracy) for group in some]
     value = float(np.sqrt(sum(square for square, _ in found) / len(planes)))
     return Sloping(value, np.sum([changes for _, changes in found], axis=0) / len(planes) / (2 * value))
 
 
-def require_camera(instrument: Instrument) -> None:
+def require_planes(instrument: Instrument) -> None:
     """Refuse an instrument whose raw images of planes have no derivatives by its parts.
 
     Raises
     ------
     GeometryError
-        No camera with lenslets, or one without `part_images`.
+        A camera without lenslets, one without `part_images`; a microscope without `pupil_images` whose
+        lenslets stand in the image.
     """
-    if not isinstance(instrument, LensletCamera):
+    if not isinstance(instrument, SeesVolumes):
         raise GeometryError(
-            "derivatives of the error of scenes are of cameras with lenslets. For others, use search 'local'."
+            "derivatives of the error of scenes are of instruments with lenslets. For others, use search "
+            "'local'."
         )
     require_followed(instrument)
 
 
 def _at(
-    camera: LensletCamera,
-    pairs: Sequence[Cameras],
+    instrument: Instrument,
+    pairs: Sequence[Pair],
     depths: np.ndarray,
     of: tuple[Scenes, Light],
     accuracy: float,
 ) -> tuple[float, np.ndarray]:
     """Sum of the squares of errors at depths that shine at once, and its changes (n,)."""
     scenes, light = of
-    seen = imaging(camera, depths, scenes, light, accuracy)
-    grid = seen.operator.object_grid
+    seen = imaging(instrument, depths, scenes, light, accuracy)
+    grid, own, cut = seen.operator.object_grid, instrument, list(pairs)
     assert grid is not None  # as imaging has it
-    own = small(camera, depths, scenes.size)
-    cut = [tuple(small(end, depths, scenes.size, own) for end in pair) for pair in pairs]
-    part = own.part_volume(cast(Sequence[Cameras], cut), grid, depths.tolist(), accuracy=accuracy)
-    ends = ([_electrons(end, camera, depths, of) for end in pair] for pair in cut)
+    if isinstance(instrument, LensletCamera):
+        whole = cast(Sequence[Cameras], pairs)
+        own = like = small(instrument, depths, scenes.size)
+        cut = [(small(a, depths, like=like), small(b, depths, like=like)) for a, b in whole]
+    part = cast(SeesVolumes, own).part_volume(
+        cast(Sequence[tuple[SeesVolumes, SeesVolumes]], cut), grid, depths.tolist(), accuracy=accuracy
+    )
+    ends = ([_electrons(end, instrument, depths, of) for end in pair] for pair in cut)
     brighter = np.array([high - low for low, high in ends]).reshape(-1, len(depths))
     left, _, found = probed(seen, scenes.samples)
     share = scenes.contrast**2
@@ -120,12 +128,12 @@ def _at(
 
 
 def _electrons(
-    end: LensletCamera, camera: LensletCamera, depths: np.ndarray, of: tuple[Scenes, Light]
+    end: Instrument, instrument: Instrument, depths: np.ndarray, of: tuple[Scenes, Light]
 ) -> np.ndarray:
-    """Of a pixel for 1 of the operator (nz,): a camera gets its light by its aperture."""
+    """Of a pixel for 1 of the operator (nz,): an instrument gets its light by its aperture."""
     scenes, light = of
-    photons = light.photons * collected(end) / collected(camera)
-    return camera_electrons(end, depths, scenes, Light(photons, light.background))
+    photons = light.photons * collected(end) / collected(instrument)
+    return electrons(end, depths, scenes, Light(photons, light.background))
 
 
 def sloped(seen: Imaging, part: PartVolume, found: Sequence[np.ndarray], brighter: np.ndarray) -> np.ndarray:

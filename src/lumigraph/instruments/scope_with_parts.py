@@ -11,6 +11,7 @@ from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 from lumigraph.instruments.described_microscope import DescribedMicroscope
+from lumigraph.instruments.sees_volumes import SeesVolumes
 from lumigraph.operators.fourier_plane import FourierPlane
 from lumigraph.operators.fourier_points import FourierPoints
 from lumigraph.operators.microscope_building import require_accuracy
@@ -26,7 +27,7 @@ that the kernel which spreads samples leaves its band alone.
 """
 
 
-class ScopeWithParts(DescribedMicroscope):
+class ScopeWithParts(SeesVolumes, DescribedMicroscope):
     """A microscope: those with square lenslets have derivatives."""
 
     def images_alike(

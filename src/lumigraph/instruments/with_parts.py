@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from typing import Self
 
 from lumigraph.core.grid import Grid
-from lumigraph.errors import GeometryError
 from lumigraph.instruments.camera import Camera
+from lumigraph.instruments.sees_volumes import SeesVolumes
 from lumigraph.operators.part_images import PartImages
 from lumigraph.operators.part_plane import PartPlane
-from lumigraph.operators.part_volume import PartVolume
 
 
-class WithParts(Camera):
+class WithParts(SeesVolumes, Camera):
     """A camera with a main lens: paraxial ones with lenslets have derivatives, others are refused."""
 
     def part_images(self, pairs: Sequence[tuple[Self, Self]], *, accuracy: float = 1e-2) -> PartImages:
@@ -93,44 +92,3 @@ class WithParts(Camera):
         """
         self.defocused(float(dz))
         return PartPlane(self.part_images(pairs, accuracy=accuracy), grid or self.operator_grid(), float(dz))
-
-    def part_volume(
-        self,
-        pairs: Sequence[tuple[Self, Self]],
-        grid: Grid,
-        depths: Sequence[float],
-        *,
-        accuracy: float = 1e-2,
-    ) -> PartVolume:
-        """Raw images of planes that shine at once, through each other: the sum of those of `part_plane`.
-
-        Parameters
-        ----------
-        pairs, accuracy
-            As of `part_plane`.
-        grid
-            Samples of the object at each depth.
-        depths
-            (nz,), from the focused plane [m], positive farther.
-
-        Raises
-        ------
-        GeometryError
-            As of `part_plane`; no depths.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> import lumigraph as lg
-        >>> camera = lg.load_camera("thesis-plenoptic-2-m050").replace(
-        ...     lenslets={"count": (5, 5)}, sensor={"shape": (61, 61)}, main_lens={"diameter": "1 mm"}
-        ... )
-        >>> pair = (camera.replace(lenslets={"focal_length": f}) for f in ("5.1999 mm", "5.2001 mm"))
-        >>> volume = camera.part_volume([tuple(pair)], lg.Grid.square(20, 50e-6), [0.0, 2e-3])
-        >>> volume.shape
-        ((61, 61), (2, 20, 20))
-        """
-        if not len(depths):
-            raise GeometryError("depths are empty. Give at least one, such as [0.0].")
-        planes = (self.part_plane(pairs, grid, float(dz), accuracy=accuracy) for dz in depths)
-        return PartVolume(tuple(planes))

@@ -1,32 +1,11 @@
-"""Raw images of several planes that shine at once, and how they change with whatever changes of a camera."""
+"""Raw images of several planes that shine at once, and how they change with an instrument's parts."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from lumigraph.errors import GeometryError
-
-
-class Plane(Protocol):
-    """One of them: see `part_plane`."""
-
-    @property
-    def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Of a raw image and of an object."""
-        ...
-
-    def forward(self, x: np.ndarray) -> np.ndarray:
-        """Raw image."""
-        ...
-
-    def derivative(self, x: np.ndarray, change: np.ndarray) -> np.ndarray:
-        """Its change."""
-        ...
-
-    def gradient(self, x: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """The transpose of `derivative`."""
-        ...
+from lumigraph.operators.whole_planes import WholePlane
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +18,7 @@ class PartVolume:
         (nz,), by depth, of as many samples.
     """
 
-    planes: tuple[Plane, ...]
+    planes: tuple[WholePlane, ...]
 
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int, int]]:

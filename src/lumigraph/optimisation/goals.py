@@ -25,7 +25,7 @@ from lumigraph.information.followed import require_followed
 from lumigraph.information.imaging import check as check_scenes
 from lumigraph.information.imaging import usual_scenes
 from lumigraph.information.points import collected
-from lumigraph.information.reconstruction_slopes import require_camera
+from lumigraph.information.reconstruction_slopes import require_planes
 from lumigraph.information.slopes import Bound, slopes
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.metric.charts import check_camera
@@ -235,7 +235,7 @@ class Goal:
             No bound and no error of scenes, or an instrument without derivatives of them.
         """
         if self.name in ERRORS:
-            require_camera(instrument)
+            require_planes(instrument)
             return
         if self.name not in BOUNDS:
             raise GeometryError(
