@@ -119,9 +119,9 @@ class How:
     ----------
     search
         local: downhill from the best of the first values. global: over all of the ranges, by differential
-        evolution. gradient: along derivatives, for bounds of microscopes, and for bounds and the errors of
-        scenes of paraxial cameras with lenslets; each step takes the time of some five cameras, however many
-        keys vary. grid: the first values alone.
+        evolution. gradient: along derivatives, for bounds and the errors of scenes of microscopes and of
+        paraxial cameras with lenslets; each step takes the time of some five cameras, however many keys vary.
+        grid: the first values alone.
     evaluations
         Cameras at most, beyond the first values.
     seed

@@ -4,6 +4,8 @@
 - `plenoptic1`: `PlenopticCamera`, lenslets at the main-lens image
 - `plenoptic2`: `FocusedPlenopticCamera`, lenslets that relay the main-lens image
 - `microscope`: `LightFieldMicroscope` and its operator; `microscope_objective`: its `MicroscopeObjective`
+- `with_parts`, `scope_with_parts`: derivatives of images by what differs between two cameras, or microscopes;
+  `sees_volumes`: of volumes
 - `parts`: `MainLens`, `Pixels`, and `lenslets`: `Lenslets`: the tables of a camera file
 - `built`: `Built`, distances as built; `tolerances`: `Tolerance`, how far values may be off
 - `joint`: `joint_operator` of several raw images of one object, `scan`, shifts between them

@@ -9,8 +9,8 @@
 - `points`, `white`: single points, and the evenly lit main lens, before lenslets; `relay`, any light through
   lenslets, cell by cell; `point_light`, a point's light in their plane
 - `part_images`: points by a camera's parts; `part_points`, one by one, with derivatives by place;
-  `part_plane`, `part_volume`, whole planes; `part_sight`, `part_waves`, `passed`, `line_parts`, what all
-  are made of
+  `part_plane`, whole planes; `part_sight`, `part_waves`, `passed`, `line_parts`, what all are made of
+- `whole_planes`: what planes by the parts of any instrument share; `part_volume`, several of them
 - `screens`: opaque sheets before the main lens; `partly`, planes whose points they hide in part
 - `regrid`: an operator of an object on another grid, moved or finer
 - `resampling`, `turning`: from an object's samples to points and from the image's samples to pixels
@@ -21,8 +21,9 @@
   lenslets' frequencies; `microscope_transforms`, to those and back; `microscope_patterns`, what they follow
   of a cell's points; `microscope_sensor`, from those to pixels;
   `microscope_pupil`, points by the pupil's phase; `microscope_pupil_waves`, its waves behind lenslets;
+  `pupil_points`, points by a microscope's parts; `pupil_plane`, whole planes; `pupil_cells`, their columns;
   `microscope_pixels`, real pixels; `microscope_samples`, how many samples they need; `fourier_microscope`;
-  `fourier_points`, its points with derivatives
+  `fourier_points`, its points with derivatives; `fourier_changes`, by its parts; `fourier_plane`, planes
 - `exact`: lenslets and distances beyond the paraxial; `paraxial`, how far off that is
 - `varying`: main lenses whose aberrations change over the field; `let`, the share of each sample; `mirrors`,
   what is known of one field, of those that mirror it
