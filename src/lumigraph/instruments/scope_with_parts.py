@@ -28,7 +28,7 @@ that the kernel which spreads samples leaves its band alone.
 
 
 class ScopeWithParts(SeesVolumes, DescribedMicroscope):
-    """A microscope: those with square lenslets have derivatives."""
+    """A microscope: those whose images are not traced by rays have derivatives."""
 
     def images_alike(
         self,
@@ -84,7 +84,7 @@ class ScopeWithParts(SeesVolumes, DescribedMicroscope):
             raise GeometryError(
                 "images of points by the pupil are of configuration '1.0' or '2.0', not 'fourier'."
             )
-        require_phase(self.objectives, self.lenslet)
+        require_phase(self.objectives)
         (far, points), N = told, None if like is None else like[1].layout.sampling.pixels
         shortest = min(self.objectives, key=lambda one: one.wavelength)
         pixels = Behind(self.calibration, self.pixels.fill_factor)
@@ -123,7 +123,7 @@ class ScopeWithParts(SeesVolumes, DescribedMicroscope):
         Raises
         ------
         GeometryError
-            Round lenslets, rays; microscopes of another number of lenslets before the pixels.
+            Rays; microscopes of another number of lenslets before the pixels.
 
         Examples
         --------
