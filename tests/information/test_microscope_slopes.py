@@ -1,8 +1,9 @@
 """Derivatives of bounds by the parts of a microscope with lenslets, beside central differences."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -39,8 +40,7 @@ def scope(aperture=0.5, magnification=20, waves=0.1, pixel=6.5 * UM, **changes) 
     )
 
 
-@dataclass(frozen=True)
-class Key:
+class Key(NamedTuple):
     """A value, a step, and the microscope that has it."""
 
     at: float
@@ -79,14 +79,14 @@ OTHER = {
 
 
 ROUND = {
-    f"{name}, round": replace(
-        key, of=lambda v, key=key: key.of(v).replace(lenslets={"shape": "round", "fill_factor": 0.93})
+    f"{name}, round": key._replace(
+        of=lambda v, key=key: key.of(v).replace(lenslets={"shape": "round", "fill_factor": 0.93})
     )
     for name, key in (PLAIN | OTHER).items()
     if name not in ("fill factor", "pixels")  # which come after lenslets of any shape
 }
-ROUND["fill factor, round"] = replace(
-    PLAIN["fill factor"], at=0.93, of=lambda v: scope(lenslets={"shape": "round", "fill_factor": v})
+ROUND["fill factor, round"] = PLAIN["fill factor"]._replace(
+    at=0.93, of=lambda v: scope(lenslets={"shape": "round", "fill_factor": v})
 )
 
 
@@ -119,7 +119,7 @@ def bound(before: BeforeLenslets, sensor, part: slice) -> float:
 
 def check(key: Key, name, part):
     """Within 1e-4 of differences of four steps, in double precision."""
-    at, step, of = key.at, key.step, key.of
+    at, step, of = key
 
     def value(k):
         one = of(at + k * step)
@@ -161,7 +161,7 @@ def test_the_bound_is_that_of_bounds():
 )
 def test_slopes_show_where_a_bound_changes(key):
     """Beside differences of bounds themselves, which sample each microscope as it asks for."""
-    at, step, of = PLAIN[key].at, PLAIN[key].step, PLAIN[key].of
+    at, step, of = PLAIN[key]
     low, high = of(at - 5 * step), of(at + 5 * step)
     found = slopes(of(at), [(low, high)], DEPTHS, LIGHT, places=2)
     lights = [

@@ -60,6 +60,8 @@ def test_slopes_by_lenslets_and_path_are_those_of_differences(window):
         )
         high, low = (np.sum(end * given) for end in ends)
         assert np.sum(by * change) == pytest.approx((high - low) / (2 * h), rel=1e-6, abs=0)
+        moved = window.changed(before, **{"lenslets": 0.0, "path": 0.0, name: change})
+        assert np.sum(moved * given) == pytest.approx(np.sum(by * change), rel=1e-9, abs=0)
 
 
 def given_of(window):

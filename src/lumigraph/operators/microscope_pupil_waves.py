@@ -79,8 +79,11 @@ class Waves:
     def fields(self, pupils: np.ndarray) -> np.ndarray:
         """On the fine grid (k, n, n), of pupils (k, rows, nodes)."""
         even = of_each(self.onto, pupils, self.across.shape[1])
-        light = self.down.down(self.across.right(even))
-        return light if self.window is None else self.window.forward(light)
+        return self.behind(self.down.down(self.across.right(even)))
+
+    def behind(self, before: np.ndarray) -> np.ndarray:
+        """On the sensor (..., n, n), of what comes before a `window` of lenslets, if there is one."""
+        return before if self.window is None else self.window.forward(before)
 
     def back(self, fields: np.ndarray) -> np.ndarray:
         """Conjugate transpose of `fields`."""

@@ -39,18 +39,28 @@ class LensletWindow:
         return self.lenslets.nbytes + self.path.nbytes
 
     def forward(self, fields: np.ndarray) -> np.ndarray:
-        """Fields (k, n, n) before the lenslets to those on the sensor, without the margins."""
+        """Fields (..., n, n) before the lenslets to those on the sensor, without the margins."""
         return self._cut(self._gone(fields * self.lenslets))
 
     def transposed(self, fields: np.ndarray) -> np.ndarray:
         """The transpose of `forward`, without conjugates."""
         return self._gone(self._whole(fields)) * self.lenslets
 
+    def changed(
+        self, before: np.ndarray, lenslets: np.ndarray | float, path: np.ndarray | float
+    ) -> np.ndarray:
+        """Change of `forward` with the lenslets and the path."""
+        waves = arrays.ifft2(before * self.lenslets)
+        both = np.multiply.outer(path + 0 * self.path, self.path)
+        found = arrays.fft2(waves * (both + both.T))
+        return self._cut(found + self._gone(before * lenslets))
+
     def slopes(self, before: np.ndarray, given: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """By `lenslets` and `path` of a number, from those by `forward` of fields (k, n, n)."""
+        """By `lenslets` and `path` of a number, from those by `forward` of fields (..., n, n)."""
         seen = arrays.ifft2(self._whole(given))
-        by_path = (seen * arrays.fft2(before * self.lenslets)).sum(0)
-        by_lenslets = (before * self._back(seen)).sum(0)
+        each = tuple(range(before.ndim - 2))
+        by_path = (seen * arrays.fft2(before * self.lenslets)).sum(each)
+        by_lenslets = (before * self._back(seen)).sum(each)
         return by_lenslets, by_path @ self.path + self.path @ by_path
 
     def _gone(self, fields: np.ndarray) -> np.ndarray:
@@ -67,5 +77,5 @@ class LensletWindow:
         return fields[..., inner, inner]
 
     def _whole(self, fields: np.ndarray) -> np.ndarray:
-        wide = ((0, 0), (self.margin,) * 2, (self.margin,) * 2)
-        return np.pad(fields, wide)
+        around = [(0, 0)] * (fields.ndim - 2) + [(self.margin, self.margin)] * 2
+        return np.pad(fields, around)

@@ -144,26 +144,28 @@ class Lit(Block):
         y (m,) [cells].
     turns
         t_y of each (m, rows).
-    fields
-        (m, modes, n, n) of each.
+    before, fields
+        (m, modes, n, n) of each: before a window of lenslets, if there is one, and on the sensor.
     """
 
     columns: list[Column]
     places: np.ndarray
     turns: list[np.ndarray]
+    before: list[np.ndarray]
     fields: list[np.ndarray]
 
     @classmethod
     def of(cls, columns: list[Column], places: np.ndarray, numbers: slice, reach: int) -> "Lit":
         """At places [cells], of these numbers, whose light goes so many cells to each side."""
         turns = [one.turned(places) for one in columns]
-        fields = [
+        before = [
             one.behind.waves.down.down(turn[:, None, :, None] * one.right)
             for one, turn in zip(columns, turns, strict=True)
         ]
+        fields = [one.behind.waves.behind(light) for one, light in zip(columns, before, strict=True)]
         images = columns[0].behind.images
         kernel = np.zeros((2 * reach + 1, 2 * reach + 1, len(places), images.layout.sampling.pixels**2))
-        found = cls(kernel, numbers, (2 * reach, 2 * reach), columns, places, turns, fields)
+        found = cls(kernel, numbers, (2 * reach, 2 * reach), columns, places, turns, before, fields)
         return found._with([images.unit * one for one in found.samples()])
 
     def samples(self) -> Iterator[np.ndarray]:
@@ -187,6 +189,9 @@ class Lit(Block):
         moved = waves.down.down(right)
         if 0 in by.matrices:
             moved = moved + by.matrices[0] @ (turn * column.right)
+        moved = waves.behind(moved)
+        if waves.window is not None and 3 in by.matrices:
+            moved = moved + waves.window.changed(self.before[k], by.matrices[3], by.matrices[4])
         found = waves.samples(2 * np.real(fields.conj() * moved).sum(1))
         if 2 in by.matrices:
             light, sampled = _light(fields), by.matrices[2]
@@ -246,7 +251,7 @@ class Slopes:
         across = parts.spread.right(given)
         if parts.resampled:
             parts.add_sampled(given, across, _light(fields))
-        by = 2 * parts.spread.down(across)[:, None] * fields.conj()
+        by = parts.back(2 * parts.spread.down(across)[:, None] * fields.conj(), lit.before[k])
         turn = turn[:, None, :, None]
         parts.by[0] += np.tensordot(by, turn * column.right, ([0, 1, 3], [0, 1, 3]))
         rows = turn * parts.down.down(by)

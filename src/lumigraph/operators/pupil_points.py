@@ -119,6 +119,14 @@ class Parts:
         for one, lit, mine in zip(given, across, light, strict=True):
             self.by[2] += lit @ mine.T + one.T @ self.waves.sampled.down(mine)
 
+    def back(self, by: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """Slopes by what comes before a window of lenslets, if there is one, of those by fields behind it."""
+        if (window := self.waves.window) is None:
+            return by
+        for slopes, more in zip(self.by[3:], window.slopes(before, by), strict=True):
+            slopes += more
+        return window.transposed(by)
+
     @property
     def _exact(self) -> Told:
         """As sampled, in double precision."""
@@ -150,7 +158,7 @@ class _Way:
         even = of_each(parts.waves.onto, turned, parts.waves.across.shape[1])
         right = parts.waves.across.right(even)
         before = parts.waves.down.down(right)
-        fields = before if parts.waves.window is None else parts.waves.window.forward(before)
+        fields = parts.waves.behind(before)
         return cls(parts, wave, phases, even, right, before, fields.reshape(4, len(wave), *fields.shape[1:]))
 
     @property
@@ -177,10 +185,7 @@ class _Way:
         by = seen * fields[0]
         by[0] += (seen[1:] * fields[1:]).sum(0)
         by = by.reshape(len(self.even), *fields.shape[2:])
-        if (window := parts.waves.window) is not None:
-            for slopes, more in zip(parts.by[3:], window.slopes(self.before, by), strict=True):
-                slopes += more
-            by = window.transposed(by)
+        by = parts.back(by, self.before)
         rows = parts.down.down(by)
         parts.by[0] += np.tensordot(by, self.right, ([0, 2], [0, 2]))
         parts.by[1] += np.tensordot(rows, self.even, ([0, 1], [0, 1]))
