@@ -70,7 +70,7 @@ def test_nonsense_is_refused_before_any_camera():
     with pytest.raises(GeometryError, match="wide but the field of view is"):
         lg.optimise(plain(), VARY, goal(scenes=Scenes(1e-3)))
     for name in ("picture error", "volume error"):
-        with pytest.raises(GeometryError, match="error of scenes are of cameras with lenslets"):
+        with pytest.raises(GeometryError, match="error of scenes are of instruments with lenslets"):
             lg.optimise(plain(), VARY, goal(name=name), search="gradient")
 
 
