@@ -76,8 +76,8 @@ def cut(one, depths, like=None):
         (ALONE, "object_distance", 120 * mm, 1e-4),
         (ALONE, "pixel_pitch", 10 * um, 1e-4),
         (ALONE, "focal_length", 5.2 * mm, 1e-3),
-        (BOTH, "object_distance", 120 * mm, 1e-4),
-        (BOTH, "pixel_pitch", 10 * um, 1e-3),
+        pytest.param(BOTH, "object_distance", 120 * mm, 1e-4, marks=pytest.mark.long),
+        pytest.param(BOTH, "pixel_pitch", 10 * um, 1e-3, marks=pytest.mark.long),
     ],
     ids=["object_distance", "pixel_pitch", "focal_length", "volume, object_distance", "volume, pixel_pitch"],
 )
