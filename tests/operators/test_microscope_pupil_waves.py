@@ -1,10 +1,13 @@
 """Sums of a pupil's waves behind lenslets: against sums node by node, without the even grid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import lumigraph as lg
-from lumigraph.operators.microscope_pupil_waves import waves_of
+from lumigraph.operators import microscope_pupil_waves
+from lumigraph.operators.microscope_pupil_waves import behind, waves_of, window_of
 from lumigraph.operators.microscope_waves import bloch, centred, over_cells
 
 CELLS, FINE, NODES = 3, 40, 56
@@ -50,3 +53,19 @@ def test_back_is_the_conjugate_transpose_of_fields(images):
     pupils = rng.normal(size=(1, NODES, NODES)) + 1j * rng.normal(size=(1, NODES, NODES))
     fields = rng.normal(size=(1, CELLS * FINE, CELLS * FINE)) + 0.5j
     assert np.vdot(waves.fields(pupils), fields) == pytest.approx(np.vdot(pupils, waves.back(fields)))
+
+
+def test_round_lenslets_beyond_the_window_send_their_light_into_it(images, monkeypatch):
+    """Light is everywhere here, and what the border spreads is left out; without a margin half is wrong."""
+    lenslet = replace(images.lenslet, is_round=True)
+    ways, told = 2 * [(images.objectives[0], lenslet)], (CELLS, FINE, NODES, "complex128")
+
+    def seen(margin):
+        monkeypatch.setattr(microscope_pupil_waves, "margin_cells", lambda *given: margin)
+        (down, across), rng = behind(*ways, told), np.random.default_rng(3)
+        pupil = rng.normal(size=(down.shape[1], across.shape[1]))
+        return window_of(*ways, told).forward((down @ pupil @ across.T)[None])
+
+    own, true = microscope_pupil_waves.margin_cells(*ways[0]), seen(6)
+    assert np.linalg.norm(seen(own) - true) < 0.05 * np.linalg.norm(true)
+    assert np.linalg.norm(seen(0) - true) > 0.3 * np.linalg.norm(true)
