@@ -23,6 +23,7 @@ from lumigraph.instruments.instrument import Instrument
 from lumigraph.operators.fourier_changes import Behind, Pupil, Slopes, pupils
 from lumigraph.operators.fourier_microscope import Window, lit_ones, overlap
 from lumigraph.operators.microscope_pupil import PupilImages
+from lumigraph.operators.part_leaning import LeaningParts, LeaningPoints
 from lumigraph.operators.part_points import PartPoints
 from lumigraph.operators.pupil_points import Lit, PupilPoints
 from lumigraph.scene import Points
@@ -127,7 +128,7 @@ Cameras = tuple[LensletCamera, LensletCamera]
 
 def before_camera(
     camera: LensletCamera, pairs: Sequence[Cameras], where: tuple[np.ndarray, range], accuracy: float
-) -> "BeforeCamera":
+) -> "BeforeCamera | BeforeLeaning":
     """Of a camera with lenslets, cut to those that are lit; at depths, and numbers of places in a cell."""
     depths, own = np.sort(where[0]), small(camera, where[0])
     cut = [tuple(small(end, where[0], like=own) for end in pair) for pair in pairs]
@@ -143,7 +144,20 @@ def before_camera(
     ends = [
         (points(low, pair[0]), points(high, pair[1])) for (low, high), pair in zip(cut, pairs, strict=True)
     ]
-    return BeforeCamera(images, points(own, camera), ends)
+    mine = points(own, camera)
+    if isinstance(images, LeaningParts):
+        each = [PartPoints(one, mine, ends) for one in images.parts]
+        return BeforeLeaning(each, images.weights, images.moved)
+    return BeforeCamera(images, mine, ends)
+
+
+class BeforeLeaning(LeaningPoints):
+    """`Followed` before a camera whose array or sensor leans."""
+
+    @property
+    def depths(self) -> Sequence[float]:
+        """As `Followed.depths`."""
+        return self.each[0].points.positions[:, 2].tolist()
 
 
 class BeforeCamera(PartPoints):

@@ -20,6 +20,7 @@ from lumigraph.instruments.instrument import Instrument
 from lumigraph.operators import cells, single_lens
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.fourier_points import FourierPoints
+from lumigraph.operators.leaning import Flat, flat
 from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.paraxial import resolved
 from lumigraph.operators.point_changes import has_changes, place_changes
@@ -153,17 +154,17 @@ class CameraSource:
 
     def image(self, place: np.ndarray) -> np.ndarray:
         """As `Source.image`."""
-        points, optics = Points(place[None], np.ones(1)), self._optics
+        points = Points(place[None], np.ones(1))
         if self.camera.lattice is None:
-            found, _ = single_lens.points_image(optics, points)
+            found, _ = single_lens.points_image(self._optics, points)
         else:
-            found = points_image(optics, points, self.accuracy, self._relays)
+            found = self._seen(lambda optics, known: points_image(optics, points, self.accuracy, known))
         return self.part(float(place[2])) * np.asarray(found, np.float64)
 
     def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
         """As `Source.lit`."""
         if has_changes(self._optics):
-            found = place_changes(self._optics, place, self.accuracy, self._relays)
+            found = self._seen(lambda optics, known: place_changes(optics, place, self.accuracy, known))
             return self.part(float(place[2])) * found.astype(np.float64), np.zeros(3)
         ratio = (self.camera.object_distance + place[2]) / self.camera.pupil_diameter
         across, along = ACROSS * self.camera.wavelength * ratio, ALONG * self.camera.wavelength * ratio**2
@@ -173,9 +174,23 @@ class CameraSource:
     def _optics(self) -> CameraOptics:
         return resolved(self.camera.optics(), self.accuracy)
 
+    def _seen(self, of: Callable[[CameraOptics, Relays], np.ndarray]) -> np.ndarray:
+        """By the camera, or by those that do not lean and stand for it."""
+        if self._flat is None:
+            return of(self._optics, self._relays[0])
+        both = zip(self._flat.cameras, self._relays, self._flat.weights, strict=True)
+        return np.sum([weight * of(one, known) for one, known, weight in both], axis=0)
+
     @cached_property
-    def _relays(self) -> Relays:
-        optics = self._optics
+    def _flat(self) -> Flat | None:
+        return None if self._optics.lean is None else flat(self._optics, self.accuracy)
+
+    @cached_property
+    def _relays(self) -> list[Relays]:
+        """Of the camera, or of each that stands for it."""
+        return [self._relays_of(one) for one in (self._flat.cameras if self._flat else (self._optics,))]
+
+    def _relays_of(self, optics: CameraOptics) -> Relays:
         distances = (optics.object_distance + self.depths).tolist()
         return Relays(max(distances, key=lambda z: cells.blur(optics, z)))
 
@@ -211,9 +226,13 @@ def small(
         shape, count = None, _lit(camera, depths, width)
     else:
         shape, count = like.sensor.shape, like.lenslets.count
-    return camera.replace(
+    cut = camera.replace(
         lenslets={"count": count}, sensor={"shape": shape}, main_lens={"diameter": camera.pupil_diameter}
     )
+    if not camera.built.array_bow:
+        return cut
+    nearer = math.hypot(*cut.lenslets.reach) / math.hypot(*camera.lenslets.reach)
+    return cut.replace(built={"array_bow": camera.built.array_bow * nearer**2})  # it is that of the corners
 
 
 def _lit(camera: LensletCamera, depths: np.ndarray, width: float) -> tuple[int, ...]:

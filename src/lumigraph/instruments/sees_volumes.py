@@ -7,7 +7,7 @@ from typing import Any, Self
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 from lumigraph.operators.part_volume import PartVolume
-from lumigraph.operators.whole_planes import WholePlane
+from lumigraph.operators.whole_planes import Part
 
 
 class SeesVolumes:
@@ -21,7 +21,7 @@ class SeesVolumes:
         dz: float = 0.0,
         *,
         accuracy: float = 1e-2,
-    ) -> WholePlane:
+    ) -> Part:
         """Raw images of a plane, with derivatives by whatever differs between pairs of instruments."""
 
     def part_volume(

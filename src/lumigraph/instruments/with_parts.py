@@ -7,13 +7,16 @@ from lumigraph.core.grid import Grid
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.sees_volumes import SeesVolumes
 from lumigraph.operators.part_images import PartImages
+from lumigraph.operators.part_leaning import LeaningParts, by_parts
 from lumigraph.operators.part_plane import PartPlane
 
 
 class WithParts(SeesVolumes, Camera):
     """A camera with a main lens: paraxial ones with lenslets have derivatives, others are refused."""
 
-    def part_images(self, pairs: Sequence[tuple[Self, Self]], *, accuracy: float = 1e-2) -> PartImages:
+    def part_images(
+        self, pairs: Sequence[tuple[Self, Self]], *, accuracy: float = 1e-2
+    ) -> PartImages | LeaningParts[PartImages]:
         """Images of points, with derivatives by whatever differs between pairs of cameras a little apart.
 
         Parameters
@@ -28,8 +31,10 @@ class WithParts(SeesVolumes, Camera):
         Raises
         ------
         GeometryError
-            Scatter and tilts; a main lens that is not thin or changes over the field; the exact model; other
-            numbers of pixels or lenslets.
+            Scatter; a main lens that is not thin or changes over the field; the exact model; other numbers of
+            pixels or lenslets.
+        SamplingError
+            Array or sensor lean farther than nine distances can follow.
 
         Examples
         --------
@@ -45,7 +50,7 @@ class WithParts(SeesVolumes, Camera):
         >>> images.gradient(point, images.forward(point)).shape
         (1,)
         """
-        return PartImages.of(self, pairs, accuracy)
+        return by_parts(self, pairs, accuracy)
 
     def part_plane(
         self,
@@ -54,7 +59,7 @@ class WithParts(SeesVolumes, Camera):
         dz: float = 0.0,
         *,
         accuracy: float = 1e-2,
-    ) -> PartPlane:
+    ) -> PartPlane | LeaningParts[PartPlane]:
         """Raw images of a plane, with derivatives by whatever differs between pairs of cameras.
 
         The object stays where it is before all cameras, and as bright for each area: how it falls onto their
@@ -91,4 +96,9 @@ class WithParts(SeesVolumes, Camera):
         (1,)
         """
         self.defocused(float(dz))
-        return PartPlane(self.part_images(pairs, accuracy=accuracy), grid or self.operator_grid(), float(dz))
+        images, wanted = self.part_images(pairs, accuracy=accuracy), grid or self.operator_grid()
+
+        def plane(one: PartImages) -> PartPlane:
+            return PartPlane(one, wanted, float(dz))
+
+        return images.each(plane) if isinstance(images, LeaningParts) else plane(images)

@@ -11,13 +11,14 @@ lies: light from its neighbours, and the tilt within a lenslet, is off by as muc
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from lumigraph.core.linear import Chain, Linear, Sum
+from lumigraph.elements.lean import Lean
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.cells import lenslet_distance
@@ -44,6 +45,11 @@ Lenslets before f/6 main lenses, of f/6 themselves, tilts of 60 mrad and bow bes
 
 FINEST_TRIED = 1e-3
 """Accuracy of the images that are compared, at best: they are off alike."""
+
+CLOSE = 0.01
+"""Of the depth of focus behind a lenslet, λ (b/d)², what is between distances by which images are
+differentiated, at least: the third order of what they change by is then 1e-4 of it.
+"""
 
 Image = Callable[[CameraOptics], np.ndarray]
 """Raw image (ny, nx) by a camera that does not lean."""
@@ -97,6 +103,32 @@ class _Range:
         return lagrange(count, ((values - self.middle) / self.half).ravel()).reshape(count, *values.shape)
 
 
+@dataclass(frozen=True, slots=True)
+class Distances:
+    """At which flat cameras stand for one that leans: of array and sensor.
+
+    Parameters
+    ----------
+    ranges, counts
+        Of both.
+    left
+        As of `Flat`.
+    """
+
+    ranges: tuple[_Range, _Range]
+    counts: tuple[int, int]
+    left: float
+
+    def of(self, camera: CameraOptics) -> Flat:
+        """Of a camera that leans like those that they were chosen for, or hardly more."""
+        values, both = shifts(camera), list(zip(self.ranges, self.counts, strict=True))
+        array, sensor = (one.nodes(n) for one, n in both)
+        cameras = tuple(moved(camera, a, s) for a in array for s in sensor)
+        first, second = (one.shares(n, v) for (one, n), v in zip(both, values, strict=True))
+        weights = (first[:, None] * second[None]).reshape(len(cameras), *values[0].shape)
+        return Flat(cameras, weights, self.left)
+
+
 def moved(camera: CameraOptics, array: float, sensor: float) -> CameraOptics:
     """The camera with a flat array and sensor, so much farther from the main lens [m].
 
@@ -115,9 +147,8 @@ def moved(camera: CameraOptics, array: float, sensor: float) -> CameraOptics:
 
 def shifts(camera: CameraOptics) -> tuple[np.ndarray, np.ndarray]:
     """How much farther lenslets before pixels, and these, stand from the main lens: two (ny, nx) [m]."""
-    lean, array, pixels = camera.lean, camera.array, camera.sensor.grid
-    assert lean is not None  # asked by those who call
-    assert array is not None
+    lean, array, pixels = camera.lean or Lean(), camera.array, camera.sensor.grid
+    assert array is not None  # asked by those who call
     y, x = np.meshgrid(-pixels.y, -pixels.x, indexing="ij")  # raw images are turned by 180°
     scale = 1 + lenslet_distance(camera) / camera.separation
     down, across = y / scale, x / scale
@@ -137,9 +168,19 @@ def flat(camera: CameraOptics, accuracy: float) -> Flat:
     SamplingError
         It leans farther than `COUNTS` can follow.
     """
-    values = shifts(camera)
-    ranges = _Range.of(values[0]), _Range.of(values[1])
-    points = _points(camera)
+    return distances(camera, accuracy).of(camera)
+
+
+def distances(camera: CameraOptics, accuracy: float) -> Distances:
+    """The fewest, as `flat` has it.
+
+    Raises
+    ------
+    SamplingError
+        It leans farther than `COUNTS` can follow.
+    """
+    array, sensor = map(_Range.of, shifts(camera))
+    ranges, points = (array, sensor), _points(camera)
 
     def seen(array: float, sensor: float) -> np.ndarray:
         return points_image(moved(camera, array, sensor), points, max(accuracy, FINEST_TRIED))
@@ -149,14 +190,29 @@ def flat(camera: CameraOptics, accuracy: float) -> Flat:
         count, off = _count(ranges, which, seen, accuracy)
         counts.append(count)
         left = math.hypot(left, off)
-    cameras = tuple(
-        moved(camera, array, sensor)
-        for array in ranges[0].nodes(counts[0])
-        for sensor in ranges[1].nodes(counts[1])
-    )
-    first, second = (r.shares(n, v) for r, n, v in zip(ranges, counts, values, strict=True))
-    weights = (first[:, None] * second[None]).reshape(len(cameras), *values[0].shape)
-    return Flat(cameras, weights.astype(np.float32), left)
+    return Distances(ranges, (counts[0], counts[1]), left)
+
+
+def near(camera: CameraOptics, others: Sequence[CameraOptics], accuracy: float) -> Distances:
+    """For a camera and others that lean a little more or less, or of which only these lean.
+
+    What differs between them is followed by three distances at least, which are not too close to be told
+    apart.
+    """
+    plain = Distances((_Range(0.0, 0.0), _Range(0.0, 0.0)), (1, 1), 0.0)
+    own = distances(camera, accuracy) if camera.lean is not None else plain
+    values, ranges, counts = shifts(camera), list(own.ranges), list(own.counts)
+    least = CLOSE * camera.wavelength * (lenslet_distance(camera) / _pitch(camera)) ** 2
+    for which, mine in enumerate(values):
+        if any(not np.array_equal(shifts(other)[which], mine) for other in others):
+            ranges[which] = _Range(ranges[which].middle, max(ranges[which].half, least))
+            counts[which] = max(counts[which], 3)
+    return Distances((ranges[0], ranges[1]), (counts[0], counts[1]), own.left)
+
+
+def _pitch(camera: CameraOptics) -> float:
+    assert camera.array is not None  # asked by those who call
+    return camera.array.lattice.pitch
 
 
 def _beside(camera: CameraOptics) -> float:
@@ -237,7 +293,7 @@ def leaning_operator(
     parts = [of(one, number, count) for number, one in enumerate(found.cameras)]
     grid, depths = parts[0].object_grid, parts[0].depths
     maps = tuple(
-        Chain((part, Let(weight)), object_grid=grid, depths=depths)
+        Chain((part, Let(weight.astype(np.float32))), object_grid=grid, depths=depths)
         for part, weight in zip(parts, found.weights, strict=True)
     )
     return LeaningOperator(maps, (1.0,) * count, left=found.left, object_grid=grid, depths=depths)

@@ -12,7 +12,6 @@ is differentiated. What is made of the image is followed back to them once, so t
 costs no product of large matrices.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -20,9 +19,8 @@ import numpy as np
 
 from lumigraph.core.threads import single_products
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators.camera import CameraOptics, HasOptics
+from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.fineness import COARSEST
-from lumigraph.operators.paraxial import resolved
 from lumigraph.operators.part_sight import Sight
 from lumigraph.operators.part_waves import Both, Change, Slopes, Waves, read_anew, times
 from lumigraph.operators.point_changes import has_changes
@@ -30,9 +28,6 @@ from lumigraph.scene import Points
 
 FINEST = 1e-3
 """Accuracy that can be asked for: finer ones would need many samples across the main lens."""
-
-Pair = tuple[HasOptics, HasOptics]
-"""Cameras a little to either side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,14 +63,8 @@ class PartImages:
                 f"accuracy is {self.accuracy:g} but must lie between {FINEST:g} and {COARSEST:g}."
             )
         for one in (self.camera, *(end for pair in self.pairs for end in pair)):
-            _require_paraxial(one)
+            require_paraxial(one)
             _require_as_many(one, self.camera)
-
-    @classmethod
-    def of(cls, camera: HasOptics, pairs: Sequence[Pair], accuracy: float = 1e-2) -> "PartImages":
-        """Of instruments."""
-        plain = tuple((resolved(a.optics(), accuracy), resolved(b.optics(), accuracy)) for a, b in pairs)
-        return cls(resolved(camera.optics(), accuracy), plain, accuracy)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -128,13 +117,13 @@ class PartImages:
         return [(own.alike(first), own.alike(last)) for first, last in self.pairs]
 
 
-def _require_paraxial(camera: CameraOptics) -> None:
+def require_paraxial(camera: CameraOptics) -> None:
     """Refuse cameras whose light behind lenslets is no product along two axes."""
     array = camera.array
-    if not has_changes(camera) or array is None or array.scatter is not None or camera.lean is not None:
+    if not has_changes(camera) or array is None or array.scatter is not None:
         raise GeometryError(
-            "derivatives by a camera's parts are of paraxial cameras with lenslets, as drawn and upright, "
-            "behind a thin lens. Use model = 'paraxial' without over_field, prescription, tilts and scatter."
+            "derivatives by a camera's parts are of paraxial cameras with lenslets that are alike, behind a "
+            "thin lens. Use model = 'paraxial' without over_field, prescription and scatter."
         )
 
 

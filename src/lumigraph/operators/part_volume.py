@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lumigraph.errors import GeometryError
-from lumigraph.operators.whole_planes import WholePlane
+from lumigraph.operators.whole_planes import Part
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +18,7 @@ class PartVolume:
         (nz,), by depth, of as many samples.
     """
 
-    planes: tuple[WholePlane, ...]
+    planes: tuple[Part, ...]
 
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int, int]]:

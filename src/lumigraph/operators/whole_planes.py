@@ -13,7 +13,7 @@ point is followed back once, however many objects there are.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -22,6 +22,27 @@ from lumigraph.core.linear import Linear
 from lumigraph.core.threads import single_products
 from lumigraph.errors import GeometryError
 from lumigraph.operators.part_waves import times
+
+
+class Part(Protocol):
+    """What sees points, or a plane (y, x), with derivatives by what differs between pairs of instruments."""
+
+    @property
+    def shape(self) -> Any:
+        """Of a raw image first, or alone."""
+        ...
+
+    def forward(self, x: Any, /) -> np.ndarray:
+        """Raw image."""
+        ...
+
+    def derivative(self, x: Any, change: np.ndarray, /) -> np.ndarray:
+        """Its change."""
+        ...
+
+    def gradient(self, x: Any, weights: np.ndarray, /) -> np.ndarray:
+        """The transpose of `derivative`."""
+        ...
 
 
 class WholePlane(ABC):

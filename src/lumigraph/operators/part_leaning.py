@@ -1,0 +1,140 @@
+r"""Cameras whose array or sensor leans, with derivatives by whatever differs between those a little apart.
+
+As `leaning` has it, an image is :math:`\sum_n w_n I_n` of few flat cameras, at distances that are the same
+for all that are compared: what changes are their images and, with the tilts, the weights of their pixels.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from lumigraph.operators.camera import CameraOptics, HasOptics
+from lumigraph.operators.leaning import near
+from lumigraph.operators.paraxial import resolved
+from lumigraph.operators.part_images import PartImages, require_paraxial
+from lumigraph.operators.part_points import Back, PartPoints
+from lumigraph.operators.whole_planes import Part
+
+Seen = TypeVar("Seen", bound=Part)
+Other = TypeVar("Other", bound=Part)
+
+
+@dataclass(frozen=True, eq=False)
+class LeaningParts(Generic[Seen]):
+    """How a camera that leans sees points or planes, with derivatives by what differs between pairs of it.
+
+    Parameters
+    ----------
+    parts
+        (n,), of flat cameras.
+    weights
+        (n, ny, nx), of their pixels.
+    moved
+        (pairs, n, ny, nx), from the first to the last camera of each pair.
+    """
+
+    parts: tuple[Seen, ...]
+    weights: np.ndarray
+    moved: np.ndarray
+
+    @property
+    def shape(self) -> Any:
+        """As of the flat cameras."""
+        return self.parts[0].shape
+
+    def each(self, of: Callable[[Seen], Other]) -> "LeaningParts[Other]":
+        """The same of something else of each flat camera."""
+        return LeaningParts(tuple(map(of, self.parts)), self.weights, self.moved)
+
+    def forward(self, x: Any) -> np.ndarray:
+        """As of a flat camera."""
+        return np.sum([weight * part.forward(x) for weight, part in self._both()], axis=0)
+
+    def derivative(self, x: Any, change: np.ndarray) -> np.ndarray:
+        """As of a flat camera."""
+        found = np.sum([weight * part.derivative(x, change) for weight, part in self._both()], axis=0)
+        by = np.tensordot(np.asarray(change, np.float64), self.moved, 1)
+        return found + np.sum([one * part.forward(x) for one, part in self._both(by)], axis=0)
+
+    def gradient(self, x: Any, weights: np.ndarray) -> np.ndarray:
+        """As of a flat camera."""
+        given = np.asarray(weights, np.float64)
+        found = np.sum([part.gradient(x, weight * given) for weight, part in self._both()], axis=0)
+        if not self.moved.any():
+            return found
+        return found + weighed(self.moved, [given * part.forward(x) for part in self.parts])
+
+    def _both(self, weights: np.ndarray | None = None) -> list[tuple[np.ndarray, Seen]]:
+        return list(zip(self.weights if weights is None else weights, self.parts, strict=True))
+
+
+@dataclass(eq=False)
+class LeaningPoints:
+    """Points one by one before a camera that leans: see `PartPoints`, those of flat cameras."""
+
+    each: Sequence[PartPoints]
+    weights: np.ndarray
+    moved: np.ndarray
+
+    def __post_init__(self) -> None:
+        self._found = np.zeros(len(self.moved))
+
+    def lit(self, number: int) -> tuple[np.ndarray, Back]:
+        """As of a flat camera."""
+        some = [one.lit(number) for one in self.each]
+        image = np.sum([weight * seen for weight, (seen, _) in zip(self.weights, some, strict=True)], axis=0)
+        return image, partial(self._back, some)
+
+    def along(self) -> np.ndarray:
+        """As of a flat camera."""
+        return self._found + np.sum([one.along() for one in self.each], axis=0)
+
+    def _back(self, some: list[tuple[np.ndarray, Back]], given: np.ndarray) -> None:
+        self._found += weighed(self.moved, [given * seen for seen, _ in some])
+        for weight, (_, back) in zip(self.weights, some, strict=True):
+            back(weight * given)
+
+
+def weighed(moved: np.ndarray, seen: Sequence[np.ndarray]) -> np.ndarray:
+    """(pairs,), sums over pixels of changes of weights times what each flat camera shows (..., ny, nx)."""
+    pixels = np.stack([one.reshape(-1, *moved.shape[2:]).sum(0) for one in seen])
+    return np.tensordot(moved, pixels, 3)
+
+
+def by_parts(
+    camera: HasOptics, pairs: Sequence[tuple[HasOptics, HasOptics]], accuracy: float
+) -> PartImages | LeaningParts[PartImages]:
+    """Of instruments, a little to either side of one.
+
+    Raises
+    ------
+    GeometryError
+        As of `PartImages`.
+    SamplingError
+        As of `leaning.flat`.
+    """
+    own, *ends = (
+        resolved(one.optics(), accuracy) for one in (camera, *(end for both in pairs for end in both))
+    )
+    both = tuple(zip(ends[::2], ends[1::2], strict=True))
+    plain = all(one.lean is None for one in (own, *ends))
+    return PartImages(own, both, accuracy) if plain else _leaning(own, both, accuracy)
+
+
+def _leaning(
+    camera: CameraOptics, pairs: Sequence[tuple[CameraOptics, CameraOptics]], accuracy: float
+) -> LeaningParts[PartImages]:
+    """Of cameras of which one leans at least."""
+    for one in (camera, *(end for pair in pairs for end in pair)):
+        require_paraxial(one)
+    found = near(camera, [end for pair in pairs for end in pair], accuracy)
+    own, ends = found.of(camera), [(found.of(low), found.of(high)) for low, high in pairs]
+    parts = tuple(
+        PartImages(one, tuple((low.cameras[n], high.cameras[n]) for low, high in ends), accuracy)
+        for n, one in enumerate(own.cameras)
+    )
+    moved = np.array([high.weights - low.weights for low, high in ends])
+    return LeaningParts(parts, own.weights, moved.reshape(len(ends), *own.weights.shape))
