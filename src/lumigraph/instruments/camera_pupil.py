@@ -46,7 +46,6 @@ def pupil_images(
     )  # fmt: skip
     lenslet = Lenslet(
         parts.pitch, parts.focal_length[0], b * L / (L + b), L / z, parts.pitch * parts.fill_factor,
-        parts.shape == "round",
     )  # fmt: skip
     calibration = camera.calibration if pixels is None else pixels
     behind = Behind(calibration, camera.pixels.fill_factor)
@@ -61,6 +60,8 @@ def _require_alike(camera: LensletCamera, accuracy: float) -> None:
     parts, told = camera.lenslets, "derivatives by the pupil's phase"
     if parts.layout != "square" or parts.rotation:
         raise GeometryError(f"{told} need lenslets in rows and columns along the sensor's.")
+    if parts.shape == "round":
+        raise GeometryError(f"{told} before a camera need square lenslets.")
     if camera.main_lens.varies:
         raise GeometryError(
             f"{told} need one main lens for all fields. Leave over_field and prescription out."
