@@ -105,6 +105,7 @@ def test_slopes_are_told_with_the_error_and_over_depths():
     assert both.changes == pytest.approx(whole, rel=1e-6)
 
 
+@pytest.mark.long
 def test_slopes_of_a_volume_are_of_the_error_of_all_depths_together():
     pair = camera(5.1999 * mm), camera(5.2001 * mm)
     both = reconstruction_slopes(camera(), [pair], BOTH, SCENES, LIGHT, volume=True)

@@ -61,7 +61,7 @@ def pairs_of(keys):
     return [(of(at - step), of(at + step)) for at, step, of in keys]
 
 
-@pytest.mark.parametrize("shape", ["square", "round"])
+@pytest.mark.parametrize("shape", ["square", pytest.param("round", marks=pytest.mark.long)])
 def test_the_gradient_is_the_derivatives_transpose_and_adds_up_objects(shape, rng):
     names = ("magnification", "wavelength", "pitch", "phase of the pupil", "pixels")
     keys = [
