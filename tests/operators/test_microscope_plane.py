@@ -13,6 +13,9 @@ from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 from lumigraph.operators.pupil_plane import Behind, PupilPlane
 
+BEFORE = "pitch", "focal length of lenslets", "lenslets before the image"
+"""Keys by which round lenslets, and the way behind them, change."""
+
 DZ, GRID = -9 * UM, Grid((13, 12), (2.3 * UM, 2.3 * UM), (0.4 * UM, -0.3 * UM))
 
 
@@ -52,7 +55,7 @@ def test_slopes_are_central_differences_of_raw_images(key, rng):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("key", PLAIN | OTHER | ROUND)
+@pytest.mark.parametrize("key", [*PLAIN, *OTHER, *(f"{key}, round" for key in BEFORE)])
 def test_slopes_by_all_parts_are_central_differences(key, rng):
     check((PLAIN | OTHER | ROUND)[key], rng.random(GRID.shape), rng)
 
