@@ -83,7 +83,7 @@ ROUND = {
         of=lambda v, key=key: key.of(v).replace(lenslets={"shape": "round", "fill_factor": 0.93})
     )
     for name, key in (PLAIN | OTHER).items()
-    if name not in ("fill factor", "pixels")  # which come after lenslets of any shape
+    if name not in ("fill factor", "pixels", "aperture, three polarised wavelengths")  # as of squares
 }
 ROUND["fill factor, round"] = PLAIN["fill factor"]._replace(
     at=0.93, of=lambda v: scope(lenslets={"shape": "round", "fill_factor": v})
