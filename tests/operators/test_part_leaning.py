@@ -7,6 +7,7 @@ import lumigraph as lg
 from cameras import focused
 from lumigraph.operators.leaning import flat
 from lumigraph.operators.part_leaning import LeaningParts, LeaningPoints
+from lumigraph.operators.part_plane import PartPlane
 from lumigraph.operators.part_points import PartPoints
 from lumigraph.operators.points import points_image
 
@@ -86,18 +87,17 @@ def test_points_one_by_one_go_back_to_what_their_images_change_by(rng):
     assert points.along() == pytest.approx(np.array(changes), rel=1e-9, abs=0)
 
 
-@pytest.mark.long
-def test_planes_and_volumes_are_sums_over_points(rng):
-    """As those of cameras that do not lean are, but for the array's border."""
-    still = {"sensor_tilt": (0.05, 0.0)}
-    pair = tuple(camera(moved(still, "sensor_tilt", step), pixel_pitch=12e-6) for step in (-1e-4, 1e-4))
-    grid, x = lg.Grid.square(6, 60e-6), rng.random((2, 6, 6))
-    part = camera(still, pixel_pitch=12e-6).part_volume([pair], grid, (0.0, 0.2e-3))
-    weights = rng.standard_normal(part.shape[0])
-    there = np.vdot(weights, part.derivative(x, np.ones(1)))
-    assert part.gradient(x, weights)[0] == pytest.approx(there, rel=1e-8, abs=0)
-    upright = camera(pixel_pitch=12e-6).part_volume([], grid, (0.0, 0.2e-3)).forward(x)
-    assert 1e-3 < off(part.forward(x), upright) < 0.1
+def test_planes_and_volumes_are_those_of_the_same_flat_cameras():
+    """Whose weights go with them, as before points."""
+    one, grid, both = camera(STILL), lg.Grid.square(6, 60e-6), pairs()
+    images, plane = one.part_images(both), one.part_plane(both, grid, 0.2e-3)
+    assert [part.images.camera for part in plane.parts] == [part.camera for part in images.parts]
+    assert {type(part) for part in plane.parts} == {PartPlane}
+    assert np.array_equal(plane.weights, images.weights)
+    assert np.array_equal(plane.moved, images.moved)
+    volume = one.part_volume(both, grid, (0.0, 0.2e-3))
+    assert [type(part) for part in volume.planes] == [LeaningParts, LeaningParts]
+    assert volume.shape == (one.sensor.shape, (2, 6, 6))
 
 
 def test_the_bound_before_a_camera_that_leans_is_that_of_bounds():
