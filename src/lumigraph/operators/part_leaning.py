@@ -73,7 +73,15 @@ class LeaningParts(Generic[Seen]):
 
 @dataclass(eq=False)
 class LeaningPoints:
-    """Points one by one before a camera that leans: see `PartPoints`, those of flat cameras."""
+    """Points one by one before a camera that leans.
+
+    Parameters
+    ----------
+    each
+        (n,), before flat cameras.
+    weights, moved
+        As of `LeaningParts`.
+    """
 
     each: Sequence[PartPoints]
     weights: np.ndarray
