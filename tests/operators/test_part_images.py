@@ -167,7 +167,7 @@ def test_a_gradient_takes_less_than_three_times_the_memory_of_an_image(given, rn
     ("change", "message"),
     [
         ({"model": "exact"}, "model = 'paraxial'"),
-        ({"built": {"focal_length_scatter": 1e-3}}, "prescription and scatter"),
+        ({"built": {"focal_length_scatter": 1e-3}}, "without scatter"),
     ],
 )
 def test_what_has_no_such_derivatives_is_refused(change, message):

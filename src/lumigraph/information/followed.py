@@ -24,7 +24,7 @@ from lumigraph.operators.fourier_changes import Behind, Pupil, Slopes, pupils
 from lumigraph.operators.fourier_microscope import Window, lit_ones, overlap
 from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.part_leaning import LeaningParts, LeaningPoints
-from lumigraph.operators.part_points import PartPoints
+from lumigraph.operators.part_points import PartPoints, points_before
 from lumigraph.operators.pupil_points import Lit, PupilPoints
 from lumigraph.scene import Points
 
@@ -128,7 +128,7 @@ Cameras = tuple[LensletCamera, LensletCamera]
 
 def before_camera(
     camera: LensletCamera, pairs: Sequence[Cameras], where: tuple[np.ndarray, range], accuracy: float
-) -> "BeforeCamera | BeforeLeaning":
+) -> PartPoints | LeaningPoints:
     """Of a camera with lenslets, cut to those that are lit; at depths, and numbers of places in a cell."""
     depths, own = np.sort(where[0]), small(camera, where[0])
     cut = [tuple(small(end, where[0], like=own) for end in pair) for pair in pairs]
@@ -146,27 +146,9 @@ def before_camera(
     ]
     mine = points(own, camera)
     if isinstance(images, LeaningParts):
-        each = [PartPoints(one, mine, ends) for one in images.parts]
-        return BeforeLeaning(each, images.weights, images.moved)
-    return BeforeCamera(images, mine, ends)
-
-
-class BeforeLeaning(LeaningPoints):
-    """`Followed` before a camera whose array or sensor leans."""
-
-    @property
-    def depths(self) -> Sequence[float]:
-        """As `Followed.depths`."""
-        return self.each[0].points.positions[:, 2].tolist()
-
-
-class BeforeCamera(PartPoints):
-    """`Followed` before a camera with lenslets."""
-
-    @property
-    def depths(self) -> Sequence[float]:
-        """As `Followed.depths`."""
-        return self.points.positions[:, 2].tolist()
+        each = [points_before(one, mine, ends) for one in images.parts]
+        return LeaningPoints(each, images.weights, images.moved)
+    return points_before(images, mine, ends)
 
 
 Scopes = tuple[LightFieldMicroscope, LightFieldMicroscope]

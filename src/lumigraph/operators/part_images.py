@@ -12,18 +12,20 @@ is differentiated. What is made of the image is followed back to them once, so t
 costs no product of large matrices.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
 
 from lumigraph.core.threads import single_products
 from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.fineness import COARSEST
 from lumigraph.operators.part_sight import Sight
-from lumigraph.operators.part_waves import Both, Change, Slopes, Waves, read_anew, times
-from lumigraph.operators.point_changes import has_changes
+from lumigraph.operators.part_waves import Both, Change, Slopes, Waves, Where, pupils, read_anew, times
+from lumigraph.operators.seen import seen_points
 from lumigraph.scene import Points
 
 FINEST = 1e-3
@@ -39,7 +41,7 @@ class PartImages:
     Parameters
     ----------
     camera
-        With lenslets of any shape and focal lengths, paraxial, behind a thin lens for all fields.
+        With lenslets of any shape and focal lengths, paraxial.
     pairs
         (n,), cameras a little to either side of it: by a length, a term of the phase, the wavelength.
     accuracy
@@ -65,6 +67,7 @@ class PartImages:
         for one in (self.camera, *(end for pair in self.pairs for end in pair)):
             require_paraxial(one)
             _require_as_many(one, self.camera)
+            _require_as_thin(one, self.camera)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -74,9 +77,9 @@ class PartImages:
     @single_products()
     def forward(self, points: Points) -> np.ndarray:
         """Raw image (ny, nx) of points."""
-        own = Sight.of(self.camera, points, self.accuracy)
+        own, mine, _ = self.before(points)
         light = np.zeros(own.shape)
-        for spot in own.spots(points):
+        for spot in own.spots(mine):
             light[spot.window] += spot.intensity * np.abs(Waves.of(own, spot).field) ** 2
         return own.read.forward(light)
 
@@ -85,45 +88,75 @@ class PartImages:
         """Change (ny, nx) of `forward`, so many times (n,) from the first to the last camera of each pair."""
         if np.shape(change) != (len(self.pairs),):
             raise GeometryError(f"change has shape {np.shape(change)} but must be ({len(self.pairs)},).")
-        own = Sight.of(self.camera, points, self.accuracy)
-        light, moved, spots = np.zeros(own.shape), np.zeros(own.shape), own.spots(points)
-        by = Change.of(own, zip(np.asarray(change, np.float64).tolist(), self.ends(own), strict=True), spots)
+        own, mine, moved = self.before(points)
+        light, changed, spots = np.zeros(own.shape), np.zeros(own.shape), own.spots(mine)
+        weights = np.asarray(change, np.float64).tolist()
+        by = Change.of(own, zip(weights, self.ends(own), moved, strict=True), spots)
         for spot in spots:
             waves = Waves.of(own, spot)
             light[spot.window] += spot.intensity * np.abs(waves.field) ** 2
-            moved[spot.window] += 2 * spot.intensity * np.real(waves.field.conj() * waves.changed(by))
-        return own.read.forward(moved) + by.sum(lambda one: one.read.forward(light))
+            changed[spot.window] += 2 * spot.intensity * np.real(waves.field.conj() * waves.changed(own, by))
+        return own.read.forward(changed) + by.sum(lambda one: one.read.forward(light))
 
     @single_products()
     def gradient(self, points: Points, weights: np.ndarray) -> np.ndarray:
         """Transpose of `derivative`: (n,) from weights (ny, nx) of the raw image's pixels."""
         if np.shape(weights) != self.shape:
             raise GeometryError(f"weights have shape {np.shape(weights)} but the raw image {self.shape}.")
-        own = Sight.of(self.camera, points, self.accuracy)
+        own, mine, moved = self.before(points)
         seen, by, light = own.read.adjoint(np.asarray(weights, np.float64)), Slopes(), np.zeros(own.shape)
         found, ends = np.zeros(len(self.pairs)), self.ends(own)
-        for dz, spots in groupby(own.spots(points), lambda spot: spot.dz):
-            pupil = np.zeros(())
+        for _, some in groupby(own.spots(mine), own.seen_from):
+            pupil, spots = np.zeros(()), list(some)
             for spot in spots:
                 waves = Waves.of(own, spot)
                 light[spot.window] += spot.intensity * np.abs(waves.field) ** 2
                 pupil = pupil + by.add(waves, spot.intensity * seen[spot.window] * waves.field.conj())
-            found += [times(pupil, *(one.anew.pupil(dz) for one in both)) for both in ends]
+            found += [times(pupil, *pupils(spots[0], *pair)) for pair in zip(ends, moved, strict=True)]
         seen_anew = [read_anew(both, light, weights) for both in ends]
-        return 2 * (found + [by.along(first.anew, last.anew) for first, last in ends]) + seen_anew
+        along = [
+            by.along((first.anew, last.anew), where) for (first, last), where in zip(ends, moved, strict=True)
+        ]
+        return 2 * (found + along) + seen_anew
 
     def ends(self, own: Sight) -> list[Both]:
         """Cameras of each pair."""
-        return [(own.alike(first), own.alike(last)) for first, last in self.pairs]
+        return [(own.alike(_thin(first)), own.alike(_thin(last))) for first, last in self.pairs]
+
+    def before(
+        self, points: Points, moved: Sequence[Where] | None = None
+    ) -> tuple[Sight, Points, list[Where | None]]:
+        """The camera before points, where its main lens sees these, and where those of each pair do.
+
+        Points that are `moved` are elsewhere before the cameras of each pair.
+        """
+        camera, mine = seen_points(self.camera, points)
+        own = Sight.of(camera, mine, self.accuracy)
+        if moved is None and self.camera.objects is None:
+            return own, mine, [None] * len(self.pairs)
+        known = [(points, points)] * len(self.pairs) if moved is None else moved
+        return (
+            own,
+            mine,
+            [
+                (seen_points(low, first)[1], seen_points(high, last)[1])
+                for (low, high), (first, last) in zip(self.pairs, known, strict=True)
+            ],
+        )
+
+
+def _thin(camera: CameraOptics) -> CameraOptics:
+    """The thin lens in the exit pupil, of one of glass."""
+    return replace(camera, objects=None)
 
 
 def require_paraxial(camera: CameraOptics) -> None:
     """Refuse cameras whose light behind lenslets is no product along two axes."""
     array = camera.array
-    if not has_changes(camera) or array is None or array.scatter is not None:
+    if camera.model != "paraxial" or array is None or array.scatter is not None:
         raise GeometryError(
-            "derivatives by a camera's parts are of paraxial cameras with lenslets that are alike, behind a "
-            "thin lens. Use model = 'paraxial' without over_field, prescription and scatter."
+            "derivatives by a camera's parts are of paraxial cameras with lenslets that are alike. "
+            "Use model = 'paraxial' without scatter."
         )
 
 
@@ -138,3 +171,18 @@ def _require_as_many(camera: CameraOptics, other: CameraOptics) -> None:
             f"cameras have {camera.sensor.shape} and {other.sensor.shape} pixels, {counts[0]} and "
             f"{counts[1]} lenslets, but derivatives need as many. Give lenslets.count and sensor.shape."
         )
+
+
+def _require_as_thin(camera: CameraOptics, other: CameraOptics) -> None:
+    """Refuse main lenses of which one alone changes over the field, or is of glass."""
+    kinds = [(varying.plate_of(one) is None, one.objects is None) for one in (camera, other)]
+    if kinds[0] != kinds[1]:
+        raise GeometryError(
+            "the main lens of one camera changes over the field, or is of glass, and that of another is not. "
+            "Derivatives are between lenses of one kind: give over_field or prescription to all."
+        )
+
+
+def one_lens(camera: CameraOptics) -> bool:
+    """Whether points of all fields are seen through the same thin lens."""
+    return camera.objects is None and varying.plate_of(camera) is None

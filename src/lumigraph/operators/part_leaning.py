@@ -90,6 +90,11 @@ class LeaningPoints:
     def __post_init__(self) -> None:
         self._found = np.zeros(len(self.moved))
 
+    @property
+    def depths(self) -> Sequence[float]:
+        """As of a flat camera."""
+        return self.each[0].depths
+
     def lit(self, number: int) -> tuple[np.ndarray, Back]:
         """As of a flat camera."""
         some = [one.lit(number) for one in self.each]

@@ -14,9 +14,10 @@ import numpy as np
 from lumigraph.core import arrays
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
+from lumigraph.errors import GeometryError
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.part_images import PartImages
+from lumigraph.operators.part_images import PartImages, one_lens
 from lumigraph.operators.part_sight import Sight, Spot
 from lumigraph.operators.part_waves import Both, Change, Slopes, Waves, Where
 from lumigraph.operators.points import SPARE
@@ -53,6 +54,13 @@ class PartPlane(CellPlane[Sight, "Lit"]):
     grid: Grid
     dz: float = 0.0
 
+    def __post_init__(self) -> None:
+        if not one_lens(self.images.camera):
+            raise GeometryError(
+                "planes have derivatives behind a thin lens that is the same for all fields. Use points "
+                "(part_images), or leave out over_field and prescription."
+            )
+
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:
         """Of a raw image and of an object."""
@@ -68,9 +76,9 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         return end.read
 
     def _changed(self, change: list[float]) -> Callable[["Lit"], Block]:
-        by = Change.of(self._own, zip(change, self._ends, strict=True), self._spots, self._moved)
+        by = Change.of(self._own, zip(change, self._ends, self._moved, strict=True), self._spots)
         brighter = sum(w * _brighter(where) for w, where in zip(change, self._moved, strict=True))
-        return lambda block: block.changed(by, brighter)
+        return lambda block: block.changed(self._own, by, brighter)
 
     def _slopes(self) -> "_Told":
         return _Told(self._ends, self._moved)
@@ -194,10 +202,10 @@ class Lit(Block):
         found = cls(np.zeros(()), numbers, (y, x), waves, own.optics.cells.samples)
         return found._with([one.spot.intensity * np.abs(one.field) ** 2 for one in waves])
 
-    def changed(self, by: Change, brighter: float) -> "Lit":
+    def changed(self, own: Sight, by: Change, brighter: float) -> "Lit":
         """Change of the images with the camera, and as the points become brighter."""
         return self._with([
-            2 * one.spot.intensity * np.real(one.field.conj() * one.changed(by))
+            2 * one.spot.intensity * np.real(one.field.conj() * one.changed(own, by))
             + brighter * np.abs(one.field) ** 2
             for one in self.waves
         ])  # fmt: skip

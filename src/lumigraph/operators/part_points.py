@@ -6,19 +6,22 @@ is made of both is followed back through four fields at once.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from lumigraph.core.threads import single_products
-from lumigraph.operators.part_images import PartImages
+from lumigraph.operators.part_images import PartImages, one_lens
 from lumigraph.operators.part_sight import Sight, Spot
-from lumigraph.operators.part_waves import Both, Slopes, Waves, Where, factor, read_anew, times
+from lumigraph.operators.part_waves import Both, Slopes, Waves, Where, factor, pupils, read_anew, times
 from lumigraph.scene import Points
 
 Back = Callable[[np.ndarray], None]
 """Takes slopes (4, ny, nx) of a number by an image and its derivatives."""
+
+Follow = Callable[[list[np.ndarray]], None]
+"""Takes slopes by a field and its three derivatives (y, x)."""
 
 
 @dataclass(eq=False)
@@ -39,10 +42,15 @@ class PartPoints:
     points: Points
     moved: Sequence[Where]
     _slopes: Slopes = field(default_factory=Slopes)
-    _pupil: tuple[float, np.ndarray] | None = None
+    _pupil: tuple[Spot, np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         self._found = np.zeros(len(self.moved))
+
+    @property
+    def depths(self) -> Sequence[float]:
+        """Of each point [m]."""
+        return self.points.positions[:, 2].tolist()
 
     @single_products()
     def lit(self, number: int) -> tuple[np.ndarray, Back]:
@@ -50,64 +58,83 @@ class PartPoints:
 
         As of `place_changes`: how much light a sample stands for, by its depth, is not differentiated.
         """
-        own, spot = self._own, self._spots[number]
-        still = Waves.of(own, spot)
-        waves = [still, *(still.turned(own, move) for move in own.moves(spot))]
-        light = np.zeros((4, *own.shape))
-        for k, one in enumerate(waves):
-            both = np.real(still.field.conj() * one.field)
-            light[(k, *spot.window)] = spot.intensity * (2 if k else 1) * both
-        pixels = np.stack([own.read.forward(one) for one in light])
-        return pixels, partial(self._back, spot, waves, light, pixels)
+        spot = self._spot(number)
+        (still, *moves), follow = self._fields(spot)
+        light = np.zeros((4, *self._own.shape))
+        light[(0, *spot.window)] = spot.intensity * np.abs(still) ** 2
+        for k, move in enumerate(moves):
+            light[(k + 1, *spot.window)] = 2 * spot.intensity * np.real(still.conj() * move)
+        pixels = np.stack([self._own.read.forward(one) for one in light])
+
+        def back(given: np.ndarray) -> None:
+            seen = [spot.intensity * self._own.read.adjoint(one)[spot.window] for one in given]
+            by = [np.multiply(seen, np.conj([still, *moves])).sum(0)]
+            follow(by + [part * still.conj() for part in seen[1:]])
+            self._see_anew(number, float(np.vdot(given, pixels)) / spot.intensity, light, given)
+
+        return pixels, single_products()(back)
 
     @single_products()
     def along(self) -> np.ndarray:
         """(n,) changes of the sum of all numbers, from the first to the last camera of each pair."""
         self._leave_depth()
-        slopes = [
-            self._slopes.along(first.anew, last.anew, where)
-            for (first, last), where in zip(self._ends, self.moved, strict=True)
-        ]
+        slopes = [self._slopes.along(*pair) for pair in zip(self._ends, self._moved, strict=True)]
         return self._found + 2 * np.array(slopes)
 
-    @single_products()
-    def _back(
-        self, spot: Spot, waves: list[Waves], light: np.ndarray, pixels: np.ndarray, given: np.ndarray
-    ) -> None:
-        seen = [spot.intensity * self._own.read.adjoint(one)[spot.window] for one in given]
-        fields = [one.field.conj() for one in waves]
-        by_own = self._slopes.add(waves[0], np.multiply(seen, fields).sum(0))
-        moves = []
-        for one, part, move in zip(waves[1:], seen[1:], self._own.moves(spot), strict=True):
-            by = self._slopes.add(one, part * fields[0])
-            by_own += by * factor(move)
-            turned = np.real(1j * by * waves[0].pupil)
-            moves.append((turned.sum(1), turned.sum(0)))
-        self._slopes.add_moves(spot, moves)
-        self._by_pupil(spot.dz, by_own)
-        brighter = float(np.vdot(given, pixels)) / spot.intensity
+    def _fields(self, spot: Spot) -> tuple[list[np.ndarray], Follow]:
+        """A point's field and its derivatives by place, and what takes slopes by them."""
+        own, moves = self._own, self._own.moves(spot)
+        still = Waves.of(own, spot)
+        waves = [still.turned(own, move) for move in moves]
+
+        def follow(by: list[np.ndarray]) -> None:
+            by_own, turned = self._slopes.add(still, by[0]), []
+            for one, slopes, move in zip(waves, by[1:], moves, strict=True):
+                by_pupil = self._slopes.add(one, slopes)
+                by_own += by_pupil * factor(move)
+                phase = np.real(1j * by_pupil * still.pupil)
+                turned.append((phase.sum(1), phase.sum(0)))
+            self._slopes.add_moves(spot, turned)
+            self._by_pupil(spot, by_own)
+
+        return [still.field, *(one.field for one in waves)], follow
+
+    def _see_anew(self, number: int, brighter: float, light: np.ndarray, given: np.ndarray) -> None:
+        """Adds what a point's brightness and what pixels take of the light bring."""
         for k, (both, where) in enumerate(zip(self._ends, self.moved, strict=True)):
-            low, high = (points.intensities[spot.number] for points in where)
+            low, high = (points.intensities[number] for points in where)
             self._found[k] += brighter * (high - low)
             self._found[k] += sum(read_anew(both, *pair) for pair in zip(light, given, strict=True))
 
-    def _by_pupil(self, dz: float, by: np.ndarray) -> None:
-        """Adds slopes by the wave in the main lens, of one depth after the other."""
-        if self._pupil is not None and self._pupil[0] == dz:
+    def _by_pupil(self, spot: Spot, by: np.ndarray) -> None:
+        """Adds slopes by the wave in the main lens, of one depth or field after the other."""
+        if self._pupil is not None and self._own.seen_from(self._pupil[0]) == self._own.seen_from(spot):
             self._pupil[1][...] += by
             return
         self._leave_depth()
-        self._pupil = dz, by
+        self._pupil = spot, by
 
     def _leave_depth(self) -> None:
         if self._pupil is not None:
-            dz, by = self._pupil
-            self._found += [2 * times(by, *(one.anew.pupil(dz) for one in both)) for both in self._ends]
+            spot, by = self._pupil
+            pairs = zip(self._ends, self._moved, strict=True)
+            self._found += [2 * times(by, *pupils(spot, *pair)) for pair in pairs]
             self._pupil = None
 
-    @cached_property
+    def _spot(self, number: int) -> Spot:
+        return self._spots[number]
+
+    @property
     def _own(self) -> Sight:
-        return Sight.of(self.images.camera, self.points, self.images.accuracy)
+        return self._seen[0]
+
+    @property
+    def _moved(self) -> list[Where | None]:
+        return self._seen[2]
+
+    @cached_property
+    def _seen(self) -> tuple[Sight, Points, list[Where | None]]:
+        return self.images.before(self.points, self.moved)
 
     @cached_property
     def _ends(self) -> list[Both]:
@@ -115,4 +142,62 @@ class PartPoints:
 
     @cached_property
     def _spots(self) -> dict[int, Spot]:
-        return {spot.number: spot for spot in self._own.spots(self.points)}
+        return {spot.number: spot for spot in self._own.spots(self._seen[1])}
+
+
+STEPS = 1 / 256, 1 / 32
+"""Of differences of fields: of λz/D across and λ(z/D)² along. The stop's edge turns by 0.025 rad."""
+
+
+class SteppedPoints(PartPoints):
+    """Before main lenses that change over the field, or are of glass: fields are compared between places.
+
+    Each point comes with six others beside it, a step to either side along each axis.
+    """
+
+    @cached_property
+    def _seen(self) -> tuple[Sight, Points, list[Where | None]]:
+        moved = [(self._beside(low), self._beside(high)) for low, high in self.moved]
+        return self.images.before(self._beside(self.points), moved)
+
+    @cached_property
+    def _steps(self) -> np.ndarray:
+        """(points, 3) [m]."""
+        camera = self.images.camera
+        ratio = (camera.object_distance + self.points.positions[:, 2]) / camera.pupil_diameter
+        across, along = STEPS[0] * camera.wavelength * ratio, STEPS[1] * camera.wavelength * ratio**2
+        return np.stack([across, across, along], axis=1)
+
+    def _beside(self, points: Points) -> Points:
+        moves = np.array([[0.0] * 3, *(side * one for one in np.eye(3) for side in (-1, 1))])
+        places = points.positions[:, None] + moves * self._steps[:, None]
+        return Points(places.reshape(-1, 3), np.repeat(points.intensities, len(moves)))
+
+    def _spot(self, number: int) -> Spot:
+        return self._spots[7 * number]
+
+    def _fields(self, spot: Spot) -> tuple[list[np.ndarray], Follow]:
+        """As of points whose waves in the main lens only turn; no light is won or lost with depth."""
+        own, waves = self._own, []
+        for k in range(7):
+            beside = replace(self._spots[spot.number + k], cells=spot.cells, window=spot.window)
+            waves.append(Waves.of(own, beside))
+        distance = [own.optics.camera.object_distance + one.spot.dz for one in waves]
+        steps = np.repeat(self._steps[spot.number // 7], 2) * np.tile([-2, 2], 3)
+        shares = [1.0, *(far / distance[0] / step for far, step in zip(distance[1:], steps, strict=True))]
+        fields = [share * one.field for share, one in zip(shares, waves, strict=True)]
+
+        def follow(by: list[np.ndarray]) -> None:
+            each = [by[0], *(one for one in by[1:] for _ in range(2))]
+            for one, share, slopes in zip(waves, shares, each, strict=True):
+                self._by_pupil(one.spot, self._slopes.add(one, share * slopes))
+
+        return [
+            fields[0],
+            *(low + high for low, high in zip(fields[1::2], fields[2::2], strict=True)),
+        ], follow
+
+
+def points_before(images: PartImages, points: Points, moved: Sequence[Where]) -> PartPoints:
+    """Points one by one, before any camera that has `PartImages`."""
+    return (PartPoints if one_lens(images.camera) else SteppedPoints)(images, points, moved)

@@ -12,6 +12,7 @@ import numpy as np
 
 from lumigraph.core.linear import Linear
 from lumigraph.operators import cells as _cells
+from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.lines import Lines
 from lumigraph.operators.optics import Optics
@@ -26,6 +27,9 @@ from lumigraph.scene import Points
 EDGE = 0.8
 """Samples across the main lens, times the accuracy: by the stop's edge 512 are 1.3e-3 off, 1024 6.6e-4."""
 
+SLACK = 1.01
+"""Factor of the stop's reach over the field, where that is known at few fields."""
+
 Turn = tuple[np.ndarray, np.ndarray]
 """Of places and of the pupil's nodes along an axis: the phase of a point's light is their product."""
 
@@ -37,8 +41,8 @@ class Spot:
     number: int
     position: np.ndarray
     intensity: float
-    cells: tuple[range, range]
-    window: tuple[slice, slice]
+    cells: tuple[range, range] = (range(0), range(0))
+    window: tuple[slice, slice] = (slice(0), slice(0))
 
     @property
     def dz(self) -> float:
@@ -63,11 +67,14 @@ class Sight:
         Across the main lens.
     like
         Another that hardly differs: what is the same is taken from it.
+    reach
+        How far nodes lie from the axis, over half of the main lens' diameter: as far as stops of all fields.
     """
 
     optics: Optics
     nodes: int
     like: "Sight | None" = None
+    reach: float = 1.0
 
     @classmethod
     def of(cls, camera: CameraOptics, points: Points, accuracy: float, fewest: int = PUPIL) -> "Sight":
@@ -78,11 +85,12 @@ class Sight:
         places = on_lenslets(optics, points.positions[:, :2], distances)
         least = 3 * farthest(optics, places) / _cells.airy(camera), EDGE / accuracy
         # Even: the stop's edge then touches no sample's side, on one or the other side of it by rounding.
-        return cls(optics.alike(camera), max(fewest, *(2 * math.ceil(count / 2) for count in least)))
+        nodes = max(fewest, *(2 * math.ceil(count / 2) for count in least))
+        return cls(optics.alike(camera), nodes, reach=_reach(camera))
 
     def alike(self, camera: CameraOptics) -> "Sight":
         """Of a camera that hardly differs, as finely sampled."""
-        return Sight(self.optics.alike(camera), self.nodes, self)
+        return Sight(self.optics.alike(camera), self.nodes, self, self.reach)
 
     @property
     def anew(self) -> "Sight":
@@ -113,35 +121,42 @@ class Sight:
         like = None if self.like is None else cast(Lines, self.like.lenslets)
         return Lines(self.optics, np.complex128, like)
 
-    def pupil(self, dz: float) -> np.ndarray:
-        """Wave (nodes, nodes) in the main lens, of a point of 1 at a depth."""
+    def pupil(self, spot: Spot) -> np.ndarray:
+        """Wave (nodes, nodes) in the main lens, of a point of 1 in the place of another."""
         if self.like is not None and self.like._before == self._before:
-            return self.like.pupil(dz)
-        if dz not in self._pupils:
-            optics = self._at(dz)
-            self._pupils.clear()  # one depth comes after another
-            self._pupils[dz] = self._light(optics).behind()[1] * math.sqrt(share(optics))
-        return self._pupils[dz]
+            return self.like.pupil(spot)
+        if (key := self.seen_from(spot)) not in self._pupils:
+            self._pupils.clear()  # one depth, or field, comes after another
+            light = self._light(spot)
+            self._pupils[key] = light.behind()[1] * math.sqrt(share(self._at(spot.dz)))
+        return self._pupils[key]
+
+    def seen_from(self, spot: Spot) -> tuple[float, ...]:
+        """Depth, and field (y, x) if the lens changes over it: what a point's wave there follows from."""
+        if not self._varies:
+            return (spot.dz,)
+        distance = self._at(spot.dz).distance
+        return spot.dz, float(spot.position[0]) / distance, float(spot.position[1]) / distance
 
     def spots(self, points: Points) -> list[Spot]:
         """Of each point, by depth."""
         found = []
         for k in np.argsort(points.positions[:, 2], kind="stable"):
-            position, intensity = points.positions[k], float(points.intensities[k])
-            optics = self._at(float(position[2]))
-            cells = lit_cells(optics, self._light(optics), self._place(optics, position))
+            spot = Spot(int(k), points.positions[k], float(points.intensities[k]))
+            optics = self._at(spot.dz)
+            cells = lit_cells(optics, self._light(spot), self._place(optics, spot.position))
             y, x = (
                 slice(mine.start * n, mine.stop * n)
                 for mine, n in zip(cells, optics.cells.samples, strict=True)
             )
-            found.append(Spot(int(k), position, intensity, cells, (y, x)))
+            found.append(replace(spot, cells=cells, window=(y, x)))
         return found
 
     def turns(self, spot: Spot) -> tuple[Turn, Turn]:
         """Along y and along x [rad/m and m]."""
         optics = self._at(spot.dz)
         turn = -2 * np.pi / (optics.camera.wavelength * optics.camera.separation)
-        grid, place = self._light(optics).grid, self._place(optics, spot.position)
+        grid, place = self._light(spot).grid, self._place(optics, spot.position)
         y, x = self.lenslets.places(*spot.cells)
         return (turn * (y - place[0]), grid.y), (turn * (x - place[1]), grid.x)
 
@@ -152,7 +167,7 @@ class Sight:
         """
         optics = self._at(spot.dz)
         turn = 2 * np.pi / (optics.camera.wavelength * optics.camera.separation)
-        grid, place = self._light(optics).grid, self._place(optics, spot.position)
+        grid, place = self._light(spot).grid, self._place(optics, spot.position)
         (y, x), found = (grid.y, grid.x), []
         for move in np.eye(2):
             down, across = turn * self._place(optics, move)
@@ -163,14 +178,19 @@ class Sight:
         return [*found, (down, across)]
 
     @cached_property
-    def _pupils(self) -> dict[float, np.ndarray]:
+    def _pupils(self) -> dict[tuple[float, ...], np.ndarray]:
         return {}
+
+    @cached_property
+    def _varies(self) -> bool:
+        """Whether the main lens changes over the field."""
+        return varying.plate_of(self.optics.camera) is not None
 
     @cached_property
     def _before(self) -> tuple[Any, ...]:
         """All that waves in the main lens, and how bright they are, follow from."""
         one = self.optics.camera
-        lens = tuple(_cells.lens(one).elements)
+        lens = tuple(one.lens.elements if self._varies else _cells.lens(one).elements)
         given = one.wavelength, one.object_distance, one.separation, one.pupil_diameter, one.object_pitch
         return lens, given, self.optics.image_scale
 
@@ -195,5 +215,14 @@ class Sight:
         """Of a point's image in the lenslet plane [m]."""
         return on_lenslets(optics, position[None, :2], optics.distance)[0]
 
-    def _light(self, optics: Optics) -> Sampled:
-        return Sampled(optics.camera, _cells.lens(optics.camera), optics.distance, 0.0, self.nodes)
+    def _light(self, spot: Spot) -> Sampled:
+        """Of a point."""
+        distance, camera, (_, *field) = self._at(spot.dz).distance, self.optics.camera, self.seen_from(spot)
+        mine = varying.at(camera, *field) if field else camera
+        return Sampled(mine, _cells.lens(mine), distance, 0.0, self.nodes, self.reach)
+
+
+def _reach(camera: CameraOptics) -> float:
+    """As of `Sight`, of all fields and of cameras that hardly differ."""
+    farthest = max(_cells.stop_reach(one.lens) for one in varying.some(camera))
+    return farthest if varying.plate_of(camera) is None else SLACK * farthest

@@ -50,7 +50,7 @@ class Waves:
         """Of a point before a camera."""
         turns = own.turns(spot)
         phases = tuple(np.exp(1j * np.outer(*turn)) for turn in turns)
-        return cls._of(own, spot, (turns, phases), own.pupil(spot.dz))
+        return cls._of(own, spot, (turns, phases), own.pupil(spot))
 
     def turned(self, own: Sight, phase: Turn) -> "Waves":
         """How they change with a phase in the main lens, a sum of one along y and one along x [rad]."""
@@ -67,13 +67,13 @@ class Waves:
         """On the samples (y, x)."""
         return self.passed.field
 
-    def changed(self, by: "Change") -> np.ndarray:
+    def changed(self, own: Sight, by: "Change") -> np.ndarray:
         """Change of the field with the camera."""
         moved = []
         for k, (turn, (places, nodes)) in enumerate(zip(self.turns, by.turns(self), strict=True)):
             moved.append(1j * (np.outer(places, turn[1]) + np.outer(turn[0], nodes)) * self.phases[k])
         y, x = self.phases
-        light = moved[0] @ self.right + y @ (by.pupil(self.spot.dz) @ x.T + self.pupil @ moved[1].T)
+        light = moved[0] @ self.right + y @ (by.pupil(own, self.spot) @ x.T + self.pupil @ moved[1].T)
         return self.passed.changed(light, by.pieces.__getitem__)
 
 
@@ -84,56 +84,53 @@ class Change:
     Parameters
     ----------
     pairs
-        Times, and cameras.
+        Times, cameras, and where points are before both.
     pieces
         Change of the lenslets' matrices.
-    moved
-        Where points are before the cameras of each pair; empty where they stay.
     """
 
-    pairs: tuple[tuple[float, Both], ...]
+    pairs: tuple[tuple[float, Both, Where | None], ...]
     pieces: dict[Key, np.ndarray]
-    moved: Sequence[Where] = ()
-    _pupils: dict[float, np.ndarray] = field(default_factory=dict)
+    _pupils: dict[tuple[float, ...], np.ndarray] = field(default_factory=dict)
 
     @classmethod
     def of(
-        cls,
-        own: Sight,
-        pairs: Iterable[tuple[float, Both]],
-        spots: Sequence[Spot],
-        moved: Sequence[Where] = (),
+        cls, own: Sight, pairs: Iterable[tuple[float, Both, Where | None]], spots: Sequence[Spot]
     ) -> "Change":
         """For some points."""
         lit = {key for spot in spots for key in own.lenslets.keys(*spot.cells)}
         known, pieces = [], {key: np.zeros_like(own.lenslets.piece(key)) for key in lit}
-        for weight, both in pairs:
+        for weight, both, where in pairs:
             first, last = (one.lenslets for one in both)
             for key in lit if first is not last else ():
                 pieces[key] += weight * (last.piece(key) - first.piece(key))
-            known.append((weight, (both[0].anew, both[1].anew)))
-        return cls(tuple(known), pieces, moved)
+            known.append((weight, (both[0].anew, both[1].anew), where))
+        return cls(tuple(known), pieces)
 
     def sum(self, of: Callable[[Sight], np.ndarray]) -> Any:
         """Change of what is made of a camera."""
-        return sum(weight * (of(last) - of(first)) for weight, (first, last) in self.pairs)
+        return sum(weight * (of(last) - of(first)) for weight, (first, last), _ in self.pairs)
 
     def turns(self, waves: Waves) -> list[Turn]:
         """Of a point's `Sight.turns`, along y and along x."""
-        found, spot = [[np.zeros(len(part)) for part in turn] for turn in waves.turns], waves.spot
-        for k, (weight, both) in enumerate(self.pairs):
-            spots = [spot.before(points) for points in self.moved[k]] if self.moved else [spot, spot]
-            ends = [one.turns(mine) for one, mine in zip(both, spots, strict=True)]
+        found = [[np.zeros(len(part)) for part in turn] for turn in waves.turns]
+        for weight, both, where in self.pairs:
+            first, last = map(Sight.turns, both, before(waves.spot, where))
             for axis, part in np.ndindex(2, 2):
-                found[axis][part] += weight * (ends[1][axis][part] - ends[0][axis][part])
+                found[axis][part] += weight * (last[axis][part] - first[axis][part])
         return [(places, nodes) for places, nodes in found]
 
-    def pupil(self, dz: float) -> np.ndarray:
-        """Of the wave in the main lens."""
-        if dz not in self._pupils:
+    def pupil(self, own: Sight, spot: Spot) -> np.ndarray:
+        """Of a point's wave in the main lens."""
+        if (key := own.seen_from(spot)) not in self._pupils:
             self._pupils.clear()
-            self._pupils[dz] = self.sum(lambda one: one.anew.pupil(dz))
-        return self._pupils[dz]
+            found = np.zeros_like(own.pupil(spot))
+            for weight, both, where in self.pairs:
+                first, last = pupils(spot, both, where)
+                if first is not last:
+                    found += weight * (last - first)
+            self._pupils[key] = found
+        return self._pupils[key]
 
 
 @dataclass(slots=True, eq=False)
@@ -164,21 +161,30 @@ class Slopes:
 
     def between(self, both: Both, pupil: np.ndarray, where: Where | None = None) -> float:
         """From one camera to the other (not halved); `pupil`, slopes by the wave there of the only depth."""
-        dz = self._of[0][1].dz
-        found = times(pupil, *(one.anew.pupil(dz) for one in both))
-        return 2 * (found + self.along(both[0].anew, both[1].anew, where))
+        found = times(pupil, *pupils(self._of[0][1], both, where))
+        return 2 * (found + self.along(both, where))
 
-    def along(self, first: Sight, last: Sight, where: Where | None = None) -> float:
+    def along(self, both: Both, where: Where | None = None) -> float:
         """From one camera to another close by, before which points are elsewhere."""
-        found, both = 0.0, (first, last)
+        found, (first, last) = 0.0, (one.anew for one in both)
         if first.lenslets is not last.lenslets:
             for key, by in self._pieces.of.items():
-                found += times(by, *(one.lenslets.piece(key) for one in both))
+                found += times(by, first.lenslets.piece(key), last.lenslets.piece(key))
         for of, spot, slopes in self._of:
-            spots = (spot, spot) if where is None else (spot.before(points) for points in where)
-            for by, *ends in zip(slopes, *map(of, both, spots), strict=True):
+            for by, *ends in zip(slopes, *map(of, (first, last), before(spot, where)), strict=True):
                 found += sum(times(*pieces) for pieces in zip(by, *ends, strict=True))
         return found
+
+
+def before(spot: Spot, where: Where | None) -> tuple[Spot, Spot]:
+    """A point before both of a pair."""
+    return (spot, spot) if where is None else (spot.before(where[0]), spot.before(where[1]))
+
+
+def pupils(spot: Spot, both: Both, where: Where | None) -> tuple[np.ndarray, np.ndarray]:
+    """Its waves in the main lenses."""
+    first, last = (one.anew.pupil(mine) for one, mine in zip(both, before(spot, where), strict=True))
+    return first, last
 
 
 def factor(change: Turn) -> np.ndarray:

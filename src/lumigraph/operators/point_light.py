@@ -123,13 +123,28 @@ def _radial(half: float, squared: float, focus: float, widest: float) -> tuple[C
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """Behind any lens: a matrix Fourier transform of its pupil."""
+    """Behind any lens: a matrix Fourier transform of its pupil.
+
+    Parameters
+    ----------
+    camera, lens
+        The camera, and its main lens turned with the lenslets.
+    distance
+        Of the point before the main lens [m].
+    widest
+        How far from its image light is followed [m].
+    samples
+        Across the main lens, at least.
+    reach
+        How far places are sampled from the axis, over half of the camera's diameter; None for its stop's.
+    """
 
     camera: CameraOptics
     lens: Train
     distance: float
     widest: float
     samples: int = PUPIL
+    reach: float | None = None
     _pupil: list = field(default_factory=list, repr=False)
 
     def at(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -143,7 +158,7 @@ class Sampled:
         """The pupil's."""
         # Light comes again after as many λL/D as there are samples.
         count = max(self.samples, math.ceil(3 * self.widest / _cells.airy(self.camera)))
-        wide = math.ceil(count * _cells.stop_reach(self.lens))
+        wide = math.ceil(count * (self.reach or _cells.stop_reach(self.lens)))
         return Grid.square(wide + 8, self.camera.pupil_diameter / count)
 
     def behind(self) -> tuple[Grid, np.ndarray]:
