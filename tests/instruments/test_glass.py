@@ -11,6 +11,7 @@ from lumigraph.elements import noll_to_nm
 from lumigraph.errors import FormatError, GeometryError, LumigraphError, ParaxialWarning
 from lumigraph.instruments import glass
 from lumigraph.io.prescription import FirstOrder, Rays
+from lumigraph.operators.points import points_image as lens_points
 from lumigraph.operators.seen import distorted, seen_points
 from lumigraph.operators.single_lens import points_image, single_lens_operator
 
@@ -170,6 +171,28 @@ def plenoptic(camera):
         lenslets={"pitch": "240 um", "focal_length": "2.6 mm", "count": (31, 31)},
         sensor={"pixel_pitch": "12 um"},
     )  # fmt: skip
+
+
+@pytest.mark.long
+def test_points_before_glass_have_derivatives_by_its_parts(camera):
+    """Each camera's thin lens sees them elsewhere."""
+
+    def plenoptic(distance):
+        return lg.FocusedPlenopticCamera(
+            wavelength="550 nm", object_distance=distance,
+            main_lens={"focal_length": F, "diameter": D, "prescription": camera.main_lens.prescription},
+            lenslets={"pitch": 200e-6, "focal_length": 2e-3, "count": (7, 7), "magnification": 0.3},
+            sensor={"pixel_pitch": "6 um", "shape": (240, 240)},
+        )  # fmt: skip
+
+    point = lg.Points(np.array([[0.9e-3, -1.3e-3, -5e-3]]), np.ones(1))
+    pairs = [tuple(plenoptic(Z1 * (1 + s)) for s in (-step, step)) for step in (1e-6, 2e-6)]
+    images = plenoptic(Z1).part_images([pairs[0]])
+    both = images.forward(point), lens_points(plenoptic(Z1), point, 2e-3)
+    low, high = (end.part_images([]).forward(point) for end in pairs[1])
+    changes = 2 * images.derivative(point, np.ones(1)), high - low
+    for (found, expected), most in ((both, 1e-2), (changes, 1e-3)):
+        assert np.linalg.norm(found - expected) < most * np.linalg.norm(expected)
 
 
 def test_micro_images_stand_where_chief_rays_have_them(plenoptic):
