@@ -17,9 +17,10 @@ from lumigraph.information.points import (
     source,
     spread,
 )
-from lumigraph.instruments import LensletCamera, LightFieldMicroscope
+from lumigraph.instruments import LensletCamera, LightFieldMicroscope, SingleLensCamera
 from lumigraph.instruments.capabilities import WithObjective
 from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.with_parts import SeesPoints
 from lumigraph.operators.fourier_changes import Behind, Pupil, Slopes, pupils
 from lumigraph.operators.fourier_microscope import Window, lit_ones, overlap
 from lumigraph.operators.microscope_pupil import PupilImages
@@ -58,14 +59,14 @@ def require_followed(instrument: Instrument) -> None:
     Raises
     ------
     GeometryError
-        A camera without lenslets, one without `part_images`, or a microscope without `pupil_images`.
+        A camera without `part_images`, or a microscope without `pupil_images`.
     """
-    if isinstance(instrument, LensletCamera):
+    if isinstance(instrument, SeesPoints):
         instrument.part_images([])
     elif not isinstance(instrument, WithObjective):
         raise GeometryError(
-            "derivatives of bounds by an instrument's parts are of microscopes and of cameras with lenslets. "
-            "For others, use search 'local'."
+            "derivatives of bounds by an instrument's parts are of microscopes and of cameras. For others, "
+            "use search 'local'."
         )
     elif not instrument.in_pupil and not has_phase(cast(LightFieldMicroscope, instrument)):
         raise GeometryError(
@@ -90,7 +91,7 @@ def followed(
     for one in (end for pair in pairs for end in pair):
         require_followed(one)
         require_alike(instrument, one)
-    if isinstance(instrument, LensletCamera):
+    if isinstance(instrument, SeesPoints):
         yield before_camera(instrument, cast(Sequence[Cameras], pairs), (depths, numbers), accuracy)
         return
     scope, scopes = cast(LightFieldMicroscope, instrument), cast(Sequence[Scopes], pairs)
@@ -113,9 +114,12 @@ def require_alike(instrument: Instrument, other: Instrument) -> None:
     GeometryError
         Other sensors or numbers of lenslets.
     """
-    own, names = instrument.sensor, OPTICAL[isinstance(instrument, LensletCamera)]
+    own, names = instrument.sensor, OPTICAL[isinstance(instrument, SeesPoints)]
     same = replace(other.sensor, **{name: getattr(own, name) for name in names})
-    counts = [cast(LensletCamera, one).lenslets.count for one in (instrument, other)]
+    counts = [
+        None if isinstance(one, SingleLensCamera) else cast(LensletCamera, one).lenslets.count
+        for one in (instrument, other)
+    ]
     if type(instrument) is not type(other) or same != own or counts[0] != counts[1]:
         raise GeometryError(
             "derivatives of bounds and errors are by optics and by the pixels' pitch; two instruments have "
@@ -123,18 +127,25 @@ def require_alike(instrument: Instrument, other: Instrument) -> None:
         )
 
 
-Cameras = tuple[LensletCamera, LensletCamera]
+Cameras = tuple[SeesPoints, SeesPoints]
+
+
+def _cut(camera: SeesPoints, depths: np.ndarray, like: SeesPoints | None = None) -> SeesPoints:
+    """With as few lenslets as `bounds` has; all pixels where there are none, for they tell the background."""
+    if isinstance(camera, LensletCamera):
+        return small(camera, depths, like=cast(LensletCamera | None, like))
+    return camera
 
 
 def before_camera(
-    camera: LensletCamera, pairs: Sequence[Cameras], where: tuple[np.ndarray, range], accuracy: float
+    camera: SeesPoints, pairs: Sequence[Cameras], where: tuple[np.ndarray, range], accuracy: float
 ) -> PartPoints | LeaningPoints:
-    """Of a camera with lenslets, cut to those that are lit; at depths, and numbers of places in a cell."""
-    depths, own = np.sort(where[0]), small(camera, where[0])
-    cut = [tuple(small(end, where[0], like=own) for end in pair) for pair in pairs]
+    """Of a camera, cut to lenslets or pixels that are lit; at depths, and numbers of places in a cell."""
+    depths, own = np.sort(where[0]), _cut(camera, where[0])
+    cut = [tuple(_cut(end, where[0], like=own) for end in pair) for pair in pairs]
     images = own.part_images(cast(Sequence[Cameras], cut), accuracy=accuracy)
 
-    def points(end: LensletCamera, whole: LensletCamera) -> Points:
+    def points(end: SeesPoints, whole: SeesPoints) -> Points:
         seen, share = CameraSource(end, accuracy), collected(whole) / collected(camera)
         places = [
             [*place, dz] for dz in depths.tolist() for place in spread(seen.cell(dz), where[1]).tolist()

@@ -16,7 +16,7 @@ import numpy as np
 from lumigraph.core import checks
 from lumigraph.errors import GeometryError
 from lumigraph.information.bounds import Light, checked_depths
-from lumigraph.information.followed import Cameras, Pair, require_alike, require_followed
+from lumigraph.information.followed import Pair, require_alike, require_followed
 from lumigraph.information.imaging import Imaging, electrons, imaging
 from lumigraph.information.points import collected, small
 from lumigraph.information.reconstruction import probed
@@ -90,7 +90,7 @@ def require_planes(instrument: Instrument) -> None:
     Raises
     ------
     GeometryError
-        A camera without lenslets, one without `part_images`; a microscope without `pupil_images` whose
+        A camera without lenslets, one without `part_plane`; a microscope without `pupil_images` whose
         lenslets stand in the image.
     """
     if not isinstance(instrument, SeesVolumes):
@@ -99,6 +99,8 @@ def require_planes(instrument: Instrument) -> None:
             "'local'."
         )
     require_followed(instrument)
+    if isinstance(instrument, LensletCamera):
+        instrument.part_plane([])
 
 
 def _at(
@@ -114,7 +116,7 @@ def _at(
     grid, own, cut = seen.operator.object_grid, instrument, list(pairs)
     assert grid is not None  # as imaging has it
     if isinstance(instrument, LensletCamera):
-        whole = cast(Sequence[Cameras], pairs)
+        whole = cast(Sequence[tuple[LensletCamera, LensletCamera]], pairs)
         own = like = small(instrument, depths, scenes.size)
         cut = [(small(a, depths, like=like), small(b, depths, like=like)) for a, b in whole]
     part = cast(SeesVolumes, own).part_volume(

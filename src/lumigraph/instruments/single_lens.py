@@ -16,16 +16,16 @@ from lumigraph.elements import Train
 from lumigraph.errors import FormatError, GeometryError, SamplingError, SamplingWarning
 from lumigraph.instruments import describe, grids, trade_offs
 from lumigraph.instruments.angular import refuse_angles
-from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.making import Making
 from lumigraph.instruments.row import Row
+from lumigraph.instruments.with_parts import SeesPoints
 from lumigraph.operators import CameraOptics, single_lens_operator
 from lumigraph.operators.single_lens import FINEST
 from lumigraph.propagation import Propagate
 
 
-class SingleLensCamera(Camera):
+class SingleLensCamera(SeesPoints):
     """A main lens and a sensor at its image.
 
     Parameters

@@ -11,8 +11,8 @@ from lumigraph.operators.part_leaning import LeaningParts, by_parts
 from lumigraph.operators.part_plane import PartPlane
 
 
-class WithParts(SeesVolumes, Camera):
-    """A camera with a main lens: paraxial ones with lenslets have derivatives, others are refused."""
+class SeesPoints(Camera):
+    """A camera with a main lens whose images of points have derivatives."""
 
     def part_images(
         self, pairs: Sequence[tuple[Self, Self]], *, accuracy: float = 1e-2
@@ -51,6 +51,10 @@ class WithParts(SeesVolumes, Camera):
         (1,)
         """
         return by_parts(self, pairs, accuracy)
+
+
+class WithParts(SeesVolumes, SeesPoints):
+    """One with lenslets: raw images of planes and volumes have them, too."""
 
     def part_plane(
         self,

@@ -23,6 +23,7 @@ from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.fineness import COARSEST
+from lumigraph.operators.part_lens import LensSight
 from lumigraph.operators.part_sight import Sight
 from lumigraph.operators.part_waves import Both, Change, Slopes, Waves, Where, pupils, read_anew, times
 from lumigraph.operators.seen import seen_points
@@ -41,7 +42,7 @@ class PartImages:
     Parameters
     ----------
     camera
-        With lenslets of any shape and focal lengths, paraxial.
+        Without lenslets, or with some of any shape and focal lengths; paraxial.
     pairs
         (n,), cameras a little to either side of it: by a length, a term of the phase, the wavelength.
     accuracy
@@ -131,7 +132,7 @@ class PartImages:
         Points that are `moved` are elsewhere before the cameras of each pair.
         """
         camera, mine = seen_points(self.camera, points)
-        own = Sight.of(camera, mine, self.accuracy)
+        own = (Sight if camera.array else LensSight).of(camera, mine, self.accuracy)
         if moved is None and self.camera.objects is None:
             return own, mine, [None] * len(self.pairs)
         known = [(points, points)] * len(self.pairs) if moved is None else moved
@@ -153,7 +154,7 @@ def _thin(camera: CameraOptics) -> CameraOptics:
 def require_paraxial(camera: CameraOptics) -> None:
     """Refuse cameras whose light behind lenslets is no product along two axes."""
     array = camera.array
-    if camera.model != "paraxial" or array is None or array.scatter is not None:
+    if camera.model != "paraxial" or (array is not None and array.scatter is not None):
         raise GeometryError(
             "derivatives by a camera's parts are of paraxial cameras with lenslets that are alike. "
             "Use model = 'paraxial' without scatter."

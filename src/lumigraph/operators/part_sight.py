@@ -34,6 +34,10 @@ Turn = tuple[np.ndarray, np.ndarray]
 """Of places and of the pupil's nodes along an axis: the phase of a point's light is their product."""
 
 
+Lit = tuple[tuple[range, range], tuple[slice, slice]]
+"""Cells along y and along x, and their samples."""
+
+
 @dataclass(frozen=True, slots=True)
 class Spot:
     """A point's number, its place (y, x, dz), its light, the cells that it lights, and their samples."""
@@ -86,7 +90,7 @@ class Sight:
         least = 3 * farthest(optics, places) / _cells.airy(camera), EDGE / accuracy
         # Even: the stop's edge then touches no sample's side, on one or the other side of it by rounding.
         nodes = max(fewest, *(2 * math.ceil(count / 2) for count in least))
-        return cls(optics.alike(camera), nodes, reach=_reach(camera))
+        return cls(optics.alike(camera), nodes, reach=reach_of(camera))
 
     def alike(self, camera: CameraOptics) -> "Sight":
         """Of a camera that hardly differs, as finely sampled."""
@@ -143,14 +147,18 @@ class Sight:
         found = []
         for k in np.argsort(points.positions[:, 2], kind="stable"):
             spot = Spot(int(k), points.positions[k], float(points.intensities[k]))
-            optics = self._at(spot.dz)
-            cells = lit_cells(optics, self._light(spot), self._place(optics, spot.position))
-            y, x = (
-                slice(mine.start * n, mine.stop * n)
-                for mine, n in zip(cells, optics.cells.samples, strict=True)
-            )
-            found.append(replace(spot, cells=cells, window=(y, x)))
+            cells, window = self._lit(spot)
+            found.append(replace(spot, cells=cells, window=window))
         return found
+
+    def _lit(self, spot: Spot) -> Lit:
+        """Cells that a point lights."""
+        optics = self._at(spot.dz)
+        cells = lit_cells(optics, self._light(spot), self._place(optics, spot.position))
+        y, x = (
+            slice(mine.start * n, mine.stop * n) for mine, n in zip(cells, optics.cells.samples, strict=True)
+        )
+        return cells, (y, x)
 
     def turns(self, spot: Spot) -> tuple[Turn, Turn]:
         """Along y and along x [rad/m and m]."""
@@ -222,7 +230,7 @@ class Sight:
         return Sampled(mine, _cells.lens(mine), distance, 0.0, self.nodes, self.reach)
 
 
-def _reach(camera: CameraOptics) -> float:
+def reach_of(camera: CameraOptics) -> float:
     """As of `Sight`, of all fields and of cameras that hardly differ."""
     farthest = max(_cells.stop_reach(one.lens) for one in varying.some(camera))
     return farthest if varying.plate_of(camera) is None else SLACK * farthest

@@ -56,7 +56,9 @@ def passed(relay: Parted, light: np.ndarray, rows: range, columns: range) -> Pas
     """Light (y, x) at a relay's places, to the samples of some cells."""
     if isinstance(relay, Straight):
         return _Squares.of(relay, light, (rows, columns))
-    return _AnyShape.of(relay, light, (rows, columns))
+    if isinstance(relay, Lines):
+        return _AnyShape.of(relay, light, (rows, columns))
+    return relay.passed(light, rows, columns)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
