@@ -5,7 +5,7 @@ import pytest
 
 import lumigraph as lg
 from lumigraph.errors import GeometryError
-from lumigraph.operators.part_points import points_before
+from lumigraph.operators.part_leaning import points_before
 from lumigraph.operators.points import points_image
 from lumigraph.scene import Points
 from lumigraph.units import mm, nm, um

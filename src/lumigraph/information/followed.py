@@ -24,8 +24,8 @@ from lumigraph.instruments.with_parts import SeesPoints
 from lumigraph.operators.fourier_changes import Behind, Pupil, Slopes, pupils
 from lumigraph.operators.fourier_microscope import Window, lit_ones, overlap
 from lumigraph.operators.microscope_pupil import PupilImages
-from lumigraph.operators.part_leaning import LeaningParts, LeaningPoints
-from lumigraph.operators.part_points import PartPoints, points_before
+from lumigraph.operators.part_leaning import LeaningPoints, points_before
+from lumigraph.operators.part_points import PartPoints
 from lumigraph.operators.pupil_points import Lit, PupilPoints
 from lumigraph.scene import Points
 
@@ -155,11 +155,7 @@ def before_camera(
     ends = [
         (points(low, pair[0]), points(high, pair[1])) for (low, high), pair in zip(cut, pairs, strict=True)
     ]
-    mine = points(own, camera)
-    if isinstance(images, LeaningParts):
-        each = [points_before(one, mine, ends) for one in images.parts]
-        return LeaningPoints(each, images.weights, images.moved)
-    return points_before(images, mine, ends)
+    return points_before(images, points(own, camera), ends)
 
 
 Scopes = tuple[LightFieldMicroscope, LightFieldMicroscope]

@@ -4,10 +4,12 @@ from collections.abc import Sequence
 from typing import Self
 
 from lumigraph.core.grid import Grid
+from lumigraph.errors import GeometryError
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.sees_volumes import SeesVolumes
+from lumigraph.operators.part_exact import ExactImages
 from lumigraph.operators.part_images import PartImages
-from lumigraph.operators.part_leaning import LeaningParts, by_parts
+from lumigraph.operators.part_leaning import Images, LeaningParts, by_parts
 from lumigraph.operators.part_plane import PartPlane
 
 
@@ -16,7 +18,7 @@ class SeesPoints(Camera):
 
     def part_images(
         self, pairs: Sequence[tuple[Self, Self]], *, accuracy: float = 1e-2
-    ) -> PartImages | LeaningParts[PartImages]:
+    ) -> Images | LeaningParts[PartImages]:
         """Images of points, with derivatives by whatever differs between pairs of cameras a little apart.
 
         Parameters
@@ -31,8 +33,8 @@ class SeesPoints(Camera):
         Raises
         ------
         GeometryError
-            Scatter; a main lens that is not thin or changes over the field; the exact model; other numbers of
-            pixels or lenslets.
+            Scatter; a main lens that is not thin or changes over the field; the exact model of lenslets that
+            are not square and of one focal length; other models, numbers of pixels or lenslets.
         SamplingError
             Array or sensor lean farther than nine distances can follow.
 
@@ -84,7 +86,7 @@ class WithParts(SeesVolumes, SeesPoints):
         Raises
         ------
         GeometryError
-            As of `part_images`; a depth that is not imaged.
+            As of `part_images`; the exact model; a depth that is not imaged.
 
         Examples
         --------
@@ -100,7 +102,13 @@ class WithParts(SeesVolumes, SeesPoints):
         (1,)
         """
         self.defocused(float(dz))
-        images, wanted = self.part_images(pairs, accuracy=accuracy), grid or self.operator_grid()
+        images = self.part_images(pairs, accuracy=accuracy)
+        if isinstance(images, ExactImages):
+            raise GeometryError(
+                "derivatives of planes by a camera's parts are paraxial; with model = 'exact' points alone "
+                "have them (part_images). Use model = 'paraxial'."
+            )
+        wanted = grid or self.operator_grid()
 
         def plane(one: PartImages) -> PartPlane:
             return PartPlane(one, wanted, float(dz))

@@ -9,7 +9,8 @@
 - `points`, `white`: single points, and the evenly lit main lens, before lenslets; `relay`, any light through
   lenslets, cell by cell; `point_light`, a point's light in their plane
 - `part_images`: points by a camera's parts; `part_points`, one by one, with derivatives by place;
-  `part_plane`, whole planes; `part_sight`, `part_waves`, `passed`, `line_parts`, what all are made of
+  `part_exact`, before exact lenslets; `part_plane`, whole planes; `part_sight`, `part_waves`, `passed`,
+  `line_parts`, what all are made of; `exact_waves`, light that is a sum over directions
 - `whole_planes`: what planes by the parts of any instrument share; `part_volume`, several of them
 - `screens`: opaque sheets before the main lens; `partly`, planes whose points they hide in part
 - `regrid`: an operator of an object on another grid, moved or finer

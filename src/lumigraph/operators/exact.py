@@ -16,8 +16,9 @@ of few: singular values of what is left of them beside their own axes' phases.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -45,6 +46,9 @@ from lumigraph.operators.optics import Optics
 
 KEPT = 0.2
 """Part of the accuracy that products may leave out."""
+
+ALIKE = 1e-3
+"""How near two singular values are whose vectors may be any in their plane, over their mean."""
 
 Function = Callable[[np.ndarray, np.ndarray], Any]
 """Of places along y and along x [m]."""
@@ -74,26 +78,69 @@ class Products:
         place, coefficients = (at - self.middle[which]) / self.half[which], self.coefficients[which]
         return np.moveaxis(chebyshev.chebvander(place, len(coefficients) - 1) @ coefficients, -1, 0)
 
+    def turned(self, like: "Products") -> "Products":
+        """The same sum, of products that are nearest to those of a function that hardly differs.
+
+        Singular vectors have any phase, and any basis where they are as strong as others.
+        """
+        (y, x), (own_y, own_x) = self.coefficients, like.coefficients
+        strength = self.strength[:, None]
+        near = np.abs(strength - like.strength) < ALIKE * (strength + like.strength)
+        left, _, right = np.linalg.svd(np.where(near, y.conj().T @ own_y + x.T @ own_x.conj(), 0))
+        turn = left @ right
+        return replace(self, coefficients=(y @ turn, x @ turn.conj()), strength=like.strength)
+
 
 def products(
-    function: Function, middle: Pair, half: Pair, turns: float, least: float, bright: Function | None = None
+    function: Function, middle: Pair, half: Pair, to: "Terms", bright: Function | None = None
 ) -> Products:
-    """Of a function of (y, x) [m] that turns so often across the intervals, but for `least` of it.
+    """Of a function of (y, x) [m], but for a part that is left out.
 
     What is left out is weighed by how `bright` it is at (y, x), a product of both axes' own.
     """
-    count = 24 + math.ceil(4 * turns)
-    nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    (nodes, values), like = interpolated(to.count), to.like
     y, x = (m + h * nodes for m, h in zip(middle, half, strict=True))
-    down, across = (np.ones(count), np.ones(count)) if bright is None else bright(y, x)
+    down, across = (np.ones(to.count), np.ones(to.count)) if bright is None else bright(y, x)
     left, strength, right = np.linalg.svd(down[:, None] * function(y[:, None], x[None, :]) * across)
     rest = np.sqrt(np.cumsum(strength[::-1] ** 2)[::-1])
-    kept = max(1, int((rest > least * rest[0]).sum()))
+    kept = max(1, int((rest > to.least * rest[0]).sum())) if like is None else len(like.strength)
     root = np.sqrt(strength[:kept])
     pair = left[:, :kept] * root / down[:, None], right[:kept].T * root / across[:, None]
+    found = Products(middle, half, (values @ pair[0], values @ pair[1]), strength[:kept] / strength[0])
+    return found if like is None else found.turned(like)
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """How many products a function of two axes is the sum of.
+
+    Parameters
+    ----------
+    turns
+        Of the function across its intervals.
+    least
+        Part of it that may be left out.
+    like
+        Of a function that hardly differs: as many, which go over into these.
+    """
+
+    turns: float
+    least: float
+    like: Products | None = None
+
+    @property
+    def count(self) -> int:
+        """Of nodes along an axis."""
+        return 24 + math.ceil(4 * self.turns) if self.like is None else len(self.like.coefficients[0])
+
+
+@cache
+def interpolated(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Chebyshev's nodes from -1 to 1, and the matrix from values there to coefficients."""
+    nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
     to = 2 / count * np.cos(np.arange(count)[:, None] * np.arccos(nodes))
     to[0] /= 2
-    return Products(middle, half, (to @ pair[0], to @ pair[1]), strength[:kept] / strength[0])
+    return nodes, to
 
 
 class ExactLenslets(Lenslets):
@@ -142,11 +189,20 @@ class ExactLenslets(Lenslets):
         Kept are those whose strengths' product counts.
         """
         if box not in self._terms:
-            parts = self._way(box), self._lenslet(), self._sphere_around(box)
+            parts = self._parts(box, (None, None, None))
             numbers = product(*(range(len(part.strength)) for part in parts))
             strengths = {n: math.prod(p.strength[k] for p, k in zip(parts, n, strict=True)) for n in numbers}
             self._terms[box] = parts, [n for n, strength in strengths.items() if strength > self.least]
         return self._terms[box]
+
+    def align(self, box: Box, like: "ExactLenslets", theirs: Box) -> None:
+        """Take terms in a box that are as those of others in theirs."""
+        if box not in self._terms:
+            parts, numbers = like.terms(theirs)
+            self._terms[box] = self._parts(box, parts), numbers
+
+    def _parts(self, box: Box, like: Sequence[Products | None]) -> tuple[Products, Products, Products]:
+        return self._way(box, like[0]), self._lenslet(like[1]), self._sphere_around(box, like[2])
 
     def _reach(self, box: Box) -> Pair:
         y, x = (
@@ -155,7 +211,7 @@ class ExactLenslets(Lenslets):
         )
         return y, x
 
-    def _way(self, box: Box) -> Products:
+    def _way(self, box: Box, like: Products | None) -> Products:
         tilt, b, k = self.scale - 1, self.b, self.k
         middle = box[0][0] * tilt, box[0][1] * tilt
         half = self._reach((box[0], (box[1][0] * tilt, box[1][1] * tilt)))
@@ -174,22 +230,22 @@ class ExactLenslets(Lenslets):
             return tuple(result)
 
         far = max(abs(m) + h for m, h in zip(middle, half, strict=True))
-        return products(beside, middle, half, self._turns(far, b), self.least, bright)
+        return products(beside, middle, half, Terms(self._turns(far, b), self.least, like), bright)
 
-    def _lenslet(self) -> Products:
+    def _lenslet(self, like: Products | None) -> Products:
         def beside(y: np.ndarray, x: np.ndarray) -> np.ndarray:
             return self._bright(y * y + x * x) * np.exp(-1j * self.k * _left(self._bent, y, x))
 
-        turns = 2 * self._turns(self.half, self.b)
-        return products(beside, (0.0, 0.0), (self.half, self.half), turns, self.least)
+        to = Terms(2 * self._turns(self.half, self.b), self.least, like)
+        return products(beside, (0.0, 0.0), (self.half, self.half), to)
 
-    def _sphere_around(self, box: Box) -> Products:
+    def _sphere_around(self, box: Box, like: Products | None) -> Products:
         def beside(y: np.ndarray, x: np.ndarray) -> np.ndarray:
             return np.exp(1j * self.k * _left(lambda squared: sphere(squared, self.L), y, x))
 
         half = self._reach(box)
         far = max(abs(m) + h for m, h in zip(box[0], half, strict=True))
-        return products(beside, box[0], half, self._turns(far, self.L), self.least)
+        return products(beside, box[0], half, Terms(self._turns(far, self.L), self.least, like))
 
     def _turns(self, far: float, radius: float) -> float:
         """Of the phase beside both axes' own, at a corner."""

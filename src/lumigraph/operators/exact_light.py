@@ -21,6 +21,7 @@ from lumigraph.elements import ThinLens, Train, ZernikePlate
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.cell_response import legendre, sphere
+from lumigraph.operators.exact_waves import Beams
 
 SAMPLES = 640
 """Across the stop for light that is not round, or more where it is followed far."""
@@ -56,6 +57,31 @@ def radial(camera: CameraOptics, distance: float, widest: float) -> CubicSpline:
     return CubicSpline(at, np.concatenate(values) / (squared * half * np.sqrt(np.pi)))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Over:
+    """What light in some directions is, for light of 1 through the stop.
+
+    Parameters
+    ----------
+    phase, strength
+        Of the amplitude, and the logarithm of what else it is.
+    within
+        How far inside the stop's edge [samples], and a half.
+    bends
+        H's yy, yx and xx over k [1/rad].
+    """
+
+    phase: np.ndarray
+    strength: np.ndarray
+    within: np.ndarray
+    bends: np.ndarray
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """With grey samples at the stop's edge."""
+        return np.clip(self.within, 0, 1) * np.exp(self.strength + 1j * self.phase)
+
+
 @dataclass(frozen=True)
 class Oblique:
     """Light around an image that stands anywhere in the lenslet plane, of a lens that may have aberrations.
@@ -69,8 +95,8 @@ class Oblique:
         The camera, and its main lens turned with the lenslets.
     distance
         Of the point before the main lens [m].
-    widest
-        How far from its image light is followed [m].
+    samples
+        Across the stop.
     place
         The image, ξ [m].
     """
@@ -78,18 +104,17 @@ class Oblique:
     camera: CameraOptics
     lens: Train
     distance: float
-    widest: float
+    samples: int
     place: tuple[float, float]
 
     def at(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
         """As `PointLight.at`."""
-        k, (down, across) = 2 * np.pi / self.camera.wavelength, self.directions
-        left, right = np.exp(1j * k * np.outer(y, down)), np.exp(1j * k * np.outer(across, x))
-        light = left @ (self.stop @ right)
-        squares = (y[:, None] ** 2, 2 * np.outer(y, x), x**2)
-        for factor, bend in zip(squares, self._bends(), strict=True):
-            light += 1j * k / 2 * factor * (left @ ((self.stop * bend) @ right))
-        return light
+        return self.beams(y, x).light
+
+    def beams(self, y: np.ndarray, x: np.ndarray) -> Beams:
+        """The same by its directions."""
+        k, over = 2 * np.pi / self.camera.wavelength, self._stop
+        return Beams.of((k * y, k * x), self.directions, over.amplitude, over.bends)
 
     @cached_property
     def chief(self) -> float:
@@ -103,40 +128,43 @@ class Oblique:
         offsets = self.place[0] + edge.imag, self.place[1] + edge.real
         way = np.sqrt(self.camera.separation**2 + offsets[0] ** 2 + offsets[1] ** 2)
         rim = [to / way - at / self.chief for to, at in zip(offsets, self.place, strict=True)]
-        count = max(SAMPLES, math.ceil(3 * self.widest / _cells.airy(self.camera)))
-        step = max(float(np.ptp(part)) for part in rim) / count
-        numbers = (np.arange(count + 8) - (count + 7) / 2) * step
+        step = max(float(np.ptp(part)) for part in rim) / self.samples
+        numbers = (np.arange(self.samples + 8) - (self.samples + 7) / 2) * step
         down, across = (numbers + (part.max() + part.min()) / 2 for part in rim)
         return down, across
 
     @cached_property
-    def cosines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of all directions, along y, x and the axis."""
-        y, x = (part + at / self.chief for part, at in zip(self.directions, self.place, strict=True))
-        return y[:, None], x[None, :], np.sqrt(1 - y[:, None] ** 2 - x**2)
+    def _stop(self) -> Over:
+        return self.over(self.directions[0][:, None], self.directions[1])
 
-    @cached_property
-    def stop(self) -> np.ndarray:
-        """Amplitude (y, x) of the directions, for light of 1 through the stop."""
-        camera, (to_y, to_x, along) = self.camera, self.cosines
+    def over(self, y: np.ndarray, x: np.ndarray) -> Over:
+        """Light in directions, as cosines along both axes from those of the chief ray on."""
+        camera, (at_y, at_x) = self.camera, self.place
+        to_y, to_x = y + at_y / self.chief, x + at_x / self.chief
+        along = np.sqrt(1 - to_y**2 - to_x**2)
         L, half, k = camera.separation, camera.pupil_diameter / 2, 2 * np.pi / camera.wavelength
-        image, (at_y, at_x) = image_distance(camera, self.distance), self.place
+        image = image_distance(camera, self.distance)
         y, x, near = at_y - L * to_y / along, at_x - L * to_x / along, image / L
         path = _from_axis(y - at_y, x - at_x, L) - _from_axis(at_y, at_x, L)
         path -= _from_axis(y - near * at_y, x - near * at_x, image)
         path += _from_axis(near * at_y, near * at_x, image)
         phase = sum((p.phase(y, x) for p in self.lens.elements if isinstance(p, ZernikePlate)), k * path)
         step = self.directions[0][1] - self.directions[0][0]
-        within = np.clip(0.5 - (np.hypot(y, x) - half) / (step * L / along**2), 0, 1)
-        share = step**2 * L / (camera.wavelength * half * math.sqrt(math.pi))
-        return within * np.exp(1j * phase) * share / along**2
+        within = 0.5 - (np.hypot(y, x) - half) / (step * L / along**2)
+        share = math.log(step**2 * L / (camera.wavelength * half * math.sqrt(math.pi)))
+        bends = np.stack(self._bends(to_y, to_x, along)) / k
+        return Over(phase, share - 2 * np.log(along), within, bends)
 
-    def _bends(self) -> list[np.ndarray]:
+    def _bends(self, to_y: np.ndarray, to_x: np.ndarray, along: np.ndarray) -> list[np.ndarray]:
         """H's yy, yx and xx [1/m]."""
-        (at_y, at_x), (to_y, to_x, along) = self.place, self.cosines
+        (at_y, at_x), way = self.place, self.camera.separation / along
         pairs = (1, to_y * to_y, at_y * at_y), (0, to_y * to_x, at_y * at_x), (1, to_x * to_x, at_x * at_x)
-        way = self.camera.separation / along
         return [(one - to) / way - (one - at / self.chief**2) / self.chief for one, to, at in pairs]
+
+
+def samples(camera: CameraOptics, widest: float) -> int:
+    """Across the stop, for light that is followed so far from its image [m]."""
+    return max(SAMPLES, math.ceil(3 * widest / _cells.airy(camera)))
 
 
 def _from_axis(y: np.ndarray | float, x: np.ndarray | float, radius: float) -> np.ndarray:

@@ -12,7 +12,7 @@ is differentiated. What is made of the image is followed back to them once, so t
 costs no product of large matrices.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -61,14 +61,7 @@ class PartImages:
     accuracy: float = 1e-2
 
     def __post_init__(self) -> None:
-        if not FINEST <= self.accuracy <= COARSEST:
-            raise SamplingError(
-                f"accuracy is {self.accuracy:g} but must lie between {FINEST:g} and {COARSEST:g}."
-            )
-        for one in (self.camera, *(end for pair in self.pairs for end in pair)):
-            require_paraxial(one)
-            _require_as_many(one, self.camera)
-            _require_as_thin(one, self.camera)
+        check_parts(self.camera, self.pairs, self.accuracy, require_paraxial)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -87,8 +80,7 @@ class PartImages:
     @single_products()
     def derivative(self, points: Points, change: np.ndarray) -> np.ndarray:
         """Change (ny, nx) of `forward`, so many times (n,) from the first to the last camera of each pair."""
-        if np.shape(change) != (len(self.pairs),):
-            raise GeometryError(f"change has shape {np.shape(change)} but must be ({len(self.pairs)},).")
+        check_change(self.pairs, change)
         own, mine, moved = self.before(points)
         light, changed, spots = np.zeros(own.shape), np.zeros(own.shape), own.spots(mine)
         weights = np.asarray(change, np.float64).tolist()
@@ -102,8 +94,7 @@ class PartImages:
     @single_products()
     def gradient(self, points: Points, weights: np.ndarray) -> np.ndarray:
         """Transpose of `derivative`: (n,) from weights (ny, nx) of the raw image's pixels."""
-        if np.shape(weights) != self.shape:
-            raise GeometryError(f"weights have shape {np.shape(weights)} but the raw image {self.shape}.")
+        check_weights(self.shape, weights)
         own, mine, moved = self.before(points)
         seen, by, light = own.read.adjoint(np.asarray(weights, np.float64)), Slopes(), np.zeros(own.shape)
         found, ends = np.zeros(len(self.pairs)), self.ends(own)
@@ -149,6 +140,33 @@ class PartImages:
 def _thin(camera: CameraOptics) -> CameraOptics:
     """The thin lens in the exit pupil, of one of glass."""
     return replace(camera, objects=None)
+
+
+def check_parts(
+    camera: CameraOptics,
+    pairs: Sequence[tuple[CameraOptics, CameraOptics]],
+    accuracy: float,
+    require: Callable[[CameraOptics], None],
+) -> None:
+    """Refuse accuracies out of range, and cameras that are refused or have other numbers of parts."""
+    if not FINEST <= accuracy <= COARSEST:
+        raise SamplingError(f"accuracy is {accuracy:g} but must lie between {FINEST:g} and {COARSEST:g}.")
+    for one in (camera, *(end for pair in pairs for end in pair)):
+        require(one)
+        _require_as_many(one, camera)
+        _require_as_thin(one, camera)
+
+
+def check_change(pairs: Sequence[object], change: np.ndarray) -> None:
+    """Refuse another number of changes than of pairs."""
+    if np.shape(change) != (len(pairs),):
+        raise GeometryError(f"change has shape {np.shape(change)} but must be ({len(pairs)},).")
+
+
+def check_weights(shape: tuple[int, int], weights: np.ndarray) -> None:
+    """Refuse weights that are no raw image."""
+    if np.shape(weights) != shape:
+        raise GeometryError(f"weights have shape {np.shape(weights)} but the raw image {shape}.")
 
 
 def require_paraxial(camera: CameraOptics) -> None:

@@ -5,7 +5,7 @@ for all that are compared: what changes are their images and, with the tilts, th
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Generic, TypeVar
 
@@ -14,12 +14,18 @@ import numpy as np
 from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.leaning import near
 from lumigraph.operators.paraxial import resolved
-from lumigraph.operators.part_images import PartImages, require_paraxial
-from lumigraph.operators.part_points import Back, PartPoints
+from lumigraph.operators.part_exact import ExactImages, ExactPoints
+from lumigraph.operators.part_images import PartImages, one_lens, require_paraxial
+from lumigraph.operators.part_points import Back, PartPoints, SteppedPoints
+from lumigraph.operators.part_waves import Where
 from lumigraph.operators.whole_planes import Part
+from lumigraph.scene import Points
 
 Seen = TypeVar("Seen", bound=Part)
 Other = TypeVar("Other", bound=Part)
+
+Images = PartImages | ExactImages
+"""Of points, by a camera's model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +125,8 @@ def weighed(moved: np.ndarray, seen: Sequence[np.ndarray]) -> np.ndarray:
 
 def by_parts(
     camera: HasOptics, pairs: Sequence[tuple[HasOptics, HasOptics]], accuracy: float
-) -> PartImages | LeaningParts[PartImages]:
-    """Of instruments, a little to either side of one.
+) -> Images | LeaningParts[PartImages]:
+    """Of instruments, a little to either side of one, whose model they have where theirs is "auto".
 
     Raises
     ------
@@ -129,12 +135,29 @@ def by_parts(
     SamplingError
         As of `leaning.flat`.
     """
-    own, *ends = (
-        resolved(one.optics(), accuracy) for one in (camera, *(end for both in pairs for end in both))
-    )
+    own, ends = resolved(camera.optics(), accuracy), [end.optics() for both in pairs for end in both]
+    ends = [replace(end, model=own.model) if end.model == "auto" else end for end in ends]
     both = tuple(zip(ends[::2], ends[1::2], strict=True))
+    if own.model == "exact":
+        return ExactImages(own, both, accuracy)
     plain = all(one.lean is None for one in (own, *ends))
     return PartImages(own, both, accuracy) if plain else _leaning(own, both, accuracy)
+
+
+def points_before(
+    images: Images | LeaningParts[PartImages], points: Points, moved: Sequence[Where]
+) -> PartPoints | LeaningPoints:
+    """Points one by one, before any camera; elsewhere before those of each pair."""
+    if isinstance(images, LeaningParts):
+        each = [_flat(one, points, moved) for one in images.parts]
+        return LeaningPoints(each, images.weights, images.moved)
+    return _flat(images, points, moved)
+
+
+def _flat(images: Images, points: Points, moved: Sequence[Where]) -> PartPoints:
+    if isinstance(images, ExactImages):
+        return ExactPoints(images, points, moved)
+    return (PartPoints if one_lens(images.camera) else SteppedPoints)(images, points, moved)
 
 
 def _leaning(

@@ -119,10 +119,6 @@ class LensSight(Sight):
         film = Film(camera, float(distances[0]), (y, x), far)
         return cls(cast(Any, film), nodes, reach=reach_of(camera))
 
-    def alike(self, camera: CameraOptics) -> "LensSight":
-        """As of cameras with lenslets."""
-        return LensSight(self.optics.alike(camera), self.nodes, self, self.reach)
-
     @property
     def shape(self) -> tuple[int, int]:
         """As of cameras with lenslets."""

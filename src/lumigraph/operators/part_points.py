@@ -8,11 +8,11 @@ is made of both is followed back through four fields at once.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from lumigraph.core.threads import single_products
-from lumigraph.operators.part_images import PartImages, one_lens
 from lumigraph.operators.part_sight import Sight, Spot
 from lumigraph.operators.part_waves import Both, Slopes, Waves, Where, factor, pupils, read_anew, times
 from lumigraph.scene import Points
@@ -31,14 +31,14 @@ class PartPoints:
     Parameters
     ----------
     images
-        The cameras'.
+        The cameras', `PartImages`; of some kinds others.
     points
         Nearer ones first.
     moved
         (n,), the same before the cameras of each pair, as far from the planes in focus.
     """
 
-    images: PartImages
+    images: Any
     points: Points
     moved: Sequence[Where]
     _slopes: Slopes = field(default_factory=Slopes)
@@ -178,11 +178,9 @@ class SteppedPoints(PartPoints):
 
     def _fields(self, spot: Spot) -> tuple[list[np.ndarray], Follow]:
         """As of points whose waves in the main lens only turn; no light is won or lost with depth."""
-        own, waves = self._own, []
-        for k in range(7):
-            beside = replace(self._spots[spot.number + k], cells=spot.cells, window=spot.window)
-            waves.append(Waves.of(own, beside))
-        distance = [own.optics.camera.object_distance + one.spot.dz for one in waves]
+        some = (self._spots[spot.number + k] for k in range(7))
+        waves = [self._wave(replace(one, cells=spot.cells, window=spot.window)) for one in some]
+        distance = [self._own.optics.camera.object_distance + one.spot.dz for one in waves]
         steps = np.repeat(self._steps[spot.number // 7], 2) * np.tile([-2, 2], 3)
         shares = [1.0, *(far / distance[0] / step for far, step in zip(distance[1:], steps, strict=True))]
         fields = [share * one.field for share, one in zip(shares, waves, strict=True)]
@@ -190,14 +188,15 @@ class SteppedPoints(PartPoints):
         def follow(by: list[np.ndarray]) -> None:
             each = [by[0], *(one for one in by[1:] for _ in range(2))]
             for one, share, slopes in zip(waves, shares, each, strict=True):
-                self._by_pupil(one.spot, self._slopes.add(one, share * slopes))
+                self._return(one, share * slopes)
 
-        return [
-            fields[0],
-            *(low + high for low, high in zip(fields[1::2], fields[2::2], strict=True)),
-        ], follow
+        sides = zip(fields[1::2], fields[2::2], strict=True)
+        return [fields[0], *(low + high for low, high in sides)], follow
 
+    def _wave(self, spot: Spot) -> Any:
+        """A point's light on its way."""
+        return Waves.of(self._own, spot)
 
-def points_before(images: PartImages, points: Points, moved: Sequence[Where]) -> PartPoints:
-    """Points one by one, before any camera that has `PartImages`."""
-    return (PartPoints if one_lens(images.camera) else SteppedPoints)(images, points, moved)
+    def _return(self, wave: Any, by: np.ndarray) -> None:
+        """Adds slopes by its field."""
+        self._by_pupil(wave.spot, self._slopes.add(wave, by))

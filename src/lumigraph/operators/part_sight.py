@@ -6,7 +6,7 @@ Cameras that hardly differ are sampled alike, so that what they do to light can 
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import Any, Self, cast
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from lumigraph.operators.lines import Lines
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.passed import Parted
 from lumigraph.operators.point_changes import PUPIL
-from lumigraph.operators.point_light import Sampled, by_distance
+from lumigraph.operators.point_light import PointLight, Sampled, by_distance
 from lumigraph.operators.points import SPARE, farthest, lit_cells, on_lenslets, share
 from lumigraph.operators.relay import Straight
 from lumigraph.operators.tiles import readout
@@ -81,7 +81,7 @@ class Sight:
     reach: float = 1.0
 
     @classmethod
-    def of(cls, camera: CameraOptics, points: Points, accuracy: float, fewest: int = PUPIL) -> "Sight":
+    def of(cls, camera: CameraOptics, points: Points, accuracy: float, fewest: int = PUPIL) -> Self:
         """As finely as the accuracy and the points ask for, by so many nodes across the lens at least."""
         distances = camera.object_distance + points.positions[:, 2]
         blurred = max(distances.tolist(), key=lambda z: _cells.blur(camera, z))
@@ -92,12 +92,12 @@ class Sight:
         nodes = max(fewest, *(2 * math.ceil(count / 2) for count in least))
         return cls(optics.alike(camera), nodes, reach=reach_of(camera))
 
-    def alike(self, camera: CameraOptics) -> "Sight":
+    def alike(self, camera: CameraOptics) -> Self:
         """Of a camera that hardly differs, as finely sampled."""
-        return Sight(self.optics.alike(camera), self.nodes, self, self.reach)
+        return replace(self, optics=self.optics.alike(camera), like=self)
 
     @property
-    def anew(self) -> "Sight":
+    def anew(self) -> Self:
         """The same, which knows nothing yet."""
         return replace(self)
 
@@ -127,7 +127,7 @@ class Sight:
 
     def pupil(self, spot: Spot) -> np.ndarray:
         """Wave (nodes, nodes) in the main lens, of a point of 1 in the place of another."""
-        if self.like is not None and self.like._before == self._before:
+        if self.like is not None and self.like.before == self.before:
             return self.like.pupil(spot)
         if (key := self.seen_from(spot)) not in self._pupils:
             self._pupils.clear()  # one depth, or field, comes after another
@@ -151,10 +151,14 @@ class Sight:
             found.append(replace(spot, cells=cells, window=window))
         return found
 
+    def light(self, spot: Spot) -> PointLight:
+        """A point's, in the lenslet plane."""
+        return self._light(spot)
+
     def _lit(self, spot: Spot) -> Lit:
         """Cells that a point lights."""
         optics = self._at(spot.dz)
-        cells = lit_cells(optics, self._light(spot), self._place(optics, spot.position))
+        cells = lit_cells(optics, self.light(spot), self._place(optics, spot.position))
         y, x = (
             slice(mine.start * n, mine.stop * n) for mine, n in zip(cells, optics.cells.samples, strict=True)
         )
@@ -195,7 +199,7 @@ class Sight:
         return varying.plate_of(self.optics.camera) is not None
 
     @cached_property
-    def _before(self) -> tuple[Any, ...]:
+    def before(self) -> tuple[Any, ...]:
         """All that waves in the main lens, and how bright they are, follow from."""
         one = self.optics.camera
         lens = tuple(one.lens.elements if self._varies else _cells.lens(one).elements)
@@ -207,7 +211,7 @@ class Sight:
         """All that lenslets' matrices follow from."""
         one, of = self.optics, self.optics.camera
         distances = of.wavelength, of.separation, of.lenslet_distance
-        return one.array, one.cells, one.axes, distances, _cells.accepted(of)
+        return one.array, one.cells, one.axes, distances, _cells.accepted(of), of.surface
 
     @cached_property
     def _seen(self) -> tuple[Any, ...]:

@@ -42,7 +42,7 @@ def point_light(
         return paraxial_light(camera, distance, widest)
     lens = _cells.lens(camera)
     if place != (0.0, 0.0) or _round(lens) is None:
-        return exact_light.Oblique(camera, lens, distance, widest, place)
+        return exact_light.Oblique(camera, lens, distance, exact_light.samples(camera, widest), place)
     return Round(exact_light.radial(camera, distance, widest))
 
 

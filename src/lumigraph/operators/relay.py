@@ -26,7 +26,7 @@ from lumigraph.operators.cell_response import (
     legendre,
     nodes,
 )
-from lumigraph.operators.exact import lenslets_of
+from lumigraph.operators.exact import ExactLenslets, lenslets_of
 from lumigraph.operators.line_parts import Key
 from lumigraph.operators.lines import Lines
 from lumigraph.operators.optics import Optics
@@ -154,17 +154,22 @@ class Straight:
 
     def field(self, light: np.ndarray, rows: range, columns: range) -> np.ndarray:
         """As `Relay.field`."""
-        box = self._box(rows, columns) if self.optics.camera.model == "exact" else MIDDLE
+        box = self.box(rows, columns) if self.optics.camera.model == "exact" else MIDDLE
         down = self.along(0, light[None], rows, box)
         return self.along(1, down.transpose(0, 2, 1), columns, box).sum(0).T
 
-    def _box(self, rows: range, columns: range) -> Box:
+    def box(self, rows: range, columns: range) -> Box:
+        """Where cells' centres are."""
         ends = [
             (mine.center(cells[0]), mine.center(cells[-1]))
             for mine, cells in zip(self._sides, (rows, columns), strict=True)
         ]
         (top, bottom), (left, right) = ends
         return ((top + bottom) / 2, (left + right) / 2), ((bottom - top) / 2, (right - left) / 2)
+
+    def align(self, box: Box, like: "Straight", theirs: Box) -> None:
+        """Take terms in a box that are as those of other exact lenslets, which hardly differ, in theirs."""
+        cast(ExactLenslets, self._lenslets).align(box, cast(ExactLenslets, like._lenslets), theirs)
 
     def along(self, which: int, light: np.ndarray, cells: range, box: Box) -> np.ndarray:
         """Amplitudes (terms, samples, n) along one axis of light (1 or terms, places, n)."""
