@@ -40,6 +40,13 @@ ONE = {
     "sensor": {"pixel_pitch": 20 * um},
 }
 """Whose main lens is matched to the lenslets, and so the light to their pitch."""
+DIFFER = TWO | {
+    "lenslets": TWO["lenslets"] | {"index": 1.5},
+    "built": {
+        "focal_length_scatter": 0.02, "decentre_scatter": 2 * um, "tilt_scatter": 1e-3, "form_scatter": 3e-8,
+        "missing": 0.05, "seed": 3,
+    },
+}  # fmt: skip
 BESIDE = range(1, 2)
 """A place off the axis, which moves with the lattice."""
 KEYS = (
@@ -47,6 +54,7 @@ KEYS = (
     "main_lens.aberrations.6", "lenslets.pitch", "lenslets.focal_length", "lenslets.magnification",
     "lenslets.fill_factor", "sensor.pixel_pitch", "sensor.fill_factor",
 )  # fmt: skip
+SIZES = tuple(f"built.{key}" for key in DIFFER["built"] if key.endswith("scatter"))
 
 
 def camera(given):
@@ -74,8 +82,10 @@ def ends(given, key, step):
         (FREE, ("built.lenslet_distance",), "lateral"),
         (HEX, ("lenslets.pitch", "lenslets.focal_length.1"), "lateral"),
         (ONE, ("lenslets.pitch", "object_distance"), "brightness"),
+        (DIFFER, ("built.form_scatter",), "depth"),
+        pytest.param(DIFFER, (*KEYS[1:9:3], *SIZES), "lateral", marks=pytest.mark.long),
     ],
-    ids=["squares", "built", "hexagons of three kinds", "1.0"],
+    ids=["squares", "built", "hexagons of three kinds", "1.0", "that differ", "that differ, by others"],
 )
 def test_slopes_are_central_differences_of_bounds(given, keys, name):
     """Of cameras twice as far to either side, each sampled as it asks for, in double precision."""
@@ -91,7 +101,9 @@ def test_slopes_are_central_differences_of_bounds(given, keys, name):
         assert 2 * change == pytest.approx(high - low, rel=1e-4, abs=0), key
 
 
-@pytest.mark.parametrize("given", [TURNED, HEX, ONE], ids=["turned squares", "hexagons", "1.0"])
+@pytest.mark.parametrize(
+    "given", [TURNED, HEX, ONE, DIFFER], ids=["turned squares", "hexagons", "1.0", "that differ"]
+)
 def test_images_and_their_derivatives_are_those_of_bounds(given):
     """Which are of single precision; behind a plain lens of a sharp stop, which is sampled here."""
     depths = np.array([-4 * mm])

@@ -65,6 +65,16 @@ def test_a_number_is_a_place_in_a_list():
         changed(camera, {"lenslets.focal_length.3": "0.6 mm"})
 
 
+def test_a_list_that_the_file_leaves_out_begins_as_the_camera_has_it():
+    camera = lg.load_camera("thesis-plenoptic-2-m050")
+    other = changed(camera, {"built.array_tilt.0": "2 mrad", "built.sensor_tilt.0,1": "-1 mrad"})
+    assert other.built.array_tilt == (0.002, 0.0)
+    assert other.built.sensor_tilt == (-0.001, -0.001)
+    assert changed(other, {"built.array_tilt.1": "1 mrad"}).built.array_tilt == (0.002, 0.001)
+    with pytest.raises(FormatError, match="2 is none of the values 0 to 1"):
+        changed(camera, {"built.array_tilt.2": "2 mrad"})
+
+
 @pytest.mark.parametrize(
     ("lenslets", "said"),
     [

@@ -6,6 +6,7 @@ import pytest
 import lumigraph as lg
 from lumigraph.errors import GeometryError
 from lumigraph.operators.part_leaning import points_before
+from lumigraph.operators.part_points import PartPoints, SteppedPoints
 from lumigraph.operators.points import points_image
 from lumigraph.scene import Points
 from lumigraph.units import mm, nm, um
@@ -102,6 +103,13 @@ def test_points_beside_others_say_how_images_change_with_their_place():
     for k, move in enumerate(np.eye(3)[:2] * step):
         low, high = (images.forward(Points(one.positions + s * move, np.ones(1))) for s in (-1, 1))
         assert off(lit[k + 1], (high - low) / (2 * step)) < 1e-3
+
+
+def test_fields_beside_each_other_say_what_turned_ones_do():
+    """Behind one lens for all fields; no light is won or lost with depth."""
+    images = camera().replace(main_lens={"over_field": None, "aberrations": {6: 0.3}}).part_images([])
+    turned, beside = (of(images, POINTS, []).lit(1)[0] for of in (PartPoints, SteppedPoints))
+    assert [off(found, known) < 1e-3 for found, known in zip(beside, turned, strict=True)] == [True] * 4
 
 
 @pytest.mark.long

@@ -163,16 +163,9 @@ def test_a_gradient_takes_less_than_three_times_the_memory_of_an_image(given, rn
     assert peak(lambda: images.gradient(POINTS, weights)) < 3 * peak(lambda: images.forward(POINTS))
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"model": "exact"}, "model = 'paraxial'"),
-        ({"built": {"focal_length_scatter": 1e-3}}, "without scatter"),
-    ],
-)
-def test_what_has_no_such_derivatives_is_refused(change, message):
-    with pytest.raises(GeometryError, match=message):
-        camera(START).replace(**change).part_images([])
+def test_what_has_no_such_derivatives_is_refused():
+    with pytest.raises(GeometryError, match="model = 'paraxial'"):
+        camera(HEX).replace(model="exact").part_images([])
 
 
 @pytest.mark.parametrize("change", [{"sensor": {"shape": (239, 240)}}, {"lenslets": {"count": (9, 8)}}])

@@ -119,8 +119,8 @@ class How:
     ----------
     search
         local: downhill from the best of the first values. global: over all of the ranges, by differential
-        evolution. gradient: along derivatives, for bounds and the errors of scenes of microscopes and of
-        paraxial cameras with lenslets; each step takes the time of some five cameras, however many keys vary.
+        evolution. gradient: along derivatives, for bounds of microscopes and cameras, and errors of scenes
+        of most of them; each step takes the time of some five cameras, however many keys vary.
         grid: the first values alone.
     evaluations
         Cameras at most, beyond the first values.
@@ -163,7 +163,8 @@ def optimise(
         Camera file (TOML), or the name of a bundled one.
     vary
         A key of the camera file and its values, as in 'lumigraph sweep': 'first:last:count' is a range, of which
-        so many values are tried first; values separated by commas are a stock. May be repeated.
+        so many values are tried first; values separated by commas are a stock. Of a list such as a tilt, a
+        number is the value's place: 'built.array_tilt.0=-2 mrad:2 mrad:3'. May be repeated.
     output
         Camera file of the best (.toml).
     """  # noqa: E501 - an example is one line

@@ -52,7 +52,8 @@ def sweep(
     camera
         Camera file (TOML), or the name of a bundled one.
     vary
-        A key of the camera file and its values: 'first:last:count', or several, separated by commas.
+        A key of the camera file and its values: 'first:last:count', or several, separated by commas. Of a
+        list such as a tilt, a number is the value's place: 'built.array_tilt.0=-2 mrad:2 mrad:3'.
         May be repeated: every combination is computed.
     measure
         Names of quantities as 'lumigraph design' prints them, separated by commas; all if left out. Simulated:

@@ -65,8 +65,7 @@ def slopes(
     Parameters
     ----------
     scope
-        A camera with lenslets that has `part_images`, or a microscope: a Fourier one, or one that has
-        `pupil_images`.
+        A camera that has `part_images`, or a microscope: a Fourier one, or one that has `pupil_images`.
     pairs
         (n,), instruments a little to either side of it: by a focal length, a lenslet's place, a term of the
         pupil's phase.

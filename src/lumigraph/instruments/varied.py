@@ -3,10 +3,11 @@
 import itertools
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lumigraph.errors import FormatError
+from lumigraph.instruments.files import write
 from lumigraph.instruments.instrument import Instrument
 
 MOST = 100_000
@@ -69,14 +70,16 @@ def changed(camera: Instrument, item: Mapping[str, Any]) -> Instrument:
     """The camera whose file has other values, by dotted keys; lengths carry a unit as in the file.
 
     A part of a key is one of a table, a number that counts a list's values from 0, or several with commas
-    between them, which all get the value: ``lenslets.single.2,8.focal_change``.
+    between them, which all get the value: ``lenslets.single.2,8.focal_change``. A list that the file leaves
+    out begins as the camera has it: ``built.array_tilt.0``.
     """
     table = tomllib.loads(camera.to_toml())
     for name, value in item.items():
         *path, last = ([one.strip() for one in part.split(",")] for part in name.split("."))
         places: list[Any] = [table]
-        for keys in path:
-            places = [_inside(place, key, name) for place in places for key in keys]
+        for before, keys in enumerate(path):
+            begun = {key: _begun(camera, [*(one for (one, *_) in path[:before]), key]) for key in keys}
+            places = [_inside(place, key, name, begun[key]) for place in places for key in keys]
         for place, key in itertools.product(places, last):
             place[_key(place, key, name)] = value
     return type(camera).from_table(table, "--vary")
@@ -97,10 +100,18 @@ def _under(place: Any, key: str) -> Any:
     return place.get(key) if isinstance(place, dict) else None
 
 
-def _inside(place: Any, key: str, name: str) -> Any:
-    """What stands under a key of a table or a list; a table that is not there is begun."""
+def _begun(camera: Instrument, keys: Sequence[str]) -> Any:
+    """What stands under keys that a file leaves out: the values of a list, or an empty table."""
+    found: Any = camera
+    for key in keys:
+        found = getattr(found, key, None)
+    return tomllib.loads(write({keys[-1]: found}))[keys[-1]] if isinstance(found, tuple) else {}
+
+
+def _inside(place: Any, key: str, name: str, begun: Any) -> Any:
+    """What stands under a key of a table or a list; in a table that has it not, what is begun."""
     key = _key(place, key, name)
-    found = place.setdefault(key, {}) if isinstance(place, dict) else place[key]
+    found = place.setdefault(key, begun) if isinstance(place, dict) else place[key]
     if not isinstance(found, dict | list):
         raise FormatError(f"--vary {name}: {key} is a value, which has no parts. Check the key.")
     return found

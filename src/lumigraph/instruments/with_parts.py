@@ -33,8 +33,9 @@ class SeesPoints(Camera):
         Raises
         ------
         GeometryError
-            Scatter; a main lens that is not thin or changes over the field; the exact model of lenslets that
-            are not square and of one focal length; other models, numbers of pixels or lenslets.
+            The exact model, or lenslets that differ by chance, where they are not square and of one focal
+            length; the exact model behind a lens that changes over the field; a pair of other models, numbers
+            of pixels or lenslets, or of which other lenslets are missing.
         SamplingError
             Array or sensor lean farther than nine distances can follow.
 
@@ -86,7 +87,8 @@ class WithParts(SeesVolumes, SeesPoints):
         Raises
         ------
         GeometryError
-            As of `part_images`; the exact model; a depth that is not imaged.
+            As of `part_images`; the exact model, lenslets that differ by chance, a main lens that changes
+            over the field; a depth that is not imaged.
 
         Examples
         --------

@@ -89,10 +89,7 @@ class Lines(LineParts):
         bright = np.array(
             [np.linalg.norm(light[o.top :, o.left :][:tall, :wide]) for o in around], np.float64
         )
-        bright = (bright / max(bright.max(initial=0), np.finfo(np.float64).tiny)) ** 4
-        order = np.argsort(bright)
-        budget = (DARK * self.optics.fineness.accuracy) ** 2 * bright.sum()
-        lit = [around[k] for k in sorted(order[np.cumsum(bright[order]) > budget].tolist())]
+        lit = [around[k] for k in bright_ones(bright, self.optics.fineness.accuracy)]
         rest: list[One] = []
         for _, row in groupby(lit, lambda one: one.y):
             rest += row
@@ -169,6 +166,14 @@ class Lines(LineParts):
             One(y, x, int(kind), top, left)
             for (y, x, kind), top, left in zip(members.tolist(), tops, lefts, strict=True)
         ]
+
+
+def bright_ones(bright: np.ndarray, accuracy: float) -> list[int]:
+    """Numbers of the lenslets, of the rms amplitudes around them, that are not left out."""
+    squared = (bright / max(bright.max(initial=0), np.finfo(np.float64).tiny)) ** 4
+    order = np.argsort(squared)
+    budget = (DARK * accuracy) ** 2 * squared.sum()
+    return sorted(order[np.cumsum(squared[order]) > budget].tolist())
 
 
 def of_kinds(some: Sequence[One]) -> Iterator[tuple[int, list[One]]]:

@@ -22,6 +22,7 @@ from lumigraph.core.threads import single_products
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics
+from lumigraph.operators.each import one_by_one
 from lumigraph.operators.fineness import COARSEST
 from lumigraph.operators.part_lens import LensSight
 from lumigraph.operators.part_sight import Sight
@@ -42,7 +43,8 @@ class PartImages:
     Parameters
     ----------
     camera
-        Without lenslets, or with some of any shape and focal lengths; paraxial.
+        Paraxial, without lenslets or with some of any shape and focal lengths; squares of one may differ by
+        chance.
     pairs
         (n,), cameras a little to either side of it: by a length, a term of the phase, the wavelength.
     accuracy
@@ -51,7 +53,7 @@ class PartImages:
     Raises
     ------
     GeometryError
-        Another camera; one of a pair that has another number of pixels or lenslets.
+        Another camera; one of a pair that has another number of pixels or lenslets, or others missing.
     SamplingError
         An accuracy out of 1e-3 to 1e-2.
     """
@@ -62,6 +64,9 @@ class PartImages:
 
     def __post_init__(self) -> None:
         check_parts(self.camera, self.pairs, self.accuracy, require_paraxial)
+        camera, *ends = one_by_one((self.camera, *(end for pair in self.pairs for end in pair)))
+        object.__setattr__(self, "camera", camera)
+        object.__setattr__(self, "pairs", tuple(zip(ends[::2], ends[1::2], strict=True)))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -171,11 +176,10 @@ def check_weights(shape: tuple[int, int], weights: np.ndarray) -> None:
 
 def require_paraxial(camera: CameraOptics) -> None:
     """Refuse cameras whose light behind lenslets is no product along two axes."""
-    array = camera.array
-    if camera.model != "paraxial" or (array is not None and array.scatter is not None):
+    if camera.model != "paraxial":
         raise GeometryError(
-            "derivatives by a camera's parts are of paraxial cameras with lenslets that are alike. "
-            "Use model = 'paraxial' without scatter."
+            "derivatives by a camera's parts are between cameras of one model, but one of a pair is exact "
+            "and the camera itself is not. Use model = 'paraxial' for all, or 'exact'."
         )
 
 

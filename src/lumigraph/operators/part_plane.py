@@ -16,6 +16,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
 from lumigraph.errors import GeometryError
 from lumigraph.operators.camera import CameraOptics
+from lumigraph.operators.each import require_repeated
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.part_images import PartImages, one_lens
 from lumigraph.operators.part_sight import Sight, Spot
@@ -48,6 +49,11 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         Samples of the object.
     dz
         Depth from the focused plane [m].
+
+    Raises
+    ------
+    GeometryError
+        Lenslets that differ by chance.
     """
 
     images: PartImages
@@ -60,6 +66,7 @@ class PartPlane(CellPlane[Sight, "Lit"]):
                 "planes have derivatives behind a thin lens that is the same for all fields. Use points "
                 "(part_images), or leave out over_field and prescription."
             )
+        require_repeated(self.images.camera)
 
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:

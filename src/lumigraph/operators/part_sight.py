@@ -6,7 +6,7 @@ Cameras that hardly differ are sampled alike, so that what they do to light can 
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self, cast
+from typing import Any, Self
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from lumigraph.core.linear import Linear
 from lumigraph.operators import cells as _cells
 from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics
+from lumigraph.operators.each import Each
 from lumigraph.operators.lines import Lines
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.passed import Parted
@@ -120,9 +121,11 @@ class Sight:
         """What they do to light."""
         if self.like is not None and self.like._behind == self._behind:
             return self.like.lenslets
+        like: Any = None if self.like is None else self.like.lenslets
+        if self.optics.array.scatter is not None:
+            return Each(self.optics, np.complex128, like)
         if self.optics.straight:
             return Straight(self.optics, np.complex128)
-        like = None if self.like is None else cast(Lines, self.like.lenslets)
         return Lines(self.optics, np.complex128, like)
 
     def pupil(self, spot: Spot) -> np.ndarray:

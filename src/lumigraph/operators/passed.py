@@ -10,11 +10,12 @@ from typing import Protocol
 
 import numpy as np
 
+from lumigraph.operators.each import LIGHT, SPREAD, Each, Ways
 from lumigraph.operators.line_parts import ON_LINES, Key, Pieces
 from lumigraph.operators.lines import Lines, One, by_row, of_kinds
 from lumigraph.operators.relay import Straight
 
-Parted = Straight | Lines
+Parted = Straight | Lines | Each
 """Relays whose light can be followed back."""
 
 
@@ -56,6 +57,8 @@ def passed(relay: Parted, light: np.ndarray, rows: range, columns: range) -> Pas
     """Light (y, x) at a relay's places, to the samples of some cells."""
     if isinstance(relay, Straight):
         return _Squares.of(relay, light, (rows, columns))
+    if isinstance(relay, Each):
+        return _Singly.of(relay, light, (rows, columns))
     if isinstance(relay, Lines):
         return _AnyShape.of(relay, light, (rows, columns))
     return relay.passed(light, rows, columns)
@@ -200,6 +203,83 @@ class _AnyShape:
             found[lines] = across[chord].T @ by[lines]
         slopes.add(key, mine)
         return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Singly:
+    """Behind square lenslets that differ, row after row: what is between is computed again, not kept.
+
+    Parameters
+    ----------
+    lit
+        Rows of lenslets that are not dark, and the columns of each.
+    """
+
+    relay: Each
+    cells: Ways
+    light: np.ndarray
+    lit: list[tuple[int, list[int]]]
+    field: np.ndarray
+
+    @classmethod
+    def of(cls, relay: Each, light: np.ndarray, cells: Ways) -> "_Singly":
+        lit = relay.lit(light, *cells)
+        return cls(relay, cells, light, lit, relay.past(light, lit, cells))
+
+    def changed(self, light: np.ndarray, change: Pieces) -> np.ndarray:
+        """As `Passed.changed`."""
+        relay, cells, own = self.relay, self.cells, self.relay.piece
+        found = relay.past(light, self.lit, cells)
+        for row, members in self.lit:
+            beside, moved = relay.unlit(cells), relay.unlit(cells)
+            for column in members:
+                one = row, column
+                window, bend = relay.around(self.light, one, cells), relay.bend(*one)
+                bent = relay.on_nodes((own, own), window) * bend
+                turned = relay.on_nodes((change, own), window) + relay.on_nodes((own, change), window)
+                turned = turned * bend + 1j * relay.phase(change, *one) * bent
+                cut = relay.cut(1, column, cells[1])
+                beside[:, cut.there] += bent @ own(SPREAD[1])[:, cut.inside]
+                moved[:, cut.there] += turned @ own(SPREAD[1])[:, cut.inside]
+                moved[:, cut.there] += bent @ change(SPREAD[1])[:, cut.inside]
+            cut = relay.cut(0, row, cells[0])
+            found[cut.there] += own(SPREAD[0])[:, cut.inside].T @ moved
+            found[cut.there] += change(SPREAD[0])[:, cut.inside].T @ beside
+        return found
+
+    def back(self, by: np.ndarray, slopes: Slopes) -> np.ndarray:
+        """As `Passed.back`."""
+        relay, own, found = self.relay, self.relay.piece, np.zeros_like(self.light)
+        for row, members in self.lit:
+            cut = relay.cut(0, row, self.cells[0])
+            part = by[cut.there]
+            seen, beside = own(SPREAD[0])[:, cut.inside] @ part, relay.unlit(self.cells)
+            for column in members:
+                self._back(found, (row, column), (seen, beside), slopes)
+            slopes.add_columns(SPREAD[0], beside @ part.T, cut.inside, own(SPREAD[0]))
+        return found
+
+    def _back(
+        self, found: np.ndarray, one: tuple[int, int], row: tuple[np.ndarray, np.ndarray], slopes: Slopes
+    ) -> None:
+        """Through a lenslet, by slopes on the row's nodes along y; the row's light there is added to."""
+        relay, own, (seen, beside) = self.relay, self.relay.piece, row
+        window, bend = relay.around(self.light, one, self.cells), relay.bend(*one)
+        (down, across), (above, right) = (map(own, LIGHT), relay.polynomials)
+        left = down @ window
+        bent = (left @ across.T) * bend
+        cut = relay.cut(1, one[1], self.cells[1])
+        spread = own(SPREAD[1])[:, cut.inside]
+        beside[:, cut.there] += bent @ spread
+        slopes.add_columns(SPREAD[1], bent.T @ seen[:, cut.there], cut.inside, own(SPREAD[1]))
+        by = seen[:, cut.there] @ spread.T
+        turned = above.T @ np.imag(by * bent) @ right
+        number, key = relay.number(one[1]), ("phases", one[0])
+        slopes.add_columns(key, -turned.reshape(-1, 1), slice(number, number + 1), own(key))
+        by = by * bend
+        slopes.add(LIGHT[0], by @ (window @ across.T).T)
+        slopes.add(LIGHT[1], by.T @ left)
+        relay.around(found, one, self.cells)[...] += down.T @ by @ across
 
 
 def _times(by: np.ndarray, light: np.ndarray) -> np.ndarray:

@@ -5,14 +5,11 @@ coherent light, the pupil's own light. As in `cell_response`, each lenslet is a 
 and exactly those lenslets count that exist.
 """
 
-import math
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, cast
 
 import numpy as np
 
-from lumigraph.elements import form
-from lumigraph.errors import GeometryError
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.cell_response import (
     INFINITE,
@@ -22,10 +19,8 @@ from lumigraph.operators.cell_response import (
     Box,
     Lenslets,
     Limits,
-    focal_lengths,
-    legendre,
-    nodes,
 )
+from lumigraph.operators.each import Each
 from lumigraph.operators.exact import ExactLenslets, lenslets_of
 from lumigraph.operators.line_parts import Key
 from lumigraph.operators.lines import Lines
@@ -37,9 +32,6 @@ Members = tuple[Pair, ...]
 
 _KEPT = 8
 """Relays at a time, of those that are sampled alike; more might fill the memory."""
-
-_STRONGEST = 0.2
-"""Of the focal length, what no lenslet falls below that differs from the others: it sets quadratures."""
 
 
 class Relay(Protocol):
@@ -198,106 +190,3 @@ class Straight:
             found = self._lenslets.along(which, middle, limits, key[2], box)
             self._known[key] = found.astype(self.precision)
         return self._known[key]
-
-
-@dataclass(slots=True)
-class Each:
-    """Square lenslets that differ from each other, each a quadrature of its own on every cell."""
-
-    optics: Optics
-    _known: dict[tuple[int, float], tuple[np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=dict)
-    _lenslets: Lenslets = field(init=False)
-
-    def __post_init__(self) -> None:
-        if not self.optics.straight or self.optics.camera.model == "exact":
-            raise GeometryError(
-                "lenslets that differ from each other are simulated for square ones of one focal length and "
-                'model = "paraxial". Use those, or leave focal_length_scatter, decentre_scatter, '
-                "tilt_scatter, form_scatter and missing out of [built]."
-            )
-        self._lenslets = lenslets_of(self.optics)
-
-    def places(self, rows: range, columns: range) -> tuple[np.ndarray, np.ndarray]:
-        """As `Relay.places`."""
-        return _Cells(self.optics, 0).places(rows), _Cells(self.optics, 1).places(columns)
-
-    def field(self, light: np.ndarray, rows: range, columns: range) -> np.ndarray:
-        """As `Relay.field`."""
-        y, x = _Cells(self.optics, 0), _Cells(self.optics, 1)
-        lines = []
-        for k, row in enumerate(rows):
-            cells = (light[y.window(k), x.window(n)] for n in range(len(columns)))
-            pairs = zip(columns, cells, strict=True)
-            lines.append(np.hstack([self._cell(seen, (row, column)) for column, seen in pairs]))
-        return np.vstack(lines)
-
-    def _cell(self, light: np.ndarray, cell: tuple[int, int]) -> np.ndarray:
-        """Amplitude (y, x) on one cell's samples, of the light (y, x) in its window."""
-        mine = [_Cells(self.optics, which) for which in (0, 1)]
-        (down, ys), (across, xs) = (self._around(one, at) for one, at in zip(mine, cell, strict=True))
-        i, j = np.meshgrid(down, across, indexing="ij")
-        scatter = self.optics.array.scatter
-        assert scatter is not None  # `relay` has looked
-        factor, dy, dx, there = scatter.of(i, j)
-        warp = scatter.warp(i, j) if scatter.warps else None
-        total = np.zeros([axis.samples for axis in self.optics.axes], np.complex64)
-        for k, n in zip(*np.nonzero(there), strict=True):
-            bend = float(factor[k, n])
-            above, seen = self._behind(0, ys[k], bend, float(dy[k, n]))
-            beside, across = self._behind(1, xs[n], bend, float(dx[k, n]))
-            if warp is None:  # few samples first: nodes are many
-                total += (above @ seen) @ light @ (beside @ across).T
-                continue
-            own = (float(warp.down[k, n]), float(warp.across[k, n]), warp.terms[k, n])
-            inside = seen @ light @ across.T * self._warped((ys[k], xs[n]), *own)
-            total += above @ inside @ beside.T
-        return total
-
-    def _warped(self, middle: Pair, down: float, across: float, terms: np.ndarray) -> np.ndarray:
-        """Factor on the nodes (y, x) of the lenslet there, which is tilted and has a form of its own."""
-        y, x = (self._quadrature(which, middle[which])[1] - middle[which] for which in (0, 1))
-        half_y, half_x = (self._half(which) for which in (0, 1))
-        path = form.path(terms, y / half_y, x / half_x) + down * y[:, None] + across * x
-        return np.exp(2j * np.pi / self._lenslets.optics[0] * path).astype(np.complex64)
-
-    def _around(self, mine: _Cells, cell: int) -> tuple[np.ndarray, list[float]]:
-        """Numbers of the lenslets that light is followed to along an axis, and their places from the cell."""
-        lattice, axis, which = self.optics.array.lattice, mine.axis, mine.which
-        step, origin = lattice.basis[1 - which][which], lattice.origin[which] - mine.center(cell)
-        reach, (low, high) = axis.size / 2 + axis.neighbourhood, mine.limits(cell)
-        ends = sorted(((max(-reach, low) - origin) / step, (min(reach, high) - origin) / step))
-        numbers = np.arange(math.ceil(ends[0] - 1e-9), math.floor(ends[1] + 1e-9) + 1)
-        return numbers, (origin + numbers * step).round(12).tolist()
-
-    def _behind(
-        self, which: int, middle: float, factor: float, decentre: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Along one axis of one lenslet: from its nodes to the samples, and of the window's light to them."""
-        wavelength, focal_length = self._lenslets.optics[0], focal_lengths(self.optics.array)[0] * factor
-        spread, at, light = self._quadrature(which, middle)
-        phase = np.exp(-1j * np.pi * (at - middle - decentre) ** 2 / (wavelength * focal_length))
-        return (spread * phase).astype(np.complex64), light
-
-    def _quadrature(self, which: int, middle: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of a lenslet's aperture: to the samples, its nodes from the cell, and of the window's light."""
-        if (which, middle) not in self._known:
-            axis, array, optics = self.optics.axes[which], self.optics.array, self._lenslets.optics
-            step, half = abs(array.lattice.basis[1 - which][which]), self._half(which)
-            count = nodes(half, _STRONGEST * focal_lengths(array)[0], axis, optics) + self._more(half)
-            at, weight = legendre(middle - half, middle + half, count)
-            spread = self._lenslets.spread(axis.image, at) * (weight * axis.fade(at, step))
-            light = self._lenslets.values(which, at) @ self._lenslets.coefficients[which]
-            self._known[which, middle] = spread, at, light.astype(np.complex64)
-        return self._known[which, middle]
-
-    def _half(self, which: int) -> float:
-        """Of a lenslet's width along an axis [m]."""
-        lattice = self.optics.array.lattice
-        return self.optics.array.fill_factor * abs(lattice.basis[1 - which][which]) / 2
-
-    def _more(self, half: float) -> int:
-        """Nodes that tilts and forms ask for, as `nodes` counts."""
-        scatter = self.optics.array.scatter
-        assert scatter is not None
-        steepest = 4 * scatter.turn + form.STEEPEST * scatter.form / half
-        return math.ceil(4 * half * steepest / self._lenslets.optics[0])

@@ -122,10 +122,9 @@ def optimise(
 
     All combinations of the first values are computed. From the best of them a simplex goes downhill
     ("local"), and from the camera as given where it lies within the ranges; or a population by differential
-    evolution looks over all of the ranges ("global"). Bounds and the errors of scenes of microscopes and of
-    paraxial cameras with lenslets have gradients ("gradient"): each step takes the time of some five cameras,
-    however many keys vary, such as the places of single lenslets. Values of a stock stay as the combination
-    has them.
+    evolution looks over all of the ranges ("global"). Bounds of microscopes and cameras, and errors of
+    scenes of many, have gradients ("gradient"): each step takes the time of some five cameras, however many
+    keys vary, such as the places of single lenslets. Values of a stock stay as the combination has them.
     What no camera can be is left out, with its reason. Bounds are judged at other places than those of the
     search, for where pixels are coarse a search finds the places' luck, and half-way between its depths,
     for lenslets may be sharp at these alone.

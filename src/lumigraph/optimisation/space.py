@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -139,14 +140,14 @@ def _same(here: Any, stock: Sequence[Any]) -> Any:
 
 
 def _number(value: Any) -> float:
-    """Of a value [m], or in its own unit where that is no length; NaN of a word."""
+    """Of a value in SI, or without a unit; NaN of a word."""
     found = NUMBER.fullmatch(str(value))
     if found is None:
         return math.nan
-    try:
-        return units.parse(str(value))
-    except LumigraphError:
-        return float(found[1])
+    for dimension in ("length", "angle", "time"):
+        with suppress(LumigraphError):
+            return units.parse(str(value), dimension)
+    return float(found[1])
 
 
 def _range(text: str) -> Range:
