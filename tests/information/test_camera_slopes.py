@@ -121,8 +121,6 @@ def test_images_and_their_derivatives_are_those_of_bounds(given):
 def test_what_has_no_derivatives_is_refused(change):
     with pytest.raises(GeometryError, match="Use search 'local' for these"):
         slopes(camera(TWO), [(camera(TWO), camera(TWO).replace(**change))], DEPTHS, LIGHT)
-    with pytest.raises(GeometryError, match="model = 'paraxial'"):
-        slopes(camera(TWO).replace(model="exact"), [], DEPTHS, LIGHT)
 
 
 def test_the_command_goes_downhill_along_them(tmp_path, capsys):

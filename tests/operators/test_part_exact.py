@@ -43,10 +43,10 @@ ANGLES = SMALL | {"sensor": SMALL["sensor"] | {"angular_response": {"power": 40.
 EXACT_ONE = ONE | {"model": "exact"}
 WHOLE = START | {"model": "exact"}
 MORE = [
-    *(("2.0", WHOLE, key) for key in KEYS),
+    *(("2.0", SMALL, key) for key in KEYS[::2]),
     *(("2.0", FREE | {"model": "exact"}, f"built.{key}") for key in FREE["built"]),
-    *(("1.0", EXACT_ONE, key) for key in (*KEYS[:4], "lenslets.pitch", "lenslets.focal_length")),
-    *(("2.0", GLASS, f"lenslets.{key}") for key in ("focal_length", "pitch")),
+    *(("1.0", EXACT_ONE, key) for key in ("wavelength", "lenslets.focal_length")),
+    ("2.0", GLASS, "lenslets.pitch"),
     ("2.0", ANGLES, "lenslets.pitch"),
 ]
 
@@ -87,8 +87,7 @@ def test_derivatives_are_central_differences_of_images(kind, given, key):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-3])
-@pytest.mark.parametrize("given", [WHOLE, GLASS], ids=["ideal", "glass"])
+@pytest.mark.parametrize(("given", "accuracy"), [(SMALL, 1e-3), (GLASS, 1e-2)], ids=["ideal", "glass"])
 def test_images_are_those_of_points(given, accuracy):
     found = camera(given).part_images([], accuracy=accuracy).forward(POINTS)
     assert off(found, points_image(camera(given), POINTS, 3e-4)) < accuracy
@@ -106,7 +105,7 @@ def test_images_are_exact_where_paraxial_ones_are_not():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("key", ["object_distance", "wavelength", "lenslets.pitch", "lenslets.focal_length"])
+@pytest.mark.parametrize("key", ["object_distance", "lenslets.focal_length"])
 def test_images_change_as_simulations_do(key):
     """Over changes of 1e-4, which single precision resolves."""
     ends = (camera(moved(SMALL, key, by)) for by in (-5e-5, 5e-5))
@@ -203,17 +202,17 @@ def test_other_models_of_one_camera_and_what_has_no_derivatives_are_refused():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("key", ["wavelength", "lenslets.focal_length", "main_lens.focal_length"])
+@pytest.mark.parametrize("key", ["wavelength", "lenslets.focal_length"])
 def test_slopes_are_central_differences_of_bounds(key):
     where = {"depths": [-3 * mm], "light": lg.information.Light(5000, 2), "places": range(1, 2)}
 
     def ends():
-        return tuple(camera(moved(WHOLE, key, step)) for step in (-1e-5, 1e-5))
+        return tuple(camera(moved(SMALL, key, step)) for step in (-1e-5, 1e-5))
 
-    found = lg.information.slopes(camera(WHOLE), [ends()], **where)
+    found = lg.information.slopes(camera(SMALL), [ends()], **where)
     low, high = (lg.information.slopes(one, [], **where).bound for one in ends())
     assert found.changes[0] == pytest.approx(high - low, rel=1e-3, abs=0)
-    assert found.bound == pytest.approx(lg.information.bounds(camera(WHOLE), **where).depth, rel=3e-3, abs=0)
+    assert found.bound == pytest.approx(lg.information.bounds(camera(SMALL), **where).depth, rel=3e-3, abs=0)
 
 
 def test_a_chosen_model_is_that_of_the_camera_itself():

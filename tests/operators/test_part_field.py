@@ -113,7 +113,7 @@ def test_fields_beside_each_other_say_what_turned_ones_do():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("key", ["coma", "wavelength", "lenslets.pitch"])
+@pytest.mark.parametrize("key", ["coma", "lenslets.pitch"])
 def test_slopes_are_central_differences_of_bounds(key):
     """Of the same bounds, and those are `bounds`: points that move are seen from other fields."""
     where = {"depths": [-3 * mm], "light": LIGHT, "places": range(1, 2)}

@@ -163,11 +163,6 @@ def test_a_gradient_takes_less_than_three_times_the_memory_of_an_image(given, rn
     assert peak(lambda: images.gradient(POINTS, weights)) < 3 * peak(lambda: images.forward(POINTS))
 
 
-def test_what_has_no_such_derivatives_is_refused():
-    with pytest.raises(GeometryError, match="model = 'paraxial'"):
-        camera(HEX).replace(model="exact").part_images([])
-
-
 @pytest.mark.parametrize("change", [{"sensor": {"shape": (239, 240)}}, {"lenslets": {"count": (9, 8)}}])
 def test_cameras_with_other_numbers_of_parts_are_refused(change):
     with pytest.raises(GeometryError, match="derivatives need as many"):

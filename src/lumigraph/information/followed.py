@@ -17,7 +17,7 @@ from lumigraph.information.points import (
     source,
     spread,
 )
-from lumigraph.instruments import LensletCamera, LightFieldMicroscope, SingleLensCamera
+from lumigraph.instruments import LensletCamera, LightFieldMicroscope
 from lumigraph.instruments.capabilities import WithObjective
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.with_parts import SeesPoints
@@ -116,15 +116,19 @@ def require_alike(instrument: Instrument, other: Instrument) -> None:
     """
     own, names = instrument.sensor, OPTICAL[isinstance(instrument, SeesPoints)]
     same = replace(other.sensor, **{name: getattr(own, name) for name in names})
-    counts = [
-        None if isinstance(one, SingleLensCamera) else cast(LensletCamera, one).lenslets.count
-        for one in (instrument, other)
-    ]
+    counts = [_lenslets(one) for one in (instrument, other)]
     if type(instrument) is not type(other) or same != own or counts[0] != counts[1]:
         raise GeometryError(
             "derivatives of bounds and errors are by optics and by the pixels' pitch; two instruments have "
             "other numbers of lenslets, or other sensors. Use search 'local' for these."
         )
+
+
+def _lenslets(instrument: Instrument) -> tuple[int, ...]:
+    """How many; none of a camera without any."""
+    if isinstance(instrument, SeesPoints) and not isinstance(instrument, LensletCamera):
+        return ()
+    return cast(LensletCamera, instrument).lenslets.count
 
 
 Cameras = tuple[SeesPoints, SeesPoints]
