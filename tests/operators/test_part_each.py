@@ -1,9 +1,8 @@
 """Derivatives behind lenslets that differ by chance: by every length and by how much they differ."""
 
-import tracemalloc
-
 import numpy as np
 import pytest
+from tests.operators.test_part_images import off, peak
 
 import lumigraph as lg
 from cameras import focused
@@ -80,10 +79,6 @@ def moved(given, key, by):
 
 def pair(given, key, kind="2.0", step=1e-6):
     return camera(moved(given, key, -step), kind), camera(moved(given, key, step), kind)
-
-
-def off(found, true):
-    return np.linalg.norm(found - true) / np.linalg.norm(true)
 
 
 def cases():
@@ -167,16 +162,6 @@ def test_lenslets_that_are_alike_begin_to_differ():
     low, high = (one.part_images([]).forward(POINT) for one in ends)
     assert off(images.derivative(POINT, np.ones(1)), high - low) < 1e-2  # of what is linear
     assert off(images.forward(POINT), alike.part_images([]).forward(POINT)) < 1e-3
-
-
-def peak(run):
-    """Memory that a run takes the second time [bytes]."""
-    run()
-    tracemalloc.start()
-    run()
-    most = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    return most
 
 
 def test_a_gradient_takes_less_than_three_times_the_memory_of_an_image(rng):

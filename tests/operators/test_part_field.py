@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.operators.test_part_images import off
 
 import lumigraph as lg
 from lumigraph.errors import GeometryError
@@ -60,10 +61,6 @@ def ends(key, step, given=START):
     changes = ({part: {name: one}} if part else {name: one} for one in (low, high))
     low, high = (camera(given).replace(**change) for change in changes)
     return low, high
-
-
-def off(found, true):
-    return np.linalg.norm(found - true) / np.linalg.norm(true)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.operators.test_part_images import off
 
 import lumigraph as lg
 from lumigraph.errors import GeometryError
@@ -49,10 +50,6 @@ def masks(step):
         camera().replace(main_lens={"aberrations": {6: 0.3 * (1 + s), 8: 0.2}}) for s in (-step, step)
     )
     return low, high
-
-
-def off(found, true):
-    return np.linalg.norm(found - true) / np.linalg.norm(true)
 
 
 @pytest.mark.parametrize(
