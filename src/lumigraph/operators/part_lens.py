@@ -26,7 +26,7 @@ from lumigraph.scene import Points
 WIDER, TAIL = 1.5, 4.0
 """How far light is followed: so many radii of a blur, and so many λL/D over the accuracy's root beyond.
 
-An Airy disc's rms beyond r [λL/D] is some 0.2/r² of its own.
+An Airy disc's rms beyond r [λL/D] is 0.08/r² of its own.
 """
 
 PERIOD = 3.0

@@ -26,10 +26,6 @@ from lumigraph.operators.line_parts import Key
 from lumigraph.operators.lines import Lines
 from lumigraph.operators.optics import Optics
 
-Pair = tuple[float, float]
-
-Members = tuple[Pair, ...]
-
 _KEPT = 8
 """Relays at a time, of those that are sampled alike; more might fill the memory."""
 
