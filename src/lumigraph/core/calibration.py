@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from lumigraph.core import checks, picture
+from lumigraph.core.aside import Aside
 from lumigraph.core.brief import brief
 from lumigraph.core.drawing import draw
 from lumigraph.core.lattice import Lattice, Vector
@@ -22,9 +23,9 @@ def _none() -> np.ndarray:
 class Calibration:
     """Where the micro-images stand on a raw image, and how light reached them.
 
-    Micro-images stand at `position(indices)`: the points of `lattice`, moved by `warp` where the camera has
-    one. Whoever needs a place on the picture asks `position`, `index`, `offset` or `centers_within`; the
-    lattice by itself holds pitches and directions.
+    Micro-images stand at `position(indices)`: the points of `lattice`, moved by `warp` and `aside` where the
+    camera has them. Whoever needs a place on the picture asks `position`, `index`, `offset` or
+    `centers_within`; the lattice by itself holds pitches and directions.
 
     Parameters
     ----------
@@ -46,6 +47,8 @@ class Calibration:
         Lenslets to sensor, b [m]; None where unknown.
     warp
         Tilt and radial distortion that move the lattice points [px]; None where the lattice is regular.
+    aside
+        Ways of single lenslets beside all that; None where they stand on the lattice.
     light
         Brightness (k,) of the measured micro-images, 1 for a bright one; None where unknown.
     fill
@@ -71,6 +74,7 @@ class Calibration:
     separation: float | None = None
     lenslet_distance: float | None = None
     warp: Warp | None = None
+    aside: Aside | None = None
     light: np.ndarray | None = None
     fill: float | None = None
     missing: np.ndarray = field(default_factory=_none)
@@ -97,6 +101,8 @@ class Calibration:
             raise CalibrationError(f"missing has shape {self.missing.shape} but must be (m, 2).")
         if self.warp is not None:
             checks.instance("warp", self.warp, Warp, CalibrationError)
+        if self.aside is not None:
+            checks.instance("aside", self.aside, Aside, CalibrationError)
         for name in ("pixel_pitch", "separation", "lenslet_distance", "fill"):
             if (value := getattr(self, name)) is not None:
                 checks.positive(name, value, error=CalibrationError)
@@ -131,8 +137,13 @@ class Calibration:
 
     def position(self, indices: np.ndarray) -> np.ndarray:
         """Micro-image centres (..., 2) as (y, x) [px] of lenslets (..., 2) as (i, j)."""
-        points = self.lattice.position(indices)
+        points = self.flat(indices)
         return points if self.warp is None else self.warp.applied(points)
+
+    def flat(self, indices: np.ndarray) -> np.ndarray:
+        """Where micro-image centres would stand without the warp (..., 2) [px]."""
+        points = self.lattice.position(indices)
+        return points if self.aside is None else points + self.aside.of(indices)
 
     def straightened(self, y: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Places of the picture [px] in the plane of the regular lattice; y and x broadcast."""
@@ -183,8 +194,23 @@ class Calibration:
             centers=self.centers[:, ::-1],
             missing=self.missing[:, ::-1],
             warp=None if self.warp is None else self.warp.transposed(),
+            aside=None if self.aside is None else self.aside.transposed(),
             sharpness=(kinds[0], kinds[2], kinds[1]) if len(kinds) == 3 else kinds,
         )
+
+    def require_regular(self, what: str) -> None:
+        """Refuse what needs lenslets that stand on a lattice.
+
+        Raises
+        ------
+        CalibrationError
+            Some stand beside it.
+        """
+        if self.aside is not None:
+            raise CalibrationError(
+                f"{what} needs lenslets on a lattice, but micro-images of {len(self.aside.indices)} stand "
+                f"beside it, by up to {np.hypot(*self.aside.ways.T).max():.3g} px. Use views instead."
+            )
 
     def check_fits(self, shape: tuple[int, int]) -> None:
         """Refuse a picture of another size.

@@ -112,6 +112,7 @@ def dense(
     """
     raw = raw if isinstance(raw, RawImage) else RawImage(raw)
     check_raw(raw, calibration)
+    calibration.require_regular("depth from patches at each place")
     kinds = checked_focus(focus, calibration)
     if lenslets is None:
         lenslets = correlation(raw, calibration, progress=within(progress, 0, 0.3))

@@ -21,7 +21,7 @@ from lumigraph.elements.lens import ThinLens
 from lumigraph.elements.lenslets import LensletArray
 from lumigraph.elements.masks import random_phase_mask, white_phase
 from lumigraph.elements.object_space import ObjectSpace
-from lumigraph.elements.scatter import Scatter
+from lumigraph.elements.scatter import Own, Scatter
 from lumigraph.elements.surface import Surface
 from lumigraph.elements.train import Element, Train
 from lumigraph.elements.zernike import ZernikePlate, noll_to_nm, zernike
@@ -35,6 +35,7 @@ __all__ = [
     "LensletArray",
     "ObjectSpace",
     "Openings",
+    "Own",
     "RectangularAperture",
     "Scatter",
     "Surface",

@@ -54,13 +54,15 @@ class LensletArray:
         Factor of all distances of the lattice, about the axis: the pitch over the lattice's. As a 0-d array
         it is differentiated through, for lenslets that abut everywhere: the edges' own movement is not.
     scatter
-        How single lenslets differ; not together with what is differentiated through.
+        How single lenslets differ; not together with what is differentiated through. Apertures that stand
+        beside the lattice stay within their cells.
 
     Raises
     ------
     GeometryError
         A focal length of zero or of the wrong count, a cell of the other layout, a fill factor outside
-        0 to 1, an extent or a stretch that is not above zero, or one to be differentiated where lenslets end.
+        0 to 1, an extent or a stretch that is not above zero, or one to be differentiated where lenslets end;
+        a lenslet that would reach beyond its cell.
 
     Examples
     --------
@@ -102,6 +104,20 @@ class LensletArray:
             raise GeometryError(
                 "lenslets that scatter are not differentiated through. Leave one of them out."
             )
+        self._check_room()
+
+    def _check_room(self) -> None:
+        """Refuse apertures that reach beyond their cells, where they might overlap."""
+        room = (1 - self.fill_factor) * self.lattice.pitch / 2
+        for one in () if self.scatter is None else self.scatter.own:
+            down, across = one.aside or (0.0, 0.0)
+            far = max(abs(down), abs(across)) if self.shape == "square" else math.hypot(down, across)
+            if far > room * (1 + 1e-9) + 1e-15:
+                raise GeometryError(
+                    f"lenslet {one.index} stands {far * 1e6:.6g} µm beside its place but has "
+                    f"{room * 1e6:.6g} µm of room in its cell. Move it less, use a smaller fill_factor, or "
+                    "move its vertex alone (decentre)."
+                )
 
     def _stretched(self) -> None:
         """A plain stretch goes into the lattice; one to be differentiated stays."""
@@ -174,20 +190,25 @@ class LensletArray:
             opening = self._opening(i, j, dy, dx, grid.pitch)
             if self.scatter is not None:
                 factor, down, across, _ = self.scatter.of(i, j)
-                sin, cos = coverage.sides(self.lattice.rotation)
-                focal_length = focal_length * factor
-                dy, dx = dy - (down * cos + across * sin), dx - (across * cos - down * sin)
+                focal_length, (down, across) = focal_length * factor, self._turned(down, across)
+                dy, dx = dy - down, dx - across
             block = np.exp(-1j * np.pi * (dy**2 + dx**2) / (wavelength * focal_length))
             if self.scatter is not None and self.scatter.warps:
                 block = block * np.exp(2j * np.pi / wavelength * self._warped(i, j, y, grid.x))
             result[first : first + rows] = block * opening
         return result
 
+    def _turned(self, down: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Ways (y, x) of those along columns and rows."""
+        sin, cos = coverage.sides(self.lattice.rotation)
+        return down * cos + across * sin, across * cos - down * sin
+
     def _warped(self, i: np.ndarray, j: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Path [m] of each sample besides those of focus and vertex, in its lenslet (i, j)."""
         assert self.scatter is not None
         (y0, x0), (sin, cos) = self._position(i, j), coverage.sides(self.lattice.rotation)
-        down, across = (y - y0) * cos - (x - x0) * sin, (y - y0) * sin + (x - x0) * cos
+        dy, dx = self._inside(i, j, y - y0, x - x0)
+        down, across = dy * cos - dx * sin, dy * sin + dx * cos
         low = int(i.min()), int(j.min())
         all_i, all_j = np.ogrid[low[0] : int(i.max()) + 1, low[1] : int(j.max()) + 1]
         warp, here = self.scatter.warp(all_i, all_j), (i - low[0], j - low[1])
@@ -250,13 +271,22 @@ class LensletArray:
         height, width = self.extent[0] / 2 * (1 + 1e-9), self.extent[1] / 2 * (1 + 1e-9)
         return present * ((np.abs(y * cos - x * sin) <= height) & (np.abs(y * sin + x * cos) <= width))
 
+    def _inside(
+        self, i: np.ndarray, j: np.ndarray, dy: np.ndarray, dx: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Ways (y, x) from lenslets' middles, of those from their places on the lattice."""
+        if self.scatter is None or not self.scatter.moves:
+            return dy, dx
+        down, across = self._turned(*self.scatter.aside(i, j))
+        return dy - down, dx - across
+
     def _opening(
         self, i: np.ndarray, j: np.ndarray, dy: np.ndarray, dx: np.ndarray, pitch: Vector
     ) -> np.ndarray | float:
         """Open fraction of each sample: its own lenslet's part, and on an edge its neighbours' too."""
         if self._open_everywhere:
             return 1.0
-        own = self._covered(dy, dx, pitch)
+        own = self._covered(*self._inside(i, j, dy, dx), pitch)
         opening = own * self._exists(i, j)
         if self.edge == "hard":
             return opening
@@ -265,8 +295,9 @@ class LensletArray:
         total, passed = own[edge], opening[edge]
         (y0, x0), (y1, x1) = self.lattice.basis
         for di, dj in ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)):
-            part = self._covered(dy - di * y1 - dj * y0, dx - di * x1 - dj * x0, pitch)
-            total, passed = total + part, passed + part * self._exists(i + di, j + dj)
+            there, away = (i + di, j + dj), (dy - di * y1 - dj * y0, dx - di * x1 - dj * x0)
+            part = self._covered(*self._inside(*there, *away), pitch)
+            total, passed = total + part, passed + part * self._exists(*there)
         # Where cells abut, every sample is covered once: this corrects the approximation at their corners.
         opening[edge] = passed / total if self._abutting else np.minimum(passed, 1.0)
         return opening

@@ -1,7 +1,8 @@
-"""`Scatter`: how lenslets of an array differ from each other, each by numbers of its own index."""
+"""`Scatter`: how lenslets of an array differ from each other, by chance and by what is their own."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -34,9 +35,29 @@ class Warp(NamedTuple):
     terms: np.ndarray
 
 
+class Own(NamedTuple):
+    """What the lenslet of an index (i, j) has of its own; lengths along columns and rows of the array.
+
+    `focal_change` is the part by which its focal length is longer; `aside` (down, across) the way from its
+    place on the lattice to the middle of its aperture, None for one on it, and `decentre` from the middle to
+    its vertex [m].
+    """
+
+    index: tuple[int, int]
+    focal_change: float = 0.0
+    aside: tuple[float, float] | None = None
+    decentre: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def vertex(self) -> tuple[float, float]:
+        """Way to it from the place on the lattice [m]."""
+        down, across = self.aside or (0.0, 0.0)
+        return down + self.decentre[0], across + self.decentre[1]
+
+
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """Errors of single lenslets, drawn by chance; the same seed draws the same for a lenslet.
+    """How single lenslets differ: errors drawn by chance, alike for a lenslet and a seed, and what is given.
 
     Parameters
     ----------
@@ -55,6 +76,8 @@ class Scatter:
     form
         Of the path through a lenslet, what neither focus nor tilt describes: rms over the square around it
         and over the lenslets [m]. Each of the terms of `form.TERMS` has the same part.
+    own
+        Of single lenslets, beside what is drawn for them.
 
     Raises
     ------
@@ -68,6 +91,7 @@ class Scatter:
     seed: int = 0
     turn: float = 0.0
     form: float = 0.0
+    own: tuple[Own, ...] = ()
 
     def __post_init__(self) -> None:
         checks.whole("seed", self.seed, 0)
@@ -80,10 +104,57 @@ class Scatter:
                 )
 
     def of(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Of lenslets (i, j): factor of the focal length, decentres along columns and rows [m], presence."""
+        """Of lenslets (i, j): factor of the focal length, way from the lattice to the vertex along columns
+        and rows [m], presence.
+        """
         bend, down, across, there = (_uniform(i, j, self.seed, channel) for channel in range(4))
         factor = 1 + self.focal_length * np.clip(ndtri(bend), -4, 4)
-        return factor, self.decentre * ndtri(down), self.decentre * ndtri(across), there >= self.missing
+        down, across = self.decentre * ndtri(down), self.decentre * ndtri(across)
+        for mine, one in self._among(i, j):
+            factor[mine] *= 1 + one.focal_change
+            down[mine] += one.vertex[0]
+            across[mine] += one.vertex[1]
+        return factor, down, across, there >= self.missing
+
+    def aside(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """From the lattice to the middle of the apertures of lenslets (i, j), along columns and rows [m]."""
+        found = np.zeros((2, *np.broadcast(i, j).shape))
+        for mine, one in self._among(i, j):
+            found[0][mine], found[1][mine] = one.aside or (0.0, 0.0)
+        return found[0], found[1]
+
+    def _among(self, i: np.ndarray, j: np.ndarray) -> Iterator[tuple[np.ndarray, Own]]:
+        for one in self.own:
+            if (mine := (i == one.index[0]) & (j == one.index[1])).any():
+                yield mine, one
+
+    @property
+    def moves(self) -> bool:
+        """Whether apertures stand beside the lattice."""
+        return any(any(one.aside or ()) for one in self.own)
+
+    @property
+    def shortest(self) -> float:
+        """Least factor of focal lengths that are given."""
+        return 1 + min((one.focal_change for one in self.own), default=0.0)
+
+    @property
+    def farthest(self) -> float:
+        """Farthest along an axis that vertices are given beside the lattice [m]."""
+        return max((abs(way) for one in self.own for way in one.vertex), default=0.0)
+
+    def in_row(self, i: int) -> "Scatter":
+        """What lenslets of a row follow from."""
+        return replace(self, own=tuple(one for one in self.own if one.index[0] == i))
+
+    def naming(self, lenslets: Mapping[tuple[int, int], bool]) -> "Scatter":
+        """The same, which names these lenslets, too, and says where those stand that are marked."""
+        own = {one.index: one for one in self.own}
+        named = {index: own.get(index, Own(index)) for index in lenslets}
+        return replace(self, own=tuple(
+            one._replace(aside=one.aside or (0.0, 0.0)) if lenslets[index] else one
+            for index, one in sorted(named.items())
+        ))  # fmt: skip
 
     @property
     def warps(self) -> bool:

@@ -226,9 +226,8 @@ def small(
         shape, count = None, _lit(camera, depths, width)
     else:
         shape, count = like.sensor.shape, like.lenslets.count
-    cut = camera.replace(
-        lenslets={"count": count}, sensor={"shape": shape}, main_lens={"diameter": camera.pupil_diameter}
-    )
+    lens, lenslets = {"diameter": camera.pupil_diameter}, camera.lenslets.amid(count)
+    cut = camera.replace(lenslets=lenslets, sensor={"shape": shape}, main_lens=lens)
     if not camera.built.array_bow:
         return cut
     nearer = math.hypot(*cut.lenslets.reach) / math.hypot(*camera.lenslets.reach)

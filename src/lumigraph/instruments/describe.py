@@ -188,7 +188,8 @@ def _lenslets(camera: "LensletCamera") -> Iterator[Row]:
         kind = "" if len(parts.focal_length) == 1 else f" {number + 1}"
         yield Row(f"lenslet focal length{kind}", focal_length, "m", "f_µ, given")
     yield from _glass(camera)
-    if camera.scatter is not None:
+    yield from _singles(camera)
+    if camera.errors is not None:
         yield Row("focal length scatter", camera.built.focal_length_scatter, "", "rms part, as built")
         yield Row("decentre scatter", camera.built.decentre_scatter, "m", "rms along each axis, as built")
         yield Row("tilt scatter", camera.built.tilt_scatter, "rad", "rms about each axis, as built")
@@ -210,6 +211,15 @@ def _lenslets(camera: "LensletCamera") -> Iterator[Row]:
     yield Row("micro-image pitch", camera.micro_image_pitch, "m", "p (1 + b/L)")
     yield Row("micro-image pitch in pixels", camera.micro_image_pitch / pixel, "px", "")
     yield Row("micro-image width", camera.micro_image_width, "m", "D b / L, without diffraction")
+
+
+def _singles(camera: "LensletCamera") -> Iterator[Row]:
+    parts = camera.lenslets
+    for number, one in parts.single.items():
+        own = parts.focal_length[0] * (1 + one.focal_change)
+        yield Row(f"lenslet {number} focal length", own, "m", "f_µ, its own")
+        if any(one.vertex):
+            yield Row(f"lenslet {number} vertex", one.vertex, "m", "(y, x) from its place on the lattice")
 
 
 def _glass(camera: "LensletCamera") -> Iterator[Row]:

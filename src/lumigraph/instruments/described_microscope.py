@@ -67,6 +67,11 @@ class DescribedMicroscope(Instrument):
                 f"single lenslets differ in configuration 'fourier', not {self.configuration!r}. "
                 "Leave lenslets.single out."
             )
+        if any(one.decentre_y or one.decentre_x for one in self.lenslets.single.values()):
+            raise GeometryError(
+                "decentre_y and decentre_x are of lenslets behind a main lens. Move the whole lenslet by "
+                "offset_y and offset_x."
+            )
         if self.objective.model == "rays" and self.configuration != "1.0":
             raise GeometryError(
                 f"objective.model 'rays' needs configuration '1.0', not {self.configuration!r}. Use 'scalar'."

@@ -115,8 +115,8 @@ def write(table: Mapping[str, Any]) -> str:
 _LENGTHS = (
     "wavelength", "object_distance", "focal_length", "diameter", "pitch", "pixel_pitch", "offset",
     "bandwidth", "tube_lens", "focus_depth", "lenslet_offset", "sensor_distance", "fourier_lens",
-    "offset_y", "offset_x", "separation", "lenslet_distance", "decentre_scatter", "form_scatter",
-    "wavelengths", "array_bow",
+    "offset_y", "offset_x", "decentre_y", "decentre_x", "separation", "lenslet_distance", "decentre_scatter",
+    "form_scatter", "wavelengths", "array_bow",
 )  # fmt: skip
 
 _ANGLES = ("rotation", "angles", "field", "y", "x", "array_tilt", "sensor_tilt", "tilt_scatter")

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from lumigraph.core import arrays, checks
+from lumigraph.core.aside import Aside
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.grid import Grid
@@ -43,12 +44,18 @@ class LensletCamera(WithParts):
     tolerances: Tolerances = Field(default_factory=dict)
 
     @model_validator(mode="after")
-    def _lenslets_are_alike(self) -> Self:
-        if self.lenslets.single:
+    def _singles_are_possible(self) -> Self:
+        parts = self.lenslets
+        if parts.single and (parts.layout != "square" or parts.shape == "round"):
             raise GeometryError(
-                "lenslets.single is of Fourier microscopes; before a main lens lenslets differ by kinds. "
-                "Give three focal lengths in layout 'hex'."
+                f"single lenslets differ from square ones, but these are {parts.shape or parts.layout}. "
+                "Leave lenslets.single out, or use layout 'square'."
             )
+        width = parts.pitch * parts.fill_factor
+        for number, one in parts.single.items():
+            name = f"lenslet {number}"
+            _check_room(f"{name}'s offset", parts.turned(*one.offset), (parts.pitch - width) / 2, "cell")
+            _check_room(f"{name}'s decentre", parts.turned(*one.decentre), width / 2, "aperture")
         return self
 
     @property
@@ -86,12 +93,18 @@ class LensletCamera(WithParts):
 
     @model_validator(mode="after")
     def _lenslets_can_differ(self) -> Self:
-        _ = self.scatter  # it refuses tilts without an index
+        _ = self.errors  # it refuses tilts without an index
         return self
 
     @property
     def scatter(self) -> Scatter | None:
-        """How single lenslets differ as built; None where they are alike."""
+        """How single lenslets differ, as described and as built; None where they are alike."""
+        errors, own = self.errors, self.lenslets.own()
+        return replace(errors or Scatter(seed=self.built.seed), own=own) if own else errors
+
+    @property
+    def errors(self) -> Scatter | None:
+        """How single lenslets differ as built from those described; None where they do not."""
         return self.built.scatter(self.lenslets.index)
 
     @property
@@ -150,11 +163,22 @@ class LensletCamera(WithParts):
         if self.traced is not None:
             centers = self._traced_centers(centers, indices)
         off = float(np.sqrt(np.mean(np.sum((centers - lattice.position(indices)) ** 2, axis=1))))
+        if (aside := self._aside(scale)) is not None:
+            centers = centers + aside.of(indices)
         inside = ((centers >= -0.5) & (centers <= [n - 0.5 for n in sensor.shape])).all(axis=1)
         return Calibration(
             lattice, sensor.shape, indices[inside], centers[inside], off,
             pixel_pitch=pitch, separation=self.pupil_distance, lenslet_distance=self.lenslet_distance,
+            aside=aside,
         )  # fmt: skip
+
+    def _aside(self, scale: float) -> Aside | None:
+        """Of micro-images whose lenslets' vertices stand beside the lattice, that times a scale [px/m]."""
+        ways = {number: one.vertex for number, one in self.lenslets.single.items() if any(one.vertex)}
+        if not ways:
+            return None
+        indices = self.lenslets.indices()[np.array(list(ways)) - 1]
+        return Aside(-indices, scale * np.array(list(ways.values())))
 
     def _traced_centers(self, centers: np.ndarray, indices: np.ndarray) -> np.ndarray:
         """Of micro-images (k, 2) [px], whose chief rays do not come from the exit pupil's middle."""
@@ -192,9 +216,9 @@ class LensletCamera(WithParts):
         airy = 2.44 * self.wavelength * self.separation / diameter
         count = point_view.reached(blur + 2 * airy, self.lenslets.pitch, self.lenslets.count)
         small = self.replace(
-            lenslets={"count": count}, sensor={"shape": None}, main_lens={"diameter": diameter}
+            lenslets=self.lenslets.amid(count), sensor={"shape": None}, main_lens={"diameter": diameter}
         )
-        return point_view.of_camera(small, dz, count)
+        return point_view.of_camera(small, dz, small.lenslets.count)
 
     def _planes(
         self, optics: CameraOptics, depths: Sequence[float] | None, grid: Grid, making: Making
@@ -374,3 +398,12 @@ class LensletCamera(WithParts):
     def object_to_pupil(self) -> float:
         """From the focused plane to the entrance pupil, where perspective has its centre [m]."""
         return self.exit_pupil.object_distance / self.exit_pupil.magnification**2
+
+
+def _check_room(what: str, way: tuple[float, float], most: float, where: str) -> None:
+    """Refuse a way (y, x) that leads out of where there is room so far [m]."""
+    if (far := max(map(abs, way))) > most * (1 + 1e-9) + 1e-15:
+        raise GeometryError(
+            f"{what} is {far * 1e6:.6g} µm but the {where} has room for {most * 1e6:.6g} µm. Use less, or "
+            "change fill_factor."
+        )

@@ -1,14 +1,14 @@
 """The lenslet array, as the table of a camera file."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from lumigraph.core.lattice import Lattice
-from lumigraph.elements import Surface
+from lumigraph.elements import Own, Surface
 from lumigraph.elements.surface import index_at
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments.part import Part
@@ -43,11 +43,30 @@ class OneLenslet(Part):
         By what part its focal length is longer than the array's: 0.03 is 3 % longer.
     offset_y, offset_x
         Of it, aperture and all, from its place on the lattice.
+    decentre_y, decentre_x
+        Of its vertex from the middle of its aperture, before a main lens.
     """
 
     focal_change: Number = 0.0
     offset_y: Displacement = 0.0
     offset_x: Displacement = 0.0
+    decentre_y: Displacement = 0.0
+    decentre_x: Displacement = 0.0
+
+    @property
+    def vertex(self) -> tuple[float, float]:
+        """Way (y, x) to it from the place on the lattice [m]."""
+        return self.offset_y + self.decentre_y, self.offset_x + self.decentre_x
+
+    @property
+    def offset(self) -> tuple[float, float]:
+        """Of the aperture (y, x) [m]."""
+        return self.offset_y, self.offset_x
+
+    @property
+    def decentre(self) -> tuple[float, float]:
+        """Of the vertex from there (y, x) [m]."""
+        return self.decentre_y, self.decentre_x
 
     @field_validator("focal_change")
     @classmethod
@@ -108,8 +127,8 @@ class Lenslets(Part):
     abbe
         Abbe number V_d, by which the focal length changes with the wavelength; left out, it does not.
     single
-        Lenslets that differ from the others, in the pupil of a Fourier microscope: `OneLenslet` by number,
-        from 1 on row by row as `indices` has them.
+        Lenslets that differ from the others, in the pupil of a Fourier microscope or, square ones of one
+        kind, behind a main lens: `OneLenslet` by number, from 1 on row by row as `indices` has them.
     """
 
     pitch: Length
@@ -163,7 +182,7 @@ class Lenslets(Part):
                 f"shape {self.shape!r} does not tile layout {self.layout!r}. "
                 f"Use {self.layout!r} or 'round', or leave it out."
             )
-        for name, shift, slack in zip("yx", self._turned(*self.offset), self._slack, strict=True):
+        for name, shift, slack in zip("yx", self.turned(*self.offset), self._slack, strict=True):
             if abs(shift) >= slack:
                 raise GeometryError(
                     f"offset along {name} is {shift * 1e6:.6g} µm but must stay below {slack * 1e6:.6g} µm. "
@@ -276,7 +295,7 @@ class Lenslets(Part):
 
     def holds(self, centers: np.ndarray) -> np.ndarray:
         """Whether the array has lenslets at centres (k, 2) of the lattice: (k,)."""
-        across, along = self._turned(*centers.T)
+        across, along = self.turned(*centers.T)
         height, width = self.extent
         return (np.abs(across) <= height / 2) & (np.abs(along) <= width / 2)
 
@@ -293,17 +312,43 @@ class Lenslets(Part):
             focal_lengths[number - 1] *= 1 + own.focal_change
         return centers, focal_lengths
 
+    def own(self) -> tuple[Own, ...]:
+        """What single lenslets have of their own, in the frame that turns with the array."""
+        indices, found = self.indices(), []
+        for number, one in self.single.items():
+            i, j = indices[number - 1].tolist()
+            aside, decentre = self.turned(*one.offset), self.turned(*one.decentre)
+            found.append(Own((i, j), one.focal_change, aside if any(aside) else None, decentre))
+        return tuple(found)
+
+    def amid(self, count: Sequence[int]) -> dict[str, Any]:
+        """What `Instrument.replace` takes for the array's middle: so many lenslets, those of it that differ.
+
+        Of an array in which some differ it has one more along an axis where its middle would move.
+        """
+        if not self.single:
+            return {"count": tuple(count)}
+        kept = tuple(n - (n - some) // 2 * 2 for n, some in zip(self.count, count, strict=True))
+        fewer = self.model_copy(update={"count": kept, "single": {}}).indices().tolist()
+        index = self.indices().tolist()
+        single = {
+            fewer.index(index[number - 1]) + 1: one
+            for number, one in self.single.items()
+            if index[number - 1] in fewer
+        }
+        return {"count": kept, "single": single}
+
     @property
     def spacing(self) -> float:
         """How wide lenslets may be before two overlap, at most the pitch [m]."""
         if not self.single:
             return self.pitch
-        along = np.stack(self._turned(*self.each()[0].T), -1)
+        along = np.stack(self.turned(*self.each()[0].T), -1)
         apart = np.abs(along[:, None] - along).max(-1)
         np.fill_diagonal(apart, np.inf)
         return float(min(apart.min(), self.pitch))
 
-    def _turned(self, y: Any, x: Any) -> tuple[Any, Any]:
+    def turned(self, y: Any, x: Any) -> tuple[Any, Any]:
         """Coordinates (y, x) in the frame that turns with the array."""
         sin, cos = math.sin(self.rotation), math.cos(self.rotation)
         return y * cos - x * sin, y * sin + x * cos

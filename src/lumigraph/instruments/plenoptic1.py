@@ -101,8 +101,8 @@ class PlenopticCamera(LensletCamera):
 
     def plane_views(self, alpha: float) -> LightField:
         """Views of a textured plane at a refocus factor, by wave optics and a part of the lenslets."""
-        count = tuple(min(n, _MOST_KNOWN) for n in self.lenslets.count)
-        small = self.replace(lenslets={"count": count}, sensor={"shape": None})
+        fewer = self.lenslets.amid([min(n, _MOST_KNOWN) for n in self.lenslets.count])
+        small = self.replace(lenslets=fewer, sensor={"shape": None})
         focal_length, behind = self.main_lens.focal_length, self.exit_pupil.behind
         if behind:
             image = behind + self.pupil_distance / alpha

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lumigraph.core.arrays import to_numpy
+from lumigraph.core.aside import Aside
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.warp import Warp
@@ -61,6 +62,9 @@ def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> 
     ]
     if calibration.light is not None:
         lines.append(f"light = {listed(to_numpy(calibration.light))}")
+    if (aside := calibration.aside) is not None:
+        lines.append(f"aside = {to_numpy(aside.indices).tolist()}  # indices of those beside the lattice")
+        lines.append(f"aside_by = {listed(to_numpy(aside.ways))}")
     if calibration.warp is not None:
         lines += ["", *_warp_lines(calibration.warp)]
     target.write_bytes(path, ("\n".join(lines) + "\n").encode())
@@ -209,6 +213,9 @@ def _extras(found: dict[str, Any], lenslets: dict[str, Any]) -> dict[str, Any]:
     extras: dict[str, Any] = {}
     if "missing" in lenslets:
         extras["missing"] = _numbers(lenslets, "lenslets.missing", (-1, 2)).astype(np.int64)
+    if "aside" in lenslets:
+        indices = _numbers(lenslets, "lenslets.aside", (-1, 2)).astype(np.int64)
+        extras["aside"] = Aside(indices, _numbers(lenslets, "lenslets.aside_by", (-1, 2)))
     if "light" in lenslets:
         extras["light"] = _numbers(lenslets, "lenslets.light", (-1,))
     if "fill" in found:

@@ -147,6 +147,8 @@ def _left_out(camera: MetricCamera, calibration: Calibration, f_number: float | 
     yield from _irregular(camera, calibration.shape)
     if calibration.warp is not None:
         yield "the warp of the micro-images' lattice is not held"
+    if calibration.aside is not None:
+        yield "places of single lenslets beside the lattice are not held"
     shear = _shear(calibration.lattice) * max(calibration.shape)
     if abs(shear) > _WIDEST:
         yield f"the lattice is sheared by {shear:.2g} px over the picture, which a mesh does not hold"

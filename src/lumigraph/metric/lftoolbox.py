@@ -142,6 +142,8 @@ def _left_out(camera: MetricCamera, calibration: Calibration, middle: Any) -> It
         yield f"{len(camera.gains)} kinds of lenslets are not held"
     if calibration.warp is not None:
         yield "the warp of the micro-images' lattice is not held"
+    if calibration.aside is not None:
+        yield "places of single lenslets beside the lattice are not held"
     if abs(skew := _skew(calibration.lattice)) * max(calibration.shape) > 1e-6:
         yield f"the lattice's shear, {skew * 1e3:.3g} mrad, is in the matrix but not in LensletGridModel"
 

@@ -18,8 +18,14 @@ from lumigraph.elements.transmission import Thin, transmit
 from lumigraph.errors import GeometryError
 from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics
-from lumigraph.operators.cell_response import Accepted
+from lumigraph.operators.cell_response import Accepted, focal_lengths
 from lumigraph.operators.fineness import Edges, Fineness
+
+ALIKE = (
+    "leave focal_length_scatter, decentre_scatter, tilt_scatter, form_scatter and missing out of [built], "
+    "and single out of [lenslets]"
+)
+"""What makes lenslets alike, in messages."""
 
 OVERSAMPLING = 1.2
 """How much closer than λL/(2D) the points of a cell stand: a kernel of `HALF_WIDTH` interpolates them."""
@@ -170,8 +176,7 @@ def check_alike(camera: CameraOptics) -> None:
     if camera.array is not None and camera.array.scatter is not None:
         raise GeometryError(
             "lenslets that differ from each other have no operator, which repeats from lenslet to lenslet. "
-            "Simulate points, or slices in Coherent() light, or leave focal_length_scatter, "
-            "decentre_scatter, tilt_scatter, form_scatter and missing out of [built]."
+            f"Simulate points, or slices in Coherent() light, or {ALIKE}."
         )
 
 
@@ -276,10 +281,13 @@ def diffraction(camera: CameraOptics) -> float:
 
 
 def spill(camera: CameraOptics) -> float:
-    """How far a micro-image reaches over its lenslet's edge [m]: 0 but where the main lens is wide."""
-    assert camera.lattice is not None  # asked by `lenslet_array`
-    width = camera.pupil_diameter * lenslet_distance(camera) / camera.separation
-    return max(0.0, width - 1.25 * camera.lattice.pitch) / 2
+    """How far a micro-image reaches over its cell's edge [m], of wide main lenses and of vertices aside."""
+    array, b = camera.array, lenslet_distance(camera)
+    assert array is not None  # asked by `lenslet_array`
+    width, aside = camera.pupil_diameter * b / camera.separation, 0.0
+    if array.scatter is not None:
+        aside = array.scatter.farthest * b / abs(min(focal_lengths(array), key=abs))
+    return max(0.0, width + 2 * aside - 1.25 * array.lattice.pitch) / 2
 
 
 def fresnel_number(camera: CameraOptics) -> float:

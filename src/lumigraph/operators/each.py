@@ -5,8 +5,8 @@ At places (v, u) in halves of its width, lenslet n turns the phase of light by
 .. math:: \varphi_n(v, u) = \sum_{jk} c_{n,jk} P_j(v) P_k(u)
 
 of Legendre polynomials of degree 4 at most: focus and vertex, tilt and form. These are few numbers c for each
-lenslet; the ways to it and from it are matrices that all share. As in `cell_response`, a lenslet is a
-quadrature with exact borders.
+lenslet; the ways to it and from it are matrices that all share which stand on the lattice. As in
+`cell_response`, a lenslet is a quadrature with exact borders.
 """
 
 import math
@@ -31,13 +31,19 @@ from lumigraph.operators.optics import Optics
 Ways = tuple[range, range]
 """Rows and columns of cells."""
 
+One = tuple[int, int]
+"""Row and column of a lenslet's cell."""
+
 DEGREES = form.ORDER + 1
 """Polynomials along an axis of a lenslet."""
 
-LIGHT: tuple[Key, Key] = (("light", 0), ("light", 1))
-"""Of the way from light around a lenslet to its nodes (nodes, window), along y and along x."""
+Both = tuple[Key, Key]
+"""Of matrices along y and along x."""
 
-SPREAD: tuple[Key, Key] = (("spread", 0), ("spread", 1))
+LIGHT: Both = (("light", 0), ("light", 1))
+"""Of the way from light around a lenslet to its nodes (nodes, window)."""
+
+SPREAD: Both = (("spread", 0), ("spread", 1))
 """Of the way from there to the samples around it (nodes, samples)."""
 
 
@@ -56,13 +62,12 @@ def require_square(array: LensletArray, model: Model) -> None:
     if array.shape != "square" or isinstance(array.focal_length, tuple) or model == "exact":
         raise GeometryError(
             "lenslets that differ from each other are simulated for square ones of one focal length and "
-            'model = "paraxial". Use those, or leave focal_length_scatter, decentre_scatter, '
-            "tilt_scatter, form_scatter and missing out of [built]."
+            f'model = "paraxial". Use those, or {_cells.ALIKE}.'
         )
 
 
 def one_by_one(cameras: Sequence[CameraOptics]) -> list[CameraOptics]:
-    """Cameras to be compared: where lenslets of some differ by chance, those of all are taken one by one.
+    """Cameras to be compared: where lenslets of some differ, those of all are taken one by one.
 
     Raises
     ------
@@ -84,8 +89,13 @@ def one_by_one(cameras: Sequence[CameraOptics]) -> list[CameraOptics]:
                 "other ones are no small change. Give built.seed and built.missing alike, or search without "
                 "derivatives."
             )
-        found.append(replace(camera, array=replace(array, scatter=scatter)))
-    return found
+        found.append((camera, array, scatter))
+    moved = [one.index for *_, scatter in found for one in scatter.own if one.aside is not None]
+    named = {one.index: one.index in moved for *_, scatter in found for one in scatter.own}
+    return [
+        replace(camera, array=replace(array, scatter=scatter.naming(named)))
+        for camera, array, scatter in found
+    ]
 
 
 def require_repeated(camera: CameraOptics) -> None:
@@ -100,8 +110,7 @@ def require_repeated(camera: CameraOptics) -> None:
         raise GeometryError(
             "derivatives of planes need images of points that repeat from lenslet to lenslet, which those "
             "behind lenslets that differ do not. Use part_images, whose points may be the object's samples, "
-            "or leave focal_length_scatter, decentre_scatter, tilt_scatter, form_scatter and missing out of "
-            "[built]."
+            f"or {_cells.ALIKE}."
         )
 
 
@@ -151,12 +160,21 @@ class Each:
         for row, members in lit:
             beside = self.unlit(cells)
             for column in members:
-                cut, window = self.cut(1, column, cells[1]), self.around(light, (row, column), cells)
-                bent = self.on_nodes((own, own), window) * self.bend(row, column)
-                beside[:, cut.there] += bent @ own(SPREAD[1])[:, cut.inside]
-            cut = self.cut(0, row, cells[0])
-            total[cut.there] += own(SPREAD[0])[:, cut.inside].T @ beside
+                one = row, column
+                cut, spread = self.cut(1, column, cells[1]), own(self.spread(one)[1])
+                bent = self.on_nodes((own, own), self.around(light, one, cells), one) * self.bend(*one)
+                beside[:, cut.there] += bent @ spread[:, cut.inside]
+            cut, spread = self.cut(0, row, cells[0]), own(self.spread((row, members[0]))[0])
+            total[cut.there] += spread[:, cut.inside].T @ beside
         return total
+
+    def light(self, one: One) -> Both:
+        """`LIGHT` of a lenslet: its own where it stands beside the lattice."""
+        return (("light", 0, *one), ("light", 1, *one)) if one in self._moved else LIGHT
+
+    def spread(self, one: One) -> Both:
+        """`SPREAD` of a lenslet."""
+        return (("spread", 0, *one), ("spread", 1, *one)) if one in self._moved else SPREAD
 
     def unlit(self, cells: Ways) -> np.ndarray:
         """Nothing on a row's nodes along y and the samples along x of some cells."""
@@ -169,16 +187,27 @@ class Each:
 
     def keys(self, rows: range, columns: range) -> set[Key]:
         """Of all matrices that bring light to some cells."""
-        return {*LIGHT, *SPREAD} | {("phases", row) for row in self._around(0, rows)}
+        around = self._around(0, rows), self._around(1, columns)
+        moved = [one for one in self._moved if one[0] in around[0] and one[1] in around[1]]
+        own = {key for one in moved for key in (*self.light(one), *self.spread(one))}
+        return {*LIGHT, *SPREAD} | own | {("phases", row) for row in around[0]}
 
     def lit(self, light: np.ndarray, rows: range, columns: range) -> list[tuple[int, list[int]]]:
-        """Cells of the lenslets that are there and not dark: rows, and the columns of each."""
+        """Cells of the lenslets that are there and not dark: rows, and the columns of each.
+
+        Lenslets beside the lattice make rows of their own.
+        """
         around = self._around(0, rows), self._around(1, columns)
         there = np.argwhere(self._scatter.of(*self._numbers(*around))[3]).tolist()
         ones = [(around[0][k], around[1][n]) for k, n in there]
         bright = np.array([np.linalg.norm(self.around(light, one, (rows, columns))) for one in ones])
         kept = (ones[k] for k in bright_ones(bright, self.optics.fineness.accuracy))
-        return [(row, [x for _, x in some]) for row, some in groupby(kept, lambda one: one[0])]
+        alike = groupby(sorted(kept, key=self._row), self._row)
+        return [(row, [x for _, x in some]) for (row, _), some in alike]
+
+    def _row(self, one: One) -> One:
+        """Names lenslets that share their way along y: those of a row, or one beside the lattice."""
+        return one[0], one[1] if one in self._moved else -self._reach[1] - 1
 
     def around(self, light: np.ndarray, one: tuple[int, int], cells: Ways) -> np.ndarray:
         """Light (y, x) in the window of a lenslet; a change of what is added to it is one of the light."""
@@ -189,9 +218,10 @@ class Each:
         )  # fmt: skip
         return light[y, x]
 
-    def on_nodes(self, ways: tuple[Pieces, Pieces], window: np.ndarray) -> np.ndarray:
+    def on_nodes(self, ways: tuple[Pieces, Pieces], window: np.ndarray, one: One) -> np.ndarray:
         """Light (v, u) on a lenslet's nodes, by matrices along y and along x."""
-        return ways[0](LIGHT[0]) @ window @ ways[1](LIGHT[1]).T
+        (y, x), (down, across) = self.light(one), ways
+        return down(y) @ window @ across(x).T
 
     def phase(self, pieces: Pieces, row: int, column: int) -> np.ndarray:
         """Of a lenslet, on its nodes (v, u) [rad], by how it differs from others."""
@@ -224,14 +254,14 @@ class Each:
         return Cut(there, inside)
 
     def piece(self, key: Key) -> np.ndarray:
-        """A matrix: `LIGHT` or `SPREAD` along an axis, or terms (degrees², columns) of a row's "phases"."""
+        """A matrix: `light` or `spread` along an axis, or terms (degrees², columns) of a row's "phases"."""
         if key not in self._pieces:
             if self.like is not None and self._shared(key):
                 self._pieces[key] = self.like.piece(key)
             else:
-                what, of = key
+                what, *of = key
                 made = {"light": self._light, "spread": self._spread, "phases": self._phases}
-                self._pieces[key] = made[str(what)](int(str(of)))
+                self._pieces[key] = made[str(what)](*of)
         return self._pieces[key]
 
     def _shared(self, key: Key) -> bool:
@@ -241,12 +271,15 @@ class Each:
 
     def _given(self, key: Key) -> tuple[Any, ...]:
         """What a matrix follows from, beside what all have that are sampled alike."""
-        array, lenslets = self.optics.array, self._lenslets
-        if key in LIGHT:
-            return (array.fill_factor,)
-        if key in SPREAD:
-            return lenslets.optics, lenslets.pixels, self._halves, self.optics.cells.size
-        return lenslets.optics[0], self._halves, array
+        array, lenslets, what = self.optics.array, self._lenslets, key[0]
+        of, *one = (int(str(number)) for number in key[1:])
+        aside = self._aside(tuple(one))
+        if what == "light":
+            return array.fill_factor, *np.divide(aside, self.optics.cells.size)
+        if what == "spread":
+            return lenslets.optics, lenslets.pixels, self._halves, self.optics.cells.size, aside
+        row = int(self._numbers(range(of, of + 1), range(1))[0][0, 0])
+        return lenslets.optics[0], self._halves, replace(array, scatter=self._scatter.in_row(row))
 
     @cached_property
     def _lenslets(self) -> Lenslets:
@@ -291,20 +324,36 @@ class Each:
         if self.like is not None:
             return self.like._counts
         scatter, optics, found = self._scatter, self._lenslets.optics, []
-        strongest = focal_lengths(self.optics.array)[0] * (1 - 4 * scatter.focal_length)
+        strongest = focal_lengths(self.optics.array)[0] * (1 - 4 * scatter.focal_length) * scatter.shortest
         for half, axis in zip(self._halves, self.optics.axes, strict=True):
             turn = scatter.turn + scatter.decentre / abs(strongest)
-            steepest = 4 * turn + form.STEEPEST * scatter.form / half
+            steepest = 4 * turn + scatter.farthest / abs(strongest) + form.STEEPEST * scatter.form / half
             found.append(nodes(half, strongest, axis, optics) + math.ceil(4 * half * steepest / optics[0]))
         return found[0], found[1]
 
-    def _light(self, which: int) -> np.ndarray:
-        at, _ = self._nodes(which)
+    @cached_property
+    def _moved(self) -> dict[One, tuple[float, float]]:
+        """By cell, ways (y, x) from the lattice of lenslets that have matrices of their own [m]."""
+        cells, lattice, found = self.optics.cells, self.optics.array.lattice, {}
+        for own in self._scatter.own:
+            if own.aside is not None:
+                middle = np.array(lattice.origin) + own.index[0] * np.array(lattice.basis[1])
+                middle += own.index[1] * np.array(lattice.basis[0])
+                row, column = np.rint((middle - cells.edge) / cells.size - 0.5).astype(int) + cells.ring
+                found[int(row), int(column)] = own.aside
+        return found
+
+    def _aside(self, one: tuple[int, ...]) -> tuple[float, float]:
+        """Of a lenslet, or of those on the lattice."""
+        return self._moved[one[0], one[1]] if one else (0.0, 0.0)
+
+    def _light(self, which: int, *one: int) -> np.ndarray:
+        at, _ = self._nodes(which, *one)
         found = self._lenslets.values(which, at) @ self._lenslets.coefficients[which]
         return found.astype(self.precision)
 
-    def _spread(self, which: int) -> np.ndarray:
-        (at, weight), axis, reach = self._nodes(which), self.optics.axes[which], self._reach[which]
+    def _spread(self, which: int, *one: int) -> np.ndarray:
+        (at, weight), axis, reach = self._nodes(which, *one), self.optics.axes[which], self._reach[which]
         parts = []
         for cell in range(-reach, reach + 1):
             seen = at - cell * axis.size
@@ -312,17 +361,18 @@ class Each:
             parts.append(spread * (weight * axis.fade(seen, axis.size)))
         return np.concatenate(parts).T.astype(self.precision)
 
-    def _nodes(self, which: int) -> tuple[np.ndarray, np.ndarray]:
-        """Places from a lenslet's middle, and weights [m]."""
-        half = self._halves[which]
-        return legendre(-half, half, self._counts[which])
+    def _nodes(self, which: int, *one: int) -> tuple[np.ndarray, np.ndarray]:
+        """Places from the middle of its cell, and weights [m]."""
+        half, aside = self._halves[which], self._aside(one)[which]
+        return legendre(aside - half, aside + half, self._counts[which])
 
     def _phases(self, row: int) -> np.ndarray:
         """Terms (degrees², columns) of the phases of a row of lenslets [rad]."""
         columns = range(-self._reach[1], self.optics.cells.image[1] + self._reach[1])
         i, j = self._numbers(range(row, row + 1), columns)
         (focal_length,), (high, wide) = focal_lengths(self.optics.array), self._halves
-        (factor, dy, dx, _), terms = self._scatter.of(i, j), np.zeros((*j.shape, DEGREES, DEGREES))
+        (factor, *vertex, _), terms = self._scatter.of(i, j), np.zeros((*j.shape, DEGREES, DEGREES))
+        dy, dx = np.subtract(vertex, self._scatter.aside(i, j))
         if self._scatter.warps:
             warp = self._scatter.warp(i, j)
             terms += form.matrices(warp.terms)

@@ -10,7 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
-from lumigraph.operators.each import LIGHT, SPREAD, Each, Ways
+from lumigraph.operators.each import Each, Ways
+from lumigraph.operators.each import One as Cell
 from lumigraph.operators.line_parts import ON_LINES, Key, Pieces
 from lumigraph.operators.lines import Lines, One, by_row, of_kinds
 from lumigraph.operators.relay import Straight
@@ -235,50 +236,50 @@ class _Singly:
             for column in members:
                 one = row, column
                 window, bend = relay.around(self.light, one, cells), relay.bend(*one)
-                bent = relay.on_nodes((own, own), window) * bend
-                turned = relay.on_nodes((change, own), window) + relay.on_nodes((own, change), window)
+                bent = relay.on_nodes((own, own), window, one) * bend
+                turned = relay.on_nodes((change, own), window, one)
+                turned = turned + relay.on_nodes((own, change), window, one)
                 turned = turned * bend + 1j * relay.phase(change, *one) * bent
-                cut = relay.cut(1, column, cells[1])
-                beside[:, cut.there] += bent @ own(SPREAD[1])[:, cut.inside]
-                moved[:, cut.there] += turned @ own(SPREAD[1])[:, cut.inside]
-                moved[:, cut.there] += bent @ change(SPREAD[1])[:, cut.inside]
-            cut = relay.cut(0, row, cells[0])
-            found[cut.there] += own(SPREAD[0])[:, cut.inside].T @ moved
-            found[cut.there] += change(SPREAD[0])[:, cut.inside].T @ beside
+                cut, spread = relay.cut(1, column, cells[1]), relay.spread(one)[1]
+                beside[:, cut.there] += bent @ own(spread)[:, cut.inside]
+                moved[:, cut.there] += turned @ own(spread)[:, cut.inside]
+                moved[:, cut.there] += bent @ change(spread)[:, cut.inside]
+            cut, spread = relay.cut(0, row, cells[0]), relay.spread((row, members[0]))[0]
+            found[cut.there] += own(spread)[:, cut.inside].T @ moved
+            found[cut.there] += change(spread)[:, cut.inside].T @ beside
         return found
 
     def back(self, by: np.ndarray, slopes: Slopes) -> np.ndarray:
         """As `Passed.back`."""
         relay, own, found = self.relay, self.relay.piece, np.zeros_like(self.light)
         for row, members in self.lit:
-            cut = relay.cut(0, row, self.cells[0])
+            cut, spread = relay.cut(0, row, self.cells[0]), relay.spread((row, members[0]))[0]
             part = by[cut.there]
-            seen, beside = own(SPREAD[0])[:, cut.inside] @ part, relay.unlit(self.cells)
+            seen, beside = own(spread)[:, cut.inside] @ part, relay.unlit(self.cells)
             for column in members:
                 self._back(found, (row, column), (seen, beside), slopes)
-            slopes.add_columns(SPREAD[0], beside @ part.T, cut.inside, own(SPREAD[0]))
+            slopes.add_columns(spread, beside @ part.T, cut.inside, own(spread))
         return found
 
-    def _back(
-        self, found: np.ndarray, one: tuple[int, int], row: tuple[np.ndarray, np.ndarray], slopes: Slopes
-    ) -> None:
+    def _back(self, found: np.ndarray, one: Cell, row: tuple[np.ndarray, np.ndarray], slopes: Slopes) -> None:
         """Through a lenslet, by slopes on the row's nodes along y; the row's light there is added to."""
         relay, own, (seen, beside) = self.relay, self.relay.piece, row
         window, bend = relay.around(self.light, one, self.cells), relay.bend(*one)
-        (down, across), (above, right) = (map(own, LIGHT), relay.polynomials)
+        light, key = relay.light(one), relay.spread(one)[1]
+        (down, across), (above, right) = map(own, light), relay.polynomials
         left = down @ window
         bent = (left @ across.T) * bend
         cut = relay.cut(1, one[1], self.cells[1])
-        spread = own(SPREAD[1])[:, cut.inside]
+        spread = own(key)[:, cut.inside]
         beside[:, cut.there] += bent @ spread
-        slopes.add_columns(SPREAD[1], bent.T @ seen[:, cut.there], cut.inside, own(SPREAD[1]))
+        slopes.add_columns(key, bent.T @ seen[:, cut.there], cut.inside, own(key))
         by = seen[:, cut.there] @ spread.T
         turned = above.T @ np.imag(by * bent) @ right
-        number, key = relay.number(one[1]), ("phases", one[0])
-        slopes.add_columns(key, -turned.reshape(-1, 1), slice(number, number + 1), own(key))
+        number, phases = relay.number(one[1]), ("phases", one[0])
+        slopes.add_columns(phases, -turned.reshape(-1, 1), slice(number, number + 1), own(phases))
         by = by * bend
-        slopes.add(LIGHT[0], by @ (window @ across.T).T)
-        slopes.add(LIGHT[1], by.T @ left)
+        slopes.add(light[0], by @ (window @ across.T).T)
+        slopes.add(light[1], by.T @ left)
         relay.around(found, one, self.cells)[...] += down.T @ by @ across
 
 

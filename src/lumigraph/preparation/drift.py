@@ -203,7 +203,7 @@ def _expected(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Basis of the calibration over a part of the picture, (y, x) [px] of i and j in columns; its inverse."""
     basis = calibration.lattice.matrix
-    if calibration.warp is not None:
+    if calibration.warp is not None or calibration.aside is not None:
         (y, x), (ny, nx) = corner, shape
         indices = calibration.indices_within((y, y + ny - 1), (x, x + nx - 1))
         points = calibration.position(indices)

@@ -258,7 +258,7 @@ class _Source:
         size: np.ndarray | float,
     ) -> tuple[np.ndarray, np.ndarray]:
         indices = np.stack(index, -1)
-        flat, on_sensor = self.calibration.lattice.position(indices), self.calibration.position(indices)
+        flat, on_sensor = self.calibration.flat(indices), self.calibration.position(indices)
         ratio = size / self.calibration.lattice.pitch
         return (
             on_sensor[..., 0] - ratio * (y - flat[..., 0]),

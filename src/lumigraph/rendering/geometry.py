@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lumigraph.core.arrays import Array, namespace, to_numpy
+from lumigraph.core.aside import Aside
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
@@ -68,7 +69,11 @@ def transposed(calibration: Calibration) -> Calibration | None:
     column = min(vectors, key=lambda v: abs(math.remainder(math.atan2(*v) - turn, 2 * math.pi)))
     basis = (float(row[0]), float(row[1])), (float(column[0]), float(column[1]))
     flipped = Lattice(basis, (lattice.origin[1], lattice.origin[0]), "hex", lattice.kinds)
-    missing = np.stack(flipped.index(*lattice.position(calibration.missing).T[::-1]), -1)
+
+    def here(indices: np.ndarray) -> np.ndarray:
+        return np.stack(flipped.index(*lattice.position(indices).T[::-1]), -1)
+
+    aside = calibration.aside
     return replace(
         calibration,
         lattice=flipped,
@@ -76,8 +81,9 @@ def transposed(calibration: Calibration) -> Calibration | None:
         indices=np.zeros((0, 2), int),
         centers=np.zeros((0, 2)),
         light=None,
-        missing=missing,
+        missing=here(calibration.missing),
         warp=None if calibration.warp is None else calibration.warp.transposed(),
+        aside=None if aside is None else Aside(here(aside.indices), aside.ways[:, ::-1]),
     )
 
 
@@ -167,6 +173,7 @@ def raw_places(
     tuple
         Centres (n, 2) of the micro-images, those between two lenslets too, and the ways (n, 2) from there.
     """
+    calibration.require_regular("a metric light field")
     flipped = transposed(calibration)
     frame = Frame.of(calibration if flipped is None else flipped)
     turn = slice(None) if flipped is None else slice(None, None, -1)

@@ -161,7 +161,7 @@ def tolerances_of(
         built(camera, {TILT: 1e-6})  # their index must be known
     for one in found:
         one.deviation_of(value_of(camera, one.name))
-    if camera.scatter is not None and (each := [one.name for one in found if one.is_of_each]):
+    if camera.errors is not None and (each := [one.name for one in found if one.is_of_each]):
         raise FormatError(
             f"{each[0]} would be drawn but the lenslets of [built] differ already. Leave out the tolerance, "
             "or focal_length_scatter, decentre_scatter, tilt_scatter, form_scatter and missing."

@@ -42,7 +42,7 @@ def measures(camera: LensletCamera, made: LensletCamera) -> tuple[Row, ...]:
 
 def of_making(camera: LensletCamera, made: LensletCamera) -> Iterator[Row]:
     """Those that only a camera as built has."""
-    scatter = made.scatter
+    scatter = made.errors
     single = Single() if scatter is None else Single.of(made, scatter)
     near = focused_distance(made)
     yield Row("focused distance", near, "m", "object that lenslets, or the sensor behind them, see sharp")

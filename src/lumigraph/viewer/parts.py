@@ -196,7 +196,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 def _bent(calibration: Calibration) -> dict[str, Any]:
     """Centres and kinds of a lattice that is not straight, which the page cannot work out itself."""
-    if calibration.warp is None:
+    if calibration.warp is None and calibration.aside is None:
         return {}
     ny, nx = calibration.shape
     indices = calibration.indices_within((0, ny - 1), (0, nx - 1))[:_MOST_CENTERS]
