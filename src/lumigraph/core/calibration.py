@@ -47,8 +47,6 @@ class Calibration:
         Lenslets to sensor, b [m]; None where unknown.
     warp
         Tilt and radial distortion that move the lattice points [px]; None where the lattice is regular.
-    aside
-        Ways of single lenslets beside all that; None where they stand on the lattice.
     light
         Brightness (k,) of the measured micro-images, 1 for a bright one; None where unknown.
     fill
@@ -63,6 +61,8 @@ class Calibration:
     by_maker
         Whether it is the file of a camera's maker, which gives pitch and rotation well, but not where a
         picture was cropped: `calibration.aligned` moves it.
+    aside
+        Ways of single lenslets beside the lattice; None where all stand on it.
     """
 
     lattice: Lattice
@@ -74,13 +74,13 @@ class Calibration:
     separation: float | None = None
     lenslet_distance: float | None = None
     warp: Warp | None = None
-    aside: Aside | None = None
     light: np.ndarray | None = None
     fill: float | None = None
     missing: np.ndarray = field(default_factory=_none)
     sharpness: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
     by_maker: bool = False
+    aside: Aside | None = None
 
     __repr__ = brief
 

@@ -219,7 +219,8 @@ def _singles(camera: "LensletCamera") -> Iterator[Row]:
         own = parts.focal_length[0] * (1 + one.focal_change)
         yield Row(f"lenslet {number} focal length", own, "m", "f_µ, its own")
         if any(one.vertex):
-            yield Row(f"lenslet {number} vertex", one.vertex, "m", "(y, x) from its place on the lattice")
+            for axis, way in zip("yx", one.vertex, strict=True):
+                yield Row(f"lenslet {number} vertex {axis}", way, "m", "from its place on the lattice")
 
 
 def _glass(camera: "LensletCamera") -> Iterator[Row]:
