@@ -8,6 +8,7 @@ from tests.operators.test_part_each import direct, off
 
 import lumigraph as lg
 from cameras import focused
+from lumigraph.core.aside import Aside
 from lumigraph.elements import LensletArray, Own, Scatter
 from lumigraph.errors import CalibrationError, FormatError, GeometryError
 from lumigraph.scene import Points, Scene
@@ -17,7 +18,7 @@ POINT = Points(np.array([[20 * um, -30 * um, 1 * mm]]), np.ones(1))
 PITCH, FILL = 100 * um, 0.8
 SINGLE = {
     6: {"offset_y": 9 * um, "offset_x": -4 * um},
-    7: {"focal_change": 0.1},
+    7: {"focal_change": 0.1, "offset_x": 7 * um},
     10: {"decentre_y": 15 * um},
     11: {"decentre_x": -20 * um, "focal_change": -0.1, "offset_y": 5 * um},
 }
@@ -130,6 +131,29 @@ def test_an_array_that_is_turned_turns_the_ways_of_its_lenslets():
     assert np.abs(np.rot90(found, -1) - expected).max() > 0.5
 
 
+def test_apertures_that_touch_leave_no_gap_between_them():
+    """Their border lies amid a sample, of which each covers half."""
+    own = Own((0, 0), aside=(0.0, 10 * um)), Own((0, 1), aside=(0.0, -10 * um))
+    array = LensletArray(lg.Lattice.square(PITCH), 5 * mm, fill_factor=FILL, scatter=Scatter(own=own))
+    line = np.abs(array.transmission(lg.Grid((1, 25), (4 * um, 4 * um), (0.0, 50 * um)), 600e-9))[0]
+    assert line == pytest.approx(1, abs=1e-12)
+
+
+def test_patches_are_placed_around_vertices(rng):
+    """Of a main image that is a ramp: each lenslet shows its part of it, turned, around its own centre."""
+    none, size, pitch = np.zeros((0, 2)), 4.0, 10.0
+    plain = lg.Calibration(lg.Lattice.square(pitch, origin=(5, 5)), (60, 60), none, none, 0.0)
+    indices = plain.indices_within((0, 59), (0, 59))
+    aside = replace(plain, aside=Aside(indices, rng.uniform(-1.5, 1.5, indices.shape)))
+    for one, flat in ((aside, True), (plain, False)):
+        y, x = np.mgrid[:60, :60]
+        center = one.position(np.stack(aside.index(y, x), -1))
+        raw = center[..., 1] - (x - center[..., 1]) * pitch / size
+        shown = np.asarray(lg.render(raw, aside, size, interpolation="linear"))
+        bends = np.abs(np.diff(shown, 2, axis=1))
+        assert (bends.max() < 1e-9) == flat
+
+
 def test_ways_in_the_file_are_along_y_and_x_however_the_array_is_turned():
     parts = camera(rotation=0.1).lenslets
     array = camera(rotation=0.1).lenslet_array()
@@ -150,7 +174,7 @@ def test_micro_images_stand_where_vertices_do():
     assert moved.position(index) - plain.position(index) == pytest.approx(scale * there)
     assert moved.position(moved.indices) == pytest.approx(moved.centers)
     assert moved.transposed().position(index[:, ::-1]) == pytest.approx(moved.position(index)[:, ::-1])
-    with pytest.raises(CalibrationError, match=r"needs lenslets on a lattice, but micro-images of 3 stand"):
+    with pytest.raises(CalibrationError, match=r"needs lenslets on a lattice, but micro-images of 4 stand"):
         moved.require_regular("depth")
 
 

@@ -133,16 +133,6 @@ class Scatter:
         """Whether apertures stand beside the lattice."""
         return any(any(one.aside or ()) for one in self.own)
 
-    @property
-    def shortest(self) -> float:
-        """Least factor of focal lengths that are given."""
-        return 1 + min((one.focal_change for one in self.own), default=0.0)
-
-    @property
-    def farthest(self) -> float:
-        """Farthest along an axis that vertices are given beside the lattice [m]."""
-        return max((abs(way) for one in self.own for way in one.vertex), default=0.0)
-
     def in_row(self, i: int) -> "Scatter":
         """What lenslets of a row follow from."""
         return replace(self, own=tuple(one for one in self.own if one.index[0] == i))

@@ -18,7 +18,7 @@ from lumigraph.elements.transmission import Thin, transmit
 from lumigraph.errors import GeometryError
 from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics
-from lumigraph.operators.cell_response import Accepted, focal_lengths
+from lumigraph.operators.cell_response import Accepted
 from lumigraph.operators.fineness import Edges, Fineness
 
 ALIKE = (
@@ -281,13 +281,10 @@ def diffraction(camera: CameraOptics) -> float:
 
 
 def spill(camera: CameraOptics) -> float:
-    """How far a micro-image reaches over its cell's edge [m], of wide main lenses and of vertices aside."""
-    array, b = camera.array, lenslet_distance(camera)
-    assert array is not None  # asked by `lenslet_array`
-    width, aside = camera.pupil_diameter * b / camera.separation, 0.0
-    if array.scatter is not None:
-        aside = array.scatter.farthest * b / abs(min(focal_lengths(array), key=abs))
-    return max(0.0, width + 2 * aside - 1.25 * array.lattice.pitch) / 2
+    """How far a micro-image reaches over its lenslet's edge [m]: 0 but where the main lens is wide."""
+    assert camera.lattice is not None  # asked by `lenslet_array`
+    width = camera.pupil_diameter * lenslet_distance(camera) / camera.separation
+    return max(0.0, width - 1.25 * camera.lattice.pitch) / 2
 
 
 def fresnel_number(camera: CameraOptics) -> float:

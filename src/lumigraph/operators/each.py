@@ -324,10 +324,10 @@ class Each:
         if self.like is not None:
             return self.like._counts
         scatter, optics, found = self._scatter, self._lenslets.optics, []
-        strongest = focal_lengths(self.optics.array)[0] * (1 - 4 * scatter.focal_length) * scatter.shortest
+        strongest = focal_lengths(self.optics.array)[0] * (1 - 4 * scatter.focal_length)
         for half, axis in zip(self._halves, self.optics.axes, strict=True):
             turn = scatter.turn + scatter.decentre / abs(strongest)
-            steepest = 4 * turn + scatter.farthest / abs(strongest) + form.STEEPEST * scatter.form / half
+            steepest = 4 * turn + form.STEEPEST * scatter.form / half
             found.append(nodes(half, strongest, axis, optics) + math.ceil(4 * half * steepest / optics[0]))
         return found[0], found[1]
 
