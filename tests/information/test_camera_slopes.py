@@ -47,6 +47,15 @@ DIFFER = TWO | {
         "missing": 0.05, "seed": 3,
     },
 }  # fmt: skip
+OWN = TWO | {
+    "lenslets": TWO["lenslets"] | {
+        "single": {
+            25: {"focal_change": 0.02, "offset_y": 2 * um}, 32: {"decentre_x": 10 * um},
+            24: {"offset_x": 3 * um},
+        },
+    },
+}  # fmt: skip
+"""Lenslets of their own, amid the array and beside."""
 BESIDE = range(1, 2)
 """A place off the axis, which moves with the lattice."""
 KEYS = (
@@ -83,9 +92,23 @@ def ends(given, key, step):
         (HEX, ("lenslets.pitch", "lenslets.focal_length.1"), "lateral"),
         (ONE, ("lenslets.pitch", "object_distance"), "brightness"),
         (DIFFER, ("built.form_scatter",), "depth"),
+        pytest.param(
+            OWN,
+            ("lenslets.single.25.focal_change", "lenslets.single.24.offset_x"),
+            "depth",
+            marks=pytest.mark.long,
+        ),
         pytest.param(DIFFER, (*KEYS[1:9:3], *SIZES), "lateral", marks=pytest.mark.long),
     ],
-    ids=["squares", "built", "hexagons of three kinds", "1.0", "that differ", "that differ, by others"],
+    ids=[
+        "squares",
+        "built",
+        "hexagons of three kinds",
+        "1.0",
+        "that differ",
+        "own",
+        "that differ, by others",
+    ],
 )
 def test_slopes_are_central_differences_of_bounds(given, keys, name):
     """Of cameras twice as far to either side, each sampled as it asks for, in double precision."""
@@ -102,7 +125,9 @@ def test_slopes_are_central_differences_of_bounds(given, keys, name):
 
 
 @pytest.mark.parametrize(
-    "given", [TURNED, HEX, ONE, DIFFER], ids=["turned squares", "hexagons", "1.0", "that differ"]
+    "given",
+    [TURNED, HEX, ONE, DIFFER, OWN],
+    ids=["turned squares", "hexagons", "1.0", "that differ", "own"],
 )
 def test_images_and_their_derivatives_are_those_of_bounds(given):
     """Which are of single precision; behind a plain lens of a sharp stop, which is sampled here."""

@@ -165,8 +165,14 @@ class Each:
                 bent = self.on_nodes((own, own), self.around(light, one, cells), one) * self.bend(*one)
                 beside[:, cut.there] += bent @ spread[:, cut.inside]
             cut, spread = self.cut(0, row, cells[0]), own(self.spread((row, members[0]))[0])
-            total[cut.there] += spread[:, cut.inside].T @ beside
+            across = self.across(members, cells[1])
+            total[cut.there, across] += spread[:, cut.inside].T @ beside[:, across]
         return total
+
+    def across(self, members: list[int], columns: range) -> slice:
+        """Samples of some columns of cells that lenslets of a row light."""
+        lit = [self.cut(1, column, columns).there for column in members]
+        return slice(min(one.start for one in lit), max(one.stop for one in lit))
 
     def light(self, one: One) -> Both:
         """`LIGHT` of a lenslet: its own where it stands beside the lattice."""

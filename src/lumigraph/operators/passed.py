@@ -245,8 +245,9 @@ class _Singly:
                 moved[:, cut.there] += turned @ own(spread)[:, cut.inside]
                 moved[:, cut.there] += bent @ change(spread)[:, cut.inside]
             cut, spread = relay.cut(0, row, cells[0]), relay.spread((row, members[0]))[0]
-            found[cut.there] += own(spread)[:, cut.inside].T @ moved
-            found[cut.there] += change(spread)[:, cut.inside].T @ beside
+            across = relay.across(members, cells[1])
+            found[cut.there, across] += own(spread)[:, cut.inside].T @ moved[:, across]
+            found[cut.there, across] += change(spread)[:, cut.inside].T @ beside[:, across]
         return found
 
     def back(self, by: np.ndarray, slopes: Slopes) -> np.ndarray:
@@ -254,11 +255,13 @@ class _Singly:
         relay, own, found = self.relay, self.relay.piece, np.zeros_like(self.light)
         for row, members in self.lit:
             cut, spread = relay.cut(0, row, self.cells[0]), relay.spread((row, members[0]))[0]
-            part = by[cut.there]
-            seen, beside = own(spread)[:, cut.inside] @ part, relay.unlit(self.cells)
+            across = relay.across(members, self.cells[1])
+            part = by[cut.there, across]
+            seen, beside = relay.unlit(self.cells), relay.unlit(self.cells)
+            seen[:, across] = own(spread)[:, cut.inside] @ part
             for column in members:
                 self._back(found, (row, column), (seen, beside), slopes)
-            slopes.add_columns(spread, beside @ part.T, cut.inside, own(spread))
+            slopes.add_columns(spread, beside[:, across] @ part.T, cut.inside, own(spread))
         return found
 
     def _back(self, found: np.ndarray, one: Cell, row: tuple[np.ndarray, np.ndarray], slopes: Slopes) -> None:
