@@ -272,6 +272,25 @@ def test_a_search_that_was_killed_goes_on_to_the_same_result(tmp_path, monkeypat
         lg.optimise(SCOPE, VARY, depths=(-10e-6, 11e-6), evaluations=6, output=tmp_path / "best.toml")
 
 
+def test_a_search_goes_on_with_more_evaluations_from_what_is_noted(tmp_path, monkeypatch):
+    """From two starts, whose cameras come in another order then."""
+    from lumigraph.optimisation import goals
+
+    plain, calls = goals.Goal.values, []
+    monkeypatch.setattr(goals.Goal, "values", lambda self, *given: calls.append(given) or plain(self, *given))
+    vary, goal = {"lenslets.magnification": "0.3:0.7:3"}, "least cross-talk"
+    whole = lg.optimise(CAMERA, vary, goal, evaluations=12)
+    calls.clear()
+    few = lg.optimise(CAMERA, vary, goal, evaluations=5, output=tmp_path / "best.toml")
+    assert len(calls) == len(few.rows)
+    found = lg.optimise(CAMERA, vary, goal, evaluations=12, output=tmp_path / "best.toml")
+    assert found.rows == whole.rows
+    assert len(calls) < len(few.rows) + len(whole.rows) - 4
+    done = len(calls)
+    assert lg.optimise(CAMERA, vary, goal, evaluations=12, output=tmp_path / "best.toml").rows == whole.rows
+    assert len(calls) == done
+
+
 def test_ranges_and_stock_are_told_apart():
     space = Space.of(["a=1 mm:3 mm:3", "b=4, 5"])
     assert space.moved({"a": "1 mm", "b": 4}, [0.25]) == {"a": "1.5 mm", "b": 4}

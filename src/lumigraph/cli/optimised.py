@@ -33,11 +33,8 @@ def result(found: "Optimum", given: "Instrument", output: Path) -> Result:
 def _lines(found: "Optimum") -> Iterator[str]:
     before, swept, best = map(partial(_told, found.goal), found.quantities()[:3])
     yield f"{found.goal.name}: {before} as given, {swept} the best of the first values, {best} the best"
-    gains = (
-        f"{found.gain(found.start):.1%} than as given",
-        f"{found.gain(found.swept):.1%} than the first values",
-    )
-    yield f"better by {gains[0]}, by {gains[1]}"
+    given, first = (f"{100 * found.gain(row):z.1f}%" for row in (found.start, found.swept))
+    yield f"better by {given} than as given, by {first} than the first values"
     yield ", ".join(f"{key} = {value}" for key, value in _changed(found).items())
     for which, one in found.tried.items():
         yield _reached(found, which, one)

@@ -1,9 +1,10 @@
 """Cameras that a search asks for, each computed once and noted in a ledger."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,8 @@ class Evaluations:
         Where it is noted; None for nowhere.
     done
         Called with the number of cameras so far.
+    names
+        Of the values that vary.
     beside
         Another goal, computed too.
     """
@@ -47,6 +50,7 @@ class Evaluations:
     first: float
     ledger: Ledger | None
     done: Callable[[int], None]
+    names: Sequence[str]
     beside: Goal | None = None
     rows: list[dict[str, Any]] = field(default_factory=list)
     seconds: float = 0.0
@@ -55,21 +59,20 @@ class Evaluations:
 
     def row(self, item: Mapping[str, Any]) -> dict[str, Any]:
         """Values of the camera with an item's values, or why there is none."""
-        key = repr(sorted(item.items()))
+        key = _key(item)
         if key not in self._known:
-            number = len(self.rows)
-            kept = None if self.ledger is None else self.ledger.entry(number)
-            # A search that is repeated asks for the same cameras in the same order.
-            if kept is None or {name: kept.values.get(name) for name in item} != dict(item):
-                row, seconds = self._computed(item)
-                if self.ledger is not None:
-                    self.ledger.record(Entry(number, seconds, values=row))
-            else:
-                row = kept.values
+            row = self._noted.get(key) or self._computed(item)
+            self._known[key] = len(self.rows)
             self.rows.append(row)
-            self._known[key] = number
             self.done(len(self.rows))
         return self.rows[self._known[key]]
+
+    @cached_property
+    def _noted(self) -> dict[str, dict[str, Any]]:
+        """Rows that the ledger has from before, whichever search asked for them."""
+        entries = {} if self.ledger is None else self.ledger.entries()
+        rows = [entry.values for entry in entries.values()]
+        return {_key({name: row[name] for name in self.names if name in row}): row for row in rows}
 
     def cost(self, item: Mapping[str, Any]) -> float:
         """Of an item, as `Goal.cost`."""
@@ -96,21 +99,27 @@ class Evaluations:
             return changed(self.start, space.moved(item, there.tolist())), float((there - parts).sum())
         return changed(self.start, item), 0.0
 
-    def _computed(self, item: Mapping[str, Any]) -> tuple[dict[str, Any], float]:
+    def _computed(self, item: Mapping[str, Any]) -> dict[str, Any]:
         began = time.perf_counter()
         try:
             row = {**item, **self._values(changed(self.start, item))}
         except (LumigraphError, SamplingWarning) as error:
             row = {**item, ERROR: " ".join(str(error).split())}
         seconds = time.perf_counter() - began
+        if self.ledger is not None:
+            self.ledger.record(Entry(len(self._noted) + self.computed, seconds, values=row))
         self.seconds, self.computed = self.seconds + seconds, self.computed + 1
-        return row, seconds
+        return row
 
     def _values(self, camera: Instrument) -> dict[str, float]:
         found = self.goal.values(camera, self.first)
         if self.beside is not None and self.beside.name not in found:
             return {**self.beside.values(camera, self.first), **found}
         return found
+
+
+def _key(item: Mapping[str, Any]) -> str:
+    return repr(sorted(item.items()))
 
 
 @contextmanager

@@ -213,7 +213,7 @@ def optimise(
     total = 1 + len(items) + beyond * (1 if other is None else 2)
     what = {
         "camera": start.to_toml(), "values": space.grid, "ranges": list(space.ranges), "goal": asdict(aim),
-        "search": [search, most, seed], **({} if other is None else {"against": asdict(other)}),
+        "search": [search, seed], **({} if other is None else {"against": asdict(other)}),
     }  # fmt: skip
 
     def done(count: int) -> None:
@@ -223,7 +223,7 @@ def optimise(
             progress(Stage(min(count / total, 1.0), f"camera {count} of at most {total}"))
 
     with noted(None if output is None else Path(output), what) as ledger:
-        cameras = Evaluations(start, aim, collected(start), ledger, done, other)
+        cameras = Evaluations(start, aim, collected(start), ledger, done, list(space.grid), other)
         cameras.row({})
         swept = grid(cameras, space)
         if swept is None:
