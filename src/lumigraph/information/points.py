@@ -197,7 +197,8 @@ class CameraSource:
     def part(self, dz: float) -> float:
         """Of the light through the main lens, in an image of 1: a sample of the object has more nearer by."""
         optics = self._optics
-        step = optics.object_pitch * optics.separation / (optics.object_distance + dz)
+        depth = dz if optics.objects is None else float(optics.objects.depth(dz))
+        step = optics.object_pitch * optics.separation / (optics.object_distance + depth)
         return (optics.sensor.pixel_pitch / step) ** 2
 
 
