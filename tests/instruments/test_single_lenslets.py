@@ -93,11 +93,24 @@ def test_what_cannot_be_is_refused(lenslets, said):
 
 
 @pytest.mark.parametrize(
-    ("name", "said"), [("lfm-guv", "not '1.0'"), ("thesis-plenoptic-1", "lenslets differ by kinds")]
+    ("name", "single", "said"),
+    [
+        ("lfm-guv", {}, "not '1.0'"),
+        ("multi-focus-hex", {}, "these are hex"),
+        ("lfm-fourier", {"decentre_y": "1 um"}, "Move the whole lenslet by offset_y"),
+    ],
 )
-def test_other_instruments_have_no_single_lenslets(name, said):
+def test_other_instruments_have_no_single_lenslets(name, single, said):
     with pytest.raises(GeometryError, match=said):
-        lg.load_camera(name).replace(lenslets={"single": {1: {}}})
+        lg.load_camera(name).replace(lenslets={"single": {1: single}})
+
+
+def test_views_of_lenslets_that_left_the_lattice_are_cut_around_them():
+    scope = lg.load_camera("lfm-fourier")
+    plain, index = scope.calibration, scope.calibration.indices[:1]
+    moved = scope.replace(lenslets={"single": {1: {"offset_y": "40 um"}}}).calibration
+    way = 40e-6 * scope.relay_magnification / scope.sensor.pixel_pitch
+    assert moved.position(index) - plain.position(index) == pytest.approx(np.array([[way, 0.0]]))
 
 
 def test_a_sensor_holds_the_images_of_lenslets_that_left_the_lattice():

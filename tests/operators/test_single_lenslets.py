@@ -72,11 +72,12 @@ def test_lenslets_all_alike_longer_are_an_array_of_that_focal_length():
     assert off(image(plain), image(longer)) > 2e-3
 
 
-def test_lenslets_all_aside_by_as_much_are_an_array_that_is_moved():
-    ways = {"offset_y": 9 * um, "offset_x": -6 * um}
-    whole = camera({}, offset=(9 * um, -6 * um))
-    assert off(image(camera(everywhere(**ways))), image(whole)) < 5e-5
-    assert off(image(camera({})), image(whole)) > 0.1
+@pytest.mark.parametrize("rotation", [0.0, 0.1])
+def test_lenslets_all_aside_by_as_much_are_an_array_that_is_moved(rotation):
+    ways = {"offset_y": 8 * um, "offset_x": -6 * um}
+    whole = image(camera({}, offset=(8 * um, -6 * um), rotation=rotation))
+    assert off(image(camera(everywhere(**ways), rotation=rotation)), whole) < 5e-5
+    assert off(image(camera({}, rotation=rotation)), whole) > 0.1
 
 
 def test_vertices_all_aside_by_as_much_are_lenslets_before_which_light_is_turned():
@@ -230,6 +231,8 @@ def test_other_operators_are_refused():
         camera().operator()
     with pytest.raises(GeometryError, match='model = "paraxial"'):
         lg.simulate(camera().replace(model="exact"), Scene([POINT]))
+    with pytest.raises(GeometryError, match=r"lenslet \(1, 0\) has a focal_change of -1 but must be above"):
+        Scatter(own=(Own((1, 0), -1.0),))
     far = Scatter(own=(Own((1, 0), 0.0, (11 * um, 0.0)),))
     with pytest.raises(GeometryError, match=r"lenslet \(1, 0\) stands 11 µm beside its place but has 10 µm"):
         LensletArray(lg.Lattice.square(PITCH), 5 * mm, fill_factor=FILL, scatter=far)

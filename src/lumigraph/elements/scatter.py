@@ -82,7 +82,7 @@ class Scatter:
     Raises
     ------
     GeometryError
-        A negative value, or a part of 1 or more.
+        A negative value, or a part of 1 or more; a focal length of its own that is not above 0.
     """
 
     focal_length: float = 0.0
@@ -101,6 +101,13 @@ class Scatter:
                 raise GeometryError(
                     f"the scatter's {name} is {getattr(self, name):g}{unit} but must be from 0 to "
                     f"{most:g}{unit}. Check the unit, or give less."
+                )
+        for one in self.own:
+            checks.finite("decentre", sum(one.vertex))
+            if not checks.finite("focal_change", one.focal_change, "") > -1:
+                raise GeometryError(
+                    f"lenslet {one.index} has a focal_change of {one.focal_change:g} but must be above -1. "
+                    "Give a part, such as 0.03 for 3 %."
                 )
 
     def of(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -187,15 +187,15 @@ class DescribedMicroscope(Instrument):
         sensor, pitch = self.sensor, self.sensor.pixel_pitch
         # Raw images are turned by 180°, and the lattice about the axis; behind a pupil they are not.
         sign = 1 if self.in_pupil else -1
-        lattice = self.lattice.scaled(sign * self.relay_magnification / pitch)
+        scale = sign * self.relay_magnification / pitch
+        lattice, aside = self.lattice.scaled(scale), self.lenslets.aside(scale)
         lattice = lattice.moved(sensor.shape[0] // 2, sensor.shape[1] // 2)
         indices = sign * self.lenslets.indices()[::sign]
-        own = self.lenslets.each()[0] - self.lattice.position(self.lenslets.indices())
-        centers = lattice.position(indices) + own * self.relay_magnification / pitch
+        centers = lattice.position(indices) + (0.0 if aside is None else aside.of(indices))
         inside = ((centers >= -0.5) & (centers <= [n - 0.5 for n in sensor.shape])).all(axis=1)
         return Calibration(
             lattice, sensor.shape, indices[inside], centers[inside], 0.0,
-            pixel_pitch=pitch, lenslet_distance=self.lenslet_distance,
+            pixel_pitch=pitch, lenslet_distance=self.lenslet_distance, aside=aside,
         )  # fmt: skip
 
     @property

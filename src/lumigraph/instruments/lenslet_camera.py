@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from lumigraph.core import arrays, checks
-from lumigraph.core.aside import Aside
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.grid import Grid
@@ -163,7 +162,7 @@ class LensletCamera(WithParts):
         if self.traced is not None:
             centers = self._traced_centers(centers, indices)
         off = float(np.sqrt(np.mean(np.sum((centers - lattice.position(indices)) ** 2, axis=1))))
-        if (aside := self._aside(scale)) is not None:
+        if (aside := self.lenslets.aside(scale)) is not None:
             centers = centers + aside.of(indices)
         inside = ((centers >= -0.5) & (centers <= [n - 0.5 for n in sensor.shape])).all(axis=1)
         return Calibration(
@@ -171,14 +170,6 @@ class LensletCamera(WithParts):
             pixel_pitch=pitch, separation=self.pupil_distance, lenslet_distance=self.lenslet_distance,
             aside=aside,
         )  # fmt: skip
-
-    def _aside(self, scale: float) -> Aside | None:
-        """Of micro-images whose lenslets' vertices stand beside the lattice, that times a scale [px/m]."""
-        ways = {number: one.vertex for number, one in self.lenslets.single.items() if any(one.vertex)}
-        if not ways:
-            return None
-        indices = self.lenslets.indices()[np.array(list(ways)) - 1]
-        return Aside(-indices, scale * np.array(list(ways.values())))
 
     def _traced_centers(self, centers: np.ndarray, indices: np.ndarray) -> np.ndarray:
         """Of micro-images (k, 2) [px], whose chief rays do not come from the exit pupil's middle."""

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from lumigraph.core.aside import Aside
 from lumigraph.core.lattice import Lattice
 from lumigraph.elements import Own, Surface
 from lumigraph.elements.surface import index_at
@@ -320,6 +321,17 @@ class Lenslets(Part):
             aside, decentre = self.turned(*one.offset), self.turned(*one.decentre)
             found.append(Own((i, j), one.focal_change, aside if any(aside) else None, decentre))
         return tuple(found)
+
+    def aside(self, scale: float) -> Aside | None:
+        """By how much micro-images stand beside the lattice, of vertices that do, times a scale [px/m].
+
+        Where the raw image is turned the scale is negative, and indices are the other way round.
+        """
+        ways = {number: one.vertex for number, one in self.single.items() if any(one.vertex)}
+        if not ways:
+            return None
+        indices = self.indices()[np.array(list(ways)) - 1]
+        return Aside(int(math.copysign(1, scale)) * indices, scale * np.array(list(ways.values())))
 
     def amid(self, count: Sequence[int]) -> dict[str, Any]:
         """What `Instrument.replace` takes for the array's middle: so many lenslets, those of it that differ.
