@@ -108,8 +108,8 @@ def test_other_instruments_have_no_single_lenslets(name, single, said):
 def test_views_of_lenslets_that_left_the_lattice_are_cut_around_them():
     scope = lg.load_camera("lfm-fourier")
     plain, index = scope.calibration, scope.calibration.indices[:1]
-    moved = scope.replace(lenslets={"single": {1: {"offset_y": "40 um"}}}).calibration
-    way = 40e-6 * scope.relay_magnification / scope.sensor.pixel_pitch
+    moved = scope.replace(lenslets={"single": {1: {"offset_y": "-40 um"}}}).calibration
+    way = -40e-6 * scope.relay_magnification / scope.sensor.pixel_pitch
     assert moved.position(index) - plain.position(index) == pytest.approx(np.array([[way, 0.0]]))
 
 

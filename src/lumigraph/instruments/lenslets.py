@@ -208,7 +208,7 @@ class Lenslets(Part):
         if (last := max(self.single)) > count:
             raise GeometryError(f"single has lenslet {last}, but there are {count}. Count them from 1.")
         width = self.pitch * self.fill_factor
-        if (room := self.spacing) < width * (1 - 1e-9):
+        if self.layout == "square" and (room := self.spacing) < width * (1 - 1e-9):
             raise GeometryError(
                 f"two lenslets stand {room * 1e6:.6g} µm from each other but are {width * 1e6:.6g} µm wide. "
                 "Change their offsets, or use a smaller fill_factor."
