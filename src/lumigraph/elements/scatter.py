@@ -35,7 +35,8 @@ class Warp(NamedTuple):
     terms: np.ndarray
 
 
-class Own(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Own:
     """What the lenslet of an index (i, j) has of its own; lengths along columns and rows of the array.
 
     `focal_change` is the part by which its focal length is longer; `aside` (down, across) the way from its
@@ -149,7 +150,7 @@ class Scatter:
         own = {one.index: one for one in self.own}
         named = {index: own.get(index, Own(index)) for index in lenslets}
         return replace(self, own=tuple(
-            one._replace(aside=one.aside or (0.0, 0.0)) if lenslets[index] else one
+            replace(one, aside=one.aside or (0.0, 0.0)) if lenslets[index] else one
             for index, one in sorted(named.items())
         ))  # fmt: skip
 
