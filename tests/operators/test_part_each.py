@@ -7,9 +7,10 @@ from tests.operators.test_part_images import off, peak
 import lumigraph as lg
 from cameras import focused
 from lumigraph.errors import GeometryError
-from lumigraph.information import Scenes, reconstruction_slopes
 from lumigraph.information.points import small
 from lumigraph.operators.part_leaning import LeaningParts
+from lumigraph.operators.part_plane import PartPlane
+from lumigraph.operators.plane_of_points import PlaneOfPoints
 from lumigraph.operators.points import points_image
 from lumigraph.operators.resampling import averaged
 from lumigraph.scene import Points
@@ -177,17 +178,17 @@ def test_cameras_with_other_lenslets_are_refused(change):
         one.part_images([(one, one.replace(built=change))])
 
 
-def test_hexagons_and_planes_are_refused():
+def test_hexagons_are_refused():
     hexagons = {"layout": "hex", "focal_length": 5.2 * mm, "count": (6, 5)}
     with pytest.raises(GeometryError, match="simulated for square ones of one focal length"):
         camera(START | {"lenslets": START["lenslets"] | hexagons}).part_images([])
-    with pytest.raises(GeometryError, match="repeat from lenslet to lenslet"):
-        camera(START).part_plane([], lg.Grid.square(8, 50 * um))
+
+
+def test_planes_are_points_where_lenslets_begin_to_differ():
     alike = camera(START).replace(built={key: 0.0 for key in DIFFER if key != "seed"})
-    with pytest.raises(GeometryError, match="repeat from lenslet to lenslet"):
-        alike.part_plane([(alike, alike.replace(built={"form_scatter": 1 * nm}))], lg.Grid.square(8, 50 * um))
-    with pytest.raises(GeometryError, match="repeat from lenslet to lenslet"):
-        reconstruction_slopes(camera(START), [], [0.0], Scenes(50 * um, 8))
+    pair = alike, alike.replace(built={"form_scatter": 1 * nm})
+    kinds = (type(alike.part_plane(some, lg.Grid.square(8, 50 * um))) for some in ([], [pair]))
+    assert [*kinds] == [PartPlane, PlaneOfPoints]
 
 
 @pytest.mark.parametrize("count", [(14, 14), (15, 15)])

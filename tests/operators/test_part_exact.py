@@ -190,15 +190,11 @@ def test_lenslets_of_a_pair_are_as_many_terms():
         assert len(end.piece(key)) == len(own.piece(key)) == 4
 
 
-def test_other_models_of_one_camera_and_what_has_no_derivatives_are_refused():
+def test_other_models_of_one_camera_are_refused():
     exact, paraxial = camera(SMALL), camera(SMALL | {"model": "paraxial"})
     for own, other in ((exact, paraxial), (paraxial, exact)):
         with pytest.raises(GeometryError, match="model = 'paraxial'"):
             own.part_images([(own, other)])
-    with pytest.raises(GeometryError, match="derivatives of planes by a camera's parts are paraxial"):
-        exact.part_plane([], lg.Grid.square(4, 50 * um))
-    with pytest.raises(GeometryError, match="derivatives of planes by a camera's parts are paraxial"):
-        lg.information.reconstruction_slopes(exact, [], [0.0], lg.information.Scenes(45 * um, 8))
 
 
 @pytest.mark.long

@@ -124,8 +124,3 @@ def test_lenses_of_two_kinds_are_not_compared():
     plain = camera().replace(main_lens={"over_field": None})
     with pytest.raises(GeometryError, match="lenses of one kind: give over_field or prescription to all"):
         camera().part_images([(camera(), plain)])
-
-
-def test_planes_have_no_such_derivatives():
-    with pytest.raises(GeometryError, match=r"Use points \(part_images\), or leave out over_field"):
-        camera().part_plane([])

@@ -5,7 +5,6 @@ import pytest
 from tests.operators.test_part_images import off
 
 import lumigraph as lg
-from lumigraph.errors import GeometryError
 from lumigraph.operators.single_lens import points_image
 from lumigraph.optimisation.goals import Goal
 from lumigraph.scene import Points
@@ -102,8 +101,3 @@ def test_a_mask_for_depth_is_found_downhill_as_by_a_simplex():
         for search in ("gradient", "local")
     ]
     assert best[0]["depth"] == pytest.approx(best[1]["depth"], rel=2e-3)
-
-
-def test_scenes_are_refused():
-    with pytest.raises(GeometryError, match="instruments with lenslets"):
-        lg.information.reconstruction_slopes(camera(), [], [0.0], lg.information.Scenes(45 * um, 8))

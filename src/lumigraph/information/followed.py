@@ -20,7 +20,7 @@ from lumigraph.information.points import (
 from lumigraph.instruments import LensletCamera, LightFieldMicroscope
 from lumigraph.instruments.capabilities import WithObjective
 from lumigraph.instruments.instrument import Instrument
-from lumigraph.instruments.with_parts import SeesPoints
+from lumigraph.instruments.with_parts import WithParts
 from lumigraph.operators.fourier_changes import Behind, Pupil, Slopes, pupils
 from lumigraph.operators.fourier_microscope import Window, lit_ones, overlap
 from lumigraph.operators.microscope_pupil import PupilImages
@@ -61,7 +61,7 @@ def require_followed(instrument: Instrument) -> None:
     GeometryError
         A camera without `part_images`, or a microscope without `pupil_images`.
     """
-    if isinstance(instrument, SeesPoints):
+    if isinstance(instrument, WithParts):
         instrument.part_images([])
     elif not isinstance(instrument, WithObjective):
         raise GeometryError(
@@ -91,7 +91,7 @@ def followed(
     for one in (end for pair in pairs for end in pair):
         require_followed(one)
         require_alike(instrument, one)
-    if isinstance(instrument, SeesPoints):
+    if isinstance(instrument, WithParts):
         yield before_camera(instrument, cast(Sequence[Cameras], pairs), (depths, numbers), accuracy)
         return
     scope, scopes = cast(LightFieldMicroscope, instrument), cast(Sequence[Scopes], pairs)
@@ -114,7 +114,7 @@ def require_alike(instrument: Instrument, other: Instrument) -> None:
     GeometryError
         Other sensors or numbers of lenslets.
     """
-    own, names = instrument.sensor, OPTICAL[isinstance(instrument, SeesPoints)]
+    own, names = instrument.sensor, OPTICAL[isinstance(instrument, WithParts)]
     same = replace(other.sensor, **{name: getattr(own, name) for name in names})
     counts = [_lenslets(one) for one in (instrument, other)]
     if type(instrument) is not type(other) or same != own or counts[0] != counts[1]:
@@ -126,15 +126,15 @@ def require_alike(instrument: Instrument, other: Instrument) -> None:
 
 def _lenslets(instrument: Instrument) -> tuple[int, ...]:
     """How many; none of a camera without any."""
-    if isinstance(instrument, SeesPoints) and not isinstance(instrument, LensletCamera):
+    if isinstance(instrument, WithParts) and not isinstance(instrument, LensletCamera):
         return ()
     return cast(LensletCamera, instrument).lenslets.count
 
 
-Cameras = tuple[SeesPoints, SeesPoints]
+Cameras = tuple[WithParts, WithParts]
 
 
-def _cut(camera: SeesPoints, depths: np.ndarray, like: SeesPoints | None = None) -> SeesPoints:
+def _cut(camera: WithParts, depths: np.ndarray, like: WithParts | None = None) -> WithParts:
     """With as few lenslets as `bounds` has; all pixels where there are none, for they tell the background."""
     if isinstance(camera, LensletCamera):
         return small(camera, depths, like=cast(LensletCamera | None, like))
@@ -142,14 +142,14 @@ def _cut(camera: SeesPoints, depths: np.ndarray, like: SeesPoints | None = None)
 
 
 def before_camera(
-    camera: SeesPoints, pairs: Sequence[Cameras], where: tuple[np.ndarray, range], accuracy: float
+    camera: WithParts, pairs: Sequence[Cameras], where: tuple[np.ndarray, range], accuracy: float
 ) -> PartPoints | LeaningPoints:
     """Of a camera, cut to lenslets or pixels that are lit; at depths, and numbers of places in a cell."""
     depths, own = np.sort(where[0]), _cut(camera, where[0])
     cut = [tuple(_cut(end, where[0], like=own) for end in pair) for pair in pairs]
     images = own.part_images(cast(Sequence[Cameras], cut), accuracy=accuracy)
 
-    def points(end: SeesPoints, whole: SeesPoints) -> Points:
+    def points(end: WithParts, whole: WithParts) -> Points:
         seen, share = CameraSource(end, accuracy), collected(whole) / collected(camera)
         places = [
             [*place, dz] for dz in depths.tolist() for place in spread(seen.cell(dz), where[1]).tolist()

@@ -12,10 +12,11 @@ from lumigraph.errors import GeometryError
 from lumigraph.information.bounds import Light, reading
 from lumigraph.information.points import near_axis
 from lumigraph.information.scenes import Scenes, coloured, frequencies, ring_means, rings
-from lumigraph.instruments import Camera, LightFieldMicroscope
+from lumigraph.instruments import Camera, LensletCamera, LightFieldMicroscope
 from lumigraph.instruments.capabilities import WithPupil
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.operators.fourier_microscope import fourier_operator
+from lumigraph.operators.sample_images import sample_images
 from lumigraph.sensor import Sensor
 from lumigraph.simulation.microscope_scene import SAMPLES
 
@@ -206,8 +207,19 @@ def _of_camera(camera: Camera, depths: np.ndarray, scenes: Scenes, accuracy: flo
     nearest = min(camera.defocused(float(dz)) for dz in depths)
     small = near_axis(camera, depths, scenes.size)
     finest = camera.wavelength * nearest / camera.pupil_diameter
-    operator = small.operator_on(_grid(scenes, finest), depths.tolist(), accuracy=accuracy)
+    grid, planes = _grid(scenes, finest), tuple(depths.tolist())
+    if _repeats(small):
+        operator = small.operator_on(grid, planes, accuracy=accuracy)
+    else:
+        volume = cast(LensletCamera, small).part_volume([], grid, planes, accuracy=accuracy)
+        operator = sample_images(volume, planes)
     return operator, _area(small, depths), small.sensor
+
+
+def _repeats(camera: Camera) -> bool:
+    """Whether it has an operator of its own: lenslets that are alike, or none."""
+    array = camera.lenslet_array()
+    return array is None or array.scatter is None
 
 
 def _grid(scenes: Scenes, finest: float) -> Grid:

@@ -209,14 +209,17 @@ def _cell(lattice: Lattice) -> np.ndarray:
     return cell
 
 
-def near_axis(camera: Camera, depths: np.ndarray, width: float) -> Camera:
-    """With only as many lenslets, or pixels, as light of planes of a width [m] around the axis reaches."""
+def near_axis(camera: Camera, depths: np.ndarray, width: float = 0.0, like: Camera | None = None) -> Camera:
+    """With only as many lenslets, or pixels, as light of planes of a width [m] around the axis reaches.
+
+    Or with as many as `like` another.
+    """
     if isinstance(camera, LensletCamera):
-        return small(camera, depths, width)
+        return small(camera, depths, width, cast(LensletCamera | None, like))
     widest, pitch = _reached(camera, depths, width), camera.sensor.pixel_pitch
     wanted = math.ceil(widest / pitch) + 2 * SPARE
     shape = tuple(min(n, wanted + (n - wanted) % 2) for n in camera.sensor.shape)
-    return camera.replace(sensor={"shape": shape})
+    return camera.replace(sensor={"shape": shape if like is None else like.sensor.shape})
 
 
 def small(

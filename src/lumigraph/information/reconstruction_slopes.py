@@ -18,11 +18,11 @@ from lumigraph.errors import GeometryError
 from lumigraph.information.bounds import Light, checked_depths
 from lumigraph.information.followed import Pair, require_alike, require_followed
 from lumigraph.information.imaging import Imaging, electrons, imaging
-from lumigraph.information.points import collected, small
+from lumigraph.information.points import collected, near_axis
 from lumigraph.information.reconstruction import probed
 from lumigraph.information.scenes import Scenes
 from lumigraph.information.slopes import Sloping
-from lumigraph.instruments import LensletCamera
+from lumigraph.instruments import Camera
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.sees_volumes import SeesVolumes
 from lumigraph.operators.part_volume import PartVolume
@@ -46,7 +46,7 @@ def reconstruction_slopes(
     Parameters
     ----------
     camera
-        With lenslets, or a microscope: one that has `part_plane`.
+        Or a microscope: one that has `part_plane`.
     pairs
         (n,), cameras or microscopes a little to either side of it.
     depths, scenes, light, volume
@@ -90,17 +90,14 @@ def require_planes(instrument: Instrument) -> None:
     Raises
     ------
     GeometryError
-        A camera without lenslets, one without `part_plane`; a microscope without `pupil_images` whose
-        lenslets stand in the image.
+        As of `require_followed`; one without `part_plane`.
     """
+    require_followed(instrument)
     if not isinstance(instrument, SeesVolumes):
         raise GeometryError(
-            "derivatives of the error of scenes are of instruments with lenslets. For others, use search "
+            "derivatives of the error of scenes are of cameras and microscopes. For others, use search "
             "'local'."
         )
-    require_followed(instrument)
-    if isinstance(instrument, LensletCamera):
-        instrument.part_plane([])
 
 
 def _at(
@@ -115,10 +112,10 @@ def _at(
     seen = imaging(instrument, depths, scenes, light, accuracy)
     grid, own, cut = seen.operator.object_grid, instrument, list(pairs)
     assert grid is not None  # as imaging has it
-    if isinstance(instrument, LensletCamera):
-        whole = cast(Sequence[tuple[LensletCamera, LensletCamera]], pairs)
-        own = like = small(instrument, depths, scenes.size)
-        cut = [(small(a, depths, like=like), small(b, depths, like=like)) for a, b in whole]
+    if isinstance(instrument, Camera):
+        whole = cast(Sequence[tuple[Camera, Camera]], pairs)
+        own = like = near_axis(instrument, depths, scenes.size)
+        cut = [(near_axis(a, depths, like=like), near_axis(b, depths, like=like)) for a, b in whole]
     part = cast(SeesVolumes, own).part_volume(
         cast(Sequence[tuple[SeesVolumes, SeesVolumes]], cut), grid, depths.tolist(), accuracy=accuracy
     )

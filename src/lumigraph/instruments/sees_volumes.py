@@ -63,4 +63,4 @@ class SeesVolumes:
         if not len(depths):
             raise GeometryError("depths are empty. Give at least one, such as [0.0].")
         planes = (self.part_plane(pairs, grid, float(dz), accuracy=accuracy) for dz in depths)
-        return PartVolume(tuple(planes))
+        return PartVolume(tuple(planes), grid)

@@ -19,13 +19,13 @@ from lumigraph.instruments.angular import refuse_angles
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.making import Making
 from lumigraph.instruments.row import Row
-from lumigraph.instruments.with_parts import SeesPoints
+from lumigraph.instruments.with_parts import WithParts
 from lumigraph.operators import CameraOptics, single_lens_operator
 from lumigraph.operators.single_lens import FINEST
 from lumigraph.propagation import Propagate
 
 
-class SingleLensCamera(SeesPoints):
+class SingleLensCamera(WithParts):
     """A main lens and a sensor at its image.
 
     Parameters

@@ -4,17 +4,16 @@ from collections.abc import Sequence
 from typing import Self
 
 from lumigraph.core.grid import Grid
-from lumigraph.errors import GeometryError
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.sees_volumes import SeesVolumes
-from lumigraph.operators.part_exact import ExactImages
-from lumigraph.operators.part_images import PartImages
-from lumigraph.operators.part_leaning import Images, LeaningParts, by_parts
-from lumigraph.operators.part_plane import PartPlane
+from lumigraph.operators.part_images import Images, PartImages
+from lumigraph.operators.part_leaning import LeaningParts, by_parts
+from lumigraph.operators.plane_of_points import plane_before
+from lumigraph.operators.whole_planes import WholePlane
 
 
-class SeesPoints(Camera):
-    """A camera with a main lens whose images of points have derivatives."""
+class WithParts(SeesVolumes, Camera):
+    """A camera with a main lens: images of points, and raw images of planes and volumes, have derivatives."""
 
     def part_images(
         self, pairs: Sequence[tuple[Self, Self]], *, accuracy: float = 1e-2
@@ -55,10 +54,6 @@ class SeesPoints(Camera):
         """
         return by_parts(self, pairs, accuracy)
 
-
-class WithParts(SeesVolumes, SeesPoints):
-    """One with lenslets: raw images of planes and volumes have them, too."""
-
     def part_plane(
         self,
         pairs: Sequence[tuple[Self, Self]],
@@ -66,7 +61,7 @@ class WithParts(SeesVolumes, SeesPoints):
         dz: float = 0.0,
         *,
         accuracy: float = 1e-2,
-    ) -> PartPlane | LeaningParts[PartPlane]:
+    ) -> WholePlane | LeaningParts[WholePlane]:
         """Raw images of a plane, with derivatives by whatever differs between pairs of cameras.
 
         The object stays where it is before all cameras, and as bright for each area: how it falls onto their
@@ -81,14 +76,18 @@ class WithParts(SeesVolumes, SeesPoints):
         dz
             Depth from the focused plane [m], positive farther.
         accuracy
-            Relative rms error of raw images, 1e-3 to 1e-2, of objects inside the array's field; images of
-            the outermost lenslets are some 3 % off, and light that misses the array's cells is left out.
+            Relative rms error of raw images, 1e-3 to 1e-2, of objects inside the array's field. Where
+            lenslets are alike behind one lens for all fields, images of the outermost ones are some 3 % off,
+            and light that misses the array's cells is left out. Where images do not repeat from lenslet to
+            lenslet (`over_field`, `prescription`, lenslets that differ, fast ones of the exact model over
+            wide fields), each sample is a point, which takes its time.
 
         Raises
         ------
         GeometryError
-            As of `part_images`; the exact model, lenslets that differ by chance, a main lens that changes
-            over the field; a depth that is not imaged.
+            As of `part_images`; a depth that is not imaged.
+        SamplingError
+            By the methods of what comes back: samples that would take too long as points.
 
         Examples
         --------
@@ -105,14 +104,9 @@ class WithParts(SeesVolumes, SeesPoints):
         """
         self.defocused(float(dz))
         images = self.part_images(pairs, accuracy=accuracy)
-        if isinstance(images, ExactImages):
-            raise GeometryError(
-                "derivatives of planes by a camera's parts are paraxial; with model = 'exact' points alone "
-                "have them (part_images). Use model = 'paraxial'."
-            )
         wanted = grid or self.operator_grid()
 
-        def plane(one: PartImages) -> PartPlane:
-            return PartPlane(one, wanted, float(dz))
+        def plane(one: Images) -> WholePlane:
+            return plane_before(one, wanted, float(dz))
 
         return images.each(plane) if isinstance(images, LeaningParts) else plane(images)

@@ -98,22 +98,6 @@ def one_by_one(cameras: Sequence[CameraOptics]) -> list[CameraOptics]:
     ]
 
 
-def require_repeated(camera: CameraOptics) -> None:
-    """Refuse lenslets that differ by chance where planes are differentiated: images repeat there.
-
-    Raises
-    ------
-    GeometryError
-        They differ.
-    """
-    if camera.array is not None and camera.array.scatter is not None:
-        raise GeometryError(
-            "derivatives of planes need images of points that repeat from lenslet to lenslet, which those "
-            "behind lenslets that differ do not. Use part_images, whose points may be the object's samples, "
-            f"or {_cells.ALIKE}."
-        )
-
-
 @dataclass(frozen=True, slots=True)
 class Cut:
     """Samples of some cells that a lenslet lights, and which of its own these are."""

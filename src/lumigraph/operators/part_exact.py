@@ -7,7 +7,7 @@ many, and turned so that they go over into the camera's own.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import cast
 
@@ -23,11 +23,12 @@ from lumigraph.operators.exact_light import Oblique
 from lumigraph.operators.exact_waves import Beams
 from lumigraph.operators.line_parts import Key
 from lumigraph.operators.paraxial import is_possible
-from lumigraph.operators.part_images import check_change, check_parts, check_weights
+from lumigraph.operators.part_images import Images, Weighed, check_parts
 from lumigraph.operators.part_points import SteppedPoints
 from lumigraph.operators.part_sight import Sight, Spot
-from lumigraph.operators.part_waves import Where, before, read_anew, times
+from lumigraph.operators.part_waves import Where, before, times
 from lumigraph.operators.passed import Slopes
+from lumigraph.operators.point_changes import PUPIL
 from lumigraph.operators.points import share
 from lumigraph.operators.relay import Straight
 from lumigraph.scene import Points
@@ -47,15 +48,15 @@ Both = tuple["ExactSight", "ExactSight"]
 
 
 @dataclass(frozen=True, eq=False)
-class ExactImages:
-    """How an exact camera sees points; see `PartImages`.
+class ExactImages(Images):
+    """Of an exact camera; see `Images`.
 
     Parameters
     ----------
     camera
         With square lenslets, exact, behind a thin lens for all fields.
     pairs, accuracy
-        As of `PartImages`.
+        As of `Images`.
 
     Raises
     ------
@@ -65,74 +66,61 @@ class ExactImages:
         An accuracy out of 1e-3 to 1e-2.
     """
 
-    camera: CameraOptics
-    pairs: tuple[tuple[CameraOptics, CameraOptics], ...]
-    accuracy: float = 1e-2
-
     def __post_init__(self) -> None:
         check_parts(self.camera, self.pairs, self.accuracy, require_exact)
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Of a raw image."""
-        return self.camera.sensor.shape
+    def before(
+        self, points: Points, moved: Sequence[Where] | None = None, fewest: int = PUPIL
+    ) -> tuple["ExactSight", Points, list[Where | None]]:
+        """As of `Images`."""
+        where: list[Where | None] = [None] * len(self.pairs) if moved is None else [*moved]
+        return ExactSight.of(self.camera, points, self.accuracy, fewest), points, where
 
-    @single_products()
-    def forward(self, points: Points) -> np.ndarray:
-        """As `PartImages.forward`."""
-        own = ExactSight.of(self.camera, points, self.accuracy)
-        light = np.zeros(own.shape)
-        for spot in own.spots(points):
-            light[spot.window] += spot.intensity * np.abs(_Seen.of(own, spot).field) ** 2
-        return own.read.forward(light)
+    def ends(self, own: "ExactSight") -> list[Both]:
+        """As of `Images`."""
+        return [(own.alike(first), own.alike(last)) for first, last in self.pairs]
 
-    @single_products()
-    def derivative(self, points: Points, change: np.ndarray) -> np.ndarray:
-        """As `PartImages.derivative`."""
-        check_change(self.pairs, change)
-        own = ExactSight.of(self.camera, points, self.accuracy)
-        light, moved, spots = np.zeros(own.shape), np.zeros(own.shape), own.spots(points)
-        pairs = list(zip(np.asarray(change, np.float64).tolist(), self.ends(own), strict=True))
-        pieces = _changed_pieces(own, spots, pairs)
-        for spot in spots:
-            seen = _Seen.of(own, spot)
-            ends = [(weight, seen.numbers(low), seen.numbers(high)) for weight, (low, high) in pairs]
+    def waves(self, own: "ExactSight", spot: Spot) -> "_Seen":
+        """As of `Images`."""
+        return _Seen.of(own, spot)
+
+    def changing(
+        self, own: "ExactSight", spots: Sequence[Spot], pairs: Sequence[Weighed]
+    ) -> Callable[["_Seen"], np.ndarray]:
+        """As of `Images`."""
+        pieces = _changed_pieces(own, spots, [(weight, cast(Both, both)) for weight, both, _ in pairs])
+
+        def changed(seen: "_Seen") -> np.ndarray:
+            ends = [(weight, *_both(seen, cast(Both, both), where)) for weight, both, where in pairs]
             by = [
                 sum((w * (high[k] - low[k]) for w, low, high in ends), 0 * own)
                 for k, own in enumerate(seen.own)
             ]
-            light[spot.window] += spot.intensity * np.abs(seen.field) ** 2
-            both = seen.field.conj() * seen.changed(by, pieces.__getitem__)
-            moved[spot.window] += 2 * spot.intensity * np.real(both)
-        read = (w * (high.read.forward(light) - low.read.forward(light)) for w, (low, high) in pairs)
-        return own.read.forward(moved) + sum(read)
+            return seen.changed(by, pieces.__getitem__)
 
-    @single_products()
-    def gradient(self, points: Points, weights: np.ndarray) -> np.ndarray:
-        """As `PartImages.gradient`."""
-        check_weights(self.shape, weights)
-        own = ExactSight.of(self.camera, points, self.accuracy)
-        seen, light = own.read.adjoint(np.asarray(weights, np.float64)), np.zeros(own.shape)
-        found, slopes, ends = np.zeros(len(self.pairs)), Slopes(), self.ends(own)
-        for spot in own.spots(points):
-            waves = _Seen.of(own, spot)
-            light[spot.window] += spot.intensity * np.abs(waves.field) ** 2
-            by = waves.back(spot.intensity * seen[spot.window] * waves.field.conj(), slopes)
-            for k, (low, high) in enumerate(ends):
-                both = waves.numbers(low), waves.numbers(high)
-                found[k] += sum(times(*pieces) for pieces in zip(by, *both, strict=True))
-        found += [_slopes_along(slopes, both) for both in ends]
-        return 2 * found + [read_anew(both, light, weights) for both in ends]
+        return changed
 
-    def before(
-        self, points: Points, moved: Sequence[Where]
-    ) -> tuple["ExactSight", Points, list[Where | None]]:
-        """As `PartImages.before`."""
-        return ExactSight.of(self.camera, points, self.accuracy), points, list(moved)
+    def slopes(self, own: "ExactSight", ends: list[Both], where: list[Where | None]) -> "_Told":
+        """As of `Images`."""
+        return _Told(ends, where, np.zeros(len(ends)))
 
-    def ends(self, own: "ExactSight") -> list[Both]:
-        """Cameras of each pair."""
-        return [(own.alike(first), own.alike(last)) for first, last in self.pairs]
+
+@dataclass(eq=False)
+class _Told:
+    """`part_images.Told` by what a point's light follows from, and by lenslets' matrices."""
+
+    ends: list[Both]
+    where: list[Where | None]
+    found: np.ndarray
+    by: Slopes = field(default_factory=Slopes)
+
+    def add(self, waves: "_Seen", by: np.ndarray) -> None:
+        mine = waves.back(by, self.by)
+        for k, pair in enumerate(zip(self.ends, self.where, strict=True)):
+            self.found[k] += sum(times(*pieces) for pieces in zip(mine, *_both(waves, *pair), strict=True))
+
+    def along(self) -> np.ndarray:
+        return 2 * (self.found + [_slopes_along(self.by, both) for both in self.ends])
 
 
 class ExactSight(Sight):
@@ -326,9 +314,16 @@ class ExactPoints(SteppedPoints):
 
     def _return(self, wave: _Seen, by: np.ndarray) -> None:
         slopes = wave.back(by, self._lenslets)
-        for k, (both, where) in enumerate(zip(cast(list[Both], self._ends), self._moved, strict=True)):
-            ends = (wave.numbers(one, mine) for one, mine in zip(both, before(wave.spot, where), strict=True))
-            self._found[k] += 2 * sum(times(*pieces) for pieces in zip(slopes, *ends, strict=True))
+        for k, pair in enumerate(zip(cast(list[Both], self._ends), self._moved, strict=True)):
+            self._found[k] += 2 * sum(
+                times(*pieces) for pieces in zip(slopes, *_both(wave, *pair), strict=True)
+            )
+
+
+def _both(wave: _Seen, both: Both, where: Where | None) -> tuple[Numbers, Numbers]:
+    """Of the cameras of a pair, and of the point where it is before them."""
+    low, high = (wave.numbers(one, mine) for one, mine in zip(both, before(wave.spot, where), strict=True))
+    return low, high
 
 
 def _changed_pieces(

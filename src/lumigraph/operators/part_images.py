@@ -12,9 +12,10 @@ is differentiated. What is made of the image is followed back to them once, so t
 costs no product of large matrices.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from itertools import groupby
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -25,30 +26,208 @@ from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.each import one_by_one
 from lumigraph.operators.fineness import COARSEST
 from lumigraph.operators.part_lens import LensSight
-from lumigraph.operators.part_sight import Sight
+from lumigraph.operators.part_sight import Sight, Spot
 from lumigraph.operators.part_waves import Both, Change, Slopes, Waves, Where, pupils, read_anew, times
+from lumigraph.operators.point_changes import PUPIL
 from lumigraph.operators.seen import seen_points
 from lumigraph.scene import Points
 
 FINEST = 1e-3
 """Accuracy that can be asked for: finer ones would need many samples across the main lens."""
 
+TOGETHER = 256
+"""Points whose slopes, and all matrices that they see, are kept at a time."""
+
+Weighed = tuple[float, Both, Where | None]
+"""How many times from the first to the last of a pair, both, and where points are before them."""
+
+
+class Told(Protocol):
+    """Slopes of a number by what points' fields follow from."""
+
+    def add(self, waves: Any, by: np.ndarray) -> None:
+        """Those that come from slopes by the field of a point, without conjugates."""
+        ...
+
+    def along(self) -> np.ndarray:
+        """(n,), what they come to from the first to the last camera of each pair."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Some:
+    """A few of the points.
+
+    Parameters
+    ----------
+    own, ends
+        The camera, which knows no others, and those of each pair.
+    spots, where
+        The points.
+    x
+        (k, points), how bright each is in each object.
+    """
+
+    own: Sight
+    ends: list[Both]
+    spots: list[Spot]
+    where: list[Where | None]
+    x: np.ndarray
+
+    def weighed(self, change: Sequence[float]) -> list[Weighed]:
+        """So many times from the first to the last of each pair."""
+        return list(zip(change, self.ends, self.where, strict=True))
+
+    def bright(self, spot: Spot) -> np.ndarray:
+        """(k,), a point's light in each object."""
+        return spot.intensity * self.x[:, spot.number]
+
 
 @dataclass(frozen=True, eq=False)
-class PartImages:
+class Images(ABC):
     """How a camera sees points, with derivatives by what differs between pairs of cameras.
 
-    Points shine as samples of the camera's own object grid, as `simulate` has them.
+    Points shine as samples of the camera's own object grid, as `simulate` has them. Objects that are made
+    of the same points are seen in little more time than one.
 
     Parameters
     ----------
     camera
-        Paraxial, without lenslets or with some of any shape and focal lengths; squares of one may differ by
-        chance.
+        That which sees them.
     pairs
         (n,), cameras a little to either side of it: by a length, a term of the phase, the wavelength.
     accuracy
         Relative rms error of points' images.
+    """
+
+    camera: CameraOptics
+    pairs: tuple[tuple[CameraOptics, CameraOptics], ...]
+    accuracy: float = 1e-2
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of a raw image."""
+        return self.camera.sensor.shape
+
+    @abstractmethod
+    def before(
+        self, points: Points, moved: Sequence[Where] | None = None, fewest: int = PUPIL
+    ) -> tuple[Any, Points, list[Where | None]]:
+        """The camera before points, where its main lens sees these, and where those of each pair do.
+
+        Points that are `moved` are elsewhere before the cameras of each pair. Light is sampled by so many
+        nodes across the lens at least.
+        """
+
+    @abstractmethod
+    def ends(self, own: Any) -> list[Any]:
+        """Cameras of each pair."""
+
+    @abstractmethod
+    def waves(self, own: Any, spot: Spot) -> Any:
+        """A point's light on its way, whose `field` is on the samples (y, x)."""
+
+    @abstractmethod
+    def changing(self, own: Any, spots: Sequence[Spot], pairs: Any) -> Callable[[Any], np.ndarray]:
+        """Gives how the field of some points changes between cameras, by their light on its way."""
+
+    @abstractmethod
+    def slopes(self, own: Any, ends: Any, where: list[Where | None]) -> Told:
+        """Of a number that does not change yet."""
+
+    def forward(self, points: Points) -> np.ndarray:
+        """Raw image (ny, nx) of points."""
+        return self.forwards(points, _once(points))[0]
+
+    def derivative(self, points: Points, change: np.ndarray) -> np.ndarray:
+        """Change (ny, nx) of `forward`, so many times (n,) from the first to the last camera of each pair."""
+        check_change(self.pairs, change)
+        return self.derivatives(points, _once(points), np.asarray(change, np.float64).tolist())[0]
+
+    def gradient(self, points: Points, weights: np.ndarray) -> np.ndarray:
+        """Transpose of `derivative`: (n,) from weights (ny, nx) of the raw image's pixels."""
+        check_weights(self.shape, weights)
+        return self.gradients(points, _once(points), np.asarray(weights, np.float64)[None])
+
+    @single_products()
+    def forwards(self, points: Points, x: np.ndarray) -> np.ndarray:
+        """Raw images (k, ny, nx) of objects in which points are so many times as bright (k, points)."""
+        own, *given = self.before(points)
+        light = np.zeros((len(x), *own.shape))
+        for some in self._some(own, given, x):
+            for spot in some.spots:
+                _add(light, some, spot, np.abs(self.waves(some.own, spot).field) ** 2)
+        return np.stack([own.read.forward(one) for one in light])
+
+    @single_products()
+    def derivatives(self, points: Points, x: np.ndarray, change: list[float]) -> np.ndarray:
+        """Changes (k, ny, nx) of `forwards`."""
+        own, *given = self.before(points)
+        light, moved = np.zeros((2, len(x), *own.shape))
+        for some in self._some(own, given, x):
+            changed = self.changing(some.own, some.spots, some.weighed(change))
+            for spot in some.spots:
+                waves = self.waves(some.own, spot)
+                _add(light, some, spot, np.abs(waves.field) ** 2)
+                _add(moved, some, spot, 2 * np.real(waves.field.conj() * changed(waves)))
+        found = np.stack([own.read.forward(one) for one in moved])
+        for weight, (low, high) in zip(change, self.ends(own), strict=True):
+            if low.read is not high.read:
+                found += [weight * (high.read.forward(one) - low.read.forward(one)) for one in light]
+        return found
+
+    @single_products()
+    def gradients(self, points: Points, x: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Transpose of `derivatives`: (n,), the sum over objects, each with its weights (k, ny, nx)."""
+        own, *given = self.before(points)
+        seen, light = np.stack([own.read.adjoint(one) for one in weights]), np.zeros((len(x), *own.shape))
+        found = np.zeros(len(self.pairs))
+        for some in self._some(own, given, x):
+            told = self.slopes(some.own, some.ends, some.where)
+            for spot in some.spots:
+                waves = self.waves(some.own, spot)
+                _add(light, some, spot, np.abs(waves.field) ** 2)
+                asked = np.tensordot(some.bright(spot), seen[(slice(None), *spot.window)], 1)
+                told.add(waves, asked * waves.field.conj())
+            found += told.along()
+        for k, both in enumerate(self.ends(own)):
+            found[k] += sum(read_anew(both, light[n], one) for n, one in enumerate(weights))
+        return found
+
+    def _some(self, own: Sight, given: Sequence[Any], x: np.ndarray) -> Iterator[_Some]:
+        """Those that shine, a few at a time, by depth."""
+        points, where = given
+        order = np.argsort(points.positions[:, 2], kind="stable")
+        order = order[x[:, order].any(0)]
+        for k in range(0, len(order), TOGETHER):
+            kept, sight = order[k : k + TOGETHER], own.anew
+            moved = [one and (_only(one[0], kept), _only(one[1], kept)) for one in where]
+            yield _Some(sight, self.ends(sight), own.spots(_only(points, kept)), moved, x[:, kept])
+
+
+def _once(points: Points) -> np.ndarray:
+    return np.ones((1, len(points.intensities)))
+
+
+def _only(points: Points, kept: np.ndarray) -> Points:
+    return Points(points.positions[kept], points.intensities[kept])
+
+
+def _add(light: np.ndarray, some: _Some, spot: Spot, image: np.ndarray) -> None:
+    """What a point brings to the light (k, y, x) of each object."""
+    light[(slice(None), *spot.window)] += np.multiply.outer(some.bright(spot), image)
+
+
+@dataclass(frozen=True, eq=False)
+class PartImages(Images):
+    """Of a paraxial camera; see `Images`.
+
+    Parameters
+    ----------
+    camera
+        Without lenslets or with some of any shape and focal lengths; squares of one may differ by chance.
+    pairs, accuracy
+        As of `Images`.
 
     Raises
     ------
@@ -58,77 +237,22 @@ class PartImages:
         An accuracy out of 1e-3 to 1e-2.
     """
 
-    camera: CameraOptics
-    pairs: tuple[tuple[CameraOptics, CameraOptics], ...]
-    accuracy: float = 1e-2
-
     def __post_init__(self) -> None:
         check_parts(self.camera, self.pairs, self.accuracy, require_paraxial)
         camera, *ends = one_by_one((self.camera, *(end for pair in self.pairs for end in pair)))
         object.__setattr__(self, "camera", camera)
         object.__setattr__(self, "pairs", tuple(zip(ends[::2], ends[1::2], strict=True)))
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Of a raw image."""
-        return self.camera.sensor.shape
-
-    @single_products()
-    def forward(self, points: Points) -> np.ndarray:
-        """Raw image (ny, nx) of points."""
-        own, mine, _ = self.before(points)
-        light = np.zeros(own.shape)
-        for spot in own.spots(mine):
-            light[spot.window] += spot.intensity * np.abs(Waves.of(own, spot).field) ** 2
-        return own.read.forward(light)
-
-    @single_products()
-    def derivative(self, points: Points, change: np.ndarray) -> np.ndarray:
-        """Change (ny, nx) of `forward`, so many times (n,) from the first to the last camera of each pair."""
-        check_change(self.pairs, change)
-        own, mine, moved = self.before(points)
-        light, changed, spots = np.zeros(own.shape), np.zeros(own.shape), own.spots(mine)
-        weights = np.asarray(change, np.float64).tolist()
-        by = Change.of(own, zip(weights, self.ends(own), moved, strict=True), spots)
-        for spot in spots:
-            waves = Waves.of(own, spot)
-            light[spot.window] += spot.intensity * np.abs(waves.field) ** 2
-            changed[spot.window] += 2 * spot.intensity * np.real(waves.field.conj() * waves.changed(own, by))
-        return own.read.forward(changed) + by.sum(lambda one: one.read.forward(light))
-
-    @single_products()
-    def gradient(self, points: Points, weights: np.ndarray) -> np.ndarray:
-        """Transpose of `derivative`: (n,) from weights (ny, nx) of the raw image's pixels."""
-        check_weights(self.shape, weights)
-        own, mine, moved = self.before(points)
-        seen, by, light = own.read.adjoint(np.asarray(weights, np.float64)), Slopes(), np.zeros(own.shape)
-        found, ends = np.zeros(len(self.pairs)), self.ends(own)
-        for _, some in groupby(own.spots(mine), own.seen_from):
-            pupil, spots = np.zeros(()), list(some)
-            for spot in spots:
-                waves = Waves.of(own, spot)
-                light[spot.window] += spot.intensity * np.abs(waves.field) ** 2
-                pupil = pupil + by.add(waves, spot.intensity * seen[spot.window] * waves.field.conj())
-            found += [times(pupil, *pupils(spots[0], *pair)) for pair in zip(ends, moved, strict=True)]
-        seen_anew = [read_anew(both, light, weights) for both in ends]
-        along = [
-            by.along((first.anew, last.anew), where) for (first, last), where in zip(ends, moved, strict=True)
-        ]
-        return 2 * (found + along) + seen_anew
-
     def ends(self, own: Sight) -> list[Both]:
-        """Cameras of each pair."""
+        """As of `Images`."""
         return [(own.alike(_thin(first)), own.alike(_thin(last))) for first, last in self.pairs]
 
     def before(
-        self, points: Points, moved: Sequence[Where] | None = None
+        self, points: Points, moved: Sequence[Where] | None = None, fewest: int = PUPIL
     ) -> tuple[Sight, Points, list[Where | None]]:
-        """The camera before points, where its main lens sees these, and where those of each pair do.
-
-        Points that are `moved` are elsewhere before the cameras of each pair.
-        """
+        """As of `Images`."""
         camera, mine = seen_points(self.camera, points)
-        own = (Sight if camera.array else LensSight).of(camera, mine, self.accuracy)
+        own = (Sight if camera.array else LensSight).of(camera, mine, self.accuracy, fewest)
         if moved is None and self.camera.objects is None:
             return own, mine, [None] * len(self.pairs)
         known = [(points, points)] * len(self.pairs) if moved is None else moved
@@ -140,6 +264,50 @@ class PartImages:
                 for (low, high), (first, last) in zip(self.pairs, known, strict=True)
             ],
         )
+
+    def waves(self, own: Sight, spot: Spot) -> Waves:
+        """As of `Images`."""
+        return Waves.of(own, spot)
+
+    def changing(
+        self, own: Sight, spots: Sequence[Spot], pairs: Sequence[Weighed]
+    ) -> Callable[[Waves], np.ndarray]:
+        """As of `Images`."""
+        by = Change.of(own, pairs, spots)
+        return lambda waves: waves.changed(own, by)
+
+    def slopes(self, own: Sight, ends: list[Both], where: list[Where | None]) -> "_Told":
+        """As of `Images`."""
+        return _Told(own, list(zip(ends, where, strict=True)), np.zeros(len(ends)))
+
+
+@dataclass(eq=False)
+class _Told:
+    """`Told` by points' waves, and by those in the main lens of one depth, or field, after the other."""
+
+    own: Sight
+    pairs: list[tuple[Both, Where | None]]
+    found: np.ndarray
+    by: Slopes = field(default_factory=Slopes)
+    pupil: tuple[Spot, np.ndarray] | None = None
+
+    def add(self, waves: Waves, by: np.ndarray) -> None:
+        pupil, spot = self.by.add(waves, by), waves.spot
+        if self.pupil is not None and self.own.seen_from(self.pupil[0]) == self.own.seen_from(spot):
+            self.pupil[1][...] += pupil
+        else:
+            self._leave()
+            self.pupil = spot, pupil
+
+    def along(self) -> np.ndarray:
+        self._leave()
+        return 2 * (self.found + [self.by.along(*pair) for pair in self.pairs])
+
+    def _leave(self) -> None:
+        if self.pupil is not None:
+            spot, by = self.pupil
+            self.found += [times(by, *pupils(spot, *pair)) for pair in self.pairs]
+            self.pupil = None
 
 
 def _thin(camera: CameraOptics) -> CameraOptics:

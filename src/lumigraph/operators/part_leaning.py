@@ -15,7 +15,7 @@ from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.leaning import near
 from lumigraph.operators.paraxial import resolved
 from lumigraph.operators.part_exact import ExactImages, ExactPoints
-from lumigraph.operators.part_images import PartImages, one_lens, require_paraxial
+from lumigraph.operators.part_images import Images, PartImages, one_lens, require_paraxial
 from lumigraph.operators.part_points import Back, PartPoints, SteppedPoints
 from lumigraph.operators.part_waves import Where
 from lumigraph.operators.whole_planes import Part
@@ -23,9 +23,6 @@ from lumigraph.scene import Points
 
 Seen = TypeVar("Seen", bound=Part)
 Other = TypeVar("Other", bound=Part)
-
-Images = PartImages | ExactImages
-"""Of points, by a camera's model."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -122,7 +122,7 @@ class LensSight(Sight):
     @property
     def shape(self) -> tuple[int, int]:
         """As of cameras with lenslets."""
-        y, x = (span.count for span in self._film.spans)
+        y, x = (span.count for span in self.film.spans)
         return y, x
 
     @cached_property
@@ -130,7 +130,7 @@ class LensSight(Sight):
         """As of cameras with lenslets."""
         if isinstance(self.like, LensSight) and self.like._seen == self._seen:
             return self.like.read
-        sensor, (y, x) = self._film.camera.sensor, self._film.spans
+        sensor, (y, x) = self.film.camera.sensor, self.film.spans
         center = tuple((span.first + span.count // 2) * span.pitch for span in (y, x))
         plane = Grid((y.count, x.count), (y.pitch, x.pitch), (center[0], center[1]))
         return averaged(plane, sensor.grid, sensor.fill_factor)
@@ -138,15 +138,15 @@ class LensSight(Sight):
     @cached_property
     def lenslets(self) -> Any:
         """None: the same before all cameras."""
-        return Nothing(self._film) if self.like is None else self.like.lenslets
+        return Nothing(self.film) if self.like is None else self.like.lenslets
 
     def _lit(self, spot: Spot) -> Lit:
         parts = []
         place = self._place(self._at(spot.dz), spot.position).tolist()
-        for at, span in zip(place, self._film.spans, strict=True):
+        for at, span in zip(place, self.film.spans, strict=True):
             ends = (
-                math.floor((at - self._film.far) / span.pitch),
-                math.ceil((at + self._film.far) / span.pitch),
+                math.floor((at - self.film.far) / span.pitch),
+                math.ceil((at + self.film.far) / span.pitch),
             )
             first, last = (min(max(0, end - span.first), span.count) for end in ends)
             parts.append(range(first, last))
@@ -155,9 +155,10 @@ class LensSight(Sight):
 
     @cached_property
     def _seen(self) -> tuple[Any, ...]:
-        sensor = self._film.camera.sensor
+        sensor = self.film.camera.sensor
         return sensor.grid, sensor.fill_factor
 
     @property
-    def _film(self) -> Film:
+    def film(self) -> Film:
+        """Its samples: in the place of `optics`."""
         return cast(Film, self.optics)

@@ -6,21 +6,21 @@ those of `tiles`.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
-from lumigraph.errors import GeometryError
 from lumigraph.operators.camera import CameraOptics
-from lumigraph.operators.each import require_repeated
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.part_images import PartImages, one_lens
+from lumigraph.operators.part_images import Images
+from lumigraph.operators.part_images import Told as ByWaves
 from lumigraph.operators.part_sight import Sight, Spot
-from lumigraph.operators.part_waves import Both, Change, Slopes, Waves, Where
+from lumigraph.operators.part_waves import Both, Where
 from lumigraph.operators.points import SPARE
 from lumigraph.operators.tiles import as_plane, by_cell, spread
 from lumigraph.operators.whole_planes import Block, CellPlane
@@ -44,29 +44,16 @@ class PartPlane(CellPlane[Sight, "Lit"]):
     Parameters
     ----------
     images
-        The cameras'.
+        The cameras', with lenslets that are alike, behind a thin lens that is the same for all fields.
     grid
         Samples of the object.
     dz
         Depth from the focused plane [m].
-
-    Raises
-    ------
-    GeometryError
-        Lenslets that differ by chance.
     """
 
-    images: PartImages
+    images: Images
     grid: Grid
     dz: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not one_lens(self.images.camera):
-            raise GeometryError(
-                "planes have derivatives behind a thin lens that is the same for all fields. Use points "
-                "(part_images), or leave out over_field and prescription."
-            )
-        require_repeated(self.images.camera)
 
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -83,12 +70,12 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         return end.read
 
     def _changed(self, change: list[float]) -> Callable[["Lit"], Block]:
-        by = Change.of(self._own, zip(change, self._ends, self._moved, strict=True), self._spots)
-        brighter = sum(w * _brighter(where) for w, where in zip(change, self._moved, strict=True))
-        return lambda block: block.changed(self._own, by, brighter)
+        weighed = list(zip(change, self._ends, self._moved, strict=True))
+        changed = self._amid.changing(self._own, self._spots, weighed)
+        return lambda block: block.changed(changed)
 
     def _slopes(self) -> "_Told":
-        return _Told(self._ends, self._moved)
+        return _Told(self._amid.slopes(self._own, self._ends, self._moved))
 
     def _points(self, end: Sight, x: np.ndarray) -> np.ndarray:
         optics, cells = self._optics(end), end.optics.cells
@@ -114,26 +101,27 @@ class PartPlane(CellPlane[Sight, "Lit"]):
     def _blocks(self) -> Iterator["Lit"]:
         spots = self._spots
         for k in range(0, len(spots), TOGETHER):
-            yield Lit.of(self._own, spots[k : k + TOGETHER], self._margin)
+            waves = [self._amid.waves(self._own, spot) for spot in spots[k : k + TOGETHER]]
+            yield Lit.of(self._own, waves, self._margin)
 
     @cached_property
-    def _amid(self) -> PartImages:
+    def _amid(self) -> Images:
         """Of arrays around the points of one cell, as wide as their light is followed."""
         camera, finer = self.images.camera, SPARE * self.images.accuracy
         optics = Optics.of(camera, camera.object_distance + self.dz, finer)
         # As even as the array: its cells' edges are where no rounding moves them by a cell.
         count = [2 * n + 1 + (k + 1) % 2 for n, k in zip(optics.reach, optics.cells.count, strict=True)]
         own, *ends = (
-            _amid(one, count, finer) for one in (camera, *(end for pair in self.images.pairs for end in pair))
+            _amid(one, count, finer, self.dz)
+            for one in (camera, *(end for pair in self.images.pairs for end in pair))
         )
-        pairs = tuple(zip(ends[::2], ends[1::2], strict=True))
-        return PartImages(own, pairs, self.images.accuracy)
+        return replace(self.images, camera=own, pairs=tuple(zip(ends[::2], ends[1::2], strict=True)))
 
     @cached_property
     def _own(self) -> Sight:
         """Before points of a cell amid."""
         middle = Points(np.array([[0.0, 0.0, self.dz]]), np.ones(1))
-        return Sight.of(self._amid.camera, middle, self._amid.accuracy, NODES)
+        return self._amid.before(middle, fewest=NODES)[0]
 
     @cached_property
     def _ends(self) -> list[Both]:
@@ -145,7 +133,7 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         own = Optics.of(self.images.camera, self._own.optics.distance, self._own.optics.fineness.accuracy)
         amid = self._own.optics.cells
         cells = replace(own.cells, points=amid.points, samples=amid.samples)
-        return Sight(replace(own, cells=cells), self._own.nodes)
+        return replace(self._own, optics=replace(own, cells=cells))
 
     @cached_property
     def _seen(self) -> list[Both]:
@@ -156,11 +144,11 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         return self._own.spots(self._lit(self._own))
 
     @cached_property
-    def _moved(self) -> list[Where]:
+    def _moved(self) -> list[Where | None]:
         return [(self._lit(first), self._lit(last)) for first, last in self._ends]
 
     def _lit(self, own: Sight) -> Points:
-        """The points of the cell amid the array, each as bright as its part of an even object of 1."""
+        """The points of the cell amid the array, each as bright as its part."""
         optics = self._optics(own)
         cells, camera = optics.cells, optics.camera
         scale = -optics.distance / camera.separation
@@ -171,8 +159,7 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         down, across = (one.ravel() * scale for one in np.meshgrid(y, x, indexing="ij"))
         sin, cos = math.sin(optics.rotation), math.cos(optics.rotation)
         places = [down * cos + across * sin, across * cos - down * sin, np.full(down.size, self.dz)]
-        area = math.prod(cells.size) / math.prod(cells.points) * (scale / camera.object_pitch) ** 2
-        return Points(np.stack(places, axis=1), np.full(down.size, area))
+        return Points(np.stack(places, axis=1), np.full(down.size, 1 / down.size))
 
     @cached_property
     def _margin(self) -> tuple[int, int]:
@@ -196,25 +183,23 @@ class Lit(Block):
         (y, x) of a cell.
     """
 
-    waves: list[Waves]
+    waves: list[Any]
     samples: tuple[int, int]
 
     @classmethod
-    def of(cls, own: Sight, spots: Sequence[Spot], margin: tuple[int, int]) -> "Lit":
+    def of(cls, own: Sight, waves: list[Any], margin: tuple[int, int]) -> "Lit":
         """Of points with others around the array, so many cells on all sides."""
-        waves = [Waves.of(own, spot) for spot in spots]
+        spots = [one.spot for one in waves]
         numbers = slice(spots[0].number, spots[-1].number + 1)
         places = zip(margin, middle_of(own), _lit(spots), strict=True)
         y, x = (more + middle - lit.start for more, middle, lit in places)
         found = cls(np.zeros(()), numbers, (y, x), waves, own.optics.cells.samples)
         return found._with([one.spot.intensity * np.abs(one.field) ** 2 for one in waves])
 
-    def changed(self, own: Sight, by: Change, brighter: float) -> "Lit":
-        """Change of the images with the camera, and as the points become brighter."""
+    def changed(self, by: Callable[[Any], np.ndarray]) -> "Lit":
+        """Change of the images, by that of each field."""
         return self._with([
-            2 * one.spot.intensity * np.real(one.field.conj() * one.changed(own, by))
-            + brighter * np.abs(one.field) ** 2
-            for one in self.waves
+            2 * one.spot.intensity * np.real(one.field.conj() * by(one)) for one in self.waves
         ])  # fmt: skip
 
     def of_each(self, kernel: np.ndarray) -> Iterator[np.ndarray]:
@@ -245,28 +230,18 @@ class Lit(Block):
         return y, x
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Told:
-    """`whole_planes.Told` before a camera: slopes by its waves and by how bright points are."""
+    """`whole_planes.Told` before a camera: slopes by points' waves."""
 
-    ends: list[Both]
-    moved: list[Where]
-    by: Slopes = field(default_factory=Slopes)
-    pupil: np.ndarray = field(default_factory=lambda: np.zeros(()))
-    bright: float = 0.0
+    by: ByWaves
 
     def add(self, block: Lit, asked: np.ndarray) -> None:
         for waves, part in zip(block.waves, block.of_each(asked), strict=True):
-            self.bright += float(np.sum(part * np.abs(waves.field) ** 2))
-            by = self.by.add(waves, waves.spot.intensity * part * waves.field.conj())
-            self.pupil = self.pupil + by
+            self.by.add(waves, waves.spot.intensity * part * waves.field.conj())
 
     def along(self) -> np.ndarray:
-        found = [
-            self.bright * _brighter(where) + self.by.between(both, self.pupil, where)
-            for both, where in zip(self.ends, self.moved, strict=True)
-        ]
-        return np.array(found, np.float64)
+        return self.by.along()
 
 
 def _lit(spots: Sequence[Spot]) -> tuple[range, range]:
@@ -276,21 +251,16 @@ def _lit(spots: Sequence[Spot]) -> tuple[range, range]:
     return y, x
 
 
-def _brighter(where: Where) -> float:
-    """How much brighter all points are before the last of a pair."""
-    first, last = where
-    return float(last.intensities[0] - first.intensities[0])
-
-
 def middle_of(own: Sight) -> tuple[int, int]:
     """Row and column of the image's cell that is amid the array."""
     y, x = (ring + n // 2 for ring, n in zip(own.optics.cells.ring, own.optics.cells.count, strict=True))
     return y, x
 
 
-def _amid(camera: CameraOptics, count: Sequence[int], accuracy: float) -> CameraOptics:
-    """With so many cells."""
-    assert camera.array is not None  # as `PartImages` asks
+def _amid(camera: CameraOptics, count: Sequence[int], accuracy: float, dz: float) -> CameraOptics:
+    """With so many cells, of which points at a depth are each as bright as a whole one."""
+    assert camera.array is not None  # as `PartPlane` asks
     size = Optics.of(camera, camera.object_distance, accuracy).cells.size
     extent = count[0] * size[0], count[1] * size[1]
-    return replace(camera, array=replace(camera.array, extent=extent))
+    pitch = math.sqrt(math.prod(size)) * (camera.object_distance + dz) / camera.separation
+    return replace(camera, array=replace(camera.array, extent=extent), object_pitch=pitch)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 from lumigraph.operators.whole_planes import Part
 
@@ -15,10 +16,13 @@ class PartVolume:
     Parameters
     ----------
     planes
-        (nz,), by depth, of as many samples.
+        (nz,), by depth.
+    grid
+        Samples of each.
     """
 
     planes: tuple[Part, ...]
+    grid: Grid
 
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int, int]]:

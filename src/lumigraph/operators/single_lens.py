@@ -170,14 +170,16 @@ def single_lens_operator(
         return _varying(plain, grid, dz, (grid.y / distance, grid.x / distance), accuracy)
     scale, pitch = -plain.separation / (plain.object_distance + dz), image_pitch(plain)
     here = _covering((scale * grid.y, scale * grid.x), pitch)
-    points = [span.pitch / scale for span in here]  # descending in the object
-    samples = Grid(
-        (here[0].count, here[1].count),
-        (-points[0], -points[1]),
-        ((here[0].first + here[0].count // 2) * points[0], (here[1].first + here[1].count // 2) * points[1]),
-    )
+    samples = object_samples(here, scale)
     maps = represented(grid, samples), *_imaging(plain, here, dz)
     return SingleLensOperator(maps, object_grid=grid)
+
+
+def object_samples(image: tuple[Span, Span], scale: float) -> Grid:
+    """Samples of the object whose images are those along y and along x, so many times as large."""
+    pitch = [span.pitch / scale for span in image]  # descending in the object
+    center = [(span.first + span.count // 2) * step for span, step in zip(image, pitch, strict=True)]
+    return Grid((image[0].count, image[1].count), (-pitch[0], -pitch[1]), (center[0], center[1]))
 
 
 def _varying(camera: CameraOptics, grid: Grid, dz: float, fields: Fields, accuracy: float) -> FieldOperator:

@@ -164,8 +164,25 @@ class Block:
 End = TypeVar("End")
 """An instrument as it is compared with those a little apart."""
 
-Some = TypeVar("Some", bound=Block)
-Given = TypeVar("Given", bound=Block, contravariant=True)
+
+class Kernel(Protocol):
+    """Images of points that repeat themselves; see `Block`."""
+
+    def add(self, light: np.ndarray, points: np.ndarray, /) -> None:
+        """What points bring to the light."""
+        ...
+
+    def return_to(self, points: np.ndarray, seen: np.ndarray, /) -> None:
+        """The transpose of `add`."""
+        ...
+
+    def asked(self, points: Sequence[np.ndarray], seen: Sequence[np.ndarray], /) -> np.ndarray:
+        """Slopes by the kernel, of objects' points and slopes by their light."""
+        ...
+
+
+Some = TypeVar("Some", bound=Kernel)
+Given = TypeVar("Given", bound=Kernel, contravariant=True)
 
 
 class Told(Protocol[Given]):
@@ -216,7 +233,7 @@ class CellPlane(WholePlane, Generic[End, Some]):
         """Of all points of a cell."""
 
     @abstractmethod
-    def _changed(self, change: list[float]) -> Callable[[Some], Block]:
+    def _changed(self, change: list[float]) -> Callable[[Some], Kernel]:
         """Gives how a block's images change."""
 
     @abstractmethod
