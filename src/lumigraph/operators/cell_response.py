@@ -121,6 +121,28 @@ class Response:
     across: np.ndarray
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Nodes:
+    """Of a quadrature along a lenslet; the last two are its edges, which weigh nothing.
+
+    Parameters
+    ----------
+    off
+        Places from the lenslet's middle [m].
+    weight
+        Of each [m], faded.
+    edge
+        Part of the light that counts at both edges.
+    light
+        Values (nodes, m) there, of the numbers that hold light.
+    """
+
+    off: np.ndarray
+    weight: np.ndarray
+    edge: np.ndarray
+    light: np.ndarray
+
+
 class Lenslets:
     """What a lenslet array does to the light around its cells.
 
@@ -145,6 +167,7 @@ class Lenslets:
         self.axes, self.array, self.pixels = axes, array, pixels
         self.optics = wavelength, distance
         self._bases = axes[0].basis(), axes[1].basis()
+        self._nodes: dict[tuple[int, float], Nodes] = {}
 
     @property
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
@@ -176,18 +199,59 @@ class Lenslets:
         A cell with its lenslets is taken as if it stood at `place` [m] from the main lens' axis, one of those
         in a `box`; where lenses are paraxial they are all alike.
         """
-        axis, (coefficients, light) = self.axes[which], self._bases[which]
-        step = abs(self.array.lattice.basis[1 - which][which])
-        (focal_length,) = focal_lengths(self.array)
-        half, total = self.array.fill_factor * step / 2, np.zeros((axis.samples, len(coefficients)))
-        count = nodes(half, focal_length, axis, self.optics)
-        reach = axis.size / 2 + axis.neighbourhood
-        for middle in row(self.array.lattice.origin[which] - center, step, reach, limits):
-            at, weight = legendre(middle - half, middle + half, count)
-            phase = np.exp(-1j * np.pi * (at - middle) ** 2 / (self.optics[0] * focal_length))
-            weight = weight * axis.fade(at, step)
-            total = total + (self.spread(axis.image, at) * (weight * phase)) @ light(at)
-        return (total @ coefficients)[None]
+        axis, coefficients = self.axes[which], self._bases[which][0]
+        total = np.zeros((self.count(box), axis.samples, len(coefficients)), complex)
+        for middle in self.middles(which, center, limits):
+            total += self._brought(which, middle, place, box)
+        return times_real(total, coefficients)
+
+    def count(self, box: Box) -> int:
+        """Of terms, for cells centred in a box."""
+        return 1
+
+    def middles(self, which: int, center: float, limits: Limits = INFINITE) -> list[float]:
+        """Of lenslets along an axis that send light to a cell, from its centre [m]."""
+        axis, origin = self.axes[which], self.array.lattice.origin[which] - center
+        return list(row(origin, self._step(which), axis.size / 2 + axis.neighbourhood, limits))
+
+    def half(self, which: int) -> float:
+        """Of a square lenslet's side [m]."""
+        return self.array.fill_factor * self._step(which) / 2
+
+    def on_nodes(self, which: int, middle: float) -> "Nodes":
+        """Of a quadrature along the lenslet around a place."""
+        if (known := self._nodes.get(key := (which, round(middle / self.axes[which].size, 9)))) is None:
+            axis, half, (focal_length,) = self.axes[which], self.half(which), focal_lengths(self.array)
+            at, weight = legendre(-half, half, nodes(half, focal_length, axis, self.optics))
+            off = np.array([*at, -half, half])
+            fade = axis.fade(middle + off, self._step(which))
+            weight = np.array([*weight, 0.0, 0.0]) * fade
+            known = Nodes(off, weight, fade[-2:], self.values(which, middle + off))
+            self._nodes[key] = known
+        return known
+
+    def kernel(
+        self, which: int, places: tuple[np.ndarray, ...], place: float = 0.0, box: Box = MIDDLE
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Light from nodes of a lenslet: its phase [rad], and (terms, ...) what its amplitude is beside.
+
+        Places are those on the image, of the nodes, and of these from the lenslet's middle [m].
+        """
+        image, at, off = places
+        (wavelength, _), (focal_length,) = self.optics, focal_lengths(self.array)
+        squared = math.prod(self.optics)
+        phase = np.pi * ((image - at) ** 2 / squared - off**2 / (wavelength * focal_length))
+        return phase, self.accepted(image - at)[None] / math.sqrt(squared)
+
+    def _brought(self, which: int, middle: float, place: float, box: Box) -> np.ndarray:
+        """Fields (terms, samples, m) of numbers that hold the light, behind the lenslet around a place."""
+        one = self.on_nodes(which, middle)
+        places = self.axes[which].image[:, None], middle + one.off, one.off
+        phase, beside = self.kernel(which, places, place, box)
+        return times_real(beside * (np.exp(1j * phase) * one.weight), one.light)
+
+    def _step(self, which: int) -> float:
+        return abs(self.array.lattice.basis[1 - which][which])
 
     def spread(self, image: np.ndarray, light: np.ndarray, tilt: float = 0.0) -> np.ndarray:
         """`fresnel` along an axis, as the pixels count it: whose angles are `tilt` less (tangent).
@@ -241,6 +305,12 @@ class Lenslets:
             pieces.append((at, weight, np.minimum(half, 2 * half - math.sqrt(3) * np.abs(at))))
         y, weight, chord = (np.concatenate(part) for part in zip(*pieces, strict=True))
         return y, weight, chord
+
+
+def times_real(rows: np.ndarray, real: np.ndarray) -> np.ndarray:
+    """Complex rows (..., n, k) times a real matrix, as two real products."""
+    parts = np.stack([np.real(rows), np.imag(rows)]) @ real
+    return parts[0] + 1j * parts[1]
 
 
 def row(origin: float, step: float, reach: float, limits: Limits) -> Iterator[float]:

@@ -33,13 +33,9 @@ from lumigraph.operators.cell_response import (
     Axis,
     Box,
     Lenslets,
-    Limits,
     Pair,
     bent,
     focal_lengths,
-    legendre,
-    nodes,
-    row,
     sphere,
 )
 from lumigraph.operators.optics import Optics
@@ -143,6 +139,11 @@ def interpolated(count: int) -> tuple[np.ndarray, np.ndarray]:
     return nodes, to
 
 
+def between(at: np.ndarray, count: int) -> np.ndarray:
+    """From values at so many of these nodes to those at places from -1 to 1: (places, count)."""
+    return chebyshev.chebvander(at, count - 1) @ interpolated(count)[1]
+
+
 class ExactLenslets(Lenslets):
     """Lenslets of one focal length, square; see `Lenslets`.
 
@@ -170,7 +171,7 @@ class ExactLenslets(Lenslets):
         self.least = KEPT * accuracy
         (self.focal_length,) = focal_lengths(array)
         self.surface, self.width = surface, array.fill_factor * array.lattice.pitch / 2
-        self.half = self.width if surface is None else surface.seen(self.width, self.focal_length)
+        self._half = self.width if surface is None else surface.seen(self.width, self.focal_length)
         self._terms: dict[Box, tuple[tuple[Products, ...], list[tuple[int, ...]]]] = {}
 
     def _bent(self, squared: np.ndarray) -> np.ndarray:
@@ -236,8 +237,8 @@ class ExactLenslets(Lenslets):
         def beside(y: np.ndarray, x: np.ndarray) -> np.ndarray:
             return self._bright(y * y + x * x) * np.exp(-1j * self.k * _left(self._bent, y, x))
 
-        to = Terms(2 * self._turns(self.half, self.b), self.least, like)
-        return products(beside, (0.0, 0.0), (self.half, self.half), to)
+        to = Terms(2 * self._turns(self._half, self.b), self.least, like)
+        return products(beside, (0.0, 0.0), (self._half, self._half), to)
 
     def _sphere_around(self, box: Box, like: Products | None) -> Products:
         def beside(y: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -253,37 +254,29 @@ class ExactLenslets(Lenslets):
         path = _left(lambda squared: sphere(squared, radius), corner, corner)
         return abs(float(path)) * self.k / (2 * np.pi)
 
-    def along(
-        self, which: int, center: float, limits: Limits, place: float = 0.0, box: Box = MIDDLE
-    ) -> np.ndarray:
-        """As `Lenslets.along`: (terms, samples, window), whose products are added up."""
-        axis, (coefficients, light) = self.axes[which], self._bases[which]
-        step, (parts, terms) = abs(self.array.lattice.basis[1 - which][which]), self.terms(box)
-        half, reach = self.half, axis.size / 2 + axis.neighbourhood
-        count = nodes(half, self.focal_length, axis, self.optics)
-        total = np.zeros((len(terms), axis.samples, len(coefficients)), complex)
-        for middle in row(self.array.lattice.origin[which] - center, step, reach, limits):
-            at, weight = legendre(middle - half, middle + half, count)
-            off, there = at - middle, at + place
-            apart = self.scale * axis.image[:, None] - at + (self.scale - 1) * place
-            path = sphere(there**2, self.L) - self._bent(off**2)
-            weight = (
-                weight * axis.fade(at, step) * np.exp(1j * self.k * path) / math.sqrt(math.prod(self.optics))
-            )
-            spread, bright = np.exp(1j * self.k * sphere(apart**2, self.b)), light(at)
-            if self.pixels is not None:
-                chief = np.arctan((axis.image + place) / self.L)[:, None]
-                spread = spread * np.sqrt(self.pixels[0].of(np.arctan(apart / self.b) - chief))
-            way, lenslet, curved = (
-                part.along(which, places) for part, places in zip(parts, (apart, off, there), strict=True)
-            )
-            for n in dict.fromkeys(number[0] for number in terms):
-                mine = [k for k, number in enumerate(terms) if number[0] == n]
-                light_in = [weight * lenslet[terms[k][1]] * curved[terms[k][2]] for k in mine]
-                seen = (spread * way[n]) @ (np.array(light_in)[:, :, None] * bright)
-                for k, field in zip(mine, seen, strict=True):
-                    total[k] += field
-        return total @ coefficients
+    def count(self, box: Box) -> int:
+        """As `Lenslets.count`."""
+        return len(self.terms(box)[1])
+
+    def half(self, which: int) -> float:
+        """As `Lenslets.half`; of glass, of what is seen of it."""
+        return self._half
+
+    def kernel(
+        self, which: int, places: tuple[np.ndarray, ...], place: float = 0.0, box: Box = MIDDLE
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As `Lenslets.kernel`: (terms, ...), whose products are added up."""
+        (image, at, off), (parts, terms) = places, self.terms(box)
+        apart, there = self.scale * image - at + (self.scale - 1) * place, at + place
+        path = sphere(apart**2, self.b) + sphere(there**2, self.L) - self._bent(off**2)
+        way, lenslet, curved = (
+            part.along(which, one) for part, one in zip(parts, (apart, off, there), strict=True)
+        )
+        beside = np.stack([way[n] * (lenslet[i] * curved[j]) for n, i, j in terms])
+        if self.pixels is not None:
+            chief = np.arctan((image + place) / self.L)
+            beside *= np.sqrt(self.pixels[0].of(np.arctan(apart / self.b) - chief))
+        return self.k * path, beside / math.sqrt(math.prod(self.optics))
 
 
 def _left(path: Callable[[np.ndarray], np.ndarray], y: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -142,7 +142,7 @@ class FilmPlane(CellPlane[LensSight, Blurred]):
         return of
 
     def _slopes(self) -> "_Told":
-        return _Told(self._bright.slopes(self._point[0], self._around, [None] * len(self._around)))
+        return _Told(self._bright.by_pairs(self._point[0], self._around, [None] * len(self._around)))
 
     @cached_property
     def _bright(self) -> PartImages:

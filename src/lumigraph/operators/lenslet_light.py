@@ -18,7 +18,15 @@ from functools import cached_property
 import numpy as np
 
 from lumigraph.core.threads import each
-from lumigraph.operators.cell_response import STEP, Axis, Lenslets, focal_lengths, legendre, nodes
+from lumigraph.operators.cell_response import (
+    STEP,
+    Axis,
+    Lenslets,
+    focal_lengths,
+    legendre,
+    nodes,
+    times_real,
+)
 from lumigraph.operators.point_images import Wave, through
 
 Pair = tuple[float, float]
@@ -242,12 +250,6 @@ class _Behind:
 
     seen: np.ndarray
     light: np.ndarray
-
-
-def times_real(rows: np.ndarray, real: np.ndarray) -> np.ndarray:
-    """Complex rows (n, k) times a real matrix, as two real products."""
-    parts = np.stack([np.real(rows), np.imag(rows)]) @ real
-    return parts[0] + 1j * parts[1]
 
 
 def _by_way(matrix: np.ndarray, least: float) -> tuple[np.ndarray, ...]:

@@ -12,9 +12,17 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from lumigraph.operators.cell_response import STEP, Lenslets, focal_lengths, held, legendre, nodes
+from lumigraph.operators.cell_response import (
+    STEP,
+    Lenslets,
+    focal_lengths,
+    held,
+    legendre,
+    nodes,
+    times_real,
+)
 from lumigraph.operators.exact import lenslets_of
-from lumigraph.operators.lenslet_light import AROUND, times_real
+from lumigraph.operators.lenslet_light import AROUND
 from lumigraph.operators.optics import Optics
 
 FAINT = 1e-7, 1e-10
@@ -68,10 +76,12 @@ class LineParts:
     def _shared(self, what: Hashable, *of: Any) -> bool:
         """Whether a matrix is the other's, with all it follows from: cameras may differ in one kind alone."""
         assert self.like is not None
+        if what == "on lines":
+            return self._wide == self.like._wide
         if what in ("along", "down") and self._focal[of[0]] != self.like._focal[of[0]]:
             return False
         one, other = (
-            (array.lattice, array.fill_factor, parts.optics.cells, parts.optics.axes, *lenslets.optics)
+            (array.lattice, array.fill_factor, parts.optics.cells, *lenslets.optics)
             for parts in (self, self.like)
             for array, lenslets in [(parts.optics.array, parts._lenslets)]
         )
@@ -263,13 +273,40 @@ class LineParts:
 
     def _on_lines(self) -> np.ndarray:
         """From light along y (window) to the lines across a lenslet: (lines, window)."""
-        coefficients, light = held(self._window(0), self.optics.axes[0].band)
-        return light(self._lines[0]) @ coefficients
+        return self._held_at(0, self._lines[0])
+
+    def _held_at(self, which: int, at: np.ndarray) -> np.ndarray:
+        """From light around a lenslet to places along an axis: (places, window)."""
+        coefficients, light = held(self._window(which), self._band(which))
+        return light(at) @ coefficients
+
+    def _band(self, which: int) -> float:
+        """Of the light [1/m]; on the samples, that of the other: any that holds it does."""
+        if self.like is not None:
+            return self.like._band(which) * self.like._steps[which] / self._steps[which]
+        return self.optics.axes[which].band
+
+    @property
+    def _wide(self) -> tuple[float, ...]:
+        """Height and width of a lenslet, halved [samples], however rounded."""
+        return tuple(round(half / step, 12) for half, step in zip(self._half, self._steps, strict=True))
+
+    @cached_property
+    def _on_chords(self) -> list[np.ndarray]:
+        """From light (window) to the nodes of a line, of each chord: (nodes, window)."""
+        if self.like is not None and self._wide == self.like._wide:
+            return self.like._on_chords
+        return [self._held_at(1, self._half[1] * mine.at) for mine in self._nodes[1:]]
 
     def _down(self, kind: int) -> np.ndarray:
         """From the lines to few numbers along y, by the kind: (k, lines)."""
+        return self._seen_of_lines * self._bend(self._focal[kind], self._lines[0])
+
+    @cached_property
+    def _seen_of_lines(self) -> np.ndarray:
+        """What all kinds share of that."""
         lines, weight, _ = self._lines
-        return self._seen(0, lines) * weight * self._bend(self._focal[kind], lines)
+        return self._seen(0, lines) * weight
 
     @property
     def _focal(self) -> tuple[float, ...]:
@@ -286,7 +323,9 @@ class LineParts:
         sequences, pitch = self._sequences(which)[0], self._first(which, 0)[1]
         at = (np.arange(sequences.shape[1]) * pitch - self._reach(which))[:, None]
         turn = np.exp(-2j * np.pi / self._squared * at * light)
-        return sequences @ (turn * self._lenslets.accepted(at - light))
+        if self._lenslets.pixels is not None:
+            turn *= self._lenslets.accepted(at - light)
+        return times_real(turn.T, sequences.T).T
 
     def _along(self) -> Iterator[tuple[int, np.ndarray]]:
         """From light (window) on a line to few numbers along x: (chords, k, window) of kinds not shared.
@@ -298,16 +337,12 @@ class LineParts:
         degrees = (np.arange(len(whole.at)) + 0.5) / longest
         seen = self._seen(1, longest * whole.at) * (longest * whole.weight)
         seen = times_real(seen, whole.polynomials * degrees)
-        coefficients, light = held(self._window(1), self.optics.axes[1].band)
-        chords, around = (
-            self._nodes[1:],
-            [light(longest * mine.at) @ coefficients for mine in self._nodes[1:]],
-        )
+        chords = self._nodes[1:]
         there = [times_real(seen, mine.polynomials.T) * (longest * mine.weight) for mine in chords]
         for kind, focal_length in enumerate(self._focal):
             if self.like is None or not self._shared("along", kind):
                 bends = [self._bend(focal_length, longest * mine.at) for mine in chords]
-                parts = zip(there, bends, around, strict=True)
+                parts = zip(there, bends, self._on_chords, strict=True)
                 found = [times_real(one * bend, light) for one, bend, light in parts]
                 yield kind, np.array(found, self.precision)
 

@@ -12,9 +12,8 @@ is differentiated. What is made of the image is followed back to them once, so t
 costs no product of large matrices.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -27,7 +26,7 @@ from lumigraph.operators.each import one_by_one
 from lumigraph.operators.fineness import COARSEST
 from lumigraph.operators.part_lens import LensSight
 from lumigraph.operators.part_sight import Sight, Spot
-from lumigraph.operators.part_waves import Both, Change, Slopes, Waves, Where, pupils, read_anew, times
+from lumigraph.operators.part_waves import Both, ByPairs, Change, Waves, Where, read_anew
 from lumigraph.operators.point_changes import PUPIL
 from lumigraph.operators.seen import seen_points
 from lumigraph.scene import Points
@@ -84,7 +83,7 @@ class _Some:
 
 
 @dataclass(frozen=True, eq=False)
-class Images(ABC):
+class PartImages:
     """How a camera sees points, with derivatives by what differs between pairs of cameras.
 
     Points shine as samples of the camera's own object grid, as `simulate` has them. Objects that are made
@@ -93,47 +92,34 @@ class Images(ABC):
     Parameters
     ----------
     camera
-        That which sees them.
+        Paraxial, without lenslets or with some of any shape and focal lengths; squares of one may differ.
     pairs
         (n,), cameras a little to either side of it: by a length, a term of the phase, the wavelength.
     accuracy
         Relative rms error of points' images.
+
+    Raises
+    ------
+    GeometryError
+        Another camera; one of a pair that has another number of pixels or lenslets, or others missing.
+    SamplingError
+        An accuracy out of 1e-3 to 1e-2.
     """
 
     camera: CameraOptics
     pairs: tuple[tuple[CameraOptics, CameraOptics], ...]
     accuracy: float = 1e-2
 
+    def __post_init__(self) -> None:
+        check_parts(self.camera, self.pairs, self.accuracy, require_paraxial)
+        camera, *ends = one_by_one((self.camera, *(end for pair in self.pairs for end in pair)))
+        object.__setattr__(self, "camera", camera)
+        object.__setattr__(self, "pairs", tuple(zip(ends[::2], ends[1::2], strict=True)))
+
     @property
     def shape(self) -> tuple[int, int]:
         """Of a raw image."""
         return self.camera.sensor.shape
-
-    @abstractmethod
-    def before(
-        self, points: Points, moved: Sequence[Where] | None = None, fewest: int = PUPIL
-    ) -> tuple[Any, Points, list[Where | None]]:
-        """The camera before points, where its main lens sees these, and where those of each pair do.
-
-        Points that are `moved` are elsewhere before the cameras of each pair. Light is sampled by so many
-        nodes across the lens at least.
-        """
-
-    @abstractmethod
-    def ends(self, own: Any) -> list[Any]:
-        """Cameras of each pair."""
-
-    @abstractmethod
-    def waves(self, own: Any, spot: Spot) -> Any:
-        """A point's light on its way, whose `field` is on the samples (y, x)."""
-
-    @abstractmethod
-    def changing(self, own: Any, spots: Sequence[Spot], pairs: Any) -> Callable[[Any], np.ndarray]:
-        """Gives how the field of some points changes between cameras, by their light on its way."""
-
-    @abstractmethod
-    def slopes(self, own: Any, ends: Any, where: list[Where | None]) -> Told:
-        """Of a number that does not change yet."""
 
     def forward(self, points: Points) -> np.ndarray:
         """Raw image (ny, nx) of points."""
@@ -183,7 +169,7 @@ class Images(ABC):
         seen, light = np.stack([own.read.adjoint(one) for one in weights]), np.zeros((len(x), *own.shape))
         found = np.zeros(len(self.pairs))
         for some in self._some(own, given, x):
-            told = self.slopes(some.own, some.ends, some.where)
+            told = self.by_pairs(some.own, some.ends, some.where)
             for spot in some.spots:
                 waves = self.waves(some.own, spot)
                 _add(light, some, spot, np.abs(waves.field) ** 2)
@@ -204,53 +190,18 @@ class Images(ABC):
             moved = [one and (_only(one[0], kept), _only(one[1], kept)) for one in where]
             yield _Some(sight, self.ends(sight), own.spots(_only(points, kept)), moved, x[:, kept])
 
-
-def _once(points: Points) -> np.ndarray:
-    return np.ones((1, len(points.intensities)))
-
-
-def _only(points: Points, kept: np.ndarray) -> Points:
-    return Points(points.positions[kept], points.intensities[kept])
-
-
-def _add(light: np.ndarray, some: _Some, spot: Spot, image: np.ndarray) -> None:
-    """What a point brings to the light (k, y, x) of each object."""
-    light[(slice(None), *spot.window)] += np.multiply.outer(some.bright(spot), image)
-
-
-@dataclass(frozen=True, eq=False)
-class PartImages(Images):
-    """Of a paraxial camera; see `Images`.
-
-    Parameters
-    ----------
-    camera
-        Without lenslets or with some of any shape and focal lengths; squares of one may differ by chance.
-    pairs, accuracy
-        As of `Images`.
-
-    Raises
-    ------
-    GeometryError
-        Another camera; one of a pair that has another number of pixels or lenslets, or others missing.
-    SamplingError
-        An accuracy out of 1e-3 to 1e-2.
-    """
-
-    def __post_init__(self) -> None:
-        check_parts(self.camera, self.pairs, self.accuracy, require_paraxial)
-        camera, *ends = one_by_one((self.camera, *(end for pair in self.pairs for end in pair)))
-        object.__setattr__(self, "camera", camera)
-        object.__setattr__(self, "pairs", tuple(zip(ends[::2], ends[1::2], strict=True)))
-
     def ends(self, own: Sight) -> list[Both]:
-        """As of `Images`."""
+        """Cameras of each pair."""
         return [(own.alike(_thin(first)), own.alike(_thin(last))) for first, last in self.pairs]
 
     def before(
         self, points: Points, moved: Sequence[Where] | None = None, fewest: int = PUPIL
     ) -> tuple[Sight, Points, list[Where | None]]:
-        """As of `Images`."""
+        """The camera before points, where its main lens sees these, and where those of each pair do.
+
+        Points that are `moved` are elsewhere before the cameras of each pair. Light is sampled by so many
+        nodes across the lens at least.
+        """
         camera, mine = seen_points(self.camera, points)
         own = (Sight if camera.array else LensSight).of(camera, mine, self.accuracy, fewest)
         if moved is None and self.camera.objects is None:
@@ -265,49 +216,33 @@ class PartImages(Images):
             ],
         )
 
-    def waves(self, own: Sight, spot: Spot) -> Waves:
-        """As of `Images`."""
+    def waves(self, own: Sight, spot: Spot) -> Any:
+        """A point's light on its way, whose `field` is on the samples (y, x)."""
         return Waves.of(own, spot)
 
     def changing(
         self, own: Sight, spots: Sequence[Spot], pairs: Sequence[Weighed]
-    ) -> Callable[[Waves], np.ndarray]:
-        """As of `Images`."""
+    ) -> Callable[[Any], np.ndarray]:
+        """Gives how the field of some points changes between cameras, by their light on its way."""
         by = Change.of(own, pairs, spots)
         return lambda waves: waves.changed(own, by)
 
-    def slopes(self, own: Sight, ends: list[Both], where: list[Where | None]) -> "_Told":
-        """As of `Images`."""
-        return _Told(own, list(zip(ends, where, strict=True)), np.zeros(len(ends)))
+    def by_pairs(self, own: Sight, ends: Sequence[Both], moved: Sequence[Where | None]) -> Told:
+        """What takes slopes by such light, to changes between the cameras of pairs."""
+        return ByPairs(own, ends, moved)
 
 
-@dataclass(eq=False)
-class _Told:
-    """`Told` by points' waves, and by those in the main lens of one depth, or field, after the other."""
+def _once(points: Points) -> np.ndarray:
+    return np.ones((1, len(points.intensities)))
 
-    own: Sight
-    pairs: list[tuple[Both, Where | None]]
-    found: np.ndarray
-    by: Slopes = field(default_factory=Slopes)
-    pupil: tuple[Spot, np.ndarray] | None = None
 
-    def add(self, waves: Waves, by: np.ndarray) -> None:
-        pupil, spot = self.by.add(waves, by), waves.spot
-        if self.pupil is not None and self.own.seen_from(self.pupil[0]) == self.own.seen_from(spot):
-            self.pupil[1][...] += pupil
-        else:
-            self._leave()
-            self.pupil = spot, pupil
+def _only(points: Points, kept: np.ndarray) -> Points:
+    return Points(points.positions[kept], points.intensities[kept])
 
-    def along(self) -> np.ndarray:
-        self._leave()
-        return 2 * (self.found + [self.by.along(*pair) for pair in self.pairs])
 
-    def _leave(self) -> None:
-        if self.pupil is not None:
-            spot, by = self.pupil
-            self.found += [times(by, *pupils(spot, *pair)) for pair in self.pairs]
-            self.pupil = None
+def _add(light: np.ndarray, some: _Some, spot: Spot, image: np.ndarray) -> None:
+    """What a point brings to the light (k, y, x) of each object."""
+    light[(slice(None), *spot.window)] += np.multiply.outer(some.bright(spot), image)
 
 
 def _thin(camera: CameraOptics) -> CameraOptics:

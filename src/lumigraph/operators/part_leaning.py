@@ -14,8 +14,8 @@ import numpy as np
 from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.leaning import near
 from lumigraph.operators.paraxial import resolved
-from lumigraph.operators.part_exact import ExactImages, ExactPoints
-from lumigraph.operators.part_images import Images, PartImages, one_lens, require_paraxial
+from lumigraph.operators.part_exact import ExactImages
+from lumigraph.operators.part_images import PartImages, one_lens, require_paraxial
 from lumigraph.operators.part_points import Back, PartPoints, SteppedPoints
 from lumigraph.operators.part_waves import Where
 from lumigraph.operators.whole_planes import Part
@@ -122,7 +122,7 @@ def weighed(moved: np.ndarray, seen: Sequence[np.ndarray]) -> np.ndarray:
 
 def by_parts(
     camera: HasOptics, pairs: Sequence[tuple[HasOptics, HasOptics]], accuracy: float
-) -> Images | LeaningParts[PartImages]:
+) -> PartImages | LeaningParts[PartImages]:
     """Of instruments, a little to either side of one, whose model they have where theirs is "auto".
 
     Raises
@@ -142,7 +142,7 @@ def by_parts(
 
 
 def points_before(
-    images: Images | LeaningParts[PartImages], points: Points, moved: Sequence[Where]
+    images: PartImages | LeaningParts[PartImages], points: Points, moved: Sequence[Where]
 ) -> PartPoints | LeaningPoints:
     """Points one by one, before any camera; elsewhere before those of each pair."""
     if isinstance(images, LeaningParts):
@@ -151,10 +151,9 @@ def points_before(
     return _flat(images, points, moved)
 
 
-def _flat(images: Images, points: Points, moved: Sequence[Where]) -> PartPoints:
-    if isinstance(images, ExactImages):
-        return ExactPoints(images, points, moved)
-    return (PartPoints if one_lens(images.camera) else SteppedPoints)(images, points, moved)
+def _flat(images: PartImages, points: Points, moved: Sequence[Where]) -> PartPoints:
+    turned = images.camera.model == "paraxial" and one_lens(images.camera)
+    return (PartPoints if turned else SteppedPoints)(images, points, moved)
 
 
 def _leaning(

@@ -17,7 +17,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.part_images import Images
+from lumigraph.operators.part_images import PartImages
 from lumigraph.operators.part_images import Told as ByWaves
 from lumigraph.operators.part_sight import Sight, Spot
 from lumigraph.operators.part_waves import Both, Where
@@ -51,7 +51,7 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         Depth from the focused plane [m].
     """
 
-    images: Images
+    images: PartImages
     grid: Grid
     dz: float = 0.0
 
@@ -75,7 +75,7 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         return lambda block: block.changed(changed)
 
     def _slopes(self) -> "_Told":
-        return _Told(self._amid.slopes(self._own, self._ends, self._moved))
+        return _Told(self._amid.by_pairs(self._own, self._ends, self._moved))
 
     def _points(self, end: Sight, x: np.ndarray) -> np.ndarray:
         optics, cells = self._optics(end), end.optics.cells
@@ -105,7 +105,7 @@ class PartPlane(CellPlane[Sight, "Lit"]):
             yield Lit.of(self._own, waves, self._margin)
 
     @cached_property
-    def _amid(self) -> Images:
+    def _amid(self) -> PartImages:
         """Of arrays around the points of one cell, as wide as their light is followed."""
         camera, finer = self.images.camera, SPARE * self.images.accuracy
         optics = Optics.of(camera, camera.object_distance + self.dz, finer)

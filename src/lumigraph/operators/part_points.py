@@ -6,15 +6,16 @@ is made of both is followed back through four fields at once.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from lumigraph.core.threads import single_products
+from lumigraph.operators.part_images import PartImages
 from lumigraph.operators.part_sight import Sight, Spot
-from lumigraph.operators.part_waves import Both, Slopes, Waves, Where, factor, pupils, read_anew, times
+from lumigraph.operators.part_waves import Both, Waves, Where, factor, read_anew
 from lumigraph.scene import Points
 
 Back = Callable[[np.ndarray], None]
@@ -31,18 +32,16 @@ class PartPoints:
     Parameters
     ----------
     images
-        The cameras', `PartImages`; of some kinds others.
+        The cameras'.
     points
         Nearer ones first.
     moved
         (n,), the same before the cameras of each pair, as far from the planes in focus.
     """
 
-    images: Any
+    images: PartImages
     points: Points
     moved: Sequence[Where]
-    _slopes: Slopes = field(default_factory=Slopes)
-    _pupil: tuple[Spot, np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         self._found = np.zeros(len(self.moved))
@@ -77,9 +76,7 @@ class PartPoints:
     @single_products()
     def along(self) -> np.ndarray:
         """(n,) changes of the sum of all numbers, from the first to the last camera of each pair."""
-        self._leave_depth()
-        slopes = [self._slopes.along(*pair) for pair in zip(self._ends, self._moved, strict=True)]
-        return self._found + 2 * np.array(slopes)
+        return self._found + self._by_pairs.along()
 
     def _fields(self, spot: Spot) -> tuple[list[np.ndarray], Follow]:
         """A point's field and its derivatives by place, and what takes slopes by them."""
@@ -88,14 +85,15 @@ class PartPoints:
         waves = [still.turned(own, move) for move in moves]
 
         def follow(by: list[np.ndarray]) -> None:
-            by_own, turned = self._slopes.add(still, by[0]), []
+            found = self._by_pairs.slopes
+            by_own, turned = found.add(still, by[0]), []
             for one, slopes, move in zip(waves, by[1:], moves, strict=True):
-                by_pupil = self._slopes.add(one, slopes)
+                by_pupil = found.add(one, slopes)
                 by_own += by_pupil * factor(move)
                 phase = np.real(1j * by_pupil * still.pupil)
                 turned.append((phase.sum(1), phase.sum(0)))
-            self._slopes.add_moves(spot, turned)
-            self._by_pupil(spot, by_own)
+            found.add_moves(spot, turned)
+            self._by_pairs.add_pupil(spot, by_own)
 
         return [still.field, *(one.field for one in waves)], follow
 
@@ -106,21 +104,6 @@ class PartPoints:
             self._found[k] += brighter * (high - low)
             self._found[k] += sum(read_anew(both, *pair) for pair in zip(light, given, strict=True))
 
-    def _by_pupil(self, spot: Spot, by: np.ndarray) -> None:
-        """Adds slopes by the wave in the main lens, of one depth or field after the other."""
-        if self._pupil is not None and self._own.seen_from(self._pupil[0]) == self._own.seen_from(spot):
-            self._pupil[1][...] += by
-            return
-        self._leave_depth()
-        self._pupil = spot, by
-
-    def _leave_depth(self) -> None:
-        if self._pupil is not None:
-            spot, by = self._pupil
-            pairs = zip(self._ends, self._moved, strict=True)
-            self._found += [2 * times(by, *pupils(spot, *pair)) for pair in pairs]
-            self._pupil = None
-
     def _spot(self, number: int) -> Spot:
         return self._spots[number]
 
@@ -128,9 +111,9 @@ class PartPoints:
     def _own(self) -> Sight:
         return self._seen[0]
 
-    @property
-    def _moved(self) -> list[Where | None]:
-        return self._seen[2]
+    @cached_property
+    def _by_pairs(self) -> Any:
+        return self.images.by_pairs(self._own, self._ends, self._seen[2])
 
     @cached_property
     def _seen(self) -> tuple[Sight, Points, list[Where | None]]:
@@ -179,7 +162,9 @@ class SteppedPoints(PartPoints):
     def _fields(self, spot: Spot) -> tuple[list[np.ndarray], Follow]:
         """As of points whose waves in the main lens only turn; no light is won or lost with depth."""
         some = (self._spots[spot.number + k] for k in range(7))
-        waves = [self._wave(replace(one, cells=spot.cells, window=spot.window)) for one in some]
+        waves = [
+            self.images.waves(self._own, replace(one, cells=spot.cells, window=spot.window)) for one in some
+        ]
         distance = [self._own.optics.camera.object_distance + one.spot.dz for one in waves]
         steps = np.repeat(self._steps[spot.number // 7], 2) * np.tile([-2, 2], 3)
         shares = [1.0, *(far / distance[0] / step for far, step in zip(distance[1:], steps, strict=True))]
@@ -188,15 +173,7 @@ class SteppedPoints(PartPoints):
         def follow(by: list[np.ndarray]) -> None:
             each = [by[0], *(one for one in by[1:] for _ in range(2))]
             for one, share, slopes in zip(waves, shares, each, strict=True):
-                self._return(one, share * slopes)
+                self._by_pairs.add(one, share * slopes)
 
         sides = zip(fields[1::2], fields[2::2], strict=True)
         return [fields[0], *(low + high for low, high in sides)], follow
-
-    def _wave(self, spot: Spot) -> Any:
-        """A point's light on its way."""
-        return Waves.of(self._own, spot)
-
-    def _return(self, wave: Any, by: np.ndarray) -> None:
-        """Adds slopes by its field."""
-        self._by_pupil(wave.spot, self._slopes.add(wave, by))

@@ -103,6 +103,11 @@ class Sight:
         return replace(self)
 
     @property
+    def own(self) -> "Sight":
+        """That which it is like, or itself."""
+        return self if self.like is None else self.like
+
+    @property
     def shape(self) -> tuple[int, int]:
         """Of all samples."""
         cells = self.optics.cells
@@ -125,7 +130,7 @@ class Sight:
         if self.optics.array.scatter is not None:
             return Each(self.optics, np.complex128, like)
         if self.optics.straight:
-            return Straight(self.optics, np.complex128)
+            return Straight(self.optics, np.complex128, like)
         return Lines(self.optics, np.complex128, like)
 
     def pupil(self, spot: Spot) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from lumigraph.operators.line_parts import Key
 from lumigraph.operators.part_sight import Sight, Spot, Turn
-from lumigraph.operators.passed import Passed, passed
+from lumigraph.operators.passed import Passed, changed_pieces, passed, times
 from lumigraph.operators.passed import Slopes as ByPieces
 from lumigraph.scene import Points
 
@@ -99,13 +99,9 @@ class Change:
     ) -> "Change":
         """For some points."""
         lit = {key for spot in spots for key in own.lenslets.keys(*spot.cells)}
-        known, pieces = [], {key: np.zeros_like(own.lenslets.piece(key)) for key in lit}
-        for weight, both, where in pairs:
-            first, last = (one.lenslets for one in both)
-            for key in lit if first is not last else ():
-                pieces[key] += weight * (last.piece(key) - first.piece(key))
-            known.append((weight, (both[0].anew, both[1].anew), where))
-        return cls(tuple(known), pieces)
+        known = [(weight, (both[0].anew, both[1].anew), where) for weight, both, where in pairs]
+        lenslets = ((weight, low.lenslets, high.lenslets) for weight, (low, high), _ in known)
+        return cls(tuple(known), changed_pieces(own.lenslets, list(lenslets), lit))
 
     def sum(self, of: Callable[[Sight], np.ndarray]) -> Any:
         """Change of what is made of a camera."""
@@ -166,14 +162,60 @@ class Slopes:
 
     def along(self, both: Both, where: Where | None = None) -> float:
         """From one camera to another close by, before which points are elsewhere."""
-        found, (first, last) = 0.0, (one.anew for one in both)
-        if first.lenslets is not last.lenslets:
-            for key, by in self._pieces.of.items():
-                found += times(by, first.lenslets.piece(key), last.lenslets.piece(key))
+        first, last = both
+        found = self._pieces.along(first.own.lenslets, first.lenslets, last.lenslets)
         for of, spot, slopes in self._of:
             for by, *ends in zip(slopes, *map(of, (first, last), before(spot, where)), strict=True):
                 found += sum(times(*pieces) for pieces in zip(by, *ends, strict=True))
         return found
+
+
+@dataclass(eq=False)
+class ByPairs:
+    """What a number made of images changes by between the cameras of each pair, point after point.
+
+    Parameters
+    ----------
+    own
+        The camera itself.
+    ends, moved
+        (n,), the cameras, and where points are before both.
+    """
+
+    own: Sight
+    ends: Sequence[Both]
+    moved: Sequence[Where | None]
+    slopes: Slopes = field(default_factory=Slopes)
+    _pupil: tuple[Spot, np.ndarray] | None = None
+
+    def __post_init__(self) -> None:
+        self._found = np.zeros(len(self.ends))
+
+    def add(self, waves: Waves, by: np.ndarray) -> None:
+        """Slopes by a point's field (y, x)."""
+        self.add_pupil(waves.spot, self.slopes.add(waves, by))
+
+    def add_pupil(self, spot: Spot, by: np.ndarray) -> None:
+        """Slopes by the wave in the main lens, of one depth or field after the other."""
+        if self._pupil is not None and self.own.seen_from(self._pupil[0]) == self.own.seen_from(spot):
+            self._pupil[1][...] += by
+            return
+        self._leave()
+        self._pupil = spot, by
+
+    def along(self) -> np.ndarray:
+        """(n,), from the first to the last camera of each pair."""
+        self._leave()
+        pairs = zip(self.ends, self.moved, strict=True)
+        found = [self.slopes.along((first.anew, last.anew), where) for (first, last), where in pairs]
+        return 2 * (self._found + found)
+
+    def _leave(self) -> None:
+        if self._pupil is not None:
+            spot, by = self._pupil
+            pairs = zip(self.ends, self.moved, strict=True)
+            self._found += [times(by, *pupils(spot, *pair)) for pair in pairs]
+            self._pupil = None
 
 
 def before(spot: Spot, where: Where | None) -> tuple[Spot, Spot]:
@@ -198,8 +240,3 @@ def read_anew(both: Both, light: np.ndarray, weights: np.ndarray) -> float:
     if first.read is last.read:
         return 0.0
     return times(weights, *(one.read.forward(light) for one in both))
-
-
-def times(by: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
-    """What a change from low to high comes to."""
-    return 0.0 if low is high else float(np.sum(by * (high - low)).real)

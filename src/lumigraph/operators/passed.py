@@ -25,6 +25,7 @@ class Slopes:
     """What something changes by with lenslets' matrices."""
 
     of: dict[Key, np.ndarray] = field(default_factory=dict)
+    _compared: dict[Key, np.ndarray] = field(default_factory=dict)
 
     def add(self, key: Key, by: np.ndarray) -> None:
         """With a whole matrix."""
@@ -35,6 +36,33 @@ class Slopes:
         if key not in self.of:
             self.of[key] = np.zeros_like(like)
         self.of[key][:, inside] += by
+
+    def along(self, own: "Parted", first: "Parted", last: "Parted") -> float:
+        """From one camera's lenslets to those of another, both close to the camera's own (halved)."""
+        if first is last:
+            return 0.0
+        if self.of:  # once for all pairs
+            for key, by in (own.back(self.of) if isinstance(own, Straight) else self.of).items():
+                self._compared[key] = self._compared.get(key, 0.0) + by
+            self.of = {}
+        return sum(times(by, first.piece(key), last.piece(key)) for key, by in self._compared.items())
+
+
+def changed_pieces(
+    own: "Parted", pairs: Sequence[tuple[float, "Parted", "Parted"]], keys: set[Key]
+) -> dict[Key, np.ndarray]:
+    """Change of matrices, so many times from the first to the last of each pair, all close to the own."""
+    compared = own.compared(keys) if isinstance(own, Straight) else keys
+    found = {key: np.zeros_like(own.piece(key)) for key in compared}
+    for weight, first, last in pairs:
+        for key in found if first is not last else ():
+            found[key] += weight * (last.piece(key) - first.piece(key))
+    return own.changed(found, keys) if isinstance(own, Straight) else found
+
+
+def times(by: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
+    """What a change from low to high comes to."""
+    return 0.0 if low is high else float(np.dot(by.ravel(), (high - low).ravel()).real)
 
 
 class Passed(Protocol):
@@ -67,44 +95,48 @@ def passed(relay: Parted, light: np.ndarray, rows: range, columns: range) -> Pas
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Squares:
-    """Behind square lenslets: along y (`down`), then along x."""
+    """Behind square lenslets: along y (`down`; terms, samples, places), then along x; a sum of terms."""
 
     relay: Straight
-    cells: tuple[range, range]
+    cells: Ways
     light: np.ndarray
     down: np.ndarray
     field: np.ndarray
 
     @classmethod
-    def of(cls, relay: Straight, light: np.ndarray, cells: tuple[range, range]) -> "_Squares":
-        down = _along(relay, relay.piece, 0, light, cells[0])
-        return cls(relay, cells, light, down, _along(relay, relay.piece, 1, down.T, cells[1]).T)
+    def of(cls, relay: Straight, light: np.ndarray, cells: Ways) -> "_Squares":
+        down = _along(relay, relay.piece, (0, cells), light[None])
+        across = _along(relay, relay.piece, (1, cells), down.transpose(0, 2, 1))
+        return cls(relay, cells, light, down, across.sum(0).T)
 
     def changed(self, light: np.ndarray, change: Pieces) -> np.ndarray:
         """As `Passed.changed`."""
-        relay, (rows, columns) = self.relay, self.cells
-        down = _along(relay, change, 0, self.light, rows) + _along(relay, relay.piece, 0, light, rows)
-        moved = _along(relay, change, 1, self.down.T, columns)
-        return (moved + _along(relay, relay.piece, 1, down.T, columns)).T
+        relay, own, first, then = self.relay, self.relay.piece, (0, self.cells), (1, self.cells)
+        down = _along(relay, change, first, self.light[None]) + _along(relay, own, first, light[None])
+        moved = _along(relay, change, then, self.down.transpose(0, 2, 1))
+        return (moved + _along(relay, own, then, down.transpose(0, 2, 1))).sum(0).T
 
     def back(self, by: np.ndarray, slopes: Slopes) -> np.ndarray:
         """As `Passed.back`."""
-        return self._back(0, self.light, self._back(1, self.down.T, by.T, slopes).T, slopes)
+        down = self._back(1, self.down.transpose(0, 2, 1), by.T[None], slopes)
+        return self._back(0, self.light[None], down.transpose(0, 2, 1), slopes).sum(0)
 
     def _back(self, which: int, light: np.ndarray, by: np.ndarray, slopes: Slopes) -> np.ndarray:
-        """Along an axis, of light (places, n) and of slopes by the samples (samples, n)."""
-        found, n = np.zeros_like(light), self.relay.optics.axes[which].samples
-        for k, cell in enumerate(self.cells[which]):
-            part, window = by[k * n : (k + 1) * n], self.relay.window(which, k)
-            slopes.add((which, cell), part @ light[window].T)
-            found[window] += self.relay.piece((which, cell)).T @ part
+        """Along an axis, of light (1 or terms, places, n) and slopes by the samples (terms, samples, n)."""
+        found = np.zeros((len(self.down), *light.shape[1:]), complex)
+        n = self.relay.optics.axes[which].samples
+        for k, key in enumerate(self.relay.of_cells(which, self.cells)):
+            part, window = by[:, k * n : (k + 1) * n], self.relay.window(which, k)
+            slopes.add(key, part @ light[:, window].transpose(0, 2, 1))
+            found[:, window] += self.relay.piece(key).transpose(0, 2, 1) @ part
         return found
 
 
-def _along(relay: Straight, pieces: Pieces, which: int, light: np.ndarray, cells: range) -> np.ndarray:
-    """Amplitudes (samples, n) behind square lenslets along one axis, of light (places, n)."""
-    parts = [pieces((which, cell)) @ light[relay.window(which, k)] for k, cell in enumerate(cells)]
-    return np.concatenate(parts)
+def _along(relay: Straight, pieces: Pieces, where: tuple[int, Ways], light: np.ndarray) -> np.ndarray:
+    """Amplitudes (terms, samples, n) of some cells along an axis, of light (1 or terms, places, n)."""
+    which, cells = where
+    keys = enumerate(relay.of_cells(which, cells))
+    return np.concatenate([pieces(key) @ light[:, relay.window(which, k)] for k, key in keys], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,7 +18,7 @@ from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.film_plane import FilmPlane
 from lumigraph.operators.kernels import A_MINUTE, LONGEST, said
 from lumigraph.operators.paraxial import field_matters
-from lumigraph.operators.part_images import Images, PartImages, one_lens
+from lumigraph.operators.part_images import PartImages, one_lens
 from lumigraph.operators.part_plane import PartPlane
 from lumigraph.operators.whole_planes import WholePlane
 from lumigraph.scene import Points
@@ -56,7 +56,7 @@ class PlaneOfPoints(WholePlane):
         By its methods: points that take more than a minute.
     """
 
-    images: Images
+    images: PartImages
     grid: Grid
     dz: float = 0.0
 
@@ -105,7 +105,7 @@ class PlaneOfPoints(WholePlane):
         said(operations, f"an image of {points} samples, as many points, takes")
 
     @cached_property
-    def _as_bright(self) -> Images:
+    def _as_bright(self) -> PartImages:
         """The same cameras, of which a point stands for a sample: as bright before all."""
         area = math.prod(self.grid.pitch)
 
@@ -131,10 +131,10 @@ class PlaneOfPoints(WholePlane):
         return Points(np.stack([y, x, np.full(y.shape, self.dz)], axis=1), np.ones(y.size))
 
 
-def plane_before(images: Images, grid: Grid, dz: float) -> WholePlane:
+def plane_before(images: PartImages, grid: Grid, dz: float) -> WholePlane:
     """Before cameras that see points as `images` have them: whole where images repeat, or by points."""
     camera = images.camera
-    if one_lens(camera) and camera.array is None and isinstance(images, PartImages):
+    if one_lens(camera) and camera.array is None and camera.model == "paraxial":
         return FilmPlane(images, grid, dz)
     return (PartPlane if _repeats(camera, images.accuracy) else PlaneOfPoints)(images, grid, dz)
 

@@ -167,7 +167,7 @@ class Sampled:
             grid = self.grid
             pupil = _cells.over_lens(self.camera, self.lens, self.distance, grid)
             squared = self.camera.wavelength * self.camera.separation
-            light = (np.abs(pupil) ** 2).sum() * squared**2 / np.prod(grid.pitch)
+            light = np.vdot(pupil, pupil).real * squared**2 / np.prod(grid.pitch)
             self._pupil.extend((grid, pupil * np.sqrt(_cells.stop_area(self.lens) / light)))
         return self._pupil[0], self._pupil[1]
 
