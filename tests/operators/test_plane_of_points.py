@@ -47,7 +47,7 @@ KINDS = {
         lens.camera, lambda key, step: lens.ends(key, step, lens.VARYING), lens.VARYING
     ),
 }  # fmt: skip
-SLOW = [pytest.param(kind, marks=pytest.mark.long) if kind == "exact" else kind for kind in KINDS]
+SLOW = [kind if kind == "no lenslets" else pytest.param(kind, marks=pytest.mark.long) for kind in KINDS]
 LENS = ("object_distance", "wavelength", "main_lens.focal_length", "main_lens.diameter", "sensor.pixel_pitch")
 KEYS = {
     "over_field": ("object_distance", "wavelength", "lenslets.pitch", "coma", "sensor.pixel_pitch"),
@@ -118,6 +118,7 @@ def test_samples_are_points_as_bright_as_their_area(kind, rng):
     assert off(plane(kind).forward(x), known) < 5e-3
 
 
+@pytest.mark.long
 def test_more_samples_take_no_more_memory_and_their_order_is_none(monkeypatch):
     """Beyond those that are seen together."""
     monkeypatch.setattr(part_images, "TOGETHER", 8)
