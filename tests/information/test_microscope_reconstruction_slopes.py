@@ -37,7 +37,7 @@ def exact(part: PartVolume) -> PartVolume:
         replace(one, images=replace(one.images, double=True)) if isinstance(one, PupilPlane) else one
         for one in part.planes
     )
-    return PartVolume(tuple(planes))
+    return replace(part, planes=tuple(planes))
 
 
 def seen_by(one, known, scenes, pairs=()):
