@@ -10,7 +10,7 @@ from lumigraph.errors import CalibrationError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Aside:
-    """By how much micro-images of some lenslets stand beside a regular lattice.
+    """Offsets of the micro-images of some lenslets from a regular lattice.
 
     Parameters
     ----------

@@ -30,12 +30,12 @@ class Banded:
 
     @property
     def nbytes(self) -> int:
-        """Of the blocks."""
+        """Memory of the blocks [bytes]."""
         return sum(m.nbytes for _, m in self.blocks)
 
     @property
     def rows(self) -> int:
-        """Their number."""
+        """Number of rows."""
         return sum(len(m) for _, m in self.blocks)
 
     def _parts(self, like: Array) -> Iterator[tuple[slice, slice, Array]]:

@@ -1,4 +1,4 @@
-"""What an object shows of itself in a few lines: arrays by type and shape, long lists by their ends."""
+"""Short representations of objects: arrays by type and shape, long lists by their ends."""
 
 import re
 import textwrap
@@ -35,7 +35,7 @@ def brief(self: Any) -> str:
 
 
 def called(thing: Any) -> str:
-    """What people call a type, or a thing of it.
+    """Plain name of a type, or of the type of an object.
 
     Examples
     --------

@@ -18,7 +18,7 @@ _SHARE, _LEAST, _MOST = 0.25, 2**28, 4 * 2**30
 
 
 class Budget:
-    """What several caches keep, in the order of its last use, within a number of bytes for all of them.
+    """Shared memory budget of several caches: the entry used longest ago is dropped first.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Budget:
         return self._limit
 
     def found(self, key: tuple[Hashable, Hashable]) -> Any:
-        """What is kept under a key, now the last to go; None where nothing is."""
+        """Entry under a key, now the last to be dropped; None if there is none."""
         with self._lock:
             if key not in self._kept:
                 return None

@@ -21,7 +21,7 @@ def _none() -> np.ndarray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """Where the micro-images stand on a raw image, and how light reached them.
+    """Positions of the micro-images on a raw image, and how light reached them.
 
     Micro-images stand at `position(indices)`: the points of `lattice`, moved by `warp` and `aside` where the
     camera has them. Whoever needs a place on the picture asks `position`, `index`, `offset` or
@@ -109,7 +109,7 @@ class Calibration:
 
     @property
     def measured(self) -> bool:
-        """Whether `centers` were measured on a picture: else they are the lattice points themselves."""
+        """True if `centers` were measured on a picture; otherwise they are the lattice points themselves."""
         return self.residual_px > 0  # false for NaN
 
     @property
@@ -141,7 +141,7 @@ class Calibration:
         return points if self.warp is None else self.warp.applied(points)
 
     def flat(self, indices: np.ndarray) -> np.ndarray:
-        """Where micro-image centres would stand without the warp (..., 2) [px]."""
+        """Micro-image centres without the warp (..., 2) [px]."""
         points = self.lattice.position(indices)
         return points if self.aside is None else points + self.aside.of(indices)
 
@@ -174,7 +174,7 @@ class Calibration:
         return indices[inside]
 
     def misses(self, indices: np.ndarray) -> np.ndarray:
-        """Which lenslets (...) of (..., 2) as (i, j) are missing."""
+        """True for missing lenslets (...), of indices (..., 2) as (i, j)."""
         keys = [each[..., 0] * (1 << 32) + each[..., 1] for each in (indices, self.missing)]
         return np.isin(keys[0], keys[1])
 

@@ -86,7 +86,7 @@ class DepthMap(Noun[A]):
 
     @property
     def unit(self) -> str:
-        """Of the values: "px", "1" or "m"."""
+        """Unit of the values: "px", "1" or "m"."""
         return QUANTITIES[self.quantity]
 
     @property

@@ -1,4 +1,4 @@
-"""Where nouns find what draws them: core knows no drawing library, `lumigraph` itself says who does."""
+"""Registry of drawing functions: `core` imports no drawing library, `lumigraph` registers one."""
 
 TYPE_CHECKING = False  # `typing` is slow to import, and `import lumigraph` imports this
 if TYPE_CHECKING:

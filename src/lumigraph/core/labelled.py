@@ -54,7 +54,7 @@ class Labels:
         return self
 
     def grid(self, names: str = "yx") -> Grid:
-        """Where the samples stand along two axes."""
+        """Grid of the samples along two axes."""
         (y, dy), (x, dx) = (self._even(name) for name in names)
         return Grid((len(y), len(x)), (dy, dx), (y[len(y) // 2], x[len(x) // 2]))
 

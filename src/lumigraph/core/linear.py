@@ -50,7 +50,7 @@ class Linear(ABC):
     @property
     @abstractmethod
     def shape(self) -> tuple[Shape, Shape]:
-        """Of what `forward` gives (the raw image), and of what it takes (the object)."""
+        """Shapes of what `forward` returns (the raw image) and of what it takes (the object)."""
 
     @abstractmethod
     def _forward(self, intensity: Array) -> Array: ...
@@ -189,7 +189,7 @@ class Transposed(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of the map [bytes]."""
+        """Memory of the map [bytes]."""
         return self.of.memory_bytes
 
 
@@ -216,7 +216,7 @@ class Chain(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of what the last map gives, and of what the first one takes."""
+        """Shapes of the last map's output and of the first map's input."""
         return self.maps[-1].shape[0], self.maps[0].shape[1]
 
     def _forward(self, intensity: Array) -> Array:
@@ -231,12 +231,12 @@ class Chain(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of all maps together [bytes]."""
+        """Memory of all maps together [bytes]."""
         return sum(part.memory_bytes for part in self.maps)
 
     @property
     def error(self) -> float:
-        """At most what those of the maps come to."""
+        """Sum of the maps' errors, an upper bound."""
         return sum(part.error for part in self.maps)
 
 
@@ -253,12 +253,12 @@ class _Side(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of all maps together [bytes]."""
+        """Memory of all maps together [bytes]."""
         return sum(part.memory_bytes for part in self.maps)
 
     @property
     def error(self) -> float:
-        """At most the largest of the maps'."""
+        """Largest error of the maps, an upper bound."""
         return max(part.error for part in self.maps)
 
 
@@ -285,7 +285,7 @@ class Sum(_Side):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of every map."""
+        """Output and input shape, the same for every map."""
         return self.maps[0].shape
 
     def _forward(self, intensity: Array) -> Array:
@@ -303,7 +303,7 @@ class Slices(_Side):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of one raw image, and of all planes."""
+        """Shapes of one raw image and of all planes."""
         raw, plane = self.maps[0].shape
         return raw, (len(self.maps), *plane)
 

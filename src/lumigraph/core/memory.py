@@ -29,7 +29,7 @@ def _free() -> int | None:
 
 
 def _free_of_group() -> int | None:
-    """What the control group may still take: pages of files that nobody uses are given back."""
+    """Memory that the control group may still use [bytes], the cache of unused file pages included."""
     try:
         most, used = (
             int((_GROUP / f"memory.{name}").read_text(encoding="ascii")) for name in ("max", "current")

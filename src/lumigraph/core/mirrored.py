@@ -55,7 +55,7 @@ class Mirrored:
 
     @property
     def nbytes(self) -> int:
-        """Of the halves."""
+        """Memory of both halves [bytes]."""
         return self.even.nbytes + self.odd.nbytes
 
     def down(self, data: np.ndarray) -> np.ndarray:
@@ -75,7 +75,7 @@ def by_halves(
     *,
     axis: int,
 ) -> np.ndarray:
-    """What halves along an axis of data become, put together to `count` along it.
+    """Result (`count` along the axis) of applying separate functions to the even and odd half of data.
 
     `even` takes the sum of the upper half and the mirrored lower one and gives the even result's upper half,
     `odd` their difference and gives the odd one's. Halves of odd counts begin in the middle.

@@ -68,7 +68,7 @@ class CoherentModes:
 
     @property
     def grid(self) -> Grid:
-        """Where the samples of all modes stand.
+        """Grid that all modes share.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class CoherentModes:
 
     @property
     def wavelengths(self) -> tuple[float, ...]:
-        """In vacuum [m]."""
+        """Wavelengths in vacuum [m]."""
         return tuple(field.wavelength for field in self.fields)
 
     @property
@@ -109,7 +109,7 @@ class CoherentModes:
 
 
 def _stacked(field: Field) -> Field:
-    """With one leading axis, that of the modes."""
+    """Field with one leading axis, the modes."""
     if field.data.ndim not in (2, 3):
         raise GeometryError(
             f"a field of the modes has shape {tuple(field.data.shape)} but must be (modes, y, x), or (y, x)."

@@ -1,4 +1,4 @@
-"""What the nouns share: NumPy reads them, they draw themselves, xarray and napari get named axes."""
+"""Base of the data types: NumPy reads them, they draw themselves, xarray and napari get named axes."""
 
 from abc import abstractmethod
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self
@@ -58,7 +58,7 @@ class Noun(Generic[A]):
 
     @classmethod
     def from_xarray(cls, array: Any) -> Self:
-        """What `to_xarray` gave, also after a selection along its axes.
+        """Object restored from `to_xarray`, also after a selection along its axes.
 
         Raises
         ------

@@ -79,7 +79,7 @@ def length(value: float | None) -> str:
 
 
 def numbers(data: Any) -> str:
-    """What an array holds, such as "uint16, 0 to 4095"."""
+    """Data type and range of an array, such as "uint16, 0 to 4095"."""
     values = to_numpy(data)
     finite = values if values.dtype.kind in "iub" else values[np.isfinite(values)]
     if not finite.size:

@@ -52,12 +52,12 @@ class Verdicts:
 
     @property
     def valid(self) -> np.ndarray:
-        """Which lenslets count (k,), true or false."""
+        """True for lenslets that count (k,)."""
         return self.reasons == Reason.GOOD
 
     @property
     def lost(self) -> np.ndarray:
-        """Which lenslets decoding leaves out (k,): a saturated one is bright all the same."""
+        """True for lenslets that decoding leaves out (k,); saturated ones are bright and stay."""
         return np.isin(self.reasons, (Reason.DARK, Reason.MASKED, Reason.DEAD))
 
 
@@ -96,7 +96,7 @@ class PreparedImage(RawImage):
 
     @property
     def valid(self) -> np.ndarray:
-        """Which pixels count (y, x), true or false."""
+        """True for pixels that count (y, x)."""
         return self.reasons == Reason.GOOD
 
     @property

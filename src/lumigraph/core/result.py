@@ -1,4 +1,4 @@
-"""What a verb found: `Result`, which text, JSON, reports and notebooks read."""
+"""Results of verbs: `Result`, which text output, JSON, reports and notebooks read."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -93,7 +93,7 @@ class Figure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
-    """What a verb found.
+    """Result of a verb: the object made, named quantities, pictures and notes.
 
     Parameters
     ----------
@@ -132,12 +132,12 @@ class Result:
     failure: str = ""
 
     def text(self, known: Sequence[str] = ()) -> str:
-        """What people read on a terminal, without the notes that they have read already."""
+        """Text for a terminal, without the notes in `known`, which were printed before."""
         notes = (f"note: {note}" for note in self.notes if note not in known)
         return "\n".join((*self.headline, *notes, *(f"written {path}" for path in self.written)))
 
     def values(self) -> dict[str, Any]:
-        """What programs read: values by name, lengths in metres, intervals as name_interval."""
+        """Values for programs: by name, lengths in metres, intervals as name_interval."""
         found: dict[str, Any] = {one.name: one.value for one in self.quantities}
         found |= {f"{one.name}_interval": one.interval for one in self.quantities if one.interval}
         found |= self.extra

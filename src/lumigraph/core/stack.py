@@ -93,7 +93,7 @@ class Stack(Noun[A]):
 
     @property
     def titles(self) -> tuple[str, ...]:
-        """What each picture is, such as "alpha 0.95", "dz 20 mm" or "page 3"."""
+        """Title of each picture, such as "alpha 0.95", "dz 20 mm" or "page 3"."""
         name, _, unit = self.quantity.removesuffix("]").partition(" [")
         if not self.positions:
             return tuple(f"{name} {k}" for k in range(len(self)))

@@ -1,4 +1,4 @@
-"""What was reconstructed: intensities in space."""
+"""Reconstructed volumes: intensities in space."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self

@@ -1,4 +1,4 @@
-"""What the frequencies that a band-limited propagation drops would have brought to its output."""
+"""Light in the output that a band-limited propagation loses with the frequencies it drops."""
 
 import math
 
@@ -20,7 +20,7 @@ _NEAR = 0.9 + 0.1 * np.sqrt((np.arange(7) + 0.5) / 7)  # of the limit; uneven, t
 def dropped_light(
     method: str, window: Grid, limits: tuple[float, float], fields: tuple[Field, Grid, Array], distance: float
 ) -> str | None:
-    r"""What is wrong where light of dropped frequencies belongs to the output.
+    r"""Warning text if frequencies that were dropped carry light of the output; else None.
 
     The band's end acts as an edge in the spectrum: along x it adds a wave from x_e = x_0 + λ z f_max,
 

@@ -187,7 +187,7 @@ class ExtendedSource:
     def sampled(
         self, grid: Grid, wavelength: float, distance: float, accuracy: float, dtype: Any
     ) -> CoherentModes:
-        """As `modes`, on a grid that may hold fewer directions, such as a slice that it shines through."""
+        """Modes as of `modes`, on a grid that may hold fewer directions, such as an illuminated slice."""
         lamps.check(grid, wavelength, accuracy)
         here = self._at(checks.finite("distance", distance))
         here._require(grid, wavelength, accuracy, np.dtype(dtype).itemsize)

@@ -1,4 +1,4 @@
-"""How much of light that arrives at an angle a pixel counts."""
+"""Response of a pixel to light that arrives at an angle."""
 
 import math
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ class AngularResponse:
 
     @property
     def is_flat(self) -> bool:
-        """Whether it is 1 at all angles."""
+        """True if the response is 1 at all angles."""
         return not self.power and all(value == 1 for value in self.values)
 
     def of(self, angle: np.ndarray | float) -> np.ndarray:
@@ -77,5 +77,5 @@ class AngularResponse:
         return response
 
     def amplitude(self, tangent: np.ndarray | float) -> np.ndarray:
-        """What it multiplies amplitudes by that arrive at angles of a tangent: √r."""
+        """Factor √r of amplitudes that arrive at angles of a tangent."""
         return np.sqrt(self.of(np.arctan(tangent)))

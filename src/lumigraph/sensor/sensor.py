@@ -154,7 +154,7 @@ class Sensor:
         photons: float | None = None,
         rng: np.random.Generator | None = None,
     ) -> RawImage:
-        """What is read out of an intensity: photon and read noise, fixed patterns, whole numbers.
+        """Raw image of an intensity: photon and read noise, fixed patterns, whole numbers.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What has arrived on the sensor, and the raw image of it."""
+"""Light that has arrived on the sensor, and its raw image."""
 
 import math
 from dataclasses import dataclass, field
@@ -45,7 +45,7 @@ class Shots:
         self._image = image if self._image is None else self._image + image
 
     def complete(self) -> None:
-        """What was begun is a block of its own."""
+        """Close the block of shots that was begun, and start a new one."""
         if self._image is None:
             return
         seen = integrate(self._image, self.camera.image_grid, self.camera.sensor)
@@ -73,7 +73,7 @@ class Shots:
 
 @dataclass(slots=True)
 class Light:
-    """What has arrived so far: intensity on the pixels, after `done` shots or parts."""
+    """Light that has arrived so far: intensity on the pixels, after `done` shots or parts."""
 
     pixels: np.ndarray
     shots: Shots

@@ -95,7 +95,7 @@ class Spectrum:
         accuracy: float = 1e-2,
         bayer: str | None = None,
     ) -> "Spectrum":
-        """Of a light, filters and pixels that are known as curves, linear between their wavelengths.
+        """Spectrum of a light, filters and pixels given as curves, linear between their wavelengths.
 
         Each channel has wavelengths of its own, Gauss's nodes of its light: as few as keep its degree of
         coherence to an accuracy over the largest path difference, such as a `camera.path_difference`.
@@ -161,7 +161,7 @@ class Spectrum:
         return cls((red, green, blue), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), bayer)
 
     def lit(self, scene: Scene, number: int) -> Scene:
-        """What the scene gives off at a wavelength: colours (y, x, 3) by the channels that see it."""
+        """Scene at one wavelength: colours (y, x, 3) weighted by the channels that detect it."""
         parts = []
         for part in scene.parts:
             if isinstance(part, Slice) and part.intensity.ndim == 3:
