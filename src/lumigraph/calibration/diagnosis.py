@@ -1,4 +1,4 @@
-"""What a white image says about how a camera is put together: `diagnose` names the fault."""
+"""Diagnosis of a camera's assembly from a white image: `diagnose` names the fault."""
 
 import math
 from collections.abc import Sequence
@@ -49,27 +49,27 @@ class _Lenslets(Protocol):
 
 
 class Built(Protocol):
-    """What `diagnose` asks of a camera: how it was meant to be."""
+    """Protocol of a camera that `diagnose` compares with: its design."""
 
     @cached_property
     def calibration(self) -> Calibration:
-        """Where micro-images were meant to stand [px]."""
+        """Design positions of the micro-images [px]."""
         ...
 
     @property
     def lenslets(self) -> _Lenslets:
-        """Their pitch and focal lengths [m], and shape."""
+        """Pitch and focal lengths of the lenslets [m], and their shape."""
         ...
 
     @property
     def wavelength(self) -> float:
-        """In vacuum [m]."""
+        """Wavelength in vacuum [m]."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """How a camera differs from what it was meant to be, in the frame of its raw image.
+    """Deviations of a camera from its design, in the frame of its raw image.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class Diagnosis:
 
 
 def diagnose(white: RawImage | Array, camera: Built) -> Diagnosis:
-    r"""What is wrong with the camera that took a white image.
+    r"""Faults in the assembly of the camera that took a white image.
 
     The lattice gives rotation, offset and, by its pitch p (1 + b/L), the distance b. A tilted array has
     another b for each lenslet: with T = L + b, micro-images stand at
@@ -274,7 +274,7 @@ def _between(lattice: Lattice) -> Lattice:
 
 
 class _Blur:
-    """How a lenslet blurs the main lens, as a function of the lattice's harmonics."""
+    """Blur of the main lens' image by a lenslet, as a function of the lattice's harmonics."""
 
     def __init__(self, camera: Built, distances: tuple[float, float], pitch: float) -> None:
         b, separation = distances

@@ -20,7 +20,7 @@ _SHARPEST, _HIGHEST = 0.14, 4.0  # 1/px, and orders, of the lines that gaps have
 
 
 class Followed(NamedTuple):
-    """What a feature repeats on.
+    """Lattice on which a feature repeats.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class _Lines:
 
 
 def _top(before: np.ndarray, here: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Where a parabola through three samples is highest, from the middle one."""
+    """Offset of a parabola's maximum from the middle one of three samples [samples]."""
     return np.clip((after - before) / (2 * np.maximum(2 * here - before - after, 1e-6)), -0.6, 0.6)
 
 
@@ -151,7 +151,7 @@ def _first(waves: np.ndarray, is_hex: bool) -> np.ndarray:
 
 
 def _is_peak(score: np.ndarray) -> np.ndarray:
-    """Where a score is the highest of its surroundings, but not at the border."""
+    """True where a score is the highest of its surroundings, but not at the border."""
     found = score == ndimage.maximum_filter(score, 3)
     found[[0, -1]] = found[:, [0, -1]] = False
     return found

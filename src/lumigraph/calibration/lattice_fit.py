@@ -1,4 +1,4 @@
-"""From a white image, or a raw image alone, to the places of its micro-images."""
+"""Calibration from a white image, or from a raw image alone: `calibrate`."""
 
 import math
 from collections.abc import Sequence
@@ -101,7 +101,7 @@ def calibrate(
 
 
 def _overexposed(image: RawImage, model: Calibration, indices: np.ndarray) -> tuple[str, ...]:
-    """What is to be known of micro-images at the top of the range."""
+    """Note about micro-images at the top of the range."""
     if not (many := saturated(image, model, indices)):
         return ()
     return (

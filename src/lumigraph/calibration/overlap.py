@@ -1,4 +1,4 @@
-"""Where micro-images stand whose discs overlap: beyond a size, the brightest places are between them."""
+"""Centres of micro-images whose discs overlap: beyond a size, the brightest places are between them."""
 
 import math
 from typing import NamedTuple

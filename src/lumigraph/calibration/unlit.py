@@ -1,4 +1,4 @@
-"""Which lenslets do not send light as they should, judged by their light alone: `unlit`, `saturated`."""
+"""Dark, faint and saturated lenslets, judged by their light alone: `unlit`, `saturated`."""
 
 import numpy as np
 from scipy import ndimage
@@ -44,7 +44,7 @@ def unlit(picture: np.ndarray, model: Calibration, centers: np.ndarray, *, white
 
 
 def saturated(image: RawImage, model: Calibration, indices: np.ndarray) -> int:
-    """How many lenslets (k, 2) are at the top of a picture's range over half of their middle."""
+    """Number of lenslets (k, 2) at the top of a picture's range over half of their middle."""
     if image.bit_depth is None:
         return 0
     data = to_numpy(image.data)

@@ -1,4 +1,4 @@
-"""What the rest of a job will need: `Estimate`."""
+"""Estimate of the time, memory and disk space that the rest of a job needs: `Estimate`."""
 
 import heapq
 import math
@@ -14,7 +14,7 @@ from lumigraph.errors import SamplingError
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What the rest of a job will need, from the frames that are done.
+    """Needs of the rest of a job, from the frames that are done.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Estimate:
         processors: float = math.inf,
         starting: float = 0.0,
     ) -> "Estimate":
-        """From entries of frames like those to come: the first one of each worker made what it keeps.
+        """Estimate from entries of similar frames; the first one of each worker includes its set-up.
 
         Parameters
         ----------

@@ -33,20 +33,20 @@ class Group(Protocol):
 
     @property
     def count(self) -> int:
-        """Of them."""
+        """Number of workers."""
         ...
 
     def each(self, numbers: Iterable[int]) -> Iterator[Outcome]:
-        """How each frame ended, in the order in which they do."""
+        """Outcomes of frames, in the order in which they end."""
         ...
 
 
 class Cluster(Protocol):
-    """Where workers are found."""
+    """Protocol of a source of workers: this machine, or a scheduler."""
 
     @property
     def is_here(self) -> bool:
-        """Whether they share this machine's memory."""
+        """True if workers share this machine's memory."""
         ...
 
     def group(self, task: Task) -> AbstractContextManager[Group]:
@@ -74,7 +74,7 @@ class Local:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """How a job stands.
+    """State of a job.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class Report:
 
     @property
     def stand(self) -> str:
-        """How many are done, in words."""
+        """Number of frames done, in words."""
         return f"{self.done} of {self.count} {many(self.noun, self.count)}"
 
     @property
@@ -117,7 +117,7 @@ class Report:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all frames are done."""
+        """True if all frames are done."""
         return self.done == self.count
 
 
@@ -209,7 +209,7 @@ def rows(output: str | os.PathLike[str]) -> Iterator[list[dict[str, Any]]]:
 
 
 def status(output: str | os.PathLike[str]) -> Report:
-    """How a job stands, by its output or its ledger, while it runs or afterwards.
+    """State of a job, by its output or its ledger, while it runs or afterwards.
 
     Raises
     ------
@@ -228,7 +228,7 @@ def status(output: str | os.PathLike[str]) -> Report:
 
 
 def page(output: str | os.PathLike[str]) -> Path:
-    """Where the page lies that shows how a job stands, by its output or its ledger."""
+    """Path of the page that shows the state of a job, by its output or its ledger."""
     path = Path(output)
     return (path if (path / "job.json").exists() else Ledger.beside(path).folder) / PAGE
 
@@ -284,7 +284,7 @@ def _quickest(known: list[Entry]) -> float:
 
 
 def _entries(task: Task, numbers: list[int]) -> list[Entry]:
-    """Of those frames that did not fail."""
+    """Entries of the frames that did not fail."""
     return [entry for number in numbers if (entry := task.ledger.entry(number)) is not None]
 
 
@@ -350,7 +350,7 @@ def _left(task: Task, first: int, last: int, progress: Progress) -> Iterator[int
 
 
 def _kept(task: Task, number: int) -> bool:
-    """Whether a frame is done and its shards are whole; what was noted of one that is not is forgotten."""
+    """True if a frame is done and its shards are intact; the record of one that is not is removed."""
     if task.is_done(number, content=True):
         return True
     task.ledger.forget(number)

@@ -14,7 +14,7 @@ from lumigraph.errors import LumigraphError
 def script(
     command: Sequence[str], output: Path, jobs: int, options: Sequence[str] = (), folder: Path | None = None
 ) -> str:
-    """What `sbatch` is given.
+    """Batch script for `sbatch`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What light passes between planes: every element is a function from `Field` to `Field`.
+"""Optical elements that light passes between planes: functions from `Field` to `Field`.
 
 - `train`: `Element`, the protocol, and `Train`, elements one after the other
 - `transmission`: what thin elements share: a cached factor for each sample

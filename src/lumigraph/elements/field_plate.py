@@ -180,7 +180,7 @@ class ZernikeMap:
 
     @property
     def _parity(self) -> np.ndarray | None:
-        """Of terms over the axis of a round lens; None where fields lie on both sides."""
+        """Signs of the terms on the other side of a round lens' axis; None if fields lie on both sides."""
         return None if self.y is not None else np.array([(-1) ** (noll_to_nm(j)[1] % 2) for j in self.terms])
 
 
@@ -205,7 +205,7 @@ def _through(nodes: Nodes, values: np.ndarray, at: float, parity: np.ndarray | N
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Openings:
-    """How wide a round lens is open, seen from the image: an ellipse for each field.
+    """Vignetted pupil of a round lens, seen from the image: an ellipse for each field.
 
     Parameters
     ----------
@@ -225,13 +225,13 @@ class Openings:
     middles: np.ndarray | None = None
 
     def at(self, field: float, wavelength: float) -> tuple[float, float]:
-        """Of a field, a tangent, at a wavelength [m] that the lens' aberrations are known at."""
+        """Widths along and across a field, a tangent, at one of the wavelengths of the aberrations [m]."""
         axes = _through(self.wavelengths, self.axes, wavelength, None)
         along, across = _through(self.x, axes, min(field, self.x[-1]), np.ones(2))
         return float(along), float(across)
 
     def middle(self, field: float) -> float:
-        """Of a field, a tangent, over half of the stop's diameter, along the field."""
+        """Centre of the opening along a field, a tangent, over half of the stop's diameter."""
         if self.middles is None:
             return 0.0
         return float(_through(self.x, self.middles[:, None], min(field, self.x[-1]), -np.ones(1))[0])

@@ -45,9 +45,9 @@ class Lean:
                 )
 
     def of_array(self, y: Any, x: Any) -> Any:
-        """How much farther from the main lens lenslets at (y, x) stand [m]."""
+        """Extra distance of lenslets at (y, x) from the main lens [m]."""
         return self.array[0] * y + self.array[1] * x + self.bow * (y**2 + x**2)
 
     def of_sensor(self, y: Any, x: Any) -> Any:
-        """How much farther from the main lens pixels at (y, x) stand [m]."""
+        """Extra distance of pixels at (y, x) from the main lens [m]."""
         return self.sensor[0] * y + self.sensor[1] * x

@@ -1,4 +1,4 @@
-r"""What a point under a microscope objective sends to the plane of the native image.
+r"""Field of a point under a microscope objective in the plane of the native image.
 
 A point at depth dz lights the pupil; with q = n sin θ and the sine condition q = M q' the field in the image,
 in object-space coordinates, is the Debye integral
@@ -127,7 +127,7 @@ class Objective:
 
     @property
     def is_round(self) -> bool:
-        """Whether the point's image is the same in every direction."""
+        """True if the point's image is rotationally symmetric."""
         return all(m == 0 for (_, m), _ in self.orders)
 
     @property
@@ -186,7 +186,7 @@ class Objective:
         return k * self.aperture * (radius + abs(dz) * ray + float(extra) + self.spread(part))
 
     def spread(self, part: float = 1.0) -> float:
-        """How far aberrations move this part of the rays at most, in object space [m]."""
+        """Largest displacement of this part of the rays by aberrations, in object space [m]."""
         return _slope(self.terms, part) * self.wavelength / self.numerical_aperture
 
     def depth_path(self, qy: np.ndarray, qx: np.ndarray) -> np.ndarray:
@@ -313,7 +313,7 @@ def _apodised(
 
 @lru_cache(maxsize=256)
 def _slope(terms: tuple[tuple[int, float], ...], part: float) -> float:
-    """Of the wavefront over the pupil [waves per radius]: below it for a part of the pupil's area."""
+    """Slope of the wavefront that a part of the pupil's area stays below [waves per radius]."""
     if not terms:
         return 0.0
     rho, angle = np.sqrt(np.linspace(0, 1, 65))[1:, None], np.linspace(0, 2 * np.pi, 129)
@@ -329,12 +329,12 @@ def _depth_path(objective: Objective, sine: np.ndarray, cosine: np.ndarray) -> n
 
 
 def _turned(harmonic: int, angle: np.ndarray) -> np.ndarray:
-    """Of `_apodised`, over the azimuth."""
+    """Azimuthal factor of a harmonic of `_apodised`."""
     return np.cos(harmonic * angle) if harmonic >= 0 else np.sin(-harmonic * angle)
 
 
 def _power_of(apodised: list[tuple[int, int, np.ndarray]], cosine: np.ndarray, weight: np.ndarray) -> float:
-    """Of all modes together in the image, by the nodes' weights."""
+    """Power of all modes together in the image, by the nodes' weights."""
     return sum((2 if not h else 1) * np.pi * float((a**2 / cosine * weight).sum()) for h, _, a in apodised)
 
 

@@ -24,7 +24,7 @@ UNITS = {"decentre": " m", "turn": " rad (of light, n - 1 times the tilt)", "for
 
 
 class Warp(NamedTuple):
-    """What paths through lenslets have besides focus and vertex: angles [rad] and terms [m].
+    """Deviations of paths through lenslets besides focus and vertex: angles [rad] and terms [m].
 
     `down` and `across` (...) turn light towards later columns and rows; `terms` (..., k) are those of
     `lumigraph.elements.form`.
@@ -37,7 +37,7 @@ class Warp(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Own:
-    """What the lenslet of an index (i, j) has of its own; lengths along columns and rows of the array.
+    """Deviations of the lenslet of an index (i, j); lengths along columns and rows of the array.
 
     `focal_change` is the part by which its focal length is longer; `aside` (down, across) the way from its
     place on the lattice to the middle of its aperture, None for one on it, and `decentre` from the middle to
@@ -58,7 +58,7 @@ class Own:
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """How single lenslets differ: errors drawn by chance, alike for a lenslet and a seed, and what is given.
+    """Differences of single lenslets: random errors, reproducible by lenslet and seed, and given ones.
 
     Parameters
     ----------
@@ -112,9 +112,7 @@ class Scatter:
                 )
 
     def of(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Of lenslets (i, j): factor of the focal length, way from the lattice to the vertex along columns
-        and rows [m], presence.
-        """
+        """Focal-length factor, vertex offsets along columns and rows [m] and presence of lenslets (i, j)."""
         bend, down, across, there = (_uniform(i, j, self.seed, channel) for channel in range(4))
         factor = 1 + self.focal_length * np.clip(ndtri(bend), -4, 4)
         down, across = self.decentre * ndtri(down), self.decentre * ndtri(across)
@@ -125,7 +123,7 @@ class Scatter:
         return factor, down, across, there >= self.missing
 
     def aside(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """From the lattice to the middle of the apertures of lenslets (i, j), along columns and rows [m]."""
+        """Offsets of the apertures of lenslets (i, j) from the lattice, along columns and rows [m]."""
         found = np.zeros((2, *np.broadcast(i, j).shape))
         for mine, one in self._among(i, j):
             found[0][mine], found[1][mine] = one.aside or (0.0, 0.0)
@@ -138,11 +136,11 @@ class Scatter:
 
     @property
     def moves(self) -> bool:
-        """Whether apertures stand beside the lattice."""
+        """True if some apertures are off the lattice."""
         return any(any(one.aside or ()) for one in self.own)
 
     def in_row(self, i: int) -> "Scatter":
-        """What lenslets of a row follow from."""
+        """Scatter of the lenslets of a row."""
         return replace(self, own=tuple(one for one in self.own if one.index[0] == i))
 
     def naming(self, lenslets: Mapping[tuple[int, int], bool]) -> "Scatter":
@@ -156,11 +154,11 @@ class Scatter:
 
     @property
     def warps(self) -> bool:
-        """Whether lenslets are tilted or have a form of their own."""
+        """True if lenslets are tilted or have a form error."""
         return bool(self.turn or self.form)
 
     def warp(self, i: np.ndarray, j: np.ndarray) -> Warp:
-        """What paths through lenslets (i, j) have besides."""
+        """Tilt and form of the paths through lenslets (i, j)."""
         down, across, *terms = (
             np.clip(ndtri(_uniform(i, j, self.seed, channel)), -4, 4) for channel in range(4, 6 + len(TERMS))
         )

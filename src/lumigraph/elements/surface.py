@@ -61,7 +61,7 @@ class Surface:
         return _light(self, half, focal_length)[0](squared)
 
     def amplitude(self, squared: np.ndarray, half: float, focal_length: float) -> np.ndarray:
-        """Of the light there, 1 at the vertex: no power is lost."""
+        """Amplitude of the light there, 1 at the vertex: no power is lost."""
         return _light(self, half, focal_length)[1](squared)
 
     def seen(self, half: float, focal_length: float) -> float:

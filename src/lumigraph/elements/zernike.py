@@ -53,7 +53,7 @@ ORDERS = ("", "secondary ", "tertiary ")
 
 
 def zernike_name(j: int) -> str:
-    """What a Zernike polynomial of Noll's index j is called.
+    """Name of the Zernike polynomial of Noll's index j.
 
     Raises
     ------
@@ -213,7 +213,7 @@ class ZernikePlate:
 
     @property
     def area(self) -> float:
-        """Of the stop, over that of a round one of its diameter."""
+        """Area of the stop, over that of a round one of its diameter."""
         return self.axes[0] * self.axes[1]
 
     def transmission(self, grid: Grid, wavelength: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What an experiment is, what it is given, what it answers, and how it is found by its id."""
+"""Experiments: their registry by id, their context and their outcome."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -55,7 +55,7 @@ class Row:
 
     @property
     def passed(self) -> bool | None:
-        """Whether `got` is within the tolerance; None where nothing is expected."""
+        """True if `got` is within the tolerance; None if nothing is expected."""
         if self.expected is None:
             return None
         below, above = self.margins
@@ -72,7 +72,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What an experiment answers.
+    """Result of an experiment.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What an experiment is given.
+    """Size, output folder and progress callback of an experiment's run.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ class Context:
             self.tell(Stage(min(max(fraction, 0.0), 1.0), what))
 
     def cached(self, name: str, function: Callable[[], Any]) -> Any:
-        """What `function` returns, an array or a dictionary of arrays, computed once per output folder.
+        """Result of `function`, an array or a dictionary of arrays, computed once per output folder.
 
         An interrupted run finds the part again and goes on with the same numbers: what is returned is
         the same whether it was computed or read.

@@ -64,7 +64,7 @@ class Result:
 
     @classmethod
     def from_json(cls, content: bytes) -> "Result":
-        """What `to_json` wrote."""
+        """Result restored from `to_json`."""
         values = json.loads(content)
         values["rows"] = tuple(Row(**{**row, "tolerance": _pair(row["tolerance"])}) for row in values["rows"])
         values["pictures"] = tuple(Picture(**one) for one in values["pictures"])

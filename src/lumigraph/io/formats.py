@@ -168,7 +168,7 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     shape: tuple[int, int] | None = None,
     max_pixels: int = MAX_PIXELS,
 ) -> Noun:
-    """What a file or a folder of views holds; its ending says which format (`docs/formats.md` has the table).
+    """Content of a file or a folder of views; its ending says which format (`docs/formats.md` has the table).
 
     Sizes are read from the headers and checked, against the file's own size too, before anything is
     decoded.
@@ -280,7 +280,7 @@ def pages(path: str | os.PathLike[str]) -> int:
 
 
 def opens_pages(path: str | os.PathLike[str]) -> bool:
-    """Whether a file holds pages or frames that `open` reads one by one: a TIFF stack, a series in Zarr."""
+    """True if a file holds pages or frames that `open` reads one by one: a TIFF stack, a series in Zarr."""
     counted = _counted(source.existing(path))
     return counted is not None and (counted > 1 or format_of(path).module == "zarr")
 

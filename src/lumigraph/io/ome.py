@@ -26,7 +26,7 @@ _LONGEST = 16 << 20  # characters
 
 @dataclass(frozen=True, slots=True)
 class Planes:
-    """What an OME-XML text says of its first image.
+    """Planes of the first image of an OME-XML text.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def text(
 
 
 def parse(description: str) -> Planes | None:
-    """What an OME-XML text says; None for any other text.
+    """Planes that an OME-XML text describes; None for any other text.
 
     Raises
     ------

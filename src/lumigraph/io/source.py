@@ -1,4 +1,4 @@
-"""What is checked before a file is decoded: that it exists, what it is, and how large it says it is."""
+"""Checks before a file is decoded: that it exists, its format, and the size that it declares."""
 
 import difflib
 import os

@@ -1,4 +1,4 @@
-"""Where a result may be written; it is written atomically."""
+"""Output files: where they may be written, and writing them atomically."""
 
 import os
 import re

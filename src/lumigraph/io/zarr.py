@@ -38,7 +38,7 @@ def count(path: Path) -> int | None:
 def load(
     path: Path, *, page: int | None = None, max_pixels: int = source.MAX_PIXELS
 ) -> RawImage | LightField | Volume | DepthMap:
-    """What is in a Zarr store by lumigraph, or the volume in any OME-Zarr.
+    """Content of a Zarr store by lumigraph, or the volume of any OME-Zarr.
 
     Of a series `page` chooses the frame, which may be a `Stack`, too.
 

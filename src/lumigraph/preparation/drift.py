@@ -1,4 +1,4 @@
-"""Whether a raw image stands on the lattice of a calibration, by the dark gaps that it carries itself."""
+"""Agreement of a raw image with the lattice of a calibration, by its own dark gaps."""
 
 import math
 import warnings
@@ -79,7 +79,7 @@ class Drift:
         return replace(expected, basis=((yj, xj), (yi, xi)))
 
     def told(self) -> str:
-        """How well the lattices agree, in one line."""
+        """Agreement of the lattices, in one line."""
         unsure = self.slip >= _SLIGHT and self.slip < _SIGMAS * self.error
         doubt = f", which its gaps tell to ±{_SIGMAS * self.error:.2f} only" if unsure else ""
         return f"the raw image's own lattice slips by {self.slip:.2f} of a pitch towards the border{doubt}"
@@ -156,7 +156,7 @@ def check_drift(data: Array, calibration: Calibration, camera: Described | None 
 
 
 def verdict(found: Drift) -> str:
-    """What a drift means for a calibration: "refused", "warned", "shifted" or "fits"."""
+    """Verdict of a drift on a calibration: "refused", "warned", "shifted" or "fits"."""
     sure = found.slip >= _SIGMAS * found.error
     if sure and found.slip >= _CERTAIN:
         return "refused"

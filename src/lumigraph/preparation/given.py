@@ -62,7 +62,7 @@ class Given:
 
 
 def _stamp(path: Path) -> tuple[int, int]:
-    """What changes when a file does."""
+    """Size and time of modification of a file, which change when it does."""
     known = path.stat() if path.exists() else None
     return (0, 0) if known is None else (known.st_size, known.st_mtime_ns)
 

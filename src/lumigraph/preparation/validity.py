@@ -1,4 +1,4 @@
-"""Which pixels and lenslets of a raw image count, judged by their light: `pixel_reasons`, `verdicts`."""
+"""Valid pixels and lenslets of a raw image, judged by their light: `pixel_reasons`, `verdicts`."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""How much light reaches each micro-image."""
+"""Vignetting: how much light reaches each micro-image."""
 
 import numpy as np
 from scipy.ndimage import gaussian_filter

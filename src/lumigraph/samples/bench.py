@@ -25,7 +25,7 @@ _CLASSES = {"plenoptic": PlenopticCamera, "focused-plenoptic": FocusedPlenopticC
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BenchSample:
-    """What a camera recorded, and what stood before it.
+    """Recording of a camera, and the scene that stood before it.
 
     Parameters
     ----------

@@ -92,7 +92,7 @@ def _pictures(files: tuple[str, ...]) -> Sequence[np.ndarray]:
 
 
 def card(work: Draws, count: int, layout: Mapping[str, Any], command: str) -> str:
-    """What a data set is, in Markdown: arrays, numbers of what was drawn, cameras, how it was made."""
+    """Description of a data set in Markdown: arrays, ranges of what was drawn, cameras, how it was made."""
     about = {
         "raw": "what the sensor read, with photon and read noise [DN]",
         "picture": "the scene with all planes in focus, 0 to 1",

@@ -32,7 +32,7 @@ BLADES = (
 
 @dataclass(frozen=True, slots=True)
 class Canvas:
-    """What one layer adds to a picture, and where.
+    """Picture of one layer, and its place.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ ACCURACY = 1e-2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VolumeSample:
-    """What a microscope recorded, and what was there.
+    """Recording of a microscope, and the volume that it shows.
 
     Parameters
     ----------

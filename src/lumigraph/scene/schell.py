@@ -234,7 +234,7 @@ def _shares(fall: float, quality: float, accuracy: float) -> np.ndarray:
 
 
 def _left(reach: float) -> float:
-    """Part of the second moments that modes leave out whose light is below exp(-reach) of the brightest."""
+    """Part of the second moments lost without modes fainter than exp(-reach) of the brightest."""
     return math.exp(-reach) * (1 + reach + reach**2 / 2)
 
 

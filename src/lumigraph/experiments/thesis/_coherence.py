@@ -54,7 +54,7 @@ class Imager:
 
     @cached_property
     def grid(self) -> Grid:
-        """Where the object's samples stand."""
+        """Grid of the object's samples."""
         return Grid.square(self.samples, WINDOW / SAMPLES)
 
     @cached_property
@@ -139,7 +139,7 @@ def snapshots(imager: Imager, light: Light, count: int, seed: int) -> np.ndarray
 
 @dataclass(frozen=True)
 class Errors:
-    """What a set of snapshots says about any number of them, relative to the reference's rms.
+    """Expected error of any number of snapshots, relative to the reference's rms.
 
     `bias` is the error that is left of infinitely many, `speckle` the standard deviation of one snapshot:
     M of them have rms² = bias² + speckle²/M.
@@ -150,7 +150,7 @@ class Errors:
 
     @classmethod
     def of(cls, halves: np.ndarray, count: int, reference: np.ndarray) -> "Errors":
-        """From sums of both halves of `count` snapshots: speckle is independent, bias is common."""
+        """Errors from sums of both halves of `count` snapshots: speckle is independent, bias is common."""
         means = halves / (count / 2)
         scale = (reference * means.mean(0)).sum() / np.square(means.mean(0)).sum()
         first, second = scale * means - reference

@@ -32,7 +32,7 @@ def measured(a: float, b: float, wavelength: float, samples: int = 300) -> tuple
 
 
 def traced(a: float, b: float, diameter: float) -> dict[str, float]:
-    """What paraxial rays say: blur and magnification on the sensor, lenslets that a point lights, filling.
+    """Paraxial values: blur and magnification on the sensor, lenslets that a point lights, filling.
 
     From the rim of the main lens through a point of its image to the lenslets and the sensor.
     """

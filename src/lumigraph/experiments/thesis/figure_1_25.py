@@ -87,7 +87,7 @@ def _covered(camera: FocusedPlenopticCamera, place: float) -> int:
 
 
 def _rows(samples: list[tuple[np.ndarray, np.ndarray, np.ndarray]], place: float, covered: int) -> list[Row]:
-    """Where each lenslet that sees the point says it is."""
+    """Position of the point according to each lenslet that receives its light."""
     total = max(light.sum() for _, _, light in samples)
     seen = sum(light.sum() > _SEEN * total for _, _, light in samples)
     places = []

@@ -64,7 +64,7 @@ def run(context: Context) -> Outcome:
 
 
 def _unaliased(f: np.ndarray, distance: float) -> Row:
-    """Where no frequency aliases: the largest step of the phase, below π."""
+    """Largest step of the phase over π: below 1, no frequency aliases."""
     sine = WAVELENGTH * (f[-1] + f[-2]) / 2
     step = 2 * distance * WAVELENGTH * (f[1] - f[0]) * (f[-1] + f[-2]) / 2 / np.sqrt(1 - sine**2)
     return Row(
@@ -74,7 +74,7 @@ def _unaliased(f: np.ndarray, distance: float) -> Row:
 
 
 def _steps(f: np.ndarray, distance: float) -> np.ndarray:
-    """How far the phase of H turns from each frequency to the next [rad], unwrapped on 64 times as many."""
+    """Phase steps of H between frequencies [rad], unwrapped on 64 times as many."""
     fine = np.linspace(f[0], f[-1], 64 * (len(f) - 1) + 1)
     phase = np.unwrap(np.angle(transfer_function(np.zeros(1), fine, distance, WAVELENGTH)[0]))
     return np.abs(np.diff(phase[::64]))

@@ -110,7 +110,7 @@ def lit_middles(profile: np.ndarray) -> np.ndarray:
 
 
 def _before(places: np.ndarray, middle: int) -> int:
-    """How many places lie before the one in the middle."""
+    """Index of the place nearest to the middle."""
     return int(np.abs(places - middle).argmin())
 
 
@@ -124,7 +124,7 @@ def stretched(calibration: Calibration, off: float) -> Calibration:
 
 
 def _seam_rows(pictures: dict[str, np.ndarray], step: float) -> list[Row]:
-    """Of pictures whose brightness is even; `step` is how much farther each patch is taken [samples]."""
+    """Rows on pictures of even brightness; `step` is how much farther each patch is taken [samples]."""
     seen, right = pictures["wrong"], pictures["right"]
     tiles = [np.floor((np.arange(n) - n // 2) / _SAMPLES + 0.5) for n in right.shape]
     places = np.meshgrid(*(np.arange(len(k)) - step * k for k in tiles), indexing="ij")

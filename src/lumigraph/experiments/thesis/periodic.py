@@ -76,7 +76,7 @@ def line_spread(camera: Camera, x: np.ndarray, separation: float, dz: float = 0.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinedCamera:
-    """What a camera makes of bright lines along y, one lenslet high.
+    """Raw images of bright lines along y, one lenslet high, before a camera.
 
     Parameters
     ----------
@@ -147,17 +147,17 @@ class LinedCamera:
 
     @property
     def pixel_pitch(self) -> float:
-        """Of the raw image [m]."""
+        """Pixel pitch of the raw image [m]."""
         camera = self.camera
         return camera.lenslets.pitch * (1 + camera.lenslet_distance / camera.separation) / self.samples
 
     @property
     def patch(self) -> float:
-        """Of the raw image at the object's depth [px]; signed."""
+        """Patch of the raw image at the object's depth [px]; signed."""
         return self.camera.patch_at(self.dz) * self.camera.pixels.pixel_pitch / self.pixel_pitch
 
     def calibration(self, raw: RawImage) -> Calibration:
-        """Where the micro-images stand."""
+        """Calibration of the micro-images."""
         ny, nx = raw.shape
         lattice = Lattice.square(self.samples, origin=(ny // 2, nx // 2))
         none, camera = np.zeros((0, 2)), self.camera

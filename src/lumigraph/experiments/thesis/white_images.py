@@ -40,7 +40,7 @@ class MisplacedCamera(FocusedPlenopticCamera):
 
 
 def matched_diameter(found: FocusedPlenopticCamera) -> float:
-    """Of the main lens whose micro-images touch: as wide as their pitch, p (L + b)/b [m]."""
+    """Main-lens diameter whose micro-images touch: as wide as their pitch, p (L + b)/b [m]."""
     b = found.lenslet_distance
     return found.lenslets.pitch * (found.separation + b) / b
 
