@@ -1,4 +1,4 @@
-"""What `lumigraph deconvolve` is told of aberrations to find, and what it reports of them."""
+"""Options of `lumigraph deconvolve` for unknown aberrations, and its report of them."""
 
 import math
 import re
@@ -140,24 +140,24 @@ class Modes:
 
     @classmethod
     def of(cls, found: "Wavefront") -> "Modes":
-        """Of a wavefront, in the mean over the field."""
+        """Modes of a wavefront, averaged over the field."""
         deviations = dict(zip(found.terms, found.deviations.mean((0, 1)).tolist(), strict=True))
         return cls(found.coefficients, deviations, found.untold, found.explained)
 
     @property
     def rms(self) -> float:
-        """Of the wavefront [waves]."""
+        """Rms of the wavefront [waves]."""
         return math.hypot(*self.coefficients.values())
 
     def lines(self) -> tuple[str, ...]:
-        """For people."""
+        """Lines for people."""
         known = (signed(c, self.deviations[j]) for j, c in self.coefficients.items())
         text = ", ".join(f"Z{j} {c} ± {d}" for j, (c, d) in zip(self.coefficients, known, strict=True))
         untold = (f"Z{j} is not known: {reason}" for j, reason in self.untold.items())
         return (f"wavefront of {self.rms:.3f} waves rms: {text}", *untold)
 
     def values(self) -> dict[str, Any]:
-        """For programs."""
+        """Values for programs."""
         terms = {
             str(j): {"waves": c, "deviation": self.deviations[j], "explained": self.explained.get(j)}
             for j, c in self.coefficients.items()
@@ -210,7 +210,7 @@ def with_wavefront(result: Result, found: "Wavefront") -> Result:
 
 
 def _widths(found: "Wavefront") -> "Iterator[Quantity]":
-    """Of beads that are balls, within one standard deviation."""
+    """Width of beads that are balls, with an interval of one standard deviation."""
     if width := found.bead_width:
         deviation = found.bead_width_deviation
         yield Quantity("bead_width", width, "m", (max(0.0, width - deviation), width + deviation))

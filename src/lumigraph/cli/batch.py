@@ -83,7 +83,7 @@ class Hands:
         return Result("Batch", "A job array.", number, (told,), values)
 
     def cluster(self) -> "Cluster":
-        """Where the workers are found."""
+        """Cluster of the workers."""
         from lumigraph import cluster
         from lumigraph.core.arrays import WORKERS
 
@@ -234,7 +234,7 @@ def _only(words: Sequence[str]) -> Path:
 
 
 def _failures(found: "Report") -> str:
-    """How many frames failed, and why: the first reasons, each with its first frames."""
+    """Number of failed frames, and the first reasons, each with its first frames."""
     reasons: dict[str, list[int]] = {}
     for number, why in sorted(found.failures.items()):
         reasons.setdefault(why.rstrip("."), []).append(number)
@@ -245,7 +245,7 @@ def _failures(found: "Report") -> str:
 
 
 def _numbers(numbers: list[int]) -> str:
-    """Of frames.
+    """Numbers of frames as text.
 
     >>> _numbers([7]), _numbers([1, 2]), _numbers(list(range(10)))
     ('frame 7', 'frames 1, 2', 'frames 0, 1, 2, 3, 4 and 5 more')

@@ -28,7 +28,7 @@ _ARRAY = ("lenslet_pitch", "micro_images")
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Known:
-    """What is known of the camera.
+    """Camera properties that are known beforehand.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Known:
     wavelength: str | None = None
 
     def nominal(self, given: dict[str, Any]) -> "Nominal":
-        """Of the options, which come before what files say."""
+        """Nominal camera: options come before values from files."""
         from lumigraph.metric import Nominal
 
         apart, known = self._apart(given), self._lengths(given)
@@ -83,7 +83,7 @@ class Known:
         return nominal if error is None else replace(nominal, pitch_ratio_error=error / lenslets)
 
     def _lengths(self, given: dict[str, Any]) -> dict[str, Any]:
-        """What options and files say of main lens, sensor and b, by its names in `Nominal`."""
+        """Values of main lens, sensor and b from options and files, by their names in `Nominal`."""
         own = {
             name: length(f"--{name.replace('_', '-')}", getattr(self, name))
             for name in ("focal_length", "pixel_pitch", "lenslet_distance")
@@ -100,7 +100,7 @@ class Known:
         return known
 
     def _sure(self, nominal: "Nominal") -> "Nominal":
-        """With errors that are given as lengths."""
+        """Nominal camera with errors that are given as lengths."""
         f = length("--focal-length-error", self.focal_length_error)
         b = length("--lenslet-distance-error", self.lenslet_distance_error)
         if f is not None:
@@ -230,7 +230,7 @@ def _read(
 def _found(
     sources: tuple[Path, ...], board: "Board", origin: Origin, views: bool, wavelength: float | None
 ) -> "tuple[Corners, Board, dict[str, Any], tuple[str, ...]]":
-    """Of raw images."""
+    """Corners found in raw images, with the board, known values and notes."""
     from lumigraph import metric
     from lumigraph.instruments import LensletCamera
     from lumigraph.instruments.capabilities import Rendered, WithMainLens
@@ -280,7 +280,7 @@ def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int)
 
 
 def _enough(found: "Plan") -> str:
-    """From which picture on lengths and distances are known to 1 %, and how well with all."""
+    """Number of pictures after which lengths and distances are known to 1 %, and their final errors."""
     from lumigraph.metric.calibration import WELL
 
     names, counts = ("f", "L", "b", "distances"), found.enough(WELL)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Bench:
-    """What is known of the camera.
+    """Camera properties that are known beforehand.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Bench:
         return known
 
     def compared(self, found: "Calibration") -> tuple[str, ...]:
-        """What the picture says about the camera of --camera, in a line."""
+        """Comparison of the picture with the camera of --camera, in a line."""
         from lumigraph.instruments import load_camera
         from lumigraph.preparation import implied
 
@@ -148,7 +148,7 @@ def calibrate(
 
 
 def _advice(white: "RawImage", bench: Bench) -> Any:
-    """What to turn on the bench."""
+    """Adjustments to make on the bench."""
     from lumigraph.calibration import diagnose
     from lumigraph.instruments import load_camera
     from lumigraph.instruments.lenslet_camera import LensletCamera

@@ -104,7 +104,7 @@ def line(text: str) -> None:
 
 
 def plain(value: Any) -> Any:
-    """What JSON can hold instead of a value that it cannot."""
+    """JSON equivalent of a value that JSON cannot hold."""
     if hasattr(value, "tolist"):
         return value.tolist()
     return list(value) if isinstance(value, tuple | set) else str(value)

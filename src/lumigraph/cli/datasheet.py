@@ -190,7 +190,7 @@ def _table(sheets: "list[Sheet]", section: str) -> list[list[str]]:
 
 
 def _how(sheets: "list[Sheet]", found: "Sequence[Entry | None]") -> str:
-    """How a quantity was measured, camera by camera where that differs."""
+    """Method by which a quantity was measured, camera by camera if methods differ."""
     told = {sheet.name: one.how for sheet, one in zip(sheets, found, strict=True) if one is not None}
     if len(told) == 1 or len(set(told.values())) == 1:
         return next(iter(told.values()))

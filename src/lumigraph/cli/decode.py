@@ -25,7 +25,7 @@ _MOST_SAMPLES = 64
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Sampling:
-    """How the raw image is sampled.
+    """Sampling of the views.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What `lumigraph deconvolve` is told of the raw image, of the object, and of how it is done."""
+"""Options of `lumigraph deconvolve`: raw image, object and method."""
 
 import math
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ MOST_DEPTHS = 1000
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Seen:
-    """What is known of the raw image.
+    """Raw image and its corrections.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class Seen:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Wanted:
-    """Where objects are looked for.
+    """Sampling of the object.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class Wanted:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Way:
-    """How it is done.
+    """Method of the deconvolution.
 
     Parameters
     ----------

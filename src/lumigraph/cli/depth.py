@@ -36,7 +36,7 @@ _OF_RAW = ("dense", "correlation")
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Search:
-    """How depth is measured.
+    """Method of measuring depth.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class _Measured:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Lengths:
-    """What takes a map to metres, if there is no camera file.
+    """Lengths that convert a map to metres, if there is no camera file.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Aim:
-    """What is made best.
+    """Goal of the optimisation.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class Aim:
         return replace(goal, scenes=self._scenes(goal.ready(given).scenes))
 
     def _scenes(self, usual: "Scenes | None") -> "Scenes | None":
-        """Those that pictures and numbers ask for; None where the goal needs none."""
+        """Scenes for pictures and numbers; None if the goal needs none."""
         from lumigraph.information import Scenes
 
         asked = bool(self.scenes) or self.scene_pitch is not None or self.scene_samples != Aim.scene_samples
@@ -113,7 +113,7 @@ def _pictures(paths: Sequence[Path] | None) -> "list[np.ndarray]":
 @Parameter(name="*")
 @dataclass(frozen=True)
 class How:
-    """How it is looked for.
+    """Search for the optimum.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What `lumigraph optimise` says and reports of its result."""
+"""Report of `lumigraph optimise` on its result."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -53,7 +53,7 @@ def _told(goal: "Goal", one: Quantity) -> str:
 
 
 def _reached(found: "Optimum", which: str, one: "Tried") -> str:
-    """What reconstruction reaches of what was expected, in words."""
+    """Error that reconstruction reaches, beside the expected one, in words."""
     words, told = NAMES.get(which, which), found.goal.told
     if one.reason:
         return f"{words}: no raw images were drawn, for {one.reason}"
@@ -87,7 +87,7 @@ def _held_out(found: "Optimum") -> Iterator[str]:
 
 
 def _kinds(found: "Optimum") -> tuple[str, str]:
-    """What is done with drawn raw images, and what stands beside it."""
+    """Words for the use of drawn raw images, and for the value beside it."""
     if found.goal.scenes is not None:
         return "reconstructions of drawn scenes", "expected error"
     return f"fits ({found.goal.name}) in drawn raw images", "bound of the same points"
@@ -102,7 +102,7 @@ def _both(found: "Optimum", k: int) -> str:
 
 
 def _changed(found: "Optimum") -> dict[str, Any]:
-    """What the best has of its own, without what follows from it."""
+    """Varied values of the best camera, without the numbers that follow from them."""
     return {key: value for key, value in found.best.items() if key not in found.start}
 
 
@@ -122,7 +122,7 @@ def _notes(found: "Optimum") -> Iterator[str]:
 
 
 def _elsewhere(found: "Optimum") -> str:
-    """What is known of the best anew, or how well."""
+    """Error of the best camera in an independent check, or its uncertainty."""
     best, error, *_ = found.checked["best"]
     if found.goal.scenes is not None:
         scenes = found.goal.scenes
@@ -144,7 +144,7 @@ def _elsewhere(found: "Optimum") -> str:
 
 
 def _between(found: "Optimum") -> str:
-    """Of the best, and of those before it."""
+    """Errors half-way between the depths, for the best camera and for those before it."""
     names = {"best": "", **{which: f"{words} " for which, words in NAMES.items()}}
     some = {words: found.checked[which].between for which, words in names.items() if which in found.checked}
     return ", ".join(f"{words}{found.goal.told(value)}" for words, value in some.items())

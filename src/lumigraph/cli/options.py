@@ -1,4 +1,4 @@
-"""What verbs share: `--json`, `--debug`, and quantities with units."""
+"""Shared options of verbs: `--json`, `--debug`, and quantities with units."""
 
 import math
 import re

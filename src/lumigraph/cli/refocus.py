@@ -32,7 +32,7 @@ MOST_SHOWN = 24
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Focus:
-    """Where to focus: α' = F/F', below 1 nearer than the focused plane was, 1 as it was, above 1 farther.
+    """Focus: α' = F/F', below 1 nearer than the focused plane, 1 as recorded, above 1 farther.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def _check_alpha(alpha: float) -> None:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Quality:
-    """How pictures are made.
+    """Method of making pictures.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What `lumigraph deconvolve` is told of several raw images of one object."""
+"""Options of `lumigraph deconvolve` for several raw images of one object."""
 
 import re
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ Shifts = tuple[tuple[float, float], ...]
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Several:
-    """How raw images of one object differ.
+    """Differences between raw images of one object.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class Several:
         return tuple((float(y), float(x)) for y, x in found.shifts.tolist()), found
 
     def lights(self) -> tuple[float, ...]:
-        """Of each raw image."""
+        """Relative light of each raw image."""
         words = (self.light or "").split(",")
         try:
             found = tuple(float(word) for word in words)
@@ -130,7 +130,7 @@ def _check_count(option: str, found: int | None, count: int) -> None:
 
 
 def _steps(text: str) -> int | None:
-    """Of a scan written as '3x3'; None of anything else."""
+    """Number of steps of a scan written as '3x3'; None for any other text."""
     found = re.fullmatch(r"\s*(\d+)\s*[x×]\s*(\d+)\s*", text)
     if found is None:
         return None

@@ -43,7 +43,7 @@ _COUNTS = {"snapshots": 100, "tilted": 64}
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Light:
-    """How the light of the scene interferes.
+    """Coherence and spectrum of the scene's light.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class Light:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Stage:
-    """What stands in front of the camera.
+    """Scene in front of the camera.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ class Stage:
         return sum(parts, Scene())
 
     def refracting(self, camera: "Instrument") -> "Medium | None":
-        """What the scene is seen through."""
+        """Medium through which the scene is imaged."""
         if self.medium is None:
             return None
         from dataclasses import replace

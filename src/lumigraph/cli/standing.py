@@ -1,4 +1,4 @@
-"""How a batch stands, as a page beside its ledger that a browser reads again by itself."""
+"""Status page of a batch, beside its ledger; a browser reloads it by itself."""
 
 import time
 from pathlib import Path

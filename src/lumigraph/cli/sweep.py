@@ -97,7 +97,7 @@ def sweep(
 
 @dataclass(frozen=True)
 class Designs:
-    """What follows from a camera with other values.
+    """Quantities of a camera with changed values.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ class Designs:
         )
 
     def _simulated(self, camera: "Instrument") -> "Iterable[Quantity]":
-        """What is measured on a simulated picture."""
+        """Quantities measured on a simulated picture."""
         from lumigraph import metric
         from lumigraph.core.cache import SHARED
         from lumigraph.metric.charts import check_camera

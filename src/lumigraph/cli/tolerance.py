@@ -166,7 +166,7 @@ def _text(one: "Outcome", value: float) -> str:
 
 
 def _figures(study: "Study") -> Iterator[Figure]:
-    """Of each measure, which tolerance costs what, and how many cameras are below a value."""
+    """Figures of each measure: cost of each tolerance, and the share of cameras below a value."""
     from lumigraph import plots
 
     for one in study.outcomes:

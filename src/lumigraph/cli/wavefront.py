@@ -93,7 +93,7 @@ def _check(seen_as: str, place: str | None, seen: Seen) -> None:
 
 
 def _place(text: str | None) -> tuple[float, float, float]:
-    """Of the star [m].
+    """Position of the star [m].
 
     >>> _place("1 um, -2 um, 3 mm")
     (1e-06, -2e-06, 0.003)

@@ -1,4 +1,4 @@
-"""Where the parts of a camera stand as built, table ``[built]``, if not where its description puts them."""
+"""Deviations of a camera's parts from its description, as built: table ``[built]``."""
 
 import math
 
@@ -60,7 +60,7 @@ class Built(Part):
     seed: Seed = 0
 
     def scatter(self, index: float | None = None) -> Scatter | None:
-        """How single lenslets of a refractive index differ; None where they are alike.
+        """Scatter of single lenslets of a refractive index; None if all are alike.
 
         Raises
         ------
@@ -79,7 +79,7 @@ class Built(Part):
         return None if found == Scatter(seed=self.seed) else found
 
     def lean(self, corner: float) -> Lean | None:
-        """Of array and sensor, whose corners are so far from the axis [m]; None where none leans.
+        """Tilt and bow of array and sensor, whose corners are `corner` from the axis [m]; None without any.
 
         Raises
         ------

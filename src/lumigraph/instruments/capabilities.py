@@ -1,4 +1,4 @@
-"""What only some kinds of instruments can do, by their methods: ``isinstance(camera, Decoded)``."""
+"""Abilities of some kinds of instruments, as protocols: ``isinstance(camera, Decoded)``."""
 
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
@@ -13,7 +13,7 @@ from lumigraph.operators.microscope_pupil import PupilImages
 
 @runtime_checkable
 class Decoded(Protocol):
-    """Its raw images are decoded into views, which are refocused by a factor."""
+    """Instruments whose raw images are decoded into views, which are refocused by a factor."""
 
     def refocus_factor(self, dz: float, separation: float) -> float:
         """α' that focuses views of a separation [m] at a depth `dz` [m] from the focused plane."""
@@ -35,7 +35,7 @@ class WithPupil(Protocol):
 
     @property
     def configuration(self) -> str:
-        """Where the lenslets stand."""
+        """Position of the lenslets: "1.0", "2.0" or "fourier"."""
         ...
 
     def pupil_images(self, terms: Sequence[int]) -> PupilImages:
@@ -45,7 +45,7 @@ class WithPupil(Protocol):
 
 @runtime_checkable
 class Rendered(Protocol):
-    """Its raw images are rendered from a patch of each micro-image."""
+    """Instruments whose raw images are rendered from a patch of each micro-image."""
 
     def patch_at(self, dz: float) -> float:
         """Patch [px] that tiles the picture of an object at a depth `dz` [m] from the focused plane."""
@@ -58,11 +58,11 @@ class Rendered(Protocol):
 
 @runtime_checkable
 class WithLenslets(Protocol):
-    """Its object is sampled by lenslets."""
+    """Instruments whose object is sampled by lenslets."""
 
     @property
     def lenslet_size(self) -> float:
-        """Of a lenslet in the focused plane [m]."""
+        """Size of a lenslet in the focused plane [m]."""
         ...
 
 
@@ -80,7 +80,7 @@ class WithMainLens(Protocol):
 
 @runtime_checkable
 class WithDepth(Protocol):
-    """What is found behind its lenslets has a depth that follows from the lens equation."""
+    """Instruments whose disparities become depths by the lens equation."""
 
     main_lens: MainLens
 
@@ -89,7 +89,7 @@ class WithDepth(Protocol):
         ...
 
     def object_to_pupil(self) -> float:
-        """From the focused plane to where the lens sees it from [m]."""
+        """Distance from the focused plane to the entrance pupil [m]."""
         ...
 
 
@@ -104,7 +104,7 @@ class WithObjective(Protocol):
 
     @property
     def in_pupil(self) -> bool:
-        """Whether lenslets stand in the pupil, so that each micro-image is a view."""
+        """True if lenslets stand in the pupil, so that each micro-image is a view."""
         ...
 
     def depth_per_alpha(self, separation: float) -> float:

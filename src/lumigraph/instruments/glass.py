@@ -58,7 +58,7 @@ TERMS = tuple(j for j in range(2, (ORDER + 1) * (ORDER + 2) // 2 + 1) if noll_to
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wanted:
-    """What a camera asks of its glass.
+    """Requirements of a camera on its glass.
 
     Parameters
     ----------
@@ -80,13 +80,13 @@ class Wanted:
 
     @property
     def image_distance(self) -> float:
-        """Of the thin lens [m]."""
+        """Image distance of the thin lens [m]."""
         return thin_lens.image_distance(self.focal_length, self.object_distance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Glass:
-    """What the rays of a prescription say.
+    """Ray-traced properties of a prescription.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class Glass:
 
 
 def first_order(path: Path, wavelength: float) -> FirstOrder:
-    """What a prescription is to first order at a wavelength [m]; errors as of `glass`."""
+    """First-order properties of a prescription at a wavelength [m]; errors as of `glass`."""
     return _first_order(path, hashlib.sha256(content(path)).hexdigest(), wavelength)
 
 
@@ -159,7 +159,7 @@ def _version() -> str:
 
 
 def glass(path: Path, wanted: Wanted) -> Glass:
-    """Of a prescription, for a camera; what was traced once is kept.
+    """Ray-traced properties of a prescription for a camera; cached.
 
     Raises
     ------
@@ -238,7 +238,7 @@ def _enough(lens: Prescription, wanted: Wanted, wavelengths: np.ndarray) -> tupl
 
 
 def _check_wavelength(lens: Prescription, own: float) -> tuple[float, float]:
-    """From where to where all glasses are known [m], where the camera's own wavelength is among them."""
+    """Range of wavelengths in which all glasses are known [m]; the camera's own must lie in it."""
     low, high = lens.wavelengths()
     if not low <= own <= high:
         raise GeometryError(
@@ -343,7 +343,7 @@ def _cosine(rays: Rays) -> np.ndarray:
 
 
 def _at_chief(rays: Rays, defocus: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of the fields: where chief rays meet a plane behind the image's, their cosines and slopes."""
+    """Heights where the fields' chief rays meet a plane behind the image's, their cosines and slopes."""
     chief = rays.along[:, 0]
     slope = chief / _cosine(rays)[:, 0]
     return rays.height[:, 0] + defocus * slope, chief, slope
@@ -356,7 +356,7 @@ def _path(rays: Rays, heights: np.ndarray, defocus: float) -> np.ndarray:
 
 
 def _places(rays: Rays, chief: np.ndarray, wanted: Wanted) -> tuple[np.ndarray, np.ndarray]:
-    """Of the thin lens' stop, along and across the field, over its radius."""
+    """Positions of rays in the thin lens' stop, along and across the field, over its radius."""
     scale = -2 * wanted.image_distance / wanted.diameter
     return scale * (rays.along - chief[:, None]), scale * rays.across
 

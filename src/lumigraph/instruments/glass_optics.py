@@ -12,7 +12,7 @@ from lumigraph.operators import CameraOptics
 
 @dataclass(frozen=True, slots=True)
 class ExitPupil:
-    """Where light comes from behind a lens, and how objects stand before a thin lens there.
+    """Exit pupil of a lens, and object distances before a thin lens placed there.
 
     Parameters
     ----------
@@ -28,26 +28,26 @@ class ExitPupil:
 
     @property
     def magnification(self) -> float:
-        """Its width over the entrance pupil's, m_p = 1 - e'/f."""
+        """Pupil magnification, its width over the entrance pupil's, m_p = 1 - e'/f."""
         return 1 - self.behind / self.focal_length
 
     @property
     def to_image(self) -> float:
-        """To the main lens' image, z2 - e' [m]."""
+        """Distance to the main lens' image, z2 - e' [m]."""
         return self.image_distance - self.behind
 
     @property
     def wider(self) -> float:
-        """Its width over the thin lens' of the same aperture at the image."""
+        """Width over that of the thin lens with the same aperture at the image."""
         return self.to_image / self.image_distance
 
     @property
     def object_distance(self) -> float:
-        """From the focused plane, as the thin lens of focal length m_p f there has it [m]."""
+        """Distance of the focused plane from a thin lens of focal length m_p f there [m]."""
         return 1 / (1 / (self.magnification * self.focal_length) - 1 / self.to_image)
 
     def to(self, separation: float) -> float:
-        """To a plane at a distance from the rear principal plane [m]."""
+        """Distance to a plane `separation` behind the rear principal plane [m]."""
         return separation - self.behind
 
     def check(self, name: str, separation: float) -> None:
@@ -70,7 +70,7 @@ class ExitPupil:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Traced:
-    """What chief rays say, over the fields that the thin lens in the exit pupil sees.
+    """Chief rays over the fields of the thin lens in the exit pupil.
 
     Parameters
     ----------
@@ -87,12 +87,12 @@ class Traced:
     lean: np.ndarray
 
     def leans(self, field: np.ndarray) -> np.ndarray:
-        """At fields, tangents [rad]."""
+        """Inclination of chief rays at fields, tangents [rad]."""
         return np.interp(field, self.fields, self.lean)
 
 
 def traced(glass: Glass, pupil: ExitPupil, object_distance: float) -> Traced:
-    """Of a lens at a distance from the focused plane [m]."""
+    """Chief rays of a lens at a distance from the focused plane [m]."""
     at = np.array(glass.aberrations.x)
     height = pupil.image_distance * at
     stretch = np.append(1.0, 1 + glass.moved[1:] / height[1:])

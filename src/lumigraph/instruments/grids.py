@@ -1,4 +1,4 @@
-"""Which grids a camera's simulation needs: the rules, each with its source, and the windows."""
+"""Grids of a camera's simulation: the sampling rules, each with its source, and the windows."""
 
 import math
 from dataclasses import dataclass

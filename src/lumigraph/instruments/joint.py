@@ -23,14 +23,14 @@ Shift = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Maker:
-    """What makes an operator of an object on any grid, and the grid of its own."""
+    """Factory of operators for an object on any grid, and its own grid."""
 
     grid: Grid
     on: Callable[[Grid], Linear]
 
     @classmethod
     def of(cls, operator: Linear) -> "Maker":
-        """Of an operator that knows its grid, brought onto others by resampling."""
+        """Factory from an operator that knows its grid, resampled onto others."""
         if operator.object_grid is None:
             raise GeometryError("the operator does not know where its object stands.")
         return cls(operator.object_grid, lambda grid: on_grid(operator, grid))
@@ -127,7 +127,7 @@ def joint_operator_for(
     samples_per_lenslet: int | None = None,
     progress: Progress | None = None,
 ) -> Joint:
-    """As `joint_operator`, of a real camera's pixels, as `Instrument.operator_for` has them."""
+    """Joint operator as of `joint_operator`, on a real camera's pixels as in `Instrument.operator_for`."""
     if isinstance(camera, Camera):
         return joint_operator(camera, depths, samples_per_lenslet, shifts=shifts, progress=progress)
     own = camera.operator_for(calibration, depths, samples_per_lenslet, progress)

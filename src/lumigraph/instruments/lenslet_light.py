@@ -38,7 +38,7 @@ Lensed = LensletCamera | LightFieldMicroscope
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LensletLight:
-    """Which pixels are whose, and what they see of the object.
+    """Assignment of pixels to lenslets, and their images of the object.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class LensletLight:
 
     @classmethod
     def of(cls, camera: Lensed) -> "LensletLight":
-        """Of the camera's own pixels.
+        """Light of the lenslets on the camera's own pixels.
 
         Raises
         ------
@@ -137,7 +137,7 @@ class LensletLight:
 
 
 def _flat(camera: Lensed) -> tuple[Linear, Grid]:
-    """How it sees a flat object in focus that goes on beyond the lenslets, and the object's samples."""
+    """Operator of a flat object in focus that extends beyond the lenslets, and the object's grid."""
     if isinstance(camera, LensletCamera):
         grid = _beyond(camera.operator_grid(SAMPLES))
         return camera.operator_on(grid, accuracy=ACCURACY), grid
@@ -177,12 +177,12 @@ def _around(middle: int, reach: int) -> slice:
 
 
 def _middle(light: np.ndarray, grid: Grid) -> np.ndarray:
-    """Of its light, (y, x) [m]."""
+    """Centroid of the light (y, x) [m]."""
     return np.array([light.sum(1) @ grid.y, light.sum(0) @ grid.x]) / light.sum()
 
 
 def _near(light: np.ndarray) -> np.ndarray:
-    """What is near the brightest sample."""
+    """Part of the light near its brightest sample."""
     y, x = (round(float(n)) for n in np.argwhere(light > light.max() / 2).mean(0))
     reach = NEAR * SAMPLES
     return light[max(y - reach, 0) : y + reach, max(x - reach, 0) : x + reach]

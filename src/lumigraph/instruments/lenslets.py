@@ -36,7 +36,7 @@ MOST_CONIC = 100.0
 
 
 class OneLenslet(Part):
-    """What a lenslet has of its own, table ``[lenslets.single.N]``.
+    """Deviations of one lenslet, table ``[lenslets.single.N]``.
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ class OneLenslet(Part):
 
     @property
     def offset(self) -> tuple[float, float]:
-        """Of the aperture (y, x) [m]."""
+        """Offset of the aperture (y, x) [m]."""
         return self.offset_y, self.offset_x
 
     @property
     def decentre(self) -> tuple[float, float]:
-        """Of the vertex from there (y, x) [m]."""
+        """Offset of the vertex from the middle of the aperture (y, x) [m]."""
         return self.decentre_y, self.decentre_x
 
     @field_validator("focal_change")
@@ -279,7 +279,7 @@ class Lenslets(Part):
         )
 
     def lattice(self) -> Lattice:
-        """Where the lenslets stand [m]."""
+        """Lattice of the lenslets [m]."""
         if self.layout == "hex":
             lattice = Lattice.hex(self.pitch, self.rotation, kinds=len(self.focal_length))
         else:
@@ -295,13 +295,13 @@ class Lenslets(Part):
         return pairs[self.holds(lattice.position(pairs))]
 
     def holds(self, centers: np.ndarray) -> np.ndarray:
-        """Whether the array has lenslets at centres (k, 2) of the lattice: (k,)."""
+        """True for centres (k, 2) of the lattice at which the array has lenslets (k,)."""
         across, along = self.turned(*centers.T)
         height, width = self.extent
         return (np.abs(across) <= height / 2) & (np.abs(along) <= width / 2)
 
     def __hash__(self) -> int:
-        """Of what all lenslets have: numbers by which some differ stand in a dict, which has no hash."""
+        """Hash of what all lenslets share: the values of single ones stand in a dict, which has no hash."""
         return hash((self.pitch, self.focal_length, self.count, self.layout, self.rotation, self.offset))
 
     def each(self) -> tuple[np.ndarray, np.ndarray]:
@@ -314,7 +314,7 @@ class Lenslets(Part):
         return centers, focal_lengths
 
     def own(self) -> tuple[Own, ...]:
-        """What single lenslets have of their own, in the frame that turns with the array."""
+        """Deviations of single lenslets, in the frame that turns with the array."""
         indices, found = self.indices(), []
         for number, one in self.single.items():
             i, j = indices[number - 1].tolist()
@@ -323,7 +323,7 @@ class Lenslets(Part):
         return tuple(found)
 
     def aside(self, scale: float) -> Aside | None:
-        """By how much micro-images stand beside the lattice, of vertices that do, times a scale [px/m].
+        """Offsets of micro-images from the lattice, of lenslets whose vertex is off it, times a scale [px/m].
 
         Where the raw image is turned the scale is negative, and indices are the other way round.
         """
@@ -334,7 +334,7 @@ class Lenslets(Part):
         return Aside(int(math.copysign(1, scale)) * indices, scale * np.array(list(ways.values())))
 
     def amid(self, count: Sequence[int]) -> dict[str, Any]:
-        """What `Instrument.replace` takes for the array's middle: so many lenslets, those of it that differ.
+        """Changes for `Instrument.replace` that keep the middle of the array, `count` lenslets.
 
         Of an array in which some differ it has one more along an axis where its middle would move.
         """
@@ -352,7 +352,7 @@ class Lenslets(Part):
 
     @property
     def spacing(self) -> float:
-        """How wide lenslets may be before two overlap, at most the pitch [m]."""
+        """Largest width of lenslets at which no two overlap, at most the pitch [m]."""
         if not self.single:
             return self.pitch
         along = np.stack(self.turned(*self.each()[0].T), -1)

@@ -181,7 +181,7 @@ class LightFieldMicroscope(ScopeWithParts):
         return self.imaged_point(y, x, dz, accuracy)[0]
 
     def imaged_point(self, y: float, x: float, dz: float, accuracy: float) -> tuple[np.ndarray, float]:
-        """As `point_image`, with the estimated relative rms error."""
+        """Image as of `point_image`, with the estimated relative rms error."""
         y, x, dz = (checks.finite(name, at) for name, at in zip(("y", "x", "dz"), (y, x, dz), strict=True))
         if self.configuration == "fourier":
             return self._fourier_point(y, x, dz), math.nan
@@ -260,7 +260,7 @@ class LightFieldMicroscope(ScopeWithParts):
         return cell_sampling(shortest, self.lenslet, behind, samples, depths, accuracy)
 
     def _sampled(self, samples: int, N: int, apart: float, degree: int) -> CellSampling:
-        """By N samples along a lenslet, for pixels that stand so far apart [lenslets]."""
+        """Sampling by N samples along a lenslet, for pixels that stand so far apart [lenslets]."""
         fill = self.pixels.fill_factor
         width = narrowed(fill * apart, N) if degree == 1 else fill * apart
         return CellSampling(samples, N, width, degree, fill**2)
@@ -270,7 +270,7 @@ class LightFieldMicroscope(ScopeWithParts):
         require_accuracy(accuracy)
 
     def magnifications(self) -> trade_offs.Range:
-        """Of the objective."""
+        """Magnifications of the objective."""
         own = self.objective.magnification
         return trade_offs.Range(
             "M, of the objective", own, (own / 4, own * 4),

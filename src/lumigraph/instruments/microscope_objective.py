@@ -55,12 +55,12 @@ class MicroscopeObjective(Part):
 
     @property
     def tube_focal_length(self) -> float | None:
-        """Of the tube lens, the maker's where none is given [m]; None where neither is."""
+        """Focal length of the tube lens, by default the maker's [m]; None if neither is given."""
         return self.tube_lens or (None if self.maker is None else closed_forms.tube_lens(self.maker))
 
     @property
     def actual_magnification(self) -> float:
-        """From the object to the native image: the engraved one, times the tube lens over the maker's."""
+        """Magnification to the native image: the engraved one, times the tube lens over the maker's."""
         if self.maker is None or self.tube_lens is None:
             return self.magnification
         return self.magnification * self.tube_lens / closed_forms.tube_lens(self.maker)

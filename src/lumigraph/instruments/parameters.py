@@ -1,4 +1,4 @@
-"""What can be changed of an instrument: sliders with units and ranges, and instruments from their values."""
+"""Parameters of an instrument: sliders with units and ranges, and instruments from their values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -73,7 +73,7 @@ def number(
 
 
 def magnified(key: str, label: str, value: float, ends: tuple[float, float]) -> Parameter:
-    """How many times larger something is shown."""
+    """Parameter of a magnification."""
     return Parameter(key, label, "×", 1.0, value, *ends)
 
 
@@ -88,17 +88,17 @@ def optional(parameter: Parameter, *, given: bool) -> Parameter:
 
 
 def wavelength(value: float) -> Parameter:
-    """From the near ultraviolet to the near infrared."""
+    """Parameter of the wavelength, near ultraviolet to near infrared."""
     return length("wavelength", "Wavelength", value, "nm", (350.0, 1000.0))
 
 
 def pixel(pixels: Pixels) -> Parameter:
-    """Their pitch."""
+    """Parameter of the pixel pitch."""
     return length("sensor.pixel_pitch", "Pixel pitch", pixels.pixel_pitch, "µm")
 
 
 def lenslets(part: Lenslets, *, layouts: bool) -> tuple[Parameter, ...]:
-    """Of an array, which may stand in either layout or only as it does."""
+    """Parameters of an array; its layout may be changed or is fixed."""
     found = [length("lenslets.pitch", "Lenslet pitch p", part.pitch, "µm")]
     if len(part.focal_length) == 1:
         found.append(length("lenslets.focal_length", "Lenslet focal length", part.focal_length[0], "mm"))
@@ -111,7 +111,7 @@ def lenslets(part: Lenslets, *, layouts: bool) -> tuple[Parameter, ...]:
 
 
 def changes(own: tuple[Parameter, ...], values: Any, count: tuple[int, int] | None) -> dict[str, Any]:
-    """What `Instrument.replace` takes for the values of a page: only those that differ from its own.
+    """Changes for `Instrument.replace` from a page's values: only those that differ from its own.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ class MainLens(Part):
 
     @property
     def varies(self) -> bool:
-        """Whether it changes over the field."""
+        """True if the lens changes over the field."""
         return self.over_field is not None or self.prescription is not None
 
 

@@ -179,7 +179,7 @@ class FocusedPlenopticCamera(LensletCamera):
         )
 
     def magnifications(self) -> trade_offs.Range:
-        """Of the lenslets."""
+        """Magnifications of the lenslets."""
         m = self.lenslet_magnification
         ends = (min(0.05, m), max(1.5, m)) if m > 0 else (min(0.05, -m), max(0.95, -m))
         return trade_offs.Range(

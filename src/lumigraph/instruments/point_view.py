@@ -27,7 +27,7 @@ _MOST_PIXELS = 1200
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointImage:
-    """What the sensor sees of a point.
+    """Image of a point on the sensor.
 
     Parameters
     ----------
@@ -52,12 +52,12 @@ class Simulated(Camera, Protocol):
 
     @cached_property
     def sampling(self) -> Sampling:
-        """Of its planes."""
+        """Sampling of the planes."""
         ...
 
 
 def of_camera(small: Simulated, dz: float, count: tuple[int, int] | None = None) -> PointImage:
-    """Of a point on the axis, through the camera's own train of elements.
+    """Image of a point on the axis, through the camera's own train of elements.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def of_camera(small: Simulated, dz: float, count: tuple[int, int] | None = None)
 
 
 def of_operator(operator: Linear, pixel_pitch: float) -> PointImage:
-    """Of the middle of an operator's one plane."""
+    """Image of the middle of an operator's only plane."""
     _, ny, nx = operator.shape[1]
     return PointImage(_middle(to_numpy(operator.psf((0, ny // 2, nx // 2)))), pixel_pitch)
 

@@ -195,7 +195,7 @@ def noll_index(key: Any) -> int:
 
 
 def numbers(value: Any) -> tuple[float, ...]:
-    """Of a list, finite.
+    """Numbers of a list, finite.
 
     Raises
     ------
@@ -210,12 +210,12 @@ def numbers(value: Any) -> tuple[float, ...]:
 
 
 def angles(value: Any, info: ValidationInfo) -> tuple[float, ...] | None:
-    """Of a list [rad]."""
+    """Angles of a list [rad]."""
     return _several(value, info, _angle, "['0 deg', '5 deg']")
 
 
 def wavelengths(value: Any, info: ValidationInfo) -> tuple[float, ...] | None:
-    """Of a list [m]."""
+    """Wavelengths of a list [m]."""
     return _several(value, info, _wavelength, "['486 nm', '656 nm']")
 
 

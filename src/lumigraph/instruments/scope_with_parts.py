@@ -39,7 +39,7 @@ class ScopeWithParts(SeesVolumes, DescribedMicroscope):
         accuracy: float = 1e-2,
         double: bool = False,
     ) -> tuple[PupilImages, list[tuple[PupilImages, PupilImages]]]:
-        """As `pupil_images` without terms, and those of pairs of microscopes a little apart, sampled alike.
+        """Pupil images without terms, and those of pairs of slightly changed microscopes, sampled alike.
 
         By pixels that may stand anywhere, so that they may move; those of the pairs in double precision.
 

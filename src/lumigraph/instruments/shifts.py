@@ -66,7 +66,7 @@ LINES = 0.9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundShifts:
-    """By how much an object was moved.
+    """Measured shifts of an object.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def find_shifts(
     exposure: Exposure | Sequence[Exposure] | None = None,
     progress: Progress | None = None,
 ) -> FoundShifts:
-    """By how much an object was moved between raw images of a camera or microscope 1.0.
+    """Shifts of an object between raw images of a camera or microscope 1.0.
 
     Works on the light of each lenslet, and takes the object for an unknown texture whose spectrum is fitted,
     for each part of the picture apart. Any camera 1.0, of which the raw images show the pixels, and a flat
@@ -216,7 +216,7 @@ class _Fit:
 
     @property
     def deviations(self) -> np.ndarray:
-        """Of the shifts, in the order of the step."""
+        """Standard deviations of the shifts, in the order of the step."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
@@ -226,7 +226,7 @@ class _Fit:
 
     @property
     def likelihood(self) -> float:
-        """Its logarithm, with what the start says."""
+        """Log-likelihood, the prior of the start included."""
         return sum(one.likelihood for one in self.told) - _far(self.shifts - self.start)
 
     def moved(self) -> tuple[np.ndarray, list[np.ndarray]] | None:
@@ -267,7 +267,7 @@ def _far(off: np.ndarray) -> float:
 
 
 def _fitted(parts: Sequence[Part], start: np.ndarray, progress: Progress) -> _Fit:
-    """From where they start to where all raw images are likeliest."""
+    """Most likely shifts, from a start."""
     shifts, spectra = start.copy(), [part.usual() for part in parts]
     fit, before, gained = None, -np.inf, np.inf
     for number in range(MOST_STEPS):

@@ -71,13 +71,13 @@ class SingleLensCamera(WithParts):
 
     @property
     def pupil_diameter(self) -> float:
-        """Of the main lens' stop, D [m]."""
+        """Diameter D of the main lens' stop [m]."""
         assert self.main_lens.diameter is not None  # checked above
         return self.main_lens.diameter
 
     @cached_property
     def sampling(self) -> grids.Sampling:
-        """How finely the planes must be sampled, and are."""
+        """Required and actual sampling of the planes."""
         wavelength, z1, z2, diameter = (
             self.wavelength,
             self.object_distance,

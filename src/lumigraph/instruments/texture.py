@@ -58,7 +58,7 @@ class Textures:
 
     @classmethod
     def of(cls, footprint: np.ndarray) -> "Textures":
-        """Of a footprint of `SAMPLES` along a lenslet."""
+        """Textures of a footprint of `SAMPLES` along a lenslet."""
         n = PERIOD * SAMPLES
         power = np.abs(np.fft.rfft2(footprint / footprint.sum(), (n, n))) ** 2
         power[0, 0] = 0.0  # of the mean nothing is assumed
@@ -90,7 +90,7 @@ def _spline(half: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Told:
-    """What a part of the picture says around some shifts and some spectrum.
+    """Log-likelihood of a part of the picture, with its derivatives by shifts and spectrum.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class Part:
 
     @property
     def variance(self) -> float:
-        """Of the texture, as lenslets see it; not below a tenth of the noise's."""
+        """Variance of the texture on the lenslets; not below a tenth of the noise's."""
         noise = float(self.noise.mean())
         return max(float(self.values.var()) - noise, 0.1 * noise)
 
@@ -171,12 +171,12 @@ class Part:
         return USUAL + np.array([np.log(self.variance), 0, 0, 0, 0])
 
     def likelihood(self, shifts: np.ndarray, spectrum: np.ndarray, blunt: float) -> float:
-        """Its logarithm, `blunt` times the variance added to the noise's."""
+        """Log-likelihood, `blunt` times the variance added to the noise's."""
         pairs = self._pairs(shifts)
         return self._likelihood(_Solved.of(self, pairs, self._splines(spectrum)[0], blunt), spectrum)
 
     def told(self, shifts: np.ndarray, spectrum: np.ndarray, blunt: float) -> Told:
-        """What it says around shifts (k, 2) [lenslets], the first of which is kept."""
+        """Log-likelihood and derivatives at shifts (k, 2) [lenslets], the first of which is fixed."""
         pairs, splines = self._pairs(shifts), self._splines(spectrum)
         solved = _Solved.of(self, pairs, splines[0], blunt)
         changes = [one for spline in splines[6:] for one in self._by_shifts(pairs.odd(spline))]
@@ -226,7 +226,7 @@ class _Pairs:
         return found + np.triu(found, 1).T
 
     def odd(self, spline: np.ndarray) -> np.ndarray:
-        """What changes its sign when a pair's places change theirs."""
+        """Part of a spline that changes its sign when a pair's places are exchanged."""
         found = self._upper(spline)
         return found - found.T
 
