@@ -65,11 +65,11 @@ def measured(
     picture
         Flattened white image (y, x), zero in the dark.
     model
-        Where the micro-images are, to a third of a pitch [px].
+        Approximate positions of the micro-images, to a third of a pitch [px].
     part
         Central part of the picture's height and width to look at.
     rounds
-        In which the window follows the centre.
+        Number of rounds in which the window follows the centre.
     """
     cell = _cell(model.lattice)
     ny, nx = picture.shape

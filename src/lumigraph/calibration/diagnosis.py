@@ -22,14 +22,14 @@ LEAST_ROTATION = math.radians(0.02)
 LEAST_OFFSET = 0.25
 """Pixels."""
 LEAST_STRETCH = 3e-4
-"""Of the pitch."""
+"""Smallest relative change of the pitch that is a fault."""
 LEAST_TILT = math.radians(0.1)
 LEAST_BEND = 0.02
 """Pixels that a tilt moves centres at the border: half of what a neighbour that is missing there does."""
 LEAST_PULL = 0.05
 """The same of another pitch: what overlapping neighbours that are missing on all sides do."""
 LEAST_GAP = 0.03
-"""Of the pitch. Below these limits a difference is no fault."""
+"""Smallest gap over the pitch. Below these limits a difference is no fault."""
 
 _CELL = 32  # samples of a folded micro-image per axis
 _SIGMAS = 4.0  # of their standard errors must pitch and tilt differ, too
@@ -74,9 +74,9 @@ class Diagnosis:
     Parameters
     ----------
     rotation
-        Of the lenslets, from +x towards +y [rad].
+        Rotation of the lenslets, from +x towards +y [rad].
     offset
-        Of the micro-image nearest to the axis (y, x) [m]; whole pitches cannot be seen.
+        Offset of the micro-image nearest to the axis (y, x) [m]; whole pitches cannot be seen.
     lenslet_distance
         Lenslets to sensor that explain the pitch, b [m].
     intended_distance
@@ -87,11 +87,11 @@ class Diagnosis:
     pitch_gradient
         Change of the pitch over the height and width of the picture (y, x) [m], which the tilt explains.
     width
-        Of the micro-images by ray optics: the main lens seen through a lenslet [m].
+        Width of the micro-images by ray optics: the main lens seen through a lenslet [m].
     gap
         Pitch minus width [m]: dark between micro-images, below 0 an overlap.
     diameter, matching_diameter
-        Of the main lens: that explains the width, and with which micro-images would touch [m].
+        Diameter of the main lens that explains the width, and the one with which micro-images touch [m].
     faults
         The names of what is wrong; empty for a good camera.
     """
@@ -145,7 +145,7 @@ def diagnose(white: RawImage | Array, camera: Built) -> Diagnosis:
     white
         Picture of an evenly lit surface, of the camera's sensor.
     camera
-        How it was meant to be, such as an instrument.
+        Intended camera, such as an instrument.
 
     Micro-images 1.22 pitches wide leave no contrast between them and the places in between: near it, from
     1.17 to 1.27, the distance is not reliable. Where the array ends near the border of the picture, missing

@@ -54,7 +54,7 @@ def fit(spots: Spots, model: Calibration, *, warped: bool = True) -> Fitted:
     model
         The lattice so far.
     warped
-        Whether tilt and distortion may be fitted.
+        True to fit tilt and distortion, too.
 
     Raises
     ------

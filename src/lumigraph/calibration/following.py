@@ -27,7 +27,7 @@ class Followed(NamedTuple):
     basis
         Lattice vectors (y, x) of i and j in columns [px].
     evidence
-        Of its lines over their surroundings.
+        Strength of its lines over their surroundings.
     errors
         Standard errors (2, 2) of the waves of i and j along y and x [1/px], by how far the lines scatter
         about those of one lattice; NaN of two lines alone.
@@ -48,7 +48,7 @@ def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> Followed |
     basis
         Lattice vectors (y, x) of i and j in columns [px].
     is_hex
-        Whether there are three first harmonics.
+        True if there are three first harmonics.
 
     Returns
     -------

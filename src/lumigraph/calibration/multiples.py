@@ -14,7 +14,7 @@ _ABSENT = 0.12  # of the weakest first harmonic of the finer, or better, lattice
 _ALIKE = 0.55  # correlation of lenslets of several kinds; touching discs of one kind reach 0.46
 _COARSEST = 9  # cells of the finer lattice in one of the coarser
 AROUND = 0.04
-"""Of a pitch, within which polishing one candidate finds the other."""
+"""Part of a pitch within which polishing one candidate finds the other."""
 _SUBLATTICES = [
     (a, b, n // a)
     for n in range(_COARSEST, 1, -1)

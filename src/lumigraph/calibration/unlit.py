@@ -22,11 +22,11 @@ def unlit(picture: np.ndarray, model: Calibration, centers: np.ndarray, *, white
     picture
         Brightness (y, x).
     model
-        Where the micro-images stand.
+        Positions of the micro-images.
     centers
-        Of those that were found (k, 2) [px]: lenslets between the outermost of them are judged.
+        Centres that were found (k, 2) [px]: lenslets between the outermost of them are judged.
     white
-        Whether the picture is evenly lit. Then a lenslet with less than a tenth of a lit one's light is
+        True for an evenly lit picture. Then a lenslet with less than a tenth of a lit one's light is
         dark. A scene has dark places that are no faults: there a dark lenslet has less than a tenth of what
         three quarters of those around it have.
     """

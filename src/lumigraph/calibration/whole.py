@@ -38,7 +38,7 @@ _UNMEASURED = (
 
 
 How = Literal["light", "sharp", "gaps", "logarithm", "discs", "nothing"]
-"""How centres were found: first harmonics of the light, the mean micro-image, the dark gaps, the logarithm
+"""Source of the centres: first harmonics of the light, the mean micro-image, the dark gaps, the logarithm
 of the picture, overlapping discs; or nothing, where none was measured."""
 
 

@@ -62,7 +62,7 @@ class Adaptive:
         Noll indices of the Zernike terms that are looked for, such as 5,6,8; left out, 5-11, of a
         picture 4-11.
     object
-        What the raw image shows: volume, anything with texture; picture, something flat at one known depth;
+        Content of the raw image: volume, anything with texture; picture, something flat at one known depth;
         beads, sparse points. A volume if left out, of cameras a picture.
     """
 

@@ -55,7 +55,7 @@ VERBS = (
     measure, batch, sweep, optimise, tolerance, dataset, board, convert, chart, datasheet, twin, view,
     samples, catalogue, reproduce,
 )  # fmt: skip
-"""In the order of their use."""
+"""Verbs in the order of their use."""
 
 
 app = App(

@@ -49,7 +49,7 @@ class Hands:
     sbatch
         More options of those jobs, such as "--time=2:00:00 --mem=8G".
     part
-        Which of how many equal parts of the frames to do, such as 3/10, as the jobs of a queue share them.
+        Part of the frames to do, of how many equal ones, such as 3/10, as the jobs of a queue share them.
     """
 
     workers: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
@@ -135,7 +135,7 @@ def batch(
     page
         Pages of a stack, such as '3:9', '3-9' or 3, counted from 0; all if left out.
     run
-        With the --warm of 'deconvolve', frames in a row that one worker does, the first one cold: more are
+        Number of frames in a row for one worker with the --warm of 'deconvolve', the first one cold: more are
         better for the last ones, fewer for many workers.
     """  # noqa: E501 - an example is one line
     from lumigraph import cluster

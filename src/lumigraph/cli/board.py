@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 _ARRAY = ("lenslet_pitch", "micro_images")
-"""What is known of the array, which `Nominal` takes as their ratio."""
+"""Values of the array, which `Nominal` takes as their ratio."""
 
 
 @Parameter(name="*")
@@ -35,25 +35,25 @@ class Known:
     focal_length
         Focal length of the main lens, such as '50 mm'; that of --camera if left out.
     focal_length_error
-        How well it is known, such as '1 mm'; 2 % if left out.
+        Standard error of the focal length, such as '1 mm'; 2 % if left out.
     pixel_pitch
         Pixel pitch of the sensor, such as '5.5 um'; that of the raw images or of --camera if left out.
     shape
         Rows and columns of the raw images, for a table of corners.
     lenslet_distance
-        From lenslets to sensor, such as '0.42 mm', of a camera 1.0 their focal length; that of --camera if
+        Lenslets to sensor, such as '0.42 mm', of a camera 1.0 their focal length; that of --camera if
         left out. It checks the board's spacing, which nothing else does.
     lenslet_distance_error
-        How well that is known, such as '0.02 mm'; 5 % if left out.
+        Standard error of that distance, such as '0.02 mm'; 5 % if left out.
     lenslet_pitch
         Between lenslets, if it is known well, such as '125.02 um': with the pitch of the micro-images it
         tells f and distances.
     lenslet_pitch_error
-        How well that is known, such as '0.01 um'; 0.03 % if left out. With it, the pitch of --camera is used.
+        Standard error of the pitch, such as '0.01 um'; 0.03 % if left out. With it, --camera's pitch is used.
     micro_image_pitch
         Pixels between micro-images, for a table of corners; of raw images it is measured.
     wavelength
-        Of the light, such as '532 nm', for raw images: what lenslets of a camera 1.0 spill into their
+        Wavelength, such as '532 nm', for raw images: what lenslets of a camera 1.0 spill into their
         neighbours' micro-images, and how far outwards those of a camera 2.0 show corners, is allowed for.
         That of --camera, or 550 nm, if left out.
     """
@@ -173,9 +173,9 @@ def board(
     views
         The raw images are of a camera 1.0, whose views show the corners.
     table
-        Where to write the corners that were found on raw images (.csv).
+        File for the corners that were found on raw images (.csv).
     pictures
-        How many pictures to plan.
+        Number of pictures to plan.
     output
         File for the camera (.json), which lumigraph.metric.load reads.
     """

@@ -80,7 +80,7 @@ def dataset(
     cameras
         So many cameras are drawn within --tolerance and the camera file's [tolerances], and take turns.
     seed
-        Of all that is drawn.
+        Seed of all random values.
     accuracy
         Relative rms error of the raw images before noise.
     volume

@@ -56,15 +56,15 @@ def datasheet(
     camera
         Camera file of the folders' pictures: depths in metres, and limits.
     depths
-        Where simulated charts stand, from the plane in focus, such as --depths '-5 mm' --depths '0 mm'; five
+        Depths of simulated charts, from the plane in focus, such as --depths '-5 mm' --depths '0 mm'; five
         distances over what the camera refocuses if left out.
     exposures
-        Of each simulated chart, white and dark image; 16, or fewer of a large sensor, if left out. The sheet
-        says how far two such sets differ, and how many exposures it takes to 2 %.
+        Exposures of each simulated chart, white and dark image; 16, or fewer for a large sensor. The sheet
+        states the difference of two such sets, and the number of exposures for 2 %.
     seed
-        Of the simulated sensor's noise.
+        Seed of the simulated sensor's noise.
     accuracy
-        Of simulated charts, relative rms, 1e-2 to 1e-5.
+        Accuracy of simulated charts, relative rms, 1e-2 to 1e-5.
     charts
         Folder to write the simulated raw images into, as a laboratory would take them; for one camera file.
     output

@@ -83,7 +83,7 @@ def decode(
     output
         Views (.zarr, .zarr.zip, .h5, _eslf.png), or a folder of pictures.
     devignette
-        Whether to divide by the white image; done where there is one.
+        Divide by the white image; done where there is one.
     """
     from lumigraph import io, preparation, rendering
 

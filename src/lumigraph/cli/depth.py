@@ -210,7 +210,7 @@ def depth(
         positive farther from the objective;
         else disparities [px per view], positive nearer, refocus factors, or patches [px].
     confidence
-        Where to write the confidence of each place, from 0 to 1.
+        File for the confidence of each place, from 0 to 1.
     lowest
         Confidence below which a point is left out of .ply: 0.5 keeps those with an expected error of less
         than 0.45 px, of cameras 2.0 about 0.55 px.

@@ -27,11 +27,11 @@ class Kind:
     Parameters
     ----------
     ending
-        Of the file that it writes; empty for one that writes none.
+        Ending of the file that it writes; empty for one that writes none.
     leading
         Words before its input.
     is_table
-        Whether its numbers are wanted.
+        True if its numbers are wanted.
     """
 
     ending: str
@@ -60,11 +60,11 @@ class Frames:
     Parameters
     ----------
     verb
-        Its name.
+        Name of the verb.
     options
-        Its words but for the input, the page and the output.
+        Words of its command but for the input, the page and the output.
     folder
-        That paths among them are relative to.
+        Folder that paths among them are relative to.
     """
 
     verb: str

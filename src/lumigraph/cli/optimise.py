@@ -40,20 +40,20 @@ class Aim:
         A second goal, as --goal: prints and draws the cameras that no other beats in both. Searches for it
         may take as many --evaluations again.
     depths
-        From the focused plane, such as '-5 mm:5 mm:5 mm'.
+        Depths from the focused plane, such as '-5 mm:5 mm:5 mm'.
     photons
-        Of a point, or of a sample of a scene in the mean, that enter the camera as it is given; others get
+        Photons of a point, or of a scene's mean sample, that enter the camera as it is given; others get
         theirs by their aperture.
     background
         Photons of even light on each pixel.
     places
-        Of points at each depth; left out, as many as leave 1 % of the bound unknown, up to 16. More make
+        Points at each depth; left out, as many as leave 1 % of the bound unknown, up to 16. More make
         it smoother over what varies, and take longer.
     scenes
         Pictures, whose contrast and power over frequency scenes have, for the errors of reconstruction;
         values count as light. Left out, 30 % of contrast and power 1/f².
     scene_pitch
-        Of the pictures' pixels in the object, such as '10 um': half the finest period of scenes. Left out,
+        Pixel pitch of the pictures in the object, such as '10 um': half scenes' finest period. Left out,
         half of what the camera as given resolves in focus.
     scene_samples
         Across a scene, which is as wide as so many pixels; the time grows with them.
@@ -125,7 +125,7 @@ class How:
     evaluations
         Cameras at most, beyond the first values.
     seed
-        Of --search global, and of the --trials.
+        Seed of --search global, and of the --trials.
     trials
         Raw images that are drawn with noise at each depth, before the camera as given and the best: points
         are fitted in them, or scenes reconstructed, and their errors stand beside what was expected. 0 for

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from lumigraph.optimisation.tried import Tried
 
 NAMES = {"start": "as given", "swept": "the best of the first values"}
-"""Of what stands beside the best."""
+"""Names of the cameras beside the best."""
 
 
 def result(found: "Optimum", given: "Instrument", output: Path) -> Result:

@@ -50,7 +50,7 @@ def _telling(default: object) -> str | None:
 
 
 PARAMETER = Parameter(negative=(), show_default=_telling)
-"""How all verbs' options are read and shown."""
+"""Settings by which all verbs' options are read and shown."""
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
 
 

@@ -110,11 +110,11 @@ class Origin:
         Parameters
         ----------
         raw
-            As it was read.
+            Raw image as it was read.
         use
-            What the camera's raw images must be for; None for anything.
+            Verb that the camera's raw images must be suited to; None for any.
         devignette
-            Whether to divide by the white image; None for yes where there is one.
+            True to divide by the white image; None for yes where there is one.
         """
         from lumigraph.preparation import Given
 

@@ -199,7 +199,7 @@ def render(
     output
         Picture (.png, .tiff, .zarr); several planes or a path: a stack (.tiff) or a film (.gif, .mp4).
     depth_map
-        Where to write the map of patches or refocus factors that was found (.tiff, .pfm, .zarr).
+        File for the map of patches or refocus factors that was found (.tiff, .pfm, .zarr).
     """
     from lumigraph import io
     from lumigraph.core.lightfield import LightField

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from lumigraph.instruments import FoundShifts, Instrument
 
 MOST_STEPS = 30
-"""Of a scan, along each axis."""
+"""Most steps of a scan, along each axis."""
 
 Shifts = tuple[tuple[float, float], ...]
 
@@ -30,14 +30,14 @@ class Several:
     Parameters
     ----------
     shifts
-        By which the object was moved: '3x3', thirds of a lenslet in the object, row after row from the least
+        Displacements of the object: '3x3', thirds of a lenslet in the object, row after row from the least
         y and x; or a pair for each raw image, such as '0 um, 0 um; 33 um, 0 um', y first.
     find_shifts
         Find the shifts from the raw images, whose noise is known, near those of --shifts: for an object with
         texture, flat and in focus before a camera 1.0, of any depth before a microscope 1.0, moved by a stage
         that is off by some tenths of a lenslet.
     light
-        Of each raw image over the first one's, such as '1, 1, 4': exposure times. Left out, as the raw images
+        Relative exposure of each raw image, such as '1, 1, 4': exposure times. Left out, as the raw images
         of 'simulate' record it, else the same.
     """
 

@@ -171,10 +171,10 @@ class Stage:
     planes
         Opaque slices that --depth-map is sorted into, 1 to 64; 8 if left out.
     medium
-        What refracts before the scene, of light-field microscopes: a volume of refractive indices (OME-TIFF,
+        Refracting volume before the scene, for light-field microscopes: refractive indices (OME-TIFF,
         .zarr, .h5), as --medium-index says. Each point and each lit sample then has an image of its own.
     medium_depth
-        By how much the volume's depths are moved, such as '-20 um' (nearer to the objective).
+        Displacement of the volume's depths, such as '-20 um' (nearer to the objective).
     medium_index
         difference: indices less that of the objective's medium; absolute: indices, such as 1.37.
     point

@@ -26,7 +26,7 @@ class Standing:
     Parameters
     ----------
     output
-        Of the batch.
+        Output of the batch.
     shown
         Progress that it passes on.
     """

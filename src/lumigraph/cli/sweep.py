@@ -104,7 +104,7 @@ class Designs:
     camera
         File, or a name of the catalogue.
     names
-        Of the quantities.
+        Names of the quantities.
     """
 
     camera: str

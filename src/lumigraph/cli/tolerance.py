@@ -26,7 +26,7 @@ Tolerances = Annotated[
 ALONE = Hands()
 
 _POINTS = 200
-"""Of a drawn curve at most."""
+"""Most points of a drawn curve."""
 
 _SHOWN = 3
 """Tolerances that a line names."""
@@ -74,7 +74,7 @@ def tolerance(
         micro-image fill, corner shift y, corner shift x, corner focus shift, corner depth error, lenslet focus shift, light of a point, lenslet Strehl ratio,
         and the simulated ones of 'lumigraph sweep'.
     seed
-        Of all that is drawn.
+        Seed of all random values.
     output
         Table of the cameras (.csv, or .parquet with pyarrow); that of the tolerances is written beside it,
         as NAME-tolerances.

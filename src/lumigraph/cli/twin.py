@@ -52,7 +52,7 @@ def twin(
     dark
         Picture without light.
     pitch_error
-        How well the lenslets' pitch over the pixels' is known, one standard deviation over it; 3e-4 if left
+        Standard deviation of the lenslets' pitch over the pixels', as a part of it; 3e-4 if left
         out. Height and stop are known no better than that allows.
     watch
         Folder: every new picture in it is compared, until Ctrl-C; the last result is the command's.

@@ -52,11 +52,11 @@ def wavefront(
     camera
         Camera file (TOML), or the name of a bundled one.
     object
-        What the raw image shows: star, one point of light; scene, something flat in the focused plane.
+        Content of the raw image: star, one point of light; scene, something flat in the focused plane.
     terms
         Noll indices of the Zernike terms that are looked for, such as 4-21 or 4,5,6.
     place
-        Of the star from the axis and the focused plane, y, x and z, such as '0 um, 0 um, 2 mm'; the middle of
+        Position of the star, y, x and z from the focused plane, such as '0 um, 0 um, 2 mm'; the middle of
         the picture if left out. y and x need be known to within half a lenslet.
     output
         Camera file with these aberrations (.toml).

@@ -21,13 +21,13 @@ class Estimate:
     frames
         Still to do.
     seconds
-        Of all workers together, side by side [s].
+        Time of all workers together, side by side [s].
     memory
-        Of one worker [bytes].
+        Memory of one worker [bytes].
     size
-        On the disk [bytes].
+        Size on the disk [bytes].
     noun
-        What an item is.
+        Name of an item.
     busy
         Processor time of all workers together [s].
     """
@@ -54,13 +54,13 @@ class Estimate:
         Parameters
         ----------
         entries
-            In the order in which they ended.
+            Entries in the order in which they ended.
         frames
             Still to do.
         workers
-            Of which those with an entry are ready; the others make what they keep first.
+            Number of workers. Those with an entry are ready; the others make what they keep first.
         processors
-            That all workers share: a frame alone may use several. Infinite where they are not known.
+            Processors that all workers share: a frame alone may use several. Infinite if unknown.
         starting
             Time until a worker begins [s].
         """

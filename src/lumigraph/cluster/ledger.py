@@ -45,13 +45,13 @@ class Entry:
     Parameters
     ----------
     number
-        Of the frame.
+        Number of the frame.
     seconds
-        That it took [s].
+        Time that it took [s].
     memory
         Most that its worker had held until then [bytes].
     size
-        Of what it wrote [bytes].
+        Size of its files [bytes].
     where
         Machine and process.
     files
@@ -82,7 +82,7 @@ class Ledger:
     Parameters
     ----------
     folder
-        That holds them.
+        Folder of the ledger's files.
     """
 
     folder: Path

@@ -24,7 +24,7 @@ class Pool:
     Parameters
     ----------
     task
-        That they share.
+        Task that the workers share.
     count
         Workers.
     """

@@ -22,7 +22,7 @@ _TRIED, _TRIAL, _PART = 16, 5.0, 4
 at most, if more than one; and one of so many frames at most."""
 
 _TOLD = 16
-"""Of so many frames that are checked, one is told of."""
+"""Frames that are checked for each call of the progress callback."""
 
 _ROUNDS, _PATIENCE = 600, 1.0
 """How often, and after how many seconds, frames are asked for again that somebody else works on."""
@@ -61,7 +61,7 @@ class Local:
     Parameters
     ----------
     count
-        Of them.
+        Number of workers.
     """
 
     count: int
@@ -81,19 +81,19 @@ class Report:
     count
         Frames in all.
     entries
-        Of those that are done, by number.
+        Entries of the frames done, by number.
     failures
         Why frames failed, by number.
     seconds
-        That this start took [s].
+        Time since this start [s].
     pace
         Frames a second, of late; 0 where it is not known.
     link
-        Of the scheduler's own page, while it is in use.
+        Link to the scheduler's own page, while it is in use.
     page
         File that shows how it stands, where there is one.
     noun
-        What an item is.
+        Name of an item.
     """
 
     count: int
@@ -145,15 +145,15 @@ def batch(
         It gives a picture, several, views, a volume, a depth map or arrays by name, of one shape for all
         items, which go into shards of a Zarr store; `Several` of them; or `Values`, which stay in the ledger.
     items
-        What JSON can hold: paths, numbers, mappings of them.
+        Items that JSON can hold: paths, numbers, mappings of them.
     output
         A Zarr store, which others can open while it grows.
     what
-        What the work is, as JSON values: a start with another one is refused.
+        Description of the work, as JSON values: a start with another one is refused.
     workers
         Processes on this machine; or a `Dask` cluster.
     part
-        Which of how many equal parts of the items to do, counted from 1, as the jobs of a queue share them.
+        Part of the items to do, of how many equal ones, counted from 1, as the jobs of a queue share them.
     progress
         Called with the fraction that is done.
     estimated

@@ -27,7 +27,7 @@ class Dask:
     Parameters
     ----------
     address
-        Of its scheduler, such as "tcp://10.0.0.1:8786".
+        Address of its scheduler, such as "tcp://10.0.0.1:8786".
     """
 
     address: str

@@ -26,7 +26,7 @@ Outcome = tuple[int, str]
 """Number of a frame and how it ended."""
 
 DONE, FAILED, BUSY, FULL = "done", "failed", "busy", "full"
-"""How a frame ended: noted as done, noted as failed, claimed by somebody else."""
+"""Outcomes of a frame: noted as done, noted as failed, claimed by somebody else."""
 
 _LONGEST = 400
 """Characters of an error that are kept."""
@@ -84,7 +84,7 @@ class Task:
     work
         Called with an item; what it keeps between calls belongs to the process.
     items
-        Of the frames, by their numbers.
+        Items of the frames, by their numbers.
     output
         A store of shards, beside which the ledger lies.
     count

@@ -45,7 +45,7 @@ PART = 2**15
 """Values that are treated at a time, one operation after the other: they stay in a processor's own cache."""
 
 _HELD: dict[tuple, Array] = {}
-"""What `held` has copied to other devices."""
+"""Copies that `held` has made on other devices."""
 
 _SINGLE = ("float32", "complex64", "float16")
 

@@ -15,9 +15,9 @@ class Aside:
     Parameters
     ----------
     indices
-        Of the lenslets (k, 2), as (i, j).
+        Indices of the lenslets (k, 2), as (i, j).
     ways
-        From the lattice to their micro-images (k, 2), as (y, x) [px].
+        Offsets of their micro-images from the lattice (k, 2), as (y, x) [px].
 
     Raises
     ------

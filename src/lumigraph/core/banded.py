@@ -20,7 +20,7 @@ class Banded:
     Parameters
     ----------
     columns
-        Their number.
+        Number of columns.
     blocks
         (first column, matrix), row after row.
     """

@@ -9,7 +9,7 @@ from typing import Any
 from lumigraph.core import picture
 
 WIDTH, LINES = 100, 8
-"""Of the text."""
+"""Size of the text."""
 
 MANY = 6
 """Members of a list or a mapping that are all shown."""

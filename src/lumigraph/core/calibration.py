@@ -40,7 +40,7 @@ class Calibration:
         Root mean square distance of the measured centres from the lattice [px]; NaN, or 0, where none was
         measured (`measured`).
     pixel_pitch
-        Of the sensor [m]; None where unknown.
+        Pixel pitch of the sensor [m]; None where unknown.
     separation
         Main lens to lenslets, F or z2 + a [m]; None where unknown.
     lenslet_distance
@@ -57,9 +57,9 @@ class Calibration:
     sharpness
         Contrast of each of the three kinds of lenslets, `lattice.kind`, over their mean; empty for one kind.
     notes
-        What to know before trusting the result, one sentence each.
+        Cautions about the result, one sentence each.
     by_maker
-        Whether it is the file of a camera's maker, which gives pitch and rotation well, but not where a
+        True for the file of a camera's maker, which gives pitch and rotation well, but not where a
         picture was cropped: `calibration.aligned` moves it.
     aside
         Ways of single lenslets beside the lattice; None where all stand on it.

@@ -56,7 +56,7 @@ def disc(y: np.ndarray, x: np.ndarray, radius: float, pitch: tuple[float, float]
     y, x
         Centres of the samples; they broadcast against each other.
     radius
-        Of the disc.
+        Radius of the disc.
     pitch
         Size of a sample (dy, dx).
     """

@@ -18,7 +18,7 @@ from lumigraph.errors import GeometryError
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {"disparity": "px", "alpha": "1", "patch": "px", "virtual depth": "1", "depth": "m"}
 )
-"""What a map may hold, and its unit.
+"""Quantities of a map, and their units.
 
 - disparity: lenslets that a point moves from one view to the next; positive is nearer than the plane in focus
 - alpha: refocus factor α' = F/F'; above 1 is farther

@@ -15,7 +15,7 @@ def valleys(picture: np.ndarray, sigma: float) -> np.ndarray:
     picture
         Brightness (y, x).
     sigma
-        Of the smoothing [px].
+        Standard deviation of the smoothing [px].
     """
     smooth = logarithm(ndimage.gaussian_filter(np.asarray(picture, np.float32), sigma))
     curved = ndimage.correlate1d(smooth, np.array([1, -2, 1], np.float32), axis=0)

@@ -16,7 +16,7 @@ from lumigraph.errors import GeometryError
 Shape = tuple[int, ...]
 
 GIVEN = "an object", "a raw image"
-"""What `forward` and `adjoint` take, as errors name it."""
+"""Names in errors of what `forward` and `adjoint` take."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
@@ -35,9 +35,9 @@ class Linear(ABC):
     object_grid
         Samples of the object, of every plane of it; None where it is not known.
     depths
-        Of an object's planes from the focused one (z,) [m]; None for one plane (y, x).
+        Depths of an object's planes from the focused one (z,) [m]; None for one plane (y, x).
     resolved_pitch
-        Of samples that hold all that a raw image shows of the focused plane [m]: half the shortest period
+        Pitch of samples that hold all of the focused plane in a raw image [m]: half the shortest period
         that the instrument resolves; None where it is not known.
     """
 
@@ -269,7 +269,7 @@ class Sum(_Side):
     Parameters
     ----------
     maps
-        At least one.
+        One map or more.
     weights
         One for each.
 
@@ -322,11 +322,11 @@ def stack(
     Parameters
     ----------
     maps
-        Of one shape.
+        Maps of one shape.
     object_grid
         Samples of every plane; None for the first map's.
     depths
-        Of the planes from the focused one (z,) [m].
+        Depths of the planes from the focused one (z,) [m].
 
     Raises
     ------

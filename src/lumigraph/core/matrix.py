@@ -21,7 +21,7 @@ class Matrix(Linear):
     matrix
         (raw samples, object samples), of NumPy, or of SciPy in compressed rows (``csr``).
     raw_shape, object_shape
-        Of what it makes, and of what it takes.
+        Shapes of output and input.
 
     Raises
     ------

@@ -9,7 +9,7 @@ from pathlib import Path
 from lumigraph.errors import LumigraphError, SamplingError
 
 _GROUP = Path("/sys/fs/cgroup")
-"""Of this process' control group, version 2: a container's bounds."""
+"""Files of this process' control group, version 2: a container's bounds."""
 
 
 def available() -> int | None:
@@ -82,7 +82,7 @@ def give_back() -> None:
 
 
 _TRIM, _MAPPED, _ARENAS, _MOST = -1, -3, -8, 2**31 - 1
-"""Of glibc's `mallopt`: what is free at the end before it is given back, from which size memory is mapped by
+"""Options of glibc's `mallopt`: what is free at the end before it is given back, size of memory mapped by
 itself, how many heaps there are; and its largest number."""
 
 

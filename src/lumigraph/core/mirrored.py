@@ -17,7 +17,7 @@ class Mirrored:
     Parameters
     ----------
     shape
-        Of the matrix.
+        Shape of the matrix.
     even, odd
         (rows - rows // 2, columns - columns // 2): from the upper halves of even and odd data to those of
         what they become.

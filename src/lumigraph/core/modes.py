@@ -25,7 +25,7 @@ class CoherentModes:
     fields
         A `Field` (modes, y, x), or several: one for each wavelength. A field (y, x) is one mode.
     error
-        How far off J may be between any two samples, over the largest intensity; 0 where all modes are there.
+        Largest error of J between any two samples, over the largest intensity; 0 where all modes are there.
 
     Raises
     ------

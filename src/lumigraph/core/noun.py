@@ -51,7 +51,7 @@ class Noun(Generic[A]):
         Parameters
         ----------
         name
-            Of the layer; that of the type if left out.
+            Name of the layer; that of the type if left out.
         """
         array = as_numpy(getattr(self, self.pixels))
         return layers.image(array, self._labels(), self, name or type(self).__name__)

@@ -118,13 +118,13 @@ def card(title: str, rows: Iterable[tuple[str, str]], picture: str = "", alt: st
     Parameters
     ----------
     title
-        What it is.
+        Heading.
     rows
         Names, and values with their units; all are escaped.
     picture
         Data URI, or empty.
     alt
-        What the picture shows.
+        Description of the picture.
     """
     cells = "".join(
         f'<tr><th scope="row" style="{_NAME}">{html.escape(name)}</th>'

@@ -33,7 +33,7 @@ def within(progress: Progress | None, first: float, last: float, what: str = "")
     Parameters
     ----------
     progress
-        Of the whole.
+        Callback of the whole.
     first, last
         Fractions of the whole.
     what

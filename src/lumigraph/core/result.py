@@ -13,7 +13,7 @@ class Quantity:
     Parameters
     ----------
     name
-        As programs read it, such as "pitch_px".
+        Name for programs, such as "pitch_px".
     value
         Number, text, or several of them; lengths in metres.
     unit
@@ -78,11 +78,11 @@ class Figure:
         An array (y, x[, 3]), a `RawImage`, a matplotlib figure, text that keeps its lines, or
         the rows of a table, its header first.
     caption
-        What it shows.
+        Caption.
     section
         Heading that it stands under.
     options
-        As `report.pictures.picture` takes them.
+        Options of `report.pictures.picture`.
     """
 
     image: Any
@@ -98,9 +98,9 @@ class Result:
     Parameters
     ----------
     title, about
-        Of a report: a word, and a sentence.
+        Heading of a report: a word, and a sentence.
     thing
-        What was made: views, a picture, a volume, a map, ...
+        Object that was made: views, a picture, a volume, a map, ...
     headline
         Lines that people read first.
     quantities
@@ -108,13 +108,13 @@ class Result:
     figures
         Gives the pictures of a report; called only for one.
     notes
-        What was done and what to know, one sentence each.
+        Notes on what was done and what to know, one sentence each.
     written
         Files.
     extra
-        What only programs read.
+        Values for programs only.
     rows
-        What programs read instead of named values, where that is a list.
+        Values for programs in place of named values, where they form a list.
     failure
         Why the command ends with an error after all is told; empty where it does not.
     """

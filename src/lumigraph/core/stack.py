@@ -28,7 +28,7 @@ class Stack(Noun[A]):
     positions
         One number for each picture: α' of a refocus stack, a depth, a time; empty where unknown.
     quantity
-        What the positions are: "alpha", "dz [m]", "lambda" (Lytro), "time [s]"; "page" where unknown.
+        Quantity of the positions: "alpha", "dz [m]", "lambda" (Lytro), "time [s]"; "page" where unknown.
     pixel_pitch
         Distance between pixels [m]; None where unknown.
     bit_depth

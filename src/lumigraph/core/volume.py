@@ -29,7 +29,7 @@ class Volume(Noun[A]):
     grid
         Where the samples of every plane stand [m].
     depths
-        Of the planes from the focused one (z,) [m], positive farther from the camera; ascending or
+        Depths of the planes from the focused one (z,) [m], positive farther from the camera; ascending or
         descending.
 
     Raises

@@ -16,7 +16,7 @@ from lumigraph.elements.zernike import ZernikePlate, noll_to_nm
 from lumigraph.errors import GeometryError
 
 SLACK = 1e-6
-"""How far beyond the last field light may come from, as a part of it: rounding."""
+"""Part of the last field by which light may come from beyond it: rounding."""
 
 NONE = 1e-6
 """Waves rms that are none."""
@@ -45,7 +45,7 @@ class ZernikeMap:
     wavelengths
         Ascending [m]; None where terms are the same for all.
     metres
-        Whether coefficients are metres of path: waves of others at other wavelengths.
+        True if coefficients are metres of path: waves of others at other wavelengths.
 
     Raises
     ------
@@ -216,7 +216,7 @@ class Openings:
     axes
         Widths (wavelengths, fields, 2) along the field and across it, over the stop's diameter.
     middles
-        Where their middles are along the fields (fields,), over half of that diameter; None for the axis.
+        Centres along the fields (fields,), over half of that diameter; None for the axis.
     """
 
     x: Nodes
@@ -248,11 +248,11 @@ class FieldPlate:
     aberrations
         Over the field.
     diameter
-        Of the stop and of the unit disc [m].
+        Diameter of the stop and of the unit disc [m].
     more
         Waves rms by Noll's index that all fields have besides.
     openings
-        Of a round lens whose stop looks different from each field; None for one round stop.
+        Openings of a round lens whose stop looks different from each field; None for one round stop.
     """
 
     aberrations: ZernikeMap

@@ -54,7 +54,7 @@ class LensletArray:
         Factor of all distances of the lattice, about the axis: the pitch over the lattice's. As a 0-d array
         it is differentiated through, for lenslets that abut everywhere: the edges' own movement is not.
     scatter
-        How single lenslets differ; not together with what is differentiated through. Apertures that stand
+        Differences of single lenslets; not together with what is differentiated through. Apertures that stand
         beside the lattice stay within their cells.
 
     Raises

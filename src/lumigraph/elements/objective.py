@@ -1,13 +1,8 @@
-r"""Field of a point under a microscope objective in the plane of the native image.
+"""Field of a point under a microscope objective in the plane of the native image.
 
-A point at depth dz lights the pupil; with q = n sin θ and the sine condition q = M q' the field in the image,
-in object-space coordinates, is the Debye integral
-
-.. math:: U(r, \psi) = \int A(q, \varphi)\, e^{i k \sqrt{n^2 - q^2}\, dz + i W(q, \varphi)}
-          e^{i k q r \cos(\varphi - \psi)}\, \frac{q\, dq\, d\varphi}{\cos\theta}
-
-An aplanatic objective turns an isotropic emitter into A = sqrt(cos θ). The azimuth is expanded in harmonics,
-so that only radial integrals remain; they are tabulated once and interpolated.
+It is the Debye integral over the pupil, with the sine condition, in object-space coordinates. The azimuth is
+expanded in harmonics, so that only radial integrals remain; they are tabulated once and interpolated.
+docs/theory/elements.md has the equations.
 
 B. Richards & E. Wolf, Proc. R. Soc. A 253, 358 (1959); M. Broxton et al., Opt. Express 21, 25418 (2013).
 """
@@ -45,7 +40,7 @@ class Objective:
     Parameters
     ----------
     wavelength
-        In vacuum [m].
+        Wavelength in vacuum [m].
     numerical_aperture, index
         NA and the immersion's refractive index n.
     model

@@ -18,7 +18,7 @@ MOST_MISSING = 0.99
 """Part of the lenslets."""
 
 MOST = {"focal_length": 0.2, "decentre": 1.0, "missing": MOST_MISSING, "turn": 0.05, "form": 10e-6}
-"""By name, in SI."""
+"""Largest values by name, in SI."""
 
 UNITS = {"decentre": " m", "turn": " rad (of light, n - 1 times the tilt)", "form": " m"}
 
@@ -70,15 +70,15 @@ class Scatter:
     missing
         Part of the lenslets that are opaque.
     seed
-        Of all that is drawn.
+        Seed of all random values.
     turn
         Standard deviation of the angles by which tilted lenslets turn light, along each axis of the array
         [rad]: of a spherical surface tilted by θ, (n - 1) θ.
     form
-        Of the path through a lenslet, what neither focus nor tilt describes: rms over the square around it
+        Form error of the path through a lenslet, without focus and tilt: rms over the square around it
         and over the lenslets [m]. Each of the terms of `form.TERMS` has the same part.
     own
-        Of single lenslets, beside what is drawn for them.
+        Deviations of single lenslets, beside what is drawn for them.
 
     Raises
     ------

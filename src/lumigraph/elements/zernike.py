@@ -47,7 +47,7 @@ def noll_to_nm(j: int) -> tuple[int, int]:
 
 
 FAMILIES = ("spherical aberration", "coma", "astigmatism", "trefoil", "quadrafoil", "pentafoil")
-"""By the order over the angle."""
+"""Names by the order over the angle."""
 
 ORDERS = ("", "secondary ", "tertiary ")
 
@@ -156,15 +156,15 @@ class ZernikePlate:
     coefficients
         Phase c_j [rad rms] by Noll's index j; one wave rms is 2π. The phase is the same for every wavelength.
     diameter
-        Of the unit disc [m]; opaque outside.
+        Diameter of the unit disc [m]; opaque outside.
     center
         (y, x) [m].
     edge
-        Of the stop: "grey" or "hard".
+        Edge of the stop: "grey" or "hard".
     axes
-        Of an elliptic stop, its widths along `direction` and across it over the diameter.
+        Widths of an elliptic stop along `direction` and across it, over the diameter.
     direction
-        From +x towards +y [rad].
+        Direction from +x towards +y [rad].
 
     Raises
     ------

@@ -23,15 +23,15 @@ class Row:
     Parameters
     ----------
     quantity
-        What was computed, such as "first zero, band limited".
+        Computed quantity, such as "first zero, band limited".
     got
-        What came out, in `unit`.
+        Computed value, in `unit`.
     unit
-        As it is shown: "µm", "dB", "1/m"; empty for a pure number.
+        Unit as it is shown: "µm", "dB", "1/m"; empty for a pure number.
     thesis
-        What is printed there, in the same unit; text where no number is; None where nothing is.
+        Value printed in the thesis, in the same unit; text where no number is; None where nothing is.
     expected
-        What is right; None for a number that is only shown.
+        Correct value; None for a number that is only shown.
     tolerance
         Largest absolute difference from `expected`, or the largest ones (below, above); may be infinite.
     note
@@ -77,7 +77,7 @@ class Outcome:
     Parameters
     ----------
     rows
-        Its table.
+        Rows of its table.
     figures
         (image (y, x[, 3]) or figure of `lumigraph.plots`, caption).
     why
@@ -102,7 +102,7 @@ class Context:
     quick
         Run a reduced size of the same physics, in some seconds.
     folder
-        Where finished parts are kept; None keeps nothing.
+        Folder for finished parts; None keeps nothing.
     tell
         Called as ``tell(fraction)``, a `core.progress.Stage`.
     """
@@ -125,7 +125,7 @@ class Context:
         Parameters
         ----------
         name
-            Of the part; letters, digits, "-", "_" and ".".
+            Name of the part; letters, digits, "-", "_" and ".".
         function
             Computes it.
 
@@ -171,11 +171,11 @@ class Experiment:
     id
         Such as "figure-3.2", "table-5.4" or "5.6".
     title
-        What it is about.
+        Subject of the experiment.
     question
-        What it answers, a sentence.
+        Question that it answers, a sentence.
     thesis
-        Where it stands there.
+        Place in the thesis.
     function
         Takes a `Context`, returns an `Outcome`.
     camera

@@ -25,7 +25,7 @@ class Built(Part):
         By how much lenslets, and pixels, stand farther from the main lens along y and along x: two angles,
         about the axis, in physical coordinates; a raw image shows them turned by 180°.
     array_bow
-        How much farther the lenslets at the array's corners stand than the middle; it grows with the square
+        Distance by which lenslets at the array's corners are behind the middle; it grows with the square
         of the distance from the axis.
     focal_length_scatter
         Standard deviation of single lenslets' focal lengths, as a part of them.
@@ -37,9 +37,9 @@ class Built(Part):
         Standard deviation of the angles by which their surfaces are tilted about their vertices, along each
         axis. A sphere that is tilted by θ turns light by (n - 1) θ; n is the `index` of the lenslets.
     form_scatter
-        Of the path through them, what neither focus nor tilt describes: its rms.
+        Rms form error of the path through lenslets, without focus and tilt.
     seed
-        Of which lenslet is how.
+        Seed of the random differences.
 
     Examples
     --------

@@ -322,7 +322,7 @@ class Camera(Instrument):
         progress
             Called as ``progress(fraction)``.
         spectrum
-            Of one channel, in the place of the camera's wavelength.
+            Spectrum of one channel, in place of the camera's wavelength.
 
         Raises
         ------

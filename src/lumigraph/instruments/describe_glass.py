@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from lumigraph.instruments.camera import Camera
 
 ROUND = 0.02
-"""How much narrower than round the stop may look without a warning."""
+"""Relative narrowing of the stop up to which there is no warning."""
 
 
 def rows(camera: "Camera") -> Iterator[Row]:

@@ -1,14 +1,8 @@
-r"""A main lens of glass: Zernike terms over field and wavelength, fitted to the rays of its prescription.
+"""A main lens of glass: Zernike terms over field and wavelength, fitted to the rays of its prescription.
 
-Light of a pupil point arrives at the image as a plane wave of direction cosines (l, m), whose phase at the
-image of the chief ray is 2π/λ times
-
-.. math:: \Phi(l, m) = s + (w_0 - w) \cdot (l, m) + \delta n,
-
-with the optical path s to the image plane, where the ray arrives at w, and a plane δ behind it. Summed over
-all directions that is the point's image, to the approximation of Huygens and Fresnel. The camera's own lens
-is thin, with the stop of diameter D in it and the image at z2: a direction is the place -z2 (l - l_0, m) of
-its stop, seen from the chief ray. There Φ is fitted, over the ellipse that the stop's rim is seen as.
+The path Φ(l, m) = s + (w_0 - w) · (l, m) + δ n of plane waves that arrive at the image is fitted over the
+ellipse as which the stop's rim appears, on the stop of the camera's thin lens. docs/theory/instruments.md
+derives it.
 """
 
 import hashlib
@@ -27,7 +21,7 @@ from lumigraph.io.prescription import FirstOrder, Prescription, Rays, content
 from lumigraph.store import cabinet
 
 VERSION = 1
-"""Of what is kept: another one forgets it."""
+"""Version of the cached arrays: another one discards them."""
 
 ORDER = 10
 """Highest radial order of the fit."""
@@ -42,10 +36,10 @@ UNFITTED = 0.05
 """Waves rms that the fit may leave."""
 
 SAME_FOCUS = 0.005
-"""How far, of it, the camera file's focal length may be from the prescription's."""
+"""Relative difference allowed between the focal lengths of camera file and prescription."""
 
 MARGIN = 1.05
-"""How much farther than the object's corner fields are traced."""
+"""Factor by which fields beyond the object's corner are traced."""
 
 VISIBLE = (400e-9, 700e-9)
 """Wavelengths that are traced at least where the glasses are known there [m]."""
@@ -67,7 +61,7 @@ class Wanted:
     object_distance
         From the front principal plane [m].
     focal_length, diameter
-        Of the camera's thin lens [m].
+        Focal length and diameter of the camera's thin lens [m].
     reach
         Farthest field that it sees, a tangent.
     """
@@ -93,15 +87,15 @@ class Glass:
     first_order
         At the camera's wavelength.
     aberrations, openings
-        Of the camera's plate.
+        Terms and openings of the camera's plate.
     entrance_pupil
         Diameter of what the camera uses [m].
     defocus
         From the paraxial image to the plane of the least rms wavefront on the axis, positive behind [m].
     moved
-        Of the fields, how far chief rays arrive from the thin lens' image, positive outwards [m].
+        Distances of the fields' chief rays from the thin lens' image, positive outwards [m].
     turned
-        Of the fields, directions of the pupil's middle from the thin lens' [rad], positive outwards.
+        Directions of the pupil's middle from the thin lens', for the fields [rad], positive outwards.
     left
         Rms path that the fit leaves at worst [m].
     between
@@ -110,7 +104,7 @@ class Glass:
     rim
         Farthest place of the stop's rim from its ellipse, over the radius.
     notes
-        What of the file was not used.
+        Parts of the file that were not used.
     """
 
     first_order: FirstOrder

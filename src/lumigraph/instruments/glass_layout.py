@@ -11,7 +11,7 @@ from lumigraph.instruments.glass import Wanted, glass
 from lumigraph.io.prescription import Prescription, content
 
 FIELD = 0.75
-"""Of the farthest field, from which the second bundle comes."""
+"""Part of the farthest field, from which the second bundle comes."""
 
 _PUPIL = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 

@@ -19,7 +19,7 @@ class ExitPupil:
     behind
         From the rear principal plane, positive behind [m]; 0 of a thin lens.
     focal_length, image_distance
-        Of the camera's thin lens, f and z2 [m].
+        Focal length f and image distance z2 of the camera's thin lens [m].
     """
 
     behind: float
@@ -77,9 +77,9 @@ class Traced:
     fields
         Tangents of images' heights over the pupil's distance.
     objects
-        What that lens sees of objects.
+        Object space of that lens.
     lean
-        By how much chief rays are steeper than from the exit pupil's middle on the axis [rad], outwards.
+        Extra inclination of chief rays over those from the exit pupil's middle on the axis [rad], outwards.
     """
 
     fields: tuple[float, ...]

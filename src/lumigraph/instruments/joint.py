@@ -44,7 +44,7 @@ def scan(steps: int, period: float | Sequence[float]) -> np.ndarray:
     steps
         Along each axis.
     period
-        What is divided (y, x) [m]: a lenslet's pitch where the array moves, ``camera.lenslet_size`` where the
+        Divided period (y, x) [m]: a lenslet's pitch where the array moves, ``camera.lenslet_size`` where the
         object does.
 
     Raises
@@ -88,9 +88,9 @@ def joint_operator(
         As for ``camera.operator``. Depths count from the first camera's focused plane; main lenses stand at
         one place.
     shifts
-        By which the object was moved (k, 2) as (y, x) [m], one for each raw image; None where it was not.
+        Displacements of the object (k, 2) as (y, x) [m], one for each raw image; None where it did not move.
     grid
-        Of the object; None for the one described above.
+        Grid of the object; None for the one described above.
     progress
         Called as ``progress(fraction)``.
 

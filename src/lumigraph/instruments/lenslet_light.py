@@ -24,14 +24,14 @@ FEWEST = 25
 """Lenslets."""
 
 NEAR = 2
-"""How far a lenslet's footprint is followed [lenslets]."""
+"""Distance to which a lenslet's footprint is followed [lenslets]."""
 
 INNER = 0.4
 """Half of the part of micro-images that counts, along each axis, in pitches: towards their rims they hold
 light of neighbours, which lenslets at the array's border lack."""
 
 ACCURACY, SPILT = 1e-2, 1e-2
-"""Of images, and of a lenslet's light what is followed from beyond the microscope's lenslets."""
+"""Accuracy of images, and part of a lenslet's light followed from beyond the microscope's lenslets."""
 
 Lensed = LensletCamera | LightFieldMicroscope
 
@@ -45,9 +45,9 @@ class LensletLight:
     labels, inner
         Number of the lenslet of each pixel (ny, nx), and how much of it counts, from 0 to 1.
     even
-        What each pixel shows of an even object (ny, nx).
+        Response of each pixel to an even object (ny, nx).
     places
-        Of the lenslets in the object (n, 2) [lenslets].
+        Positions of the lenslets in the object (n, 2) [lenslets].
     """
 
     labels: np.ndarray

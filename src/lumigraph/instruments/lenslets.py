@@ -28,11 +28,11 @@ from lumigraph.instruments.quantities import (
 MOST_LENSLETS = 2**20
 """Largest array: 1024 x 1024."""
 MOST_CHANGE = 0.5
-"""Of a single lenslet's focal length."""
+"""Largest change of a single lenslet's focal length."""
 MOST_INDEX = 4.0
-"""Of lenslets: germanium's."""
+"""Largest index of lenslets: germanium's."""
 MOST_CONIC = 100.0
-"""Of their surfaces, either way."""
+"""Largest conic constant of their surfaces, of either sign."""
 
 
 class OneLenslet(Part):
@@ -41,11 +41,11 @@ class OneLenslet(Part):
     Parameters
     ----------
     focal_change
-        By what part its focal length is longer than the array's: 0.03 is 3 % longer.
+        Relative change of its focal length: 0.03 is 3 % longer than the array's.
     offset_y, offset_x
-        Of it, aperture and all, from its place on the lattice.
+        Offset of the lenslet, aperture and all, from its place on the lattice.
     decentre_y, decentre_x
-        Of its vertex from the middle of its aperture, before a main lens.
+        Offset of its vertex from the middle of its aperture, before a main lens.
     """
 
     focal_change: Number = 0.0
@@ -88,7 +88,7 @@ def _singles(value: Any) -> Any:
 
 
 Singles = Annotated[dict[int, OneLenslet], BeforeValidator(_singles)]
-"""What single lenslets have, by number."""
+"""Deviations of single lenslets, by number."""
 
 
 class Lenslets(Part):
@@ -106,16 +106,16 @@ class Lenslets(Part):
     layout
         "square" or "hex".
     magnification
-        Of a focused plenoptic camera, m = b/a of the first focal length: above 0 Keplerian, between -1
+        Magnification of a camera 2.0, m = b/a of the first focal length: above 0 Keplerian, between -1
         and 0 Galilean.
     shape
-        Of a lenslet: "square" or "hex", the lattice's cell, or "round"; left out, the cell.
+        Shape of a lenslet: "square" or "hex", the lattice's cell, or "round"; left out, the cell.
     fill_factor
         Width of a lenslet over the pitch; the rest is opaque.
     rotation
         From +x towards +y [rad], or text such as "2 mrad".
     offset
-        Of the lenslets from the axis (y, x), less than half a pitch.
+        Offset of the lenslets from the axis (y, x), less than half a pitch.
     index
         Refractive index of the lenslets, which tilts and surfaces need: at the camera's wavelength, or n_d
         beside an Abbe number.
@@ -123,7 +123,7 @@ class Lenslets(Part):
         Constant K of the curved side of plano-convex lenslets, 0 of spheres, whose rays model "exact" then
         follows; left out, lenslets are free of spherical aberration.
     thickness
-        Of the glass from vertex to flat side, where the curved side faces the main lens; left out, it faces
+        Thickness of the glass, vertex to flat side, if the curved one faces the main lens; left out, it faces
         the sensor. Of distances to the sensor, glass counts as thickness over index.
     abbe
         Abbe number V_d, by which the focal length changes with the wavelength; left out, it does not.

@@ -40,7 +40,7 @@ class LightFieldMicroscope(ScopeWithParts):
     Parameters
     ----------
     wavelength
-        Of the emission, its middle [m] or text with a unit.
+        Central wavelength of the emission [m], or text with a unit.
     objective
         `MicroscopeObjective`.
     lenslets
@@ -54,7 +54,7 @@ class LightFieldMicroscope(ScopeWithParts):
     bandwidth
         Full width of the emission band [m]; left out, one wavelength.
     relay_magnification
-        Of the lenses between the lenslets' images and the sensor.
+        Magnification of the lenses between the lenslets' images and the sensor.
     lenslet_offset
         Native image to lenslets [m], positive behind it ("2.0").
     sensor_distance
@@ -102,7 +102,7 @@ class LightFieldMicroscope(ScopeWithParts):
             Relative rms error of points' images. It sets how far light is followed, how finely it is sampled
             and how many samples behind a lenslet pixels are interpolated from. A Fourier microscope has none.
         pixels
-            What the raw image's pixels are: None, those of this description; a `Calibration`, those of a real
+            Pixels of the raw image: None, those of this description; a `Calibration`, those of a real
             camera, wherever its lenslets stand; a whole number N, N × N for each lenslet, as `rectify` gives.
         folder
             Keeps what is computed in files, mapped into memory when it is used.
@@ -215,7 +215,7 @@ class LightFieldMicroscope(ScopeWithParts):
         terms
             Noll indices; their coefficients, in waves rms, add to the description's aberrations.
         farthest
-            Of the points from the focused plane [m]: how many samples pixels are interpolated from.
+            Largest distance of points from the focused plane [m]; it sets the pixels' interpolation.
         accuracy, pixels
             As in `operator`.
         double

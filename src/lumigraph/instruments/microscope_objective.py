@@ -16,7 +16,7 @@ class MicroscopeObjective(Part):
     Parameters
     ----------
     magnification
-        As engraved.
+        Engraved magnification.
     numerical_aperture, immersion_index
         NA and n.
     maker
@@ -26,11 +26,11 @@ class MicroscopeObjective(Part):
     model
         "scalar", "vector", "paraxial" or "rays" (for images traced by rays); left out, vector from NA 0.8 on.
     axial_share
-        Of dipoles, with "vector"; 1/3 for all directions.
+        Axial share of dipoles, with "vector"; 1/3 for all directions.
     aberrations
         Zernike terms: Noll index to waves rms.
     sample_index, focus_depth
-        Of the medium around the object, and how deep in it the focused plane lies; left out, the immersion.
+        Index of the medium around the object, and depth of the focused plane in it; left out, the immersion.
     """
 
     magnification: Positive

@@ -23,21 +23,21 @@ class Parameter:
     Parameters
     ----------
     key
-        As in the camera file, such as "lenslets.pitch".
+        Key in the camera file, such as "lenslets.pitch".
     label
-        For people.
+        Name for people.
     unit, scale
-        As it is written, and its size in SI.
+        Unit as it is written, and its size in SI.
     value
-        In that unit; text for a choice, None where it is computed.
+        Value in that unit; text for a choice, None where it is computed.
     low, high
         Ends of the slider, in that unit.
     kind
         "log" or "linear" slider, "whole" numbers, or a "choice".
     choices
-        Of a choice.
+        Words to choose from.
     optional
-        Whether it may be left out, and is then computed.
+        True if it may be left out, and is then computed.
     """
 
     key: str
@@ -118,9 +118,9 @@ def changes(own: tuple[Parameter, ...], values: Any, count: tuple[int, int] | No
     own
         Parameters at the instrument's values.
     values
-        By the parameters' keys, in their units; what is missing stays.
+        Values by the parameters' keys, in their units; what is missing stays.
     count
-        Of its lenslets; None without them.
+        Number of lenslets; None without them.
 
     Raises
     ------

@@ -45,7 +45,7 @@ class PlenopticCamera(LensletCamera):
     built
         `Built`: distances as built, where they are not the description's.
     tolerances
-        How far values may be off, as `lumigraph.tolerance` takes them, such as "±0.05 mm" of "separation".
+        Tolerances of values, as `lumigraph.tolerance` takes them, such as "±0.05 mm" of "separation".
 
     Raises
     ------
@@ -130,7 +130,7 @@ class PlenopticCamera(LensletCamera):
         terms
             Noll indices; their coefficients, in waves rms, add to the description's aberrations.
         dz
-            Of the plane from the focused one [m], positive farther.
+            Depth of the plane from the focused one [m], positive farther.
         accuracy
             Relative rms error of points' images, 1e-5 to 0.1.
         pixels

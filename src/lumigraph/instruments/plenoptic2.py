@@ -39,7 +39,7 @@ class FocusedPlenopticCamera(LensletCamera):
     built
         `Built`: distances as built, where they are not the description's.
     tolerances
-        How far values may be off, as `lumigraph.tolerance` takes them, such as "±0.05 mm" of "separation".
+        Tolerances of values, as `lumigraph.tolerance` takes them, such as "±0.05 mm" of "separation".
 
     Raises
     ------

@@ -20,7 +20,7 @@ MOST_ALONG = 15
 """Lenslets along each side that are simulated."""
 
 MOST_SAMPLES = 9e6
-"""Of a plane: about two seconds."""
+"""Largest number of samples of a plane: about two seconds."""
 
 _MOST_PIXELS = 1200
 
@@ -38,7 +38,7 @@ class PointImage:
     lenslets
         Along y and x, that were simulated; None without lenslets.
     notes
-        Where the sampling is doubtful, and what was left out.
+        Remarks on doubtful sampling, and on what was left out.
     """
 
     data: np.ndarray
@@ -66,7 +66,7 @@ def of_camera(small: Simulated, dz: float, count: tuple[int, int] | None = None)
     dz
         From the focused plane [m].
     count
-        Of those lenslets; None without them.
+        Number of those lenslets; None without them.
 
     Raises
     ------

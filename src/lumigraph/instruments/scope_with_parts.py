@@ -48,7 +48,7 @@ class ScopeWithParts(SeesVolumes, DescribedMicroscope):
         pairs
             Microscopes a little to either side of this one.
         farthest
-            Of the points from the focused plane [m].
+            Largest distance of the points from the focused plane [m].
         points
             Along a lenslet, whose light is 1.
         accuracy, double

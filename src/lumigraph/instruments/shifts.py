@@ -28,7 +28,7 @@ from lumigraph.instruments.microscope import LightFieldMicroscope
 from lumigraph.instruments.texture import Part, Told
 
 REACH = 0.5
-"""How far from where they start shifts are looked for [lenslets]: one standard deviation."""
+"""Standard deviation of shifts about their start, which limits the search [lenslets]."""
 
 TOLD = 0.1
 """Standard deviation [lenslets] above which a shift is warned of; where all are above it they are refused."""
@@ -37,19 +37,19 @@ BLUNT = (0.3, 0.06, 0.012, 0.0024)
 """Noise that is assumed at first, over the texture's variance."""
 
 MOST_STEPS, LONGEST, SETTLED = 40, 0.2, 0.3
-"""Of all; their length [lenslets]; and their size in standard deviations when they end."""
+"""Most steps; their largest length [lenslets]; and their size in standard deviations at the end."""
 
 GAIN = 0.1
-"""Of log-likelihood by the last step, when they end: spectra settle, too."""
+"""Gain of log-likelihood by the last step at which iterations end: spectra settle, too."""
 
 MOST_VALUES, LEAST_LENSLETS, MOST_PARTS = 640, 16, 12
-"""Of a part of the picture, and how many parts are looked at: those with the most texture."""
+"""Largest size of a part of the picture, and how many parts are used: those with the most texture."""
 
 ALIKE = 10
-"""How many parts' worth of shifts say in advance that parts agree."""
+"""Number of parts whose shifts a prior of agreement is worth."""
 
 MARGIN = 1.2
-"""By which errors are wider than Fisher's information says, set on ten draws of each of some kinds of object:
+"""Factor of errors over those of Fisher's information, set on ten draws of each of some kinds of object:
 what is no Gaussian texture is told less. On other draws errors were then 0.70 to 1.11 times as large as told
 (`python -m benchmarks.found_shifts pulls`)."""
 
@@ -108,12 +108,12 @@ def find_shifts(
     raws
         Two or more, of one object that was moved, or of a camera that was (minus the shifts).
     camera
-        That took them, of kind "plenoptic", or a microscope of configuration "1.0".
+        Camera that took them, of kind "plenoptic", or a microscope of configuration "1.0".
     start
-        Where the search begins (k, 2) as (y, x) [m], such as `scan`, within half a lenslet in the object
+        Start of the search (k, 2) as (y, x) [m], such as `scan`, within half a lenslet in the object
         (one standard deviation) of the truth; the first is kept. None for no shifts.
     exposure
-        Of all raw images, or of each, with the gain; None for what `Sensor.expose` has recorded.
+        Exposure of all raw images, or of each, with the gain; None for what `Sensor.expose` has recorded.
     progress
         Called as ``progress(fraction)``.
 
@@ -189,9 +189,9 @@ class _Fit:
     Parameters
     ----------
     step
-        To the likeliest shifts (2 (k - 1),), all y first.
+        Step to the likeliest shifts (2 (k - 1),), all y first.
     covariance
-        Of the shifts, by what all parts and the start say.
+        Covariance of the shifts, from all parts and the start.
     """
 
     parts: Sequence[Part]

@@ -17,17 +17,17 @@ import scipy.linalg as linalg
 from scipy.ndimage import map_coordinates, spline_filter
 
 SAMPLES = 12
-"""Of footprints and covariances, along a lenslet."""
+"""Samples of footprints and covariances along a lenslet."""
 
 PERIOD = 32
-"""Of covariances [lenslets]: longer than a part of the picture and what it depends on."""
+"""Period of covariances [lenslets]: longer than a part of the picture and what it depends on."""
 
 USUAL = np.array([0.0, np.log(2.0), 0.0, np.log(2.0), np.log(1.5)])
 """Spectra that are expected: logarithms of the strength over the values' variance, of lengths times 2π
 [lenslets], which are a triangle L, and of γ."""
 
 WIDE = np.array([3.0, 3.0, 5.0, 3.0, 0.5])
-"""How far spectra may be from it: one standard deviation."""
+"""Standard deviation of spectra about it."""
 
 ODD = 1e-3
 """Variance, over the texture's, of what no texture of one spectrum shows, such as edges."""
@@ -95,9 +95,9 @@ class Told:
     Parameters
     ----------
     likelihood
-        Its logarithm, with what is expected of spectra.
+        Log-likelihood, the prior of spectra included.
     slope, information
-        By shifts, then by the spectrum.
+        Derivatives by shifts, then by the spectrum.
     moved
         Number of shifts.
     """

@@ -25,7 +25,7 @@ NAMES = {
     "lenslets.each.focal_length": "length", "lenslets.each.decentre": "length",
     "lenslets.each.tilt": "angle", "lenslets.each.form": "length", "lenslets.each.missing": "part",
 }  # fmt: skip
-"""What may be off, as keys of a camera file, and ``main_lens.aberrations.N`` [waves rms] of Noll index N.
+"""Keys of a camera file with tolerances, and ``main_lens.aberrations.N`` [waves rms] of Noll index N.
 
 Distances without a table are main lens to lenslets, lenslets to sensor and object to main lens; tilts and bow
 are those of ``[built]``. Below
@@ -56,7 +56,7 @@ class Tolerance:
     half
         Half of the range, in SI, or as a part of the value.
     relative
-        Whether it is a part of the value.
+        True if it is a part of the value.
     shape
         "normal": ± is two standard deviations, which 95 % of all cameras keep; "uniform": all keep it, and
         none is likelier than another. What lenslets have of their own is normal.

@@ -24,7 +24,7 @@ class Range:
     Parameters
     ----------
     label
-        What is magnified.
+        Name of the magnification.
     own
         The instrument's.
     ends

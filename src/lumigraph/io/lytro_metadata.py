@@ -34,9 +34,9 @@ class Frame:
     bayer
         Colours of the first 2 x 2 pixels, or None.
     pixel_pitch
-        In metres, or None.
+        Pixel pitch in metres, or None.
     known
-        For `RawImage.metadata`: black_level, white_level and white_balance as (r, gr, gb, b), colour_matrix
+        `RawImage.metadata`: black_level, white_level and white_balance as (r, gr, gb, b), colour_matrix
         (camera to linear sRGB), gamma, and all that was recorded under "lytro".
     """
 

@@ -60,13 +60,13 @@ def text(
     Parameters
     ----------
     shape, dtype
-        Of the data.
+        Shape and type of the data.
     pitch
         Physical sizes (z, y, x) [m]; None is left out.
     depths
         Positions of the planes [m].
     name
-        Of the image.
+        Name of the image.
     note
         Kept in an annotation.
     """

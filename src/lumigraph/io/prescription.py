@@ -23,13 +23,13 @@ _TYPES = ("STANDARD", "EVENASPH")
 _SHAPES = ("SQAP", "SQOB", "ELAP", "ELOB", "SPID", "UDAP", "UDOB", "CLOB", "OBDC")
 _VIGNETTING = ("VDXN", "VDYN", "VCXN", "VCYN", "VANN")
 _VISIBLE = (0.38e-6, 0.75e-6)
-"""Where a glass is known by its index and Abbe number [m]."""
+"""Range in which a glass is known by its index and Abbe number [m]."""
 
 _D_LINE = 587.5618e-9
 """Wavelength of the indices of a ZMX file [m]."""
 
 _SAME_INDEX = 1e-3
-"""By which a glass's index may be off the file's: melts and catalogues differ by less."""
+"""Difference allowed between a glass's index and the file's: melts and catalogues differ by less."""
 
 _MM, _UM = 1e-3, 1e-6
 
@@ -92,7 +92,7 @@ class Prescription:
     Parameters
     ----------
     path
-        Of a ZMX file or of Optiland's JSON.
+        Path of a ZMX file or of Optiland's JSON.
 
     Raises
     ------

@@ -72,7 +72,7 @@ def save(
     Parameters
     ----------
     calibration
-        Of a hexagonal array.
+        Calibration of a hexagonal array.
     path
         The file (.xml).
     lens_types

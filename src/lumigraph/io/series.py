@@ -45,11 +45,11 @@ class Frame:
     Parameters
     ----------
     arrays
-        By name; of one shape and type in all frames.
+        Arrays by name; of one shape and type in all frames.
     axes
         Names of their axes.
     attributes
-        What else is known, as JSON values; those of the first frame are kept.
+        Other metadata, as JSON values; those of the first frame are kept.
     """
 
     arrays: dict[str, np.ndarray]

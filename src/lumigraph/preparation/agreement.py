@@ -35,7 +35,7 @@ def implied(seen: Lattice, camera: Described, *, used: bool = True) -> tuple[str
     camera
         Whose file says where its micro-images should stand.
     used
-        Whether it is the picture's lattice that is used, not the camera's.
+        True if the picture's lattice is used, not the camera's.
 
     Returns
     -------

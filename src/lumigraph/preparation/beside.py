@@ -87,7 +87,7 @@ def coloured(even: RawImage, raw: RawImage) -> RawImage:
     even
         Values above the dark, over the white image.
     raw
-        As it was read: its bits and recorded levels say what is full.
+        Raw image as it was read: its bits and recorded levels say what is full.
     """
     black, white = levels(raw)
     if raw.bit_depth is None and "white_level" not in raw.metadata:

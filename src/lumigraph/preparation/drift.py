@@ -44,10 +44,10 @@ class Drift:
     rotation, expected_rotation
         The same of the rows, from +x towards +y [rad].
     slip
-        How far the two lattices are apart at the border of the picture where they agree in its middle
+        Distance between the two lattices at the border of the picture where they agree in its middle
         [pitches]; from a half on, pixels there belong to another lenslet.
     shift
-        Of the mean micro-image from where the calibration has it (y, x) [px]; None where it is not seen.
+        Shift of the mean micro-image from its calibrated place (y, x) [px]; None where it is not visible.
     evidence
         Lines of the lattice in the spectrum of the raw image's gaps over their surroundings.
     error

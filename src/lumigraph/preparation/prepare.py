@@ -46,15 +46,15 @@ def prepare(
     Parameters
     ----------
     raw
-        As it was read (y, x[, c]).
+        Raw image as it was read (y, x[, c]).
     calibration
-        Where the micro-images stand.
+        Calibration of the micro-images.
     white
         Picture of an evenly lit surface with the same settings.
     dark
         Picture with the lens covered: shows which pixels shine by themselves, too.
     camera
-        Its description: gives lengths, and the lattice where nothing else does; one without lenslets is
+        Camera description: gives lengths, and the lattice where nothing else does; one without lenslets is
         not looked at.
     mask
         Pixels to use (y, x), true or false; None for all.

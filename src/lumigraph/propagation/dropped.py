@@ -9,7 +9,7 @@ from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 
 FEWEST_FREQUENCIES = 100
-"""With fewer in the band, "auto" takes zoom: band-limited has 51 dB with 158 of them, 45 dB with 63."""
+"""Least frequencies in the band, else "auto" takes zoom: band-limited has 51 dB by 158, 45 dB by 63."""
 LARGEST_ERROR = 1e-2
 """Relative rms error that is let pass."""
 DARK = 1e-10
@@ -34,9 +34,9 @@ def dropped_light(
     Parameters
     ----------
     method
-        Its name.
+        Name of the method.
     window
-        Of the calculation.
+        Window of the calculation.
     limits
         Highest frequencies (y, x) that are kept [1/m].
     fields

@@ -124,7 +124,7 @@ def smallest_window(input_diameter: float, output_diameter: float) -> float:
     Parameters
     ----------
     input_diameter, output_diameter
-        Of the light and of what is looked at, 2 r_in and 2 r_out [m].
+        Diameters of the light and of what is looked at, 2 r_in and 2 r_out [m].
     """
     return input_diameter + output_diameter
 
@@ -225,7 +225,7 @@ def light_wraps(
     Parameters
     ----------
     window
-        Of the calculation.
+        Window of the calculation.
     limits
         Highest frequencies (y, x) that are kept [1/m].
     farthest

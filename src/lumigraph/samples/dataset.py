@@ -36,17 +36,17 @@ class Draws:
     cameras
         Camera files' texts, with their kinds; sample n is taken by camera n modulo their count.
     depths
-        Of the scenes' planes from the focused plane [m].
+        Depths of the scenes' planes from the focused plane [m].
     layouts
-        Of `LAYOUTS`.
+        Layouts, of `LAYOUTS`.
     photographs
         Files whose parts become textures.
     seed
-        Of all that is drawn.
+        Seed of all random values.
     accuracy
-        Of the raw images before noise, relative rms.
+        Error of the raw images before noise, relative rms.
     volume
-        Whether the intensities of all planes are kept, too.
+        True to keep the intensities of all planes, too.
     """
 
     cameras: tuple[str, ...]
@@ -130,7 +130,7 @@ def dataset(
     Parameters
     ----------
     work
-        What is drawn.
+        Description of what is drawn.
     count
         Samples.
     output
@@ -138,7 +138,7 @@ def dataset(
     workers, part, progress, estimated
         As `cluster.batch` takes them.
     command
-        For the card.
+        Command line for the card.
 
     Raises
     ------

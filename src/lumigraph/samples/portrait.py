@@ -121,9 +121,9 @@ def glowing(grid: Grid, depth: float) -> Scene:
     Parameters
     ----------
     grid
-        Their samples [m].
+        Grid of their samples [m].
     depth
-        Of the leaves before and of the wall behind the focused plane [m].
+        Depths of the leaves before and of the wall behind the focused plane [m].
 
     Examples
     --------

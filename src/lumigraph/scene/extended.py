@@ -66,7 +66,7 @@ class ExtendedSource:
     Parameters
     ----------
     lamp
-        Its shape.
+        Shape of the lamp.
     distance
         z from the source to the plane [m]; infinity for collimated light, negative for light that converges
         to an image of the source behind the plane, such as a condenser's in the main lens.

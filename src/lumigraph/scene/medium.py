@@ -17,7 +17,7 @@ from lumigraph.core.volume import Volume
 from lumigraph.errors import GeometryError
 
 STRAY = 1e-5
-"""Of the light, what may be bent farther than it is followed."""
+"""Part of the light that may be bent farther than is followed."""
 
 MOST_SAMPLES = 4096
 """Along a side, of a path that is looked at to tell how far it bends light."""
@@ -37,9 +37,9 @@ class Medium:
     grid
         Where the samples of every slice stand [m]; beside it, the border's paths go on.
     depths
-        Of the slices from the focused plane (z,) [m], positive farther from the objective; in any order.
+        Depths from the focused plane (z,) [m], positive farther from the objective; in any order.
     slabs
-        Whether slices are slabs of an index that changes from one to the next, as `of_index` has them: then
+        True for slabs of an index that changes from one to the next, as `of_index` has them: then
         simulations tell whether they stand near enough to each other.
 
     Raises

@@ -16,7 +16,7 @@ MOST = 64
 """Slices."""
 
 BESIDE = 2.0
-"""How much farther than the main lens sees behind an edge a slice goes on [samples]."""
+"""Samples that a slice is continued beyond what the main lens sees behind an edge."""
 
 
 @runtime_checkable

@@ -74,7 +74,7 @@ def point_source(
     distance
         z [m]; negative for a wave that converges to a point behind the grid, exp(-ikr) / r.
     position
-        Of the point (y0, x0) [m].
+        Position of the point (y0, x0) [m].
     dtype
         complex128 or complex64.
     paraxial

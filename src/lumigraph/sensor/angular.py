@@ -26,7 +26,7 @@ class AngularResponse:
     power
         n; 0 for none.
     angles, values
-        Of the table v: angles from 0 on [rad], and the response there, above 0 and at most 1. Between them
+        Table v: angles from 0 on [rad], and the response there, above 0 and at most 1. Between them
         it is interpolated without overshoot (PCHIP); beyond the last angle it keeps the last value.
 
     Raises

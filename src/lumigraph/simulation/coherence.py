@@ -23,7 +23,7 @@ from lumigraph.simulation import directions
 Seed = int | np.random.Generator | None
 
 BLOCKS = 8
-"""Of shots, whose spread tells the error: two show one difference, which by chance may be small."""
+"""Blocks of shots, whose spread shows the error: two show one difference, which by chance may be small."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +39,7 @@ class Plane:
     distance
         To the main lens [m].
     pupil_diameter
-        Of the main lens [m].
+        Diameter of the main lens' stop [m].
     """
 
     amplitude: np.ndarray
@@ -338,7 +338,7 @@ class PartiallyCoherent:
         `GaussianSchell` or `ExtendedSource`; or `CoherentModes` of the camera's wavelength, with a sample
         wherever a slice has one, in the focused plane.
     accuracy
-        Of a source's mutual intensity, over the largest intensity; that of `CoherentModes` is their own. Its
+        Error of a source's mutual intensity, over the largest intensity; `CoherentModes` have their own. Its
         share is part of ``metadata["error"]``.
 
     Raises

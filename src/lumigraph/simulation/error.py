@@ -27,9 +27,9 @@ class Reached:
     rms
         Relative rms error, estimated.
     source
-        How it is known.
+        Source of the estimate.
     paraxial
-        By how much parabolic lenses are off beside this, relative rms, estimated; 0 where lenses are exact.
+        Additional error of parabolic lenses, relative rms, estimated; 0 where lenses are exact.
     """
 
     rms: float
@@ -52,7 +52,7 @@ def of_quadrature(path: str, accuracy: float) -> Reached:
 
 
 SINGLE = 1.3
-"""How much farther off the image of one sample of a slice is than that of many."""
+"""Ratio of the error of one sample's image to that of many samples'."""
 
 
 def of_operator(intensity: np.ndarray, accuracy: float) -> Reached:
@@ -64,7 +64,7 @@ def of_operator(intensity: np.ndarray, accuracy: float) -> Reached:
 
 
 ROUNDING = 1.5e-6
-"""Of points' images in single precision, relative rms."""
+"""Rounding error of points' images in single precision, relative rms."""
 
 
 def of_points(difference: float, accuracy: float) -> Reached:

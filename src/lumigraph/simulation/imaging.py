@@ -75,7 +75,7 @@ def simulate(
     scene
         Slices, points and diffusers; see `lumigraph.targets`. Or a `Volume`, whose planes are slices.
     coherence
-        Of slices: `Incoherent` (default), `Coherent`, `PartiallyCoherent`, `Snapshots` or `TiltedWaves`. The
+        For slices: `Incoherent` (default), `Coherent`, `PartiallyCoherent`, `Snapshots` or `TiltedWaves`. The
         last two leave the raw image's relative rms error, estimated from the spread of blocks of their
         shots, in ``metadata["estimated_error"]``.
     spectrum
@@ -87,7 +87,7 @@ def simulate(
         Runs the propagations, such as a pool's ``imap``; results are added in order, so that every map
         gives the same raw image.
     medium
-        What refracts before the scene, of light-field microscopes ("1.0" and "2.0"): slices that delay light,
+        Refracting medium before the scene, for microscopes "1.0" and "2.0": slices that delay light,
         by multislice; at most some thousand points and lit samples.
 
     Raises

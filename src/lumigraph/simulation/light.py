@@ -20,13 +20,13 @@ class Shots:
     Parameters
     ----------
     camera
-        That they went through.
+        Camera of the shots.
     total
-        On the pixels, of all blocks that are complete.
+        Light on the pixels, of all blocks that are complete.
     drawn
         Shots in each of these.
     squares
-        Of their images' norms, each over its shots, summed.
+        Squared norms of their images, each over its shots, summed.
     """
 
     camera: Camera

@@ -37,7 +37,7 @@ COARSER = 1.5
 """Pitch of the samples that tell the error of an operator's own, over theirs."""
 
 LEAST = 0.5
-"""Of the accuracy asked for, that an operator is made for where samples of a slice take up the rest."""
+"""Smallest part of the accuracy left to an operator, if a slice's samples take up the rest."""
 
 
 @runtime_checkable

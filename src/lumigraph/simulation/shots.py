@@ -25,7 +25,7 @@ class Shot:
     train: Train
     weight: float
     block: int = 0
-    """Of the blocks of a random or quasi-random sample, the one that this shot belongs to."""
+    """Block of a random or quasi-random sample to which this shot belongs."""
 
     def arrive(self) -> tuple[int, np.ndarray]:
         """Block of the shot, and its intensity on the samples of the image."""

@@ -26,14 +26,14 @@ class Spectrum:
     Parameters
     ----------
     wavelengths
-        In vacuum [m].
+        Wavelengths in vacuum [m].
     weights
         (wavelengths, channels), channels 1 or 3 (red, green, blue), not negative; those of a channel are
         scaled to a sum of 1, so that an even white scene has mean 1 in all of them.
     bayer
         Pattern of a colour filter, such as "RGGB": the raw image is (ny, nx). None keeps (ny, nx, 3).
     error
-        What few wavelengths leave of the degree of coherence; raw images count it in their error.
+        Error of the degree of coherence by few wavelengths; raw images count it in their error.
 
     Raises
     ------
@@ -111,9 +111,9 @@ class Spectrum:
         light
             (n,) per wavelength, in any unit, such as of a lamp; None for an even one.
         accuracy
-            Of the degree of coherence.
+            Accuracy of the degree of coherence.
         bayer
-            As of a `Spectrum`.
+            Bayer pattern as of a `Spectrum`.
 
         Raises
         ------

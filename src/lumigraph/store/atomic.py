@@ -41,9 +41,9 @@ def write_bytes(path: str | os.PathLike[str], content: bytes, *, flush: bool = T
     Parameters
     ----------
     path, content
-        Of the file.
+        Path and content of the file.
     flush
-        Whether to wait until the disk has it. Without, a cut of the power may leave a torn file, though a
+        True to wait until the disk has it. Without, a cut of the power may leave a torn file, though a
         kill does not: for files whose checksum is kept elsewhere.
 
     Raises

@@ -21,10 +21,10 @@ PARTS = (0.1, 0.3, 0.42, 0.6, 0.75, 0.9, 1.1)
 """Frequencies over the main lens's cut-off; the rendered picture ends at 0.5 where m = 0.5."""
 
 AMPLITUDE = 0.13
-"""Of each frequency: all together stay below the mean."""
+"""Amplitude of each frequency: all together stay below the mean."""
 
 ELECTRONS = 9000.0
-"""Of an even scene, in a pixel in the middle of a micro-image."""
+"""Electrons of an even scene in a pixel in the middle of a micro-image."""
 
 _MAGNIFICATION = 0.5
 _OVERSAMPLING = 1.25  # of the main-lens image above twice its cut-off

@@ -13,7 +13,7 @@ HAZE = 1.0
 """Photons that every pixel sees without an object."""
 
 PIXELS = 15
-"""Of a lenslet, along each side."""
+"""Pixels of a lenslet, along each side."""
 
 
 def scope(count: int) -> LightFieldMicroscope:

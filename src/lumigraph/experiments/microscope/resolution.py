@@ -13,13 +13,13 @@ from lumigraph.plots.curves import curves
 from lumigraph.units import um
 
 DEPTHS = (-50 * um, -25 * um, -12 * um, 0.0, 12 * um, 25 * um, 50 * um)
-"""Of the beads, in the full run."""
+"""Depths of the beads, in the full run."""
 
 STEP = 2 * um
 PLANES = 11
 SAMPLES = 11
 PHOTONS = 2e5
-"""Of a bead, on the sensor."""
+"""Photons of a bead, on the sensor."""
 
 SHELL = 18 * um
 """Radius of the vesicle."""

@@ -1,14 +1,7 @@
 """The 2f system as a filter, and random-phase snapshots of a resolution target through it.
 
-In the Fresnel approximation the intensity in the image of a 2f system is exactly
-
-    |h * (U exp(iπ r²/(λz)))|²,
-
-h the transform of the pupil, so that one snapshot costs one forward transform and a small inverse one: of the
-object's frequencies only those inside the pupil, D/(2λz) = 12.5 /mm, arrive. The image is sampled just
-finely enough for its intensity, which holds twice these frequencies. Light that converges on the lens, as
-behind a condenser, cancels the phase; parallel light does not, and the more of it is coherent the more misses
-the lens from the border of the field.
+In the Fresnel approximation the intensity is |h * (U exp(iπ r²/(λz)))|², h the transform of the pupil: one
+snapshot costs one forward transform and a small inverse one. docs/theory/experiments.md has the rest.
 """
 
 from collections.abc import Callable
@@ -27,7 +20,7 @@ from lumigraph.scene import Slice, targets
 from lumigraph.units import mm
 
 SAMPLES, WINDOW = 1765, 10 * mm
-"""Those of the thesis' section 3.5.1."""
+"""Sampling of the thesis' section 3.5.1."""
 QUICK_SAMPLES = 882
 """Half of the window at the same pitch: the same object detail, masks and speckle."""
 INCOHERENCE = 0.14

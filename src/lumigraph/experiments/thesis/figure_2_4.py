@@ -11,7 +11,7 @@ from lumigraph.units import mm, nm, um
 
 WAVELENGTH = 633 * nm
 GRID = Grid.square(500, 1.6 * um)
-"""Of 0.8 mm: aliasing begins at N p²/λ = 2.02 mm, as in the thesis' figure; its own grid is not given."""
+"""Grid of 0.8 mm: aliasing begins at N p²/λ = 2.02 mm, as in the thesis, which does not give its grid."""
 DISTANCES = (1 * mm, 2 * mm, 10 * mm, 20 * mm)
 
 WHY = (

@@ -18,13 +18,13 @@ from lumigraph.scene import targets
 from lumigraph.simulation import simulate
 
 _TURN, _OFF = math.radians(0.3), -4.0
-"""Of the lenslets; and how much farther each micro-image is taken from its own place than the last [px]."""
+"""Rotation of the lenslets; extra distance of each micro-image from the last one [px]."""
 
 _SAMPLES, _NEAR = 41, 3
-"""Of the picture per lenslet; and lenslets from the axis at which patches are still in their micro-images."""
+"""Samples of the picture per lenslet; lenslets from the axis at which patches are still in micro-images."""
 
 _THRESHOLD, _STOP = 0.5, 0.8
-"""Of the brightest; and the main lens' diameter over that whose micro-images touch: they need gaps."""
+"""Part of the brightest; and the main lens' diameter over that whose micro-images touch: they need gaps."""
 
 
 @experiment(

@@ -1,20 +1,11 @@
-r"""Exact raw images of lined objects, without speckle: the lenslets' periodicity does the work.
+"""Exact raw images of lined objects, without speckle, by the periodicity of the lenslets.
 
-Random phases would need 10^4 snapshots for 1 %. Instead mutually incoherent points are summed exactly,
-which is cheap for a grating, for three reasons that hold under the Fresnel approximation:
+Mutually incoherent points are summed; n points per lenslet and axis have only n² different images, moved by
+whole periods. docs/theory/experiments.md has the reasons and Talanov's transformation, which puts the period
+on whole samples. Coordinates are those of the upright raw image: an object at x appears around the lenslet at
+x L/z1.
 
-- The intensity on the sensor is band-limited in the object coordinate, at D/(λ z1): points spaced more
-  closely than λ z1/(2D) stand for a continuous object that is low-passed there.
-- Moving a point by p z1/L moves its intensity on the sensor by exactly p (1 + b/L). So n points per lenslet
-  and axis have only n² different images, each computed on a window of a few lenslets.
-- An object that does not vary along y has a raw image of period p (1 + b/L) along y: the images of all
-  points of a column are folded into one lenslet's height.
-
-Talanov's transformation makes the periodicity exact on the samples: the phase exp(iπx²/(λL)) is left out at
-the lenslets, b becomes bL/(L + b), and the sensor is a factor 1 + b/L larger afterwards.
-
-V. I. Talanov, JETP Lett. 11, 199 (1970). Coordinates are those of the upright raw image: an object at x
-appears around the lenslet at x L/z1.
+V. I. Talanov, JETP Lett. 11, 199 (1970).
 """
 
 import math
@@ -47,7 +38,7 @@ def main_lens_amplitude(
     Parameters
     ----------
     camera
-        Its main lens, wavelength and focused distance.
+        Main lens, wavelength and focused distance.
     y, x
         Places in the plane, relative to where the chief ray of the point meets it [m].
     separation
@@ -85,7 +76,7 @@ class LinedCamera:
     dz
         Depth of the object from the focused plane [m].
     samples
-        Of the sensor per lenslet, an odd number.
+        Samples of the sensor per lenslet, an odd number.
     classes
         Points per lenslet, an odd number.
     spreads

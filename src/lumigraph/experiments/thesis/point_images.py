@@ -46,7 +46,7 @@ class PointImage:
     Parameters
     ----------
     camera
-        That saw them.
+        Camera of the images.
     main, main_grid
         Main-lens image (y, x), and where its samples stand [m].
     raw

@@ -20,9 +20,9 @@ class MisplacedCamera(FocusedPlenopticCamera):
     Parameters
     ----------
     sensor_shift
-        Of the sensor away from the lenslets [m].
+        Shift of the sensor away from the lenslets [m].
     lenslet_shift
-        Of the lenslets towards the sensor [m].
+        Shift of the lenslets towards the sensor [m].
     """
 
     sensor_shift: float = 0.0
