@@ -204,7 +204,7 @@ def _lengths(intended: Calibration) -> tuple[float, float, float]:
     if pixel is None or separation is None or distance is None:
         raise CalibrationError(
             "the camera's pixel_pitch, separation or lenslet_distance is not known, and a white image alone "
-            "does not tell them. Give a camera that has all three."
+            "does not show them. Give a camera that has all three."
         )
     return pixel, separation, distance
 
@@ -319,7 +319,7 @@ def _mean_cell(picture: np.ndarray, lattice: Lattice) -> np.ndarray:
 def _width(cell: np.ndarray, blur: _Blur) -> tuple[float, bool]:
     """Width of the micro-images over the pitch, and whether the lattice stands between them.
 
-    It is that of the disc whose harmonics, blurred, are those of the cell. Harmonics see overlapping
+    It is that of the disc whose harmonics, blurred, are those of the cell. Harmonics show overlapping
     micro-images too: light adds up. Beyond 1.22 pitches the brightest places are between micro-images.
     """
     spectrum = np.fft.fft2(cell) / cell.sum()

@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from lumigraph.instruments import Instrument, LightFieldMicroscope
 
 TERMS = "5-11"
-"""Unless others are asked for: up to coma, trefoil and spherical aberration."""
+"""Default terms: up to coma, trefoil and spherical aberration."""
 
 FLAT = "4-11"
 """The same of a picture at a known depth: with defocus."""
 
 HIGHEST = 66
-"""Noll index: order 10. More of them than a light field tells."""
+"""Highest Noll index, order 10: more than a light field can determine."""
 
 
 def indices(text: str) -> tuple[int, ...]:
@@ -51,7 +51,7 @@ def indices(text: str) -> tuple[int, ...]:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Adaptive:
-    """Aberrations that are found first.
+    """Aberrations to find before the object.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class Adaptive:
     def found(
         self, raw: "PreparedImage", camera: "Instrument", planes: tuple[float, ...] | None, shown: Progress
     ) -> "Wavefront | None":
-        """The wavefront, if it is asked for; cameras that have none are refused by `estimate`."""
+        """Wavefront, if requested; `estimate` refuses cameras that have none."""
         if not self.adaptive:
             return None
         from lumigraph.adaptive import estimate
@@ -121,7 +121,7 @@ def signed(value: float, deviation: float) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Modes:
-    """Zernike terms that were found, as the command line says them.
+    """Zernike terms that were found, in the form of the report.
 
     Parameters
     ----------

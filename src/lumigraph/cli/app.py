@@ -188,6 +188,6 @@ def _say(text: str) -> None:
 
 
 def _discard_output() -> None:
-    """Let what is still to be written go nowhere."""
+    """Discard all further output."""
     with suppress(AttributeError, OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -30,13 +30,13 @@ RUN = 16
 
 _STATUS = "status"
 _SHOWN = 5
-"""Failures that are told one by one."""
+"""Number of failures that are listed one by one."""
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Hands:
-    """Who does it.
+    """Workers that do the job.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ class Known:
         Standard error of that distance, such as '0.02 mm'; 5 % if left out.
     lenslet_pitch
         Between lenslets, if it is known well, such as '125.02 um': with the pitch of the micro-images it
-        tells f and distances.
+        gives f and distances.
     lenslet_pitch_error
         Standard error of the pitch, such as '0.01 um'; 0.03 % if left out. With it, --camera's pitch is used.
     micro_image_pitch
@@ -148,7 +148,7 @@ def board(
     lenslets show them, with the columns frame, corner, y, x, center_y, center_x, kind, and in_views of a
     camera 1.0; or one folder of COMPOTE's (bap.csv, centers.csv, camera.json, scene.json), which also says
     what the board and the camera are. Or the word plan: which pictures of the board to take with --camera,
-    and how well they will tell its lengths.
+    and how precise its lengths will be.
 
     Example: `lumigraph board plan --camera camera.toml --board "9 x 5 corners, 10 mm"`
 
@@ -254,7 +254,7 @@ def _found(
 
 
 def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int) -> Result:
-    """Pictures to take."""
+    """Plan of the pictures to take."""
     from lumigraph import metric
     from lumigraph.instruments import LensletCamera
     from lumigraph.instruments.capabilities import Rendered
@@ -293,7 +293,7 @@ def _enough(found: "Plan") -> str:
 
 
 def _hardly_told(found: "Plan", nominal: "Nominal") -> tuple[str, ...]:
-    """A note where pictures tell f hardly better than it is known without them."""
+    """Note if the pictures hardly improve on the f that is known beforehand."""
     if found.steps[-1].errors[0] < 0.7 * nominal.focal_length_error * nominal.focal_length:
         return ()
     return (

@@ -89,7 +89,7 @@ class _Lines:
         self.task, self.began, self.next = task, time.monotonic(), FIRST_LINE
 
     def __call__(self, *, description: str = "", completed: float = 0.0, **_: object) -> None:
-        """Write what is done, if it is time to."""
+        """Write the fraction done, if it is time to."""
         passed = time.monotonic() - self.began
         if passed >= self.next and completed < 1:
             self.next = 2 * passed

@@ -145,7 +145,7 @@ def _as_built(
     shapes = sorted({one.operator_grid().shape for one in found})
     if len(shapes) > 1:
         raise FormatError(
-            f"the cameras drawn see pictures of {shapes[0]} to {shapes[-1]} samples, and a data set has one "
+            f"the cameras drawn have objects of {shapes[0]} to {shapes[-1]} samples, but a data set has one "
             "shape. Leave out the tolerances of lenslets.rotation and offset, or make others tighter."
         )
     return found

@@ -149,7 +149,7 @@ def side_by_side(
 
 @dataclass(frozen=True)
 class _Begun:
-    """A raw image that is ready, and what its operator is made of."""
+    """A prepared raw image, and the settings of its operator."""
 
     ready: "PreparedImage"
     asked: "_Asked"
@@ -342,7 +342,7 @@ def operator_of(
     camera: "Instrument", planes: tuple[float, ...] | None, samples: int | None,
     calibration: "Calibration | None", progress: Progress = silent, shifts: Shifts | None = None,
 ) -> "Linear":  # fmt: skip
-    """The camera's model of how it sees planes [m], or an object that was moved by shifts [m]."""
+    """Operator of the camera for planes [m], or for an object that was moved by shifts [m]."""
     from lumigraph.instruments.joint import joint_operator_for
 
     if camera.calibration is None and samples is not None:

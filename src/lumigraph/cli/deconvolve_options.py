@@ -160,7 +160,7 @@ class Way:
         above_zero("--change", self.change)
 
     def method(self, camera: "Instrument", operator: "Linear") -> "RichardsonLucy":
-        """`RichardsonLucy` with what was asked for."""
+        """`RichardsonLucy` with these options."""
         from lumigraph.deconvolution import RichardsonLucy, TotalVariation, Wavelets
         from lumigraph.instruments.smoothing import low_pass_of
 

@@ -272,7 +272,7 @@ def _is_focused(camera: "Instrument | None", calibration: "Calibration") -> bool
 
 
 def _corrected(found: "DepthMap", views: Any, how: tuple[Any, Search], shown: Progress) -> "DepthMap":
-    """Refocus factors without the bias of diffraction, which planes of known depth tell."""
+    """Refocus factors without the bias of diffraction, measured on planes of known depth."""
     from lumigraph import depth as verbs
 
     camera, search = how

@@ -1,4 +1,4 @@
-"""Frames of a batch: what a verb makes of each, and which there are."""
+"""Frames of a batch, and the output of a verb for each."""
 
 import os
 import tempfile

@@ -102,7 +102,7 @@ def _notes(found: "Bounds") -> Iterator[str]:
             f"{np.max(found.errors):.1%}, rms"
         )
     if np.isinf(found.deviations).any():
-        yield "at some places the raw image does not tell all, such as which side of the focus a point is on"
+        yield "at some places the raw image does not determine all, such as the side of the focus"
 
 
 def _figures(found: "Bounds", rows: list[tuple[str, ...]]) -> Iterator[Figure]:

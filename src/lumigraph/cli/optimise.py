@@ -58,7 +58,7 @@ class Aim:
     scene_samples
         Across a scene, which is as wide as so many pixels; the time grows with them.
     held_out
-        Pictures that the search does not see, of the same --scene-pitch: 16 squares of them at most are
+        Pictures held out from the search, of the same --scene-pitch: 16 squares of them at most are
         reconstructed from drawn raw images before the camera as given, the best of the first values and the
         best, as if they were like the --scenes. Warns where the best is not better there.
     """

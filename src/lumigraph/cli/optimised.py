@@ -72,7 +72,7 @@ def _off(found: "Optimum", one: "Tried") -> str:
 
 
 def _held_out(found: "Optimum") -> Iterator[str]:
-    """Errors of scenes that the search did not see, in words, and how much better the best is."""
+    """Errors of held-out scenes, in words, and the gain of the best camera."""
     best = found.held_out.get("best")
     for which, one in found.held_out.items():
         words = NAMES.get(which, which)
@@ -94,7 +94,7 @@ def _kinds(found: "Optimum") -> tuple[str, str]:
 
 
 def _both(found: "Optimum", k: int) -> str:
-    """Values of both goals of a camera of the front, and what it has of its own."""
+    """Values of both goals of a camera of the front, and its varied values."""
     row, goals = found.front[k], (found.goal, found.against)
     reached = " with ".join(f"{one.name} {one.told(row[one.name])}" for one in goals if one)
     own = ", ".join(f"{key} = {row[key]}" for key in _changed(found) if key in row)
@@ -190,7 +190,7 @@ def _trials(found: "Optimum") -> Iterator[Figure]:
 
 
 def _of_held_out(found: "Optimum") -> Iterator[Figure]:
-    """Errors of scenes that the search did not see, and the first of them."""
+    """Figure of the errors of held-out scenes, and the first of them."""
     some = {NAMES.get(which, which): one for which, one in found.held_out.items() if not one.reason}
     if not some:
         return
@@ -263,7 +263,7 @@ def _scaled(goal: "Goal", values: list[float]) -> tuple[list[float], str]:
 
 
 def _search(found: "Optimum") -> Iterator[Figure]:
-    """The best so far over the cameras in turn."""
+    """Figure of the best value so far over the cameras in turn."""
     from lumigraph import plots
     from lumigraph.optimisation.goals import BOUNDS
     from lumigraph.plots.axes import length_unit

@@ -45,7 +45,7 @@ COMMON = Common()
 
 
 def _telling(default: object) -> str | None:
-    """The default as the help shows it, if it is worth showing."""
+    """Text of the default in the help, if it is informative."""
     return None if default is False or default is None else str(default)
 
 

@@ -60,7 +60,7 @@ class Focus:
 
     @property
     def count(self) -> int:
-        """Pictures that are asked for."""
+        """Number of requested pictures."""
         several = range_of("--alphas", self.alphas) if self.alphas else []
         return len(self.alpha or []) + len(several) + len(self.depth or [])
 

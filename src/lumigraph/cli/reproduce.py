@@ -104,7 +104,7 @@ def _table(result: "Computed") -> str:
 
 
 def _failure(results: "list[Computed]", output: Path) -> str:
-    """Why the exit code is 1, or nothing."""
+    """Reason for the exit code 1, or an empty text."""
     failed = [result for result in results if result.failed]
     if not failed:
         return ""

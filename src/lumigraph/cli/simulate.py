@@ -59,7 +59,7 @@ class Light:
     na
         Numerical aperture of the tilted waves, all directions if left out; or of the lamp of partial.
     wavelength
-        Wavelength instead of the camera's own, such as '550 nm'. May be repeated: the sensor sees the sum;
+        Wavelength instead of the camera's own, such as '550 nm'. May be repeated: the raw image is the sum;
         with --colours three are red, green and blue.
     colours
         rgb: a colour raw image; or a Bayer pattern, such as RGGB. The scene's pictures keep their colours.
@@ -122,7 +122,7 @@ class Light:
 
     @contextmanager
     def unasked(self) -> "Iterator[None]":
-        """Without --accuracy the result states what parabolic lenses miss: nobody asked for less."""
+        """True without --accuracy: the result then only states the error of parabolic lenses."""
         with warnings.catch_warnings():
             if self.accuracy is None:
                 warnings.simplefilter("ignore", ParaxialWarning)
@@ -147,7 +147,7 @@ class Light:
         if self.na is None:
             raise FormatError("--coherence partial needs --na, the numerical aperture of the lamp.")
         if not isinstance(camera, WithMainLens):
-            raise FormatError("--coherence partial is for cameras: a microscope sees fluorescence.")
+            raise FormatError("--coherence partial is for cameras: microscopes image fluorescence.")
         lamp = ExtendedSource.disc(self.na, -camera.object_distance)
         return simulation.PartiallyCoherent(lamp, 1e-3 if self.accuracy is None else self.accuracy)
 
@@ -359,7 +359,7 @@ def simulate(
     )  # fmt: skip
     table = described.describe()
     return Result(
-        "Simulate", f"What the sensor of a {table.title} sees.", raw, tuple(lines), values,
+        "Simulate", f"Raw image of a {table.title}.", raw, tuple(lines), values,
         lambda: _figures(raw, described), tuple(table.warnings), (output,),
     )  # fmt: skip
 

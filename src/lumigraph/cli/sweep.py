@@ -159,7 +159,7 @@ def axes_of(varied: Mapping[str, list[Any]]) -> "Axes":
 
 
 def _names(measure: str | None, known: Sequence[str]) -> list[str]:
-    """The quantities that are asked for."""
+    """Requested quantities."""
     if measure is None:
         return list(known)
     from lumigraph.metric import is_measure

@@ -1,4 +1,4 @@
-"""`lumigraph tolerance`: what errors of making do to a camera, and which tolerance to pay for."""
+"""`lumigraph tolerance`: effects of manufacturing errors on a camera, and which tolerances matter."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -44,7 +44,7 @@ def tolerance(
     hands: Hands = ALONE,
     common: Reported = REPORTED,
 ) -> Result:
-    """Draw cameras with errors of making, and say which tolerance to pay for.
+    """Draw cameras within manufacturing tolerances, and report which tolerance costs most.
 
     A camera with errors is as it was built: all else stays where the camera file puts it, and its plane of
     focus moves. Each measure gets its mean and deviation over the cameras drawn, and the share of each
@@ -64,7 +64,7 @@ def tolerance(
         "lenslets.focal_length=±1 % uniform"; +- will do. Normal errors keep to it in 95 % of all cameras,
         uniform ones in all. Lenslets that differ from each other: "lenslets.each.focal_length=±1 %",
         "lenslets.each.decentre=±2 um", "lenslets.each.tilt=±1 mrad" (with their index in the camera file),
-        "lenslets.each.form=±20 nm" (rms path), "lenslets.each.missing=0.2 %". What leans: "array_tilt_y=±1 mrad",
+        "lenslets.each.form=±20 nm" (rms path), "lenslets.each.missing=0.2 %". Tilts and bow: "array_tilt_y=±1 mrad",
         array_tilt_x, array_bow (a length, at the corners), sensor_tilt_y, sensor_tilt_x. May be repeated.
     draws
         Cameras drawn.
@@ -123,7 +123,7 @@ def given_tolerances(texts: list[str]) -> dict[str, str]:
 
 
 def _partly(found: Any, output: Path) -> Result:
-    told = f"{found.stand} are done; the last part tells what follows from them"
+    told = f"{found.stand} are done; the last part reports the results"
     return Result("Tolerances", "A part of the cameras.", None, (told,), written=(output,))
 
 

@@ -37,7 +37,7 @@ def twin(
     """Compare a bench with its camera file by white images, and say what to turn on the bench.
 
     WHITES are white images of the bench as it stands, which are averaged. The array's height, tilt, shift
-    and turn and the stop's diameter are told, with 95 % intervals; what is not sure is not told.
+    and rotation and the diameter of the stop are reported with 95 % intervals, or as undetermined.
 
     Example: `lumigraph twin white.tiff --camera camera.toml`
 

@@ -38,7 +38,7 @@ def wavefront(
     """Find the wavefront at a camera's main lens, from one raw image of a star or of a scene.
 
     Of a star, or any point of light, Zernike terms are fitted to the pixels through the camera's wave optics.
-    Of a flat scene with texture they follow from the shifts of views, as rays see it: for a camera of kind
+    Of a flat scene with texture they follow from the shifts of views, by rays: for a camera of kind
     "plenoptic" or a microscope of configuration "1.0", and less exactly. Terms have standard deviations.
 
     Example: `lumigraph wavefront star.tiff --camera telescope.toml --dark dark.tiff --report wavefront.html`

@@ -1,6 +1,6 @@
 """Record of a job's finished frames: a folder beside its output, written by any number of processes.
 
-An entry is a file of its own, written in one step after the frame's shards, and names their checksums: it
+Each entry is a separate file, written in one step after the frame's shards, and names their checksums: it
 counts while the shards are as it says. A worker claims a frame by a lock on one byte of a file; the system
 gives it back when the worker ends, however it ends.
 """
@@ -228,7 +228,7 @@ class Ledger:
 
 _HELD: set[tuple[str, int]] = set()
 _GUARD = threading.Lock()
-"""Locks of files are the process' own: threads of one are told apart here."""
+"""Locks of files are the process' own: threads of one are distinguished here."""
 
 
 @contextmanager

@@ -25,7 +25,7 @@ _TOLD = 16
 """Frames that are checked for each call of the progress callback."""
 
 _ROUNDS, _PATIENCE = 600, 1.0
-"""How often, and after how many seconds, frames are asked for again that somebody else works on."""
+"""How often, and after how many seconds, frames that another worker claims are tried again."""
 
 
 class Group(Protocol):
@@ -237,7 +237,7 @@ def _begin(
     task: Task, who: tuple[Cluster, Group], left: list[int], progress: Progress,
     estimated: Callable[[Estimate], None] | None,
 ) -> list[int]:  # fmt: skip
-    """Do frames that show what the others will need, tell it, and give the others.
+    """Do some frames, report the estimated needs of the rest, and return the rest.
 
     The first one makes what they share; after it, some from all over the job by all workers side by side.
 
@@ -303,7 +303,7 @@ def _need(
 
 
 def _do(task: Task, group: Group, numbers: list[int], done: int, total: int, progress: Progress) -> list[int]:
-    """Do some frames; those that somebody else works on are asked for until they are done.
+    """Do some frames; those claimed by another worker are tried until they are done.
 
     Their numbers are given in the order in which they ended.
 

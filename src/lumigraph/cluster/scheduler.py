@@ -22,7 +22,7 @@ _ONE = Lock()
 
 @dataclass(frozen=True, slots=True)
 class Dask:
-    """A running dask cluster, whose workers have lumigraph and see the same files.
+    """A running dask cluster, whose workers have lumigraph and access to the same files.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ class SideBySide(Protocol):
 
 @dataclass(frozen=True)
 class Task:
-    """A job as a worker sees it; it is sent to other processes and machines.
+    """A job for a worker; it is sent to other processes and machines.
 
     Parameters
     ----------

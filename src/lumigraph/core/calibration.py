@@ -157,7 +157,7 @@ class Calibration:
         return self.lattice.index(*self.straightened(y, x))
 
     def offset(self, y: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Way (dy, dx) [px] from the centre of its micro-image to each place; y and x broadcast."""
+        """Offset (dy, dx) [px] of each place from the centre of its micro-image; y and x broadcast."""
         center = self.position(np.stack(self.index(y, x), -1))
         return y - center[..., 0], x - center[..., 1]
 
@@ -199,12 +199,12 @@ class Calibration:
         )
 
     def require_regular(self, what: str) -> None:
-        """Refuse what needs lenslets that stand on a lattice.
+        """Refuse lenslets that are displaced from the lattice, for `what` needs a regular one.
 
         Raises
         ------
         CalibrationError
-            Some stand beside it.
+            Some are displaced.
         """
         if self.aside is not None:
             raise CalibrationError(

@@ -42,7 +42,7 @@ class DepthMap(Noun[A]):
         One of `QUANTITIES`.
     error
         Mean distance from the truth to expect of each value (y, x), in its unit; None where the method
-        cannot tell.
+        does not estimate it.
 
     Raises
     ------
@@ -144,7 +144,7 @@ class DepthMap(Noun[A]):
     def replaced(
         self, values: np.ndarray, quantity: str, slope: np.ndarray | float | None = None
     ) -> "DepthMap":
-        """The map with other values; of what cannot be told, NaN, the confidence becomes 0.
+        """Map with other values; where they are NaN, the confidence becomes 0.
 
         `slope` is how much they change with the values before; where None, expected errors are not known.
         """

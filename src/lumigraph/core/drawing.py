@@ -9,7 +9,7 @@ _home: "Callable[[], Any] | None" = None
 
 
 def done_by(home: "Callable[[], Any]") -> None:
-    """Take the functions that draw from what `home` gives; it is called when the first thing is drawn."""
+    """Register the drawing functions that `home` returns; it is called at the first drawing."""
     global _home
     _home = home
 

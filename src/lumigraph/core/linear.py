@@ -178,7 +178,7 @@ class Transposed(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """The map's, the other way round."""
+        """Shapes of the map, exchanged."""
         return self.of.shape[1], self.of.shape[0]
 
     def _forward(self, intensity: Array) -> Array:

@@ -51,7 +51,7 @@ def total() -> int | None:
 
 
 def told(size: float) -> str:
-    """Bytes as people read them.
+    """Text of a number of bytes, with a suitable unit.
 
     >>> told(512), told(5.5 * 2**20), told(3 * 2**30)
     ('512 B', '5.5 MiB', '3 GiB')

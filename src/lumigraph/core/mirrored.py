@@ -1,4 +1,4 @@
-r"""Products with matrices that are alike from both ends, :math:`M_{-i, -j} = M_{ij}`, by halves.
+r"""Products with centrosymmetric matrices, :math:`M_{-i, -j} = M_{ij}`, by halves.
 
 Such a matrix turns even data into even and odd into odd, so that two matrices of half the rows and columns
 do: half of the arithmetic.
@@ -12,7 +12,7 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mirrored:
-    """A matrix (rows, columns) that is alike from both ends.
+    """A centrosymmetric matrix (rows, columns).
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Mirrored:
 
     @property
     def transposed(self) -> "Mirrored":
-        """The transpose, which is alike from both ends as well."""
+        """The transpose, which is centrosymmetric, too."""
         (rows, columns), even = self.shape, self.even.T.copy()
         if rows % 2:
             even[:, 0] /= 2  # as `of` has what stands in the middle of a row

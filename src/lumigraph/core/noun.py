@@ -35,7 +35,7 @@ class Noun(Generic[A]):
         return as_numpy(getattr(self, self.pixels), dtype, copy)
 
     def plot(self, **options: Any) -> Any:
-        """A matplotlib Figure of it, as `lumigraph.plots.show` draws it; no window is opened."""
+        """Matplotlib Figure, as `lumigraph.plots.show` draws it; no window is opened."""
         return draw("show", self, **options)
 
     def to_xarray(self) -> Any:

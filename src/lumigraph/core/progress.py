@@ -7,7 +7,7 @@ Progress = Callable[[float], None]
 
 
 class Stage(float):
-    """A fraction that also says what goes on, for a bar's description.
+    """Fraction with a description of the current step, for a progress bar.
 
     >>> fraction = Stage(0.25, "raw image")
     >>> print(fraction, fraction.what)
@@ -24,7 +24,7 @@ class Stage(float):
 
 
 def silent(fraction: float) -> None:
-    """Progress that nobody looks at."""
+    """Progress callback that does nothing."""
 
 
 def within(progress: Progress | None, first: float, last: float, what: str = "") -> Progress:

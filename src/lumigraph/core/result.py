@@ -116,7 +116,7 @@ class Result:
     rows
         Values for programs in place of named values, where they form a list.
     failure
-        Why the command ends with an error after all is told; empty where it does not.
+        Reason why the command ends with an error after its output; empty if it does not.
     """
 
     title: str

@@ -29,7 +29,7 @@ class ZernikeMap:
     """Zernike terms of a lens over the field and, where they are known, over wavelengths.
 
     Between the given fields and wavelengths terms follow splines through them, cubic where there are four or
-    more. Of a round lens a line of fields tells all: fields in other directions have its terms turned.
+    more. A line of fields suffices for a round lens: fields in other directions have its terms turned.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def _beyond(value: np.ndarray, nodes: Nodes) -> np.ndarray:
 
 
 def _through(nodes: Nodes, values: np.ndarray, at: float, parity: np.ndarray | None) -> np.ndarray:
-    """Values (n, ...) at nodes, for a place between them; a parity tells those on the axis' other side."""
+    """Values (n, ...) at nodes, for a place between them; a parity gives those on the axis' other side."""
     where = np.asarray(nodes)
     if parity is not None and len(nodes) > 1:
         where, values = (
@@ -241,7 +241,7 @@ class Openings:
 class FieldPlate:
     """Plate of a main lens whose aberrations change over the field, in a stop that is round on the axis.
 
-    One field of light behind the lens does not tell where each part came from: use the plate `at` a field.
+    One field of light behind the lens does not show where each part came from: use the plate `at` a field.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ class FieldPlate:
         )  # fmt: skip
 
     def __call__(self, light: Field) -> Field:
-        """Refused: what one plate does is not what this one does."""
+        """Refuse a field: the phase of this plate depends on the direction of light."""
         raise GeometryError(OF_ONE_LENS)
 
 

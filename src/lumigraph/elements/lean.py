@@ -1,4 +1,4 @@
-"""`Lean`: by how much lenslets and pixels stand off the planes that they are meant to lie in."""
+"""`Lean`: tilt and bow of the lenslet array, and tilt of the sensor."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +14,7 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Lean:
-    """Tilt of an array, its bow, and tilt of a sensor, about the axis; distances from the main lens grow.
+    """Tilt and bow of an array, and tilt of a sensor, about the axis; distances from the main lens grow.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`Scatter`: how lenslets of an array differ from each other, by chance and by what is their own."""
+"""`Scatter`: differences of the lenslets of an array, random and given."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -51,7 +51,7 @@ class Own:
 
     @property
     def vertex(self) -> tuple[float, float]:
-        """Way to it from the place on the lattice [m]."""
+        """Offset of the vertex from the place on the lattice [m]."""
         down, across = self.aside or (0.0, 0.0)
         return down + self.decentre[0], across + self.decentre[1]
 
@@ -144,7 +144,7 @@ class Scatter:
         return replace(self, own=tuple(one for one in self.own if one.index[0] == i))
 
     def naming(self, lenslets: Mapping[tuple[int, int], bool]) -> "Scatter":
-        """The same, which names these lenslets, too, and says where those stand that are marked."""
+        """Scatter that also lists these lenslets, with the apertures of those that are marked."""
         own = {one.index: one for one in self.own}
         named = {index: own.get(index, Own(index)) for index in lenslets}
         return replace(self, own=tuple(
@@ -168,7 +168,7 @@ class Scatter:
 
 
 def _uniform(i: np.ndarray, j: np.ndarray, seed: int, channel: int) -> np.ndarray:
-    """Numbers between 0 and 1 by an index: a hash, whichever other lenslets are asked for."""
+    """Numbers between 0 and 1 by index, a hash, independent of the other lenslets in the call."""
     golden, first, second = (np.uint64(one) for one in _MULTIPLIERS)
     found = np.full(np.broadcast(i, j).shape, np.uint64(seed % 2**64))
     with np.errstate(over="ignore"):

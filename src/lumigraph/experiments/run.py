@@ -185,7 +185,7 @@ def _version(name: str) -> str:
 
 
 def _peak_memory() -> int:
-    """Highest memory of this process so far [byte]; 0 where the system does not tell."""
+    """Highest memory of this process so far [byte]; 0 if the system does not report it."""
     try:
         import resource
     except ImportError:  # Windows

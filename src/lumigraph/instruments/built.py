@@ -11,7 +11,7 @@ from lumigraph.instruments.quantities import Angle, Displacement, Length, NotNeg
 
 
 class Built(Part):
-    """A camera as it was built: other distances than described, lenslets that differ, planes that lean.
+    """A camera as built: distances other than described, lenslets that differ, tilted planes.
 
     The object stays at `object_distance`, in focus or not.
 

@@ -85,7 +85,7 @@ class Camera(Instrument):
 
     @property
     def object_scale(self) -> float:
-        """Size in the focused plane of what is 1 in the lenslet plane, z1/L before a thin lens."""
+        """Scale from the lenslet plane to the focused plane, z1/L before a thin lens."""
         if not self.exit_pupil.behind:
             return self.object_distance / self.separation
         return self.exit_pupil.to_image / self.magnification / self.pupil_distance
@@ -125,7 +125,7 @@ class Camera(Instrument):
 
     @property
     def object_grid(self) -> Grid:
-        """Samples of the focused plane that the sensor sees."""
+        """Grid of the focused plane within the field of the sensor."""
         return self.sampling.object_grid
 
     @property
@@ -196,7 +196,7 @@ class Camera(Instrument):
         return None if path is None else glass(path, self._wanted)
 
     def at_wavelength(self, wavelength: float) -> Self:
-        """The same in light of another wavelength [m]: glass stays where its own brings it to focus."""
+        """Camera at another wavelength [m]; glass stays focused for its own wavelength."""
         other = self._in_light_of(wavelength)
         if self.main_lens.prescription is not None:
             vars(other).update(exit_pupil=self.exit_pupil, glass=self.glass, traced=self.traced)
@@ -250,7 +250,7 @@ class Camera(Instrument):
         return ()
 
     def depth_reach(self) -> float:
-        """A third of the way to the focal length."""
+        """A third of the distance from the focused plane to the focal length [m]."""
         return 0.3 * (self.object_distance - self.main_lens.focal_length)
 
     def point_view(self, dz: float = 0.0) -> PointImage:
@@ -265,7 +265,7 @@ class Camera(Instrument):
         samples_per_lenslet: int | None = None,
         progress: Progress | None = None,
     ) -> Linear:
-        """The operator of its own pixels, wherever a raw image's lenslets stand."""
+        """Operator of the described pixels, whatever the calibration of a raw image."""
         return self.operator(depths, samples_per_lenslet, progress=progress)
 
     def magnifications(self) -> Range:
@@ -303,7 +303,7 @@ class Camera(Instrument):
         progress: Progress | None = None,
         spectrum: Spectrum | None = None,
     ) -> Linear:
-        """The exact model of how this camera sees incoherent planes, for `lumigraph.deconvolve`.
+        """Exact operator of this camera for incoherent planes, for `lumigraph.deconvolve`.
 
         Parameters
         ----------

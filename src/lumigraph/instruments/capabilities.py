@@ -22,7 +22,7 @@ class Decoded(Protocol):
 
 @runtime_checkable
 class Correctable(Protocol):
-    """The bias of a measure of depth can be found on planes whose depth is known."""
+    """Instruments whose bias of depth can be measured on planes of known depth."""
 
     def plane_views(self, alpha: float) -> LightField:
         """Views of a textured plane at a refocus factor."""
@@ -31,7 +31,7 @@ class Correctable(Protocol):
 
 @runtime_checkable
 class WithPupil(Protocol):
-    """Images of points are known as functions of its pupil's phase."""
+    """Instruments whose images of points are functions of the pupil's phase."""
 
     @property
     def configuration(self) -> str:
@@ -68,7 +68,7 @@ class WithLenslets(Protocol):
 
 @runtime_checkable
 class WithMainLens(Protocol):
-    """A main lens forms its image: depths follow from the lens equation."""
+    """Instruments with a main lens: depths follow from the lens equation."""
 
     main_lens: MainLens
     object_distance: float
@@ -95,7 +95,7 @@ class WithDepth(Protocol):
 
 @runtime_checkable
 class WithObjective(Protocol):
-    """An objective forms its image: depths are small and go with the refocus factor."""
+    """Instruments with an objective: depths are small and proportional to the refocus factor."""
 
     @property
     def objectives(self) -> tuple[Objective, ...]:

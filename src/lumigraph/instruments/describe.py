@@ -351,6 +351,6 @@ def _smallest(camera: "LensletCamera") -> float:
 def _cropped(camera: "LensletCamera") -> Iterator[str]:
     seen, present = len(camera.calibration.indices), len(camera.lenslets.indices())
     if seen < present:
-        yield f"the sensor shows {seen} micro-image centres of {present}. Leave its shape out to see all."
+        yield f"the sensor shows {seen} micro-image centres of {present}. Leave its shape out to show all."
     if camera.lenslet_distance and max(camera.lenslets.reach) > camera.separation / 4:
         yield "the array is wide for its distance: rays beyond 14 degrees are not paraxial."

@@ -90,7 +90,7 @@ class DescribedMicroscope(Instrument):
 
     @property
     def lenslet_distance(self) -> float:
-        """Lenslets to the plane that the sensor sees, b [m]."""
+        """Distance b from lenslets to the plane imaged on the sensor [m]."""
         return self.sensor_distance or self.lenslets.focal_length[0]
 
     @property
@@ -112,7 +112,7 @@ class DescribedMicroscope(Instrument):
 
     @property
     def micro_image_pitch(self) -> float:
-        """Between micro-images on the sensor [m]."""
+        """Distance between micro-images on the sensor [m]."""
         return self.lenslets.pitch * self.relay_magnification
 
     @property

@@ -27,7 +27,7 @@ ORDER = 10
 """Highest radial order of the fit."""
 
 FIELDS = (9, 17, 33, 65)
-"""Fields from the axis to the farthest that are tried; every second one tells how well others are known."""
+"""Numbers of fields that are tried; every second field gives the error of the interpolation."""
 
 BETWEEN = 0.02
 """Waves rms that every second field may be off by, between the others: with all of them it is far less."""
@@ -63,7 +63,7 @@ class Wanted:
     focal_length, diameter
         Focal length and diameter of the camera's thin lens [m].
     reach
-        Farthest field that it sees, a tangent.
+        Farthest field of the camera, a tangent.
     """
 
     wavelength: float
@@ -145,7 +145,7 @@ def _first_order(path: Path, digest: str, wavelength: float) -> FirstOrder:
 
 
 def _version() -> str:
-    """Optiland's."""
+    """Version of Optiland."""
     try:
         return metadata.version("optiland")
     except metadata.PackageNotFoundError:
@@ -367,7 +367,7 @@ def _best_focus(rays: Rays, wanted: Wanted) -> float:
 
 
 def _ellipses(places: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Centre along the field and half axes (fields, 3) of what the stop's rim is seen as."""
+    """Centre along the field and half axes (fields, 3) of the ellipse as which the stop's rim appears."""
     found = np.array([_ellipse(*rim) for rim in zip(*(each[:, -_ANGLES:] for each in places), strict=True)])
     found[0, 0] = 0.0
     found[0, 1:] = found[0, 1:].mean()

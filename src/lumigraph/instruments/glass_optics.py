@@ -1,4 +1,4 @@
-"""A camera's optics behind glass: the thin lens that stands in its exit pupil, and what it sees."""
+"""A camera's optics behind glass: the thin lens in its exit pupil, and object space before it."""
 
 from dataclasses import dataclass, replace
 

@@ -128,7 +128,7 @@ class Instrument(Part):
         raise NotImplementedError
 
     def check_accuracy(self, accuracy: float) -> None:
-        """Refuse what `operator` cannot be as exact as, before any work.
+        """Refuse an accuracy that `operator` cannot reach, before any work.
 
         Raises
         ------
@@ -146,7 +146,7 @@ class Instrument(Part):
         samples_per_lenslet: int | None = None,
         progress: Progress | None = None,
     ) -> Linear:
-        """The model of a raw image with that calibration, or, as the kind has none, of its own pixels."""
+        """Operator of a raw image with that calibration; of the described pixels for kinds without one."""
         raise NotImplementedError
 
     def would_be(self, share: float) -> str:
@@ -218,12 +218,12 @@ class Instrument(Part):
         raise NotImplementedError
 
     def magnifications(self) -> Range:
-        """Magnifications over which the trade-offs are worth a look."""
+        """Range of magnifications for the trade-offs."""
         raise NotImplementedError
 
     @property
     def path_difference(self) -> float:
-        """The largest between ways that meet in a point of the image and matter, to first order [m]."""
+        """Largest path difference of the light that meets in a point of the image, to first order [m]."""
         raise NotImplementedError
 
     def at_wavelength(self, wavelength: float) -> Self:

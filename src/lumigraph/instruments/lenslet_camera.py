@@ -226,7 +226,7 @@ class LensletCamera(WithParts):
         return self.wavelength * self.separation / (2 * self.pupil_diameter)
 
     def _in_light_of(self, wavelength: float) -> Self:
-        """Also with the focal length that lenslets of glass have, behind the same main lens and pixels."""
+        """Camera at another wavelength [m], with the focal length that lenslets of glass then have."""
         parts, same = self.lenslets, super()._in_light_of(wavelength)
         if parts.abbe is None:
             return same
@@ -392,7 +392,7 @@ class LensletCamera(WithParts):
 
 
 def _check_room(what: str, way: tuple[float, float], most: float, where: str) -> None:
-    """Refuse a way (y, x) that leads out of where there is room so far [m]."""
+    """Refuse an offset (y, x) beyond the room for it [m]."""
     if (far := max(map(abs, way))) > most * (1 + 1e-9) + 1e-15:
         raise GeometryError(
             f"{what} is {far * 1e6:.6g} µm but the {where} has room for {most * 1e6:.6g} µm. Use less, or "

@@ -68,7 +68,7 @@ class LensletLight:
         pixels = camera.calibration
         if len(pixels.indices) < FEWEST:
             raise CalibrationError(
-                f"the camera has {len(pixels.indices)} lenslets, but shifts are told by {FEWEST} or more."
+                f"the camera has {len(pixels.indices)} lenslets, but shifts need {FEWEST} or more."
             )
         operator, grid = _flat(camera)
         y, x = np.meshgrid(*(np.arange(n) for n in pixels.shape), indexing="ij")
@@ -103,12 +103,12 @@ class LensletLight:
         counts = (even > FAINT * np.median(even[even > 0])).all(0) if even.any() else np.zeros(0, bool)
         if counts.sum() < FEWEST:
             raise CalibrationError(
-                f"{counts.sum()} lenslets count in all raw images, but shifts are told by {FEWEST} or more."
+                f"{counts.sum()} lenslets count in all raw images, but shifts need {FEWEST} or more."
             )
         values, noise = light[:, counts] / even[:, counts], noise[:, counts] / even[:, counts] ** 2
         mean = float(values.mean())
         if not mean > 0:
-            raise CalibrationError("the raw images are dark: nothing tells how the object was moved.")
+            raise CalibrationError("the raw images are dark: shifts are unknown. Give more light.")
         noise = np.maximum(noise, 0.1 * noise.mean())
         return Part(values / mean, noise / mean**2, self.places[counts], self.textures)
 
@@ -147,7 +147,7 @@ def _flat(camera: Lensed) -> tuple[Linear, Grid]:
 
 
 def _beyond(grid: Grid) -> Grid:
-    """An object that goes on beyond the lenslets, which sends some light there, too."""
+    """Grid of an object that extends beyond the lenslets, from where light spills, too."""
     height, width = (n + 2 * NEAR * SAMPLES for n in grid.shape)
     return Grid((height, width), grid.pitch, grid.center)
 
@@ -155,7 +155,7 @@ def _beyond(grid: Grid) -> Grid:
 def _places(
     indices: np.ndarray, middle: np.ndarray, grid: Grid, shown: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """Middles (n, 2) [m] of what lenslets see, each by its own light: neighbours' is not even at a border."""
+    """Centroids (n, 2) [m] of the lenslets' footprints in the object, each by its own light."""
     first = [_middle(shown((indices == middle + step).all(1)), grid) for step in ((0, 0), (1, 0), (0, 1))]
     steps = np.array(first[1:]) - first[0]
     places = first[0] + (indices - middle) @ steps

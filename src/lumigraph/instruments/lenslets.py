@@ -56,7 +56,7 @@ class OneLenslet(Part):
 
     @property
     def vertex(self) -> tuple[float, float]:
-        """Way (y, x) to it from the place on the lattice [m]."""
+        """Offset (y, x) of the vertex from the place on the lattice [m]."""
         return self.offset_y + self.decentre_y, self.offset_x + self.decentre_x
 
     @property
@@ -234,7 +234,7 @@ class Lenslets(Part):
         return found
 
     def surface(self, wavelength: float) -> Surface | None:
-        """The curved side at a wavelength [m]; None of ideal lenslets.
+        """Curved surface at a wavelength [m]; None for ideal lenslets.
 
         Raises
         ------

@@ -58,7 +58,7 @@ class LightFieldMicroscope(ScopeWithParts):
     lenslet_offset
         Native image to lenslets [m], positive behind it ("2.0").
     sensor_distance
-        Lenslets to the plane that the sensor sees, b [m]; left out, their focal length.
+        Lenslets to the plane imaged on the sensor, b [m]; left out, their focal length.
     fourier_lens
         Focal length of the lens between native image and lenslets [m] ("fourier").
 
@@ -88,7 +88,7 @@ class LightFieldMicroscope(ScopeWithParts):
         folder: str | PathLike[str] | None = None,
         progress: Progress | None = None,
     ) -> Linear:
-        """The model of how this microscope sees slices at `depths`, for `lumigraph.deconvolve`.
+        """Operator of this microscope for slices at `depths`, for `lumigraph.deconvolve`.
 
         Parameters
         ----------
@@ -140,14 +140,14 @@ class LightFieldMicroscope(ScopeWithParts):
         samples_per_lenslet: int | None = None,
         progress: Progress | None = None,
     ) -> Linear:
-        """The operator of a real camera's pixels, as exact as photographs are; its object is a volume."""
+        """Operator of a real camera's pixels, as accurate as photographs need; its object is a volume."""
         planes = depths or (0.0,)
         return self.operator(
             planes, samples_per_lenslet, accuracy=MODELLED, pixels=calibration, progress=progress
         )
 
     def would_be(self, share: float) -> str:
-        """A relay that explains a lattice so many times as large."""
+        """Relay magnification that would explain a lattice so many times as large."""
         relay = self.relay_magnification
         return f"a relay of {relay * share:.4g} instead of {relay:.4g}"
 
@@ -167,7 +167,7 @@ class LightFieldMicroscope(ScopeWithParts):
         return microscope_design.parameters(self)
 
     def point_image(self, y: float, x: float, dz: float = 0.0, *, accuracy: float = 1e-3) -> np.ndarray:
-        """Raw image (ny, nx) of a point anywhere [m] that is as bright as a sample of `object_grid` of 1.
+        """Raw image (ny, nx) of a point anywhere [m], as bright as a sample of 1 of `object_grid`.
 
         `accuracy` is the relative rms error; a Fourier microscope has none, and sees no points beside its
         `object_grid`.
@@ -266,7 +266,7 @@ class LightFieldMicroscope(ScopeWithParts):
         return CellSampling(samples, N, width, degree, fill**2)
 
     def check_accuracy(self, accuracy: float) -> None:
-        """Refuse what `operator` cannot be as exact as, before any work."""
+        """Refuse an accuracy that `operator` cannot reach, before any work."""
         require_accuracy(accuracy)
 
     def magnifications(self) -> trade_offs.Range:

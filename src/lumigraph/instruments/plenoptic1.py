@@ -41,7 +41,7 @@ class PlenopticCamera(LensletCamera):
     model
         "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration, or
         lenslets of glass, and Rayleigh and Sommerfeld's integral, for square lenslets of one focal length;
-        "auto": exact where the paraxial one misses the accuracy that is asked for.
+        "auto": exact where the paraxial one misses the requested accuracy.
     built
         `Built`: distances as built, where they are not the description's.
     tolerances
@@ -123,7 +123,7 @@ class PlenopticCamera(LensletCamera):
         """Images of points in a plane as functions of Zernike terms of the main lens, with derivatives.
 
         Points stand at (y, x, 0) in that plane, and shine as samples as large as a lenslet there. Lenslets go
-        on beyond the array, whose outermost two see some light that is not there.
+        on beyond the array, whose outermost two receive some light that does not exist.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Microscopes whose images have derivatives by whatever differs between two of them a little apart."""
+"""Microscopes whose images have derivatives by any difference between two nearby microscopes."""
 
 import math
 from collections.abc import Sequence
@@ -66,7 +66,7 @@ class ScopeWithParts(SeesVolumes, DescribedMicroscope):
         return replace(own, double=double), [(low, high) for low, high in ends]
 
     def fourier_points(self) -> FourierPoints:
-        """Images of points anywhere as a Fourier microscope sees them, with derivatives by their place.
+        """Images of points anywhere by a Fourier microscope, with derivatives by their position.
 
         Raises
         ------
@@ -102,7 +102,7 @@ class ScopeWithParts(SeesVolumes, DescribedMicroscope):
         *,
         accuracy: float = 1e-2,
     ) -> WholePlane:
-        """Raw images of a plane, with derivatives by whatever differs between pairs of microscopes.
+        """Raw images of a plane, with derivatives by any difference between pairs of nearby microscopes.
 
         The object stays where it is before all microscopes, along the lenslets' rows and columns, and as
         bright for each area: how it falls onto their lenslets is part of what is differentiated.

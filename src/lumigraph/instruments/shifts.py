@@ -1,7 +1,7 @@
-r"""`find_shifts`: by how much an object was moved between raw images, from the raw images themselves.
+r"""`find_shifts`: shifts of an object between raw images, measured on the raw images themselves.
 
-What two raw images of an object differ by is a shift, or detail that lenslets do not resolve, which each raw
-image sees anew: so shifts are fitted to the likelihood of all raw images with the object integrated out
+Two raw images of an object differ by a shift, and by detail that lenslets do not resolve, which aliases
+differently in each. So shifts are fitted to the likelihood of all raw images with the object integrated out
 (`texture`), by steps of Gauss and Newton with Fisher's information. First much noise is assumed, which leaves
 the coarse detail that leads to the right place, and then less and less.
 
@@ -50,7 +50,7 @@ ALIKE = 10
 
 MARGIN = 1.2
 """Factor of errors over those of Fisher's information, set on ten draws of each of some kinds of object:
-what is no Gaussian texture is told less. On other draws errors were then 0.70 to 1.11 times as large as told
+other textures than Gaussian ones determine less. On other draws errors were 0.70 to 1.11 of those stated
 (`python -m benchmarks.found_shifts pulls`)."""
 
 BRIGHTER = 0.1
@@ -71,7 +71,7 @@ class FoundShifts:
     Parameters
     ----------
     shifts
-        (k, 2) as (y, x) [m], for `joint_operator`. The first is as it was given: raw images tell differences.
+        (k, 2) as (y, x) [m], for `joint_operator`. The first is as given: raw images show differences only.
     errors
         (k, 2), their standard deviations [m], with the object unknown; 0 of the first.
     covariance
@@ -121,7 +121,7 @@ def find_shifts(
     ------
     CalibrationError
         One raw image, one of another shape, an unknown gain, no light, too few lenslets, or an object that
-        does not tell how it was moved, such as an even one.
+        does not show how it was moved, such as an even one.
     GeometryError
         A camera of another kind, or another number of shifts.
 
@@ -156,7 +156,7 @@ def find_shifts(
 
 
 def _gathering(camera: Instrument) -> Lensed:
-    """A camera each of whose lenslets gathers the light of one place, or the refusal of another."""
+    """Camera whose lenslets each gather the light of one place; others are refused."""
     if isinstance(camera, LightFieldMicroscope) and camera.configuration == "1.0":
         return camera
     if isinstance(camera, LensletCamera) and isinstance(camera, Decoded):
@@ -184,7 +184,7 @@ def _halves(places: np.ndarray, part: np.ndarray) -> list[np.ndarray]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Fit:
-    """Shifts (k, 2) [lenslets], the spectrum of each part, and what is around them.
+    """Shifts (k, 2) [lenslets], the spectrum of each part, and the likelihood around them.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ class _Fit:
 
     @property
     def off(self) -> float:
-        """The step in standard deviations."""
+        """Size of the step in standard deviations."""
         return float(np.max(np.abs(self.step) / self.deviations))
 
     @property
@@ -282,7 +282,7 @@ def _fitted(parts: Sequence[Part], start: np.ndarray, progress: Progress) -> _Fi
     else:
         _warn(
             f"the last of {MOST_STEPS} steps gained {gained:.2g} of log-likelihood: shifts have not settled, "
-            "and errors are larger than told. Use an object with texture in all directions"
+            "and errors are larger than stated. Use an object with texture in all directions"
         )
     progress(1.0)
     assert fit is not None  # there are steps
@@ -300,20 +300,20 @@ def _judged(fit: _Fit, size: float) -> FoundShifts:
     worst, least = float(errors.max()), float(np.sqrt(np.linalg.eigvalsh(each).min()))
     if least > TOLD * size:
         raise CalibrationError(
-            f"the raw images do not tell how the object was moved: to ± {least:.2g} m in any "
+            f"the raw images do not show how the object was moved: only to ± {least:.2g} m in any "
             f"direction, where a lenslet is {size:.2g} m wide. Use an object with texture, or more light."
         )
     if worst > TOLD * size:
         k, axis = np.unravel_index(int(errors.argmax()), errors.shape)
         _warn(
-            f"the shift of raw image {k} along {'yx'[axis]} is told to ± {worst:.2g} m, where a lenslet is "
+            f"the shift of raw image {k} along {'yx'[axis]} is known to ± {worst:.2g} m, and a lenslet is "
             f"{size:.2g} m wide. Use an object with texture in all directions"
         )
     return FoundShifts(fit.shifts * size, errors, covariance, misfit)
 
 
 def _warn_of_light(whole: Part) -> None:
-    """Raw images of other light than is known of them."""
+    """Warn of raw images whose brightness differs from the known exposure."""
     means = whole.values.mean(1)
     k = int(np.argmax(np.abs(means - 1)))
     if abs(means[k] - 1) > BRIGHTER:
@@ -324,19 +324,19 @@ def _warn_of_light(whole: Part) -> None:
 
 
 def _warn_of_spots(whole: Part) -> None:
-    """Spots in the dark, which are no Gaussian texture."""
+    """Warn of spots in the dark, which are no Gaussian texture."""
     apart = whole.values - whole.values.mean()
     peaked = float(np.mean(apart**4) / np.mean(apart**2) ** 2) - 3
     if peaked > SPOTS:
         _warn(
             f"lenslets' light is that of some bright spots (excess kurtosis {peaked:.2g} > {SPOTS:g}): "
-            "shifts may be off by several times what is told. Use an object "
+            "errors of shifts may be several times the stated ones. Use an object "
             "with texture, or measure the shifts"
         )
 
 
 def _warn_of_lines(part: Part) -> None:
-    """Lines of one period, which lenslets may show as coarser ones."""
+    """Warn of lines of one period, which lenslets may show as coarser ones."""
     share = part.lines()
     if share > LINES:
         _warn(

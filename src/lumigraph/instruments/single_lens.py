@@ -139,7 +139,7 @@ class SingleLensCamera(WithParts):
 
 
 def _warned(operator: Linear, dz: float, accuracy: float) -> Linear:
-    """The same, with a word where it is less exact than asked for."""
+    """The operator, with a warning if it is less accurate than requested."""
     if operator.error > accuracy:
         warnings.warn(
             f"an accuracy of {accuracy:g} was asked for but images of the plane at {dz:g} m, far out of "

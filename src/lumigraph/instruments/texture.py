@@ -1,6 +1,6 @@
-r"""An unknown object as a random texture, of which only its spectrum is known, and what lenslets see of it.
+r"""An unknown object as a random texture, of which only the spectrum is known, and its image by lenslets.
 
-Values y that lenslets see at places p are Gaussian, with covariances
+Values y of lenslets at places p are Gaussian, with covariances
 
 .. math:: C_{ij} = \int S(f)\, |\hat h(f)|^2 e^{2\pi i f (p_i - p_j)} df, \quad
     S \propto (1 + |L^T f|^2)^{-\gamma}

@@ -1,4 +1,4 @@
-"""`Tolerance`: by how much a part may be off, as the table ``[tolerances]`` of a camera file says."""
+"""`Tolerance`: allowed deviation of a part, table ``[tolerances]`` of a camera file."""
 
 import math
 import re

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Magnifications over which an instrument is looked at.
+    """Range of magnifications of an instrument.
 
     Parameters
     ----------

@@ -187,7 +187,7 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     views
         Views (v, u) of an ESLF mosaic; one number for both.
     shape
-        Rows and columns of the raw images, for calibration files that do not tell (`.xml`, `.ini`).
+        Rows and columns of the raw images, for calibration files without them (`.xml`, `.ini`).
     max_pixels
         Larger pictures are refused; four channels, or four values of a light field, count as one pixel.
 

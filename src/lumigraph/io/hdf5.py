@@ -96,7 +96,7 @@ def _writing(path: Path) -> Iterator[h5py.File]:
 
 
 class _Spool(FileIO):
-    """A file whose failures libhdf5 does not see: it crashes where the disk is full."""
+    """File that hides its failures from libhdf5, which crashes on a full disk."""
 
     failure: OSError | None = None
 

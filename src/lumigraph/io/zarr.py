@@ -216,7 +216,7 @@ def _reading(path: Path) -> Iterator[zarr.Group]:
 
 
 class _Writer(WrapperStore[LocalStore | ZipStore]):
-    """A store whose failures zarr does not see: it would leave its other chunks' tasks to complain later."""
+    """Store that hides its failures from zarr, whose other chunks' tasks would complain later."""
 
     failure: OSError | None = None
 

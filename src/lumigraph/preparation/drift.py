@@ -81,7 +81,7 @@ class Drift:
     def told(self) -> str:
         """Agreement of the lattices, in one line."""
         unsure = self.slip >= _SLIGHT and self.slip < _SIGMAS * self.error
-        doubt = f", which its gaps tell to ±{_SIGMAS * self.error:.2f} only" if unsure else ""
+        doubt = f", known only to ±{_SIGMAS * self.error:.2f}" if unsure else ""
         return f"the raw image's own lattice slips by {self.slip:.2f} of a pitch towards the border{doubt}"
 
     def report(self) -> str:
@@ -100,8 +100,8 @@ def drift(data: Array, calibration: Calibration) -> Drift | None:
     Only a picture with light behind lenslets all over is judged: points before a dark ground repeat, too.
     Dark gaps between micro-images leave lines in the spectrum at the lattice's harmonics. The lattice is
     searched for by its first ones, within 25 % of the calibration's pitch and 6° of its rotation, and
-    refined on those that follow. A raw image without gaps, or of fewer than some 14 lenslets across, tells
-    nothing.
+    refined on those that follow. A raw image without gaps, or of fewer than some 14 lenslets across, gives
+    None.
     """
     picture, corner = _middle(to_numpy(data))
     basis, waves = _expected(calibration, picture.shape, corner)
@@ -132,7 +132,7 @@ def drift(data: Array, calibration: Calibration) -> Drift | None:
 def check_drift(data: Array, calibration: Calibration, camera: Described | None = None) -> Drift | None:
     """Refuse a raw image (y, x[, c]) that carries another lattice than the calibration's.
 
-    Where that is a camera's own, by its file, what of the file would explain the raw image is told, too.
+    If that lattice is a camera file's, the error also names the change of the file that would explain it.
 
     Returns
     -------
@@ -147,7 +147,7 @@ def check_drift(data: Array, calibration: Calibration, camera: Described | None 
     Raises
     ------
     CalibrationError
-        They slip by more than half a pitch, so that pixels belong to other lenslets; both are told.
+        They slip by more than half a pitch, so that pixels belong to other lenslets; the message has both.
     """
     found = drift(data, calibration)
     if found is not None:

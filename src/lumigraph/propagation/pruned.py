@@ -1,4 +1,4 @@
-"""Convolution by a band-limited transfer function, without the transforms that see only zeros.
+"""Convolution by a band-limited transfer function, without the transforms of zeros.
 
 Of a padded window only the input's own rows are transformed along x, only the columns inside the band
 along y, and only the rows that are asked for back along x; where every second sample is asked for and the

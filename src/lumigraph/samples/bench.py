@@ -47,7 +47,7 @@ class BenchSample:
 
 
 def bench(kind: str = "plenoptic", *, seed: int = 1, progress: Progress | None = None) -> BenchSample:
-    """Simulated pictures of a small plenoptic camera on a bench: what to calibrate, decode and refocus.
+    """Simulated pictures of a small plenoptic camera on a bench, to calibrate, decode and refocus.
 
     Wave optics, incoherent light; some ten seconds on two cores.
 

@@ -1,4 +1,4 @@
-"""Scenes drawn by chance before a camera, with the truth: what learned methods are trained and tested on."""
+"""Randomly drawn scenes before a camera, with the truth, to train and test learned methods."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -61,7 +61,7 @@ def drawn(
     layouts: Sequence[str] = LAYOUTS[:2],
     photographs: Sequence[np.ndarray] = (),
 ) -> DrawnSample:
-    """One scene drawn by chance, as a camera sees it, with photon and read noise.
+    """One randomly drawn scene before a camera, with photon and read noise.
 
     Light adds up: where patches meet, the near one hides nothing of what is behind it.
 

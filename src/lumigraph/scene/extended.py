@@ -175,7 +175,7 @@ class ExtendedSource:
         Warns
         -----
         SamplingWarning
-            Light that is steeper than the samples can tell.
+            Light that is steeper than the samples resolve.
         """
         light = self.sampled(grid, wavelength, distance, accuracy, dtype)
         nearer = self._at(distance)

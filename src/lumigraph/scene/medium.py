@@ -20,7 +20,7 @@ STRAY = 1e-5
 """Part of the light that may be bent farther than is followed."""
 
 MOST_SAMPLES = 4096
-"""Along a side, of a path that is looked at to tell how far it bends light."""
+"""Samples along a side of a path that is examined for how much it bends light."""
 
 T = TypeVar("T")
 
@@ -40,7 +40,7 @@ class Medium:
         Depths from the focused plane (z,) [m], positive farther from the objective; in any order.
     slabs
         True for slabs of an index that changes from one to the next, as `of_index` has them: then
-        simulations tell whether they stand near enough to each other.
+        simulations check that they are close enough to each other.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Colour filters on pixels: what they see of a picture, and the picture from what they saw."""
+"""Colour filters on pixels: mosaic of a picture, and its demosaicing."""
 
 import importlib
 import warnings

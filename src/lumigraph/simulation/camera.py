@@ -11,7 +11,7 @@ from lumigraph.sensor import Sensor
 
 @runtime_checkable
 class Imaging(Protocol):
-    """Anything with elements that light goes through to a sensor."""
+    """Protocol of an instrument whose elements lead light to a sensor."""
 
     def image_train(self) -> Train:
         """Elements from the field just before the main lens to the sensor."""
@@ -19,7 +19,7 @@ class Imaging(Protocol):
 
 
 class Camera(Imaging, Protocol):
-    """An instrument, as `simulate` sees it; what belongs to lenslets is None without them."""
+    """Protocol of a camera that `simulate` accepts; members of lenslets are None without them."""
 
     def optics(self) -> CameraOptics:
         """Plain values of the camera, which operators read."""

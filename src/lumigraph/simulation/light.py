@@ -15,7 +15,7 @@ from lumigraph.simulation.coherence import Coherence, Incoherent, PartiallyCoher
 
 @dataclass(slots=True)
 class Shots:
-    """Sum of the images of mutually incoherent shots, block by block: what tells how far off it is.
+    """Sum of the images of mutually incoherent shots, in blocks whose spread gives its error.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Raw images of scenes by a light-field microscope: slices on its operator's samples, points where they are.
 
-All light is incoherent: fluorescence. What stands beyond the field that the lenslets see is left out.
+All light is incoherent: fluorescence. Parts beyond the field of the lenslets are left out.
 """
 
 import math
@@ -34,7 +34,7 @@ SAMPLES = 5
 _SOURCE = "cells treated as far, what samples behind a lenslet do not hold, samples of slices"
 
 COARSER = 1.5
-"""Pitch of the samples that tell the error of an operator's own, over theirs."""
+"""Pitch of the samples that estimate the error of an operator's own, over theirs."""
 
 LEAST = 0.5
 """Smallest part of the accuracy left to an operator, if a slice's samples take up the rest."""
@@ -99,7 +99,7 @@ def microscope_image(
     """
     if not isinstance(coherence, Incoherent):
         raise GeometryError(
-            f"coherence is {coherence!r} but a light-field microscope sees fluorescence, which does not "
+            f"coherence is {coherence!r} but a light-field microscope images fluorescence, which does not "
             "interfere. Leave coherence out."
         )
     if not scene.parts:

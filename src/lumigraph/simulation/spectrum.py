@@ -17,7 +17,7 @@ from lumigraph.simulation import curves
 
 @dataclass(frozen=True, slots=True)
 class Spectrum:
-    """Wavelengths, and how much of each the sensor's channels see.
+    """Wavelengths, and the response of the sensor's channels to each.
 
     Thin lenses are free of dispersion: what differs between the wavelengths is diffraction. A main lens of a
     prescription, and lenslets with an Abbe number, have the colours of their glass, focused at the camera's
@@ -70,13 +70,13 @@ class Spectrum:
 
     @classmethod
     def band(cls, shortest: float, longest: float, count: int = 5) -> "Spectrum":
-        """One channel that sees a band [m] evenly, by so many wavelengths."""
+        """One channel with an even response over a band [m], by so many wavelengths."""
         count = checks.whole("count", count)
         return cls(tuple(np.linspace(shortest, longest, count).tolist()), ((1.0,),) * count)
 
     @classmethod
     def line(cls, line: SpectralLine, path_difference: float, accuracy: float = 1e-3) -> "Spectrum":
-        """One channel that sees a narrow line, as light of a largest path difference [m] shows it.
+        """One channel for a narrow line, for light of a largest path difference [m].
 
         Its degree of coherence over that way is right to an accuracy.
         """
@@ -97,7 +97,7 @@ class Spectrum:
     ) -> "Spectrum":
         """Spectrum of a light, filters and pixels given as curves, linear between their wavelengths.
 
-        Each channel has wavelengths of its own, Gauss's nodes of its light: as few as keep its degree of
+        Each channel has its own wavelengths, Gauss's nodes of its light: as few as keep its degree of
         coherence to an accuracy over the largest path difference, such as a `camera.path_difference`.
 
         Parameters

@@ -1,4 +1,4 @@
-"""Scenes that a microscope sees through a medium: every lit sample is a point with an image of its own."""
+"""Scenes imaged through a medium by a microscope: each lit sample is a point with its own image."""
 
 import math
 import warnings
@@ -66,7 +66,7 @@ def lit_points(scope: Seeing, scene: Scene) -> Points:
     if len(points.intensities) > MOST:
         raise SamplingError(
             f"the scene has {len(points.intensities)} points and lit samples but a medium takes {MOST} at "
-            "most: each has an image of its own. Use a smaller scene, or samples farther apart."
+            "most: each is imaged separately. Use a smaller scene, or samples farther apart."
         )
     return points
 

@@ -10,7 +10,7 @@ from lumigraph.deconvolution.filters import widths_of
 from lumigraph.instruments import LightFieldMicroscope
 
 HAZE = 1.0
-"""Photons that every pixel sees without an object."""
+"""Photons of the background on every pixel."""
 
 PIXELS = 15
 """Pixels of a lenslet, along each side."""

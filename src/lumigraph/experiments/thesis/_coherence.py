@@ -24,7 +24,7 @@ SAMPLES, WINDOW = 1765, 10 * mm
 QUICK_SAMPLES = 882
 """Half of the window at the same pitch: the same object detail, masks and speckle."""
 INCOHERENCE = 0.14
-"""C/N where the thesis sees its asymptote."""
+"""C/N at which the thesis finds its asymptote."""
 
 Light = Callable[[Grid, np.random.Generator], np.ndarray]
 """Complex illumination (ny, nx) of an object, of random phase."""

@@ -140,7 +140,7 @@ def _scattered(camera: FocusedPlenopticCamera, samples: list) -> np.ndarray:
 
 
 def _rendered(samples: list) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Light of the pixels of all lenslets, summed by the place that they see [µm]."""
+    """Light of the pixels of all lenslets, summed by their place in the object [µm]."""
     edges = np.linspace(-250, 250, 61)
     curves = {}
     for pixels, name in zip(samples, ("red point", "green point"), strict=True):
