@@ -56,14 +56,14 @@ class Adaptive:
     Parameters
     ----------
     adaptive
-        Find the aberrations of a microscope or of a camera of kind plenoptic from the raw image, of several
-        pages from the first, and deconvolve with them. Takes minutes.
+        Find the aberrations of a microscope or of a camera of kind plenoptic from the raw image, or the first
+        of several pages, and deconvolve with them. Takes minutes.
     terms
-        Noll indices of the Zernike terms that are looked for, such as 5,6,8; left out, 5-11, of a
-        picture 4-11.
+        Noll indices of the Zernike terms to find, such as 5,6,8; left out, 5-11, or 4-11 for a
+        picture.
     object
         Content of the raw image: volume, anything with texture; picture, something flat at one known depth;
-        beads, sparse points. A volume if left out, of cameras a picture.
+        beads, sparse points. Left out, a volume, or for cameras a picture.
     """
 
     adaptive: Annotated[bool, Parameter(negative="")] = False

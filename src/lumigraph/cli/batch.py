@@ -45,7 +45,7 @@ class Hands:
     scheduler
         Address of a running dask cluster instead, such as tcp://10.0.0.1:8786.
     slurm
-        Hand it to SLURM instead, as an array of so many jobs.
+        Submit to SLURM instead, as an array of so many jobs.
     sbatch
         More options of those jobs, such as "--time=2:00:00 --mem=8G".
     part
@@ -114,9 +114,9 @@ def batch(
 ) -> Result:
     """Run another verb for each of many frames: pages of a stack, or files by a pattern.
 
-    The results become one Zarr store, OME-Zarr of volumes, which napari and others open while it grows; of
-    'measure' and 'calibrate' a table. What is done is noted beside it: kill it at any time, and the same
-    line goes on where it was. A frame that fails is noted and left out, and tried again by the next start.
+    The results become one Zarr store (volumes: OME-Zarr), which napari and others open while it grows;
+    those of 'measure' and 'calibrate' a table. Finished frames are recorded beside it. Safe to interrupt: run
+    the same command again to resume. Frames that fail are recorded, left out, and tried again then.
 
     Example: `lumigraph batch deconvolve film.tif --white white.tif --camera scope.toml --iterations 8 -o volumes.ome.zarr`
 
@@ -129,7 +129,7 @@ def batch(
     verb
         simulate, decode, render, refocus, depth, deconvolve, calibrate or measure; or status.
     words
-        The verb's own: files or patterns in quotes first, then its options.
+        Arguments of the verb: files or patterns in quotes first, then its options.
     output
         Zarr store (.zarr), or table (.csv, .parquet).
     page

@@ -46,7 +46,7 @@ class Known:
     lenslet_distance_error
         Standard error of that distance, such as '0.02 mm'; 5 % if left out.
     lenslet_pitch
-        Between lenslets, if it is known well, such as '125.02 um': with the pitch of the micro-images it
+        Pitch of the lenslets, if it is known well, such as '125.02 um': with the pitch of the micro-images it
         gives f and distances.
     lenslet_pitch_error
         Standard error of the pitch, such as '0.01 um'; 0.03 % if left out. With it, --camera's pitch is used.

@@ -35,7 +35,7 @@ class Bench:
     lenslet_distance
         Lenslets to sensor, such as '18.6 mm'.
     camera
-        Camera file that says all three.
+        Camera file with all three lengths.
     """
 
     pixel_pitch: str | None = None
@@ -101,7 +101,7 @@ def calibrate(
     exact
         For a rectified picture: take --pitch and --rotation (0 if left out) as exact.
     explain
-        Say what to turn on the bench: rotation, shift, distance, tilt and aperture, against --camera.
+        Print the adjustments to make: rotation, shift, distance, tilt and aperture, against --camera.
     overlay
         Draw the lattice over the white image into this file (.png, .svg, .pdf).
     """

@@ -48,7 +48,7 @@ def dataset(
 
     Each sample is a raw image by wave optics with the sensor's noise, its picture in focus, the depth of
     each place and what was drawn, in one Zarr store with a data card beside it (.md). The same seed draws
-    the same samples. Kill it at any time: the same line goes on where it was.
+    the same samples. Safe to interrupt: run the same command again to resume.
 
     Example: `lumigraph dataset thesis-plenoptic-1 -n 500 --z "-60 mm:60 mm:20 mm" -o train.zarr`
 

@@ -39,9 +39,9 @@ def datasheet(
     """Write the data sheet of a plenoptic camera: resolution, directions, depth, light and geometry.
 
     SOURCES are folders of raw images, or camera files, whose charts are simulated by wave optics and measured
-    in the same way; several stand side by side. A folder has a charts.toml that names its pictures, several
-    exposures of each chart (see the page on metric cameras), or white images and scenes told apart by "white"
-    and "dark" in their names.
+    in the same way; several are compared side by side. A folder has a charts.toml that names its pictures,
+    several exposures of each chart (see the page on metric cameras), or white images and scenes,
+    distinguished by "white" and "dark" in their names.
 
     Example: `lumigraph datasheet camera.toml -o sheet.html`
 

@@ -34,9 +34,9 @@ class Sampling:
     samples
         Samples of a view per lenslet: those between the lenslets are interpolated.
     interpolation
-        Between pixels, and between lenslets.
+        Interpolation between pixels, and between lenslets.
     hot_pixels
-        Find pixels that shine by themselves without --dark too, leave them out and mark what rests on them.
+        Find hot pixels even without --dark, leave them out and mark the samples that depend on them.
     """
 
     directions: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None

@@ -1,4 +1,4 @@
-"""`lumigraph optimise`: the camera that reaches a goal best, of all that can be made."""
+"""`lumigraph optimise`: the best camera for a goal, of all that can be made."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -148,10 +148,10 @@ def optimise(
     output: Output,
     common: Reported = REPORTED,
 ) -> Result:
-    """Look for the camera that reaches a goal best, within ranges and a stock, and write its file.
+    """Search for the best camera for a goal, within ranges and a stock, and write its file.
 
-    All combinations of the first values are computed; then ranges are searched from the best of them. Killed
-    at any time, the same line goes on where it was, to the same camera.
+    All combinations of the first values are computed; then ranges are searched from the best of them. Safe
+    to interrupt: run the same command again to resume; it finds the same camera.
 
     Example: `lumigraph optimise lfm-fourier --vary "fourier_lens=60 mm:110 mm:3" --vary "lenslets.pitch=1 mm, 1.25 mm, 1.5 mm" --depths "-20 um:20 um:10 um" -o best.toml`
 

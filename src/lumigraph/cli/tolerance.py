@@ -46,9 +46,9 @@ def tolerance(
 ) -> Result:
     """Draw cameras within manufacturing tolerances, and report which tolerance costs most.
 
-    A camera with errors is as it was built: all else stays where the camera file puts it, and its plane of
-    focus moves. Each measure gets its mean and deviation over the cameras drawn, and the share of each
-    tolerance by first-order sensitivities. Killed at any time, the same line goes on where it was.
+    Each drawn camera is built with errors and not readjusted, so that its plane of focus moves. Each measure
+    gets its mean and deviation over the cameras drawn, and the share of each tolerance by first-order
+    sensitivities. Safe to interrupt: run the same command again to resume.
 
     Example: `lumigraph tolerance thesis-plenoptic-2-m050 -t "separation=±0.05 mm" -t "lenslets.focal_length=±1 %" -t "lenslets.pitch=±0.1 um uniform" -o draws.csv`
 
@@ -135,7 +135,7 @@ def _result(study: "Study", output: Path) -> Result:
     counts = (Quantity("cameras", study.draws), Quantity("impossible", len(study.failures)))
     words = [f"{study.draws} cameras drawn with {len(study.names)} tolerances"]
     words += [_line(one, study.names) for one in study.outcomes]
-    about = "What errors of making do to a camera, and which tolerance to pay for."
+    about = "Effects of manufacturing errors on a camera, and the tolerances that matter."
     return Result(
         "Tolerances", about, study, tuple(words), (*counts, *study.quantities()),
         lambda: _figures(study), tuple(study.notes()), (output, beside), {"tolerances": study.rows()},

@@ -34,7 +34,7 @@ def twin(
     output: Output | None = None,
     common: Reported = REPORTED,
 ) -> Result:
-    """Compare a bench with its camera file by white images, and say what to turn on the bench.
+    """Compare a bench with its camera file by white images, and print the adjustments to make.
 
     WHITES are white images of the bench as it stands, which are averaged. The array's height, tilt, shift
     and rotation and the diameter of the stop are reported with 95 % intervals, or as undetermined.
@@ -48,7 +48,7 @@ def twin(
     whites
         White images of one state of the bench.
     camera
-        Camera file, or a name of the catalogue: what the bench is meant to be.
+        Camera file, or a name of the catalogue: the intended bench.
     dark
         Picture without light.
     pitch_error

@@ -98,7 +98,7 @@ def view(
 ) -> Result | None:
     """Look at a file in the browser: refocus by a click, move the viewpoint, see raw pixels, depth, volumes.
 
-    Prints the page's address and ends with Ctrl-C. Only this computer's browser is answered.
+    Prints the page's address and ends with Ctrl-C. Only browsers on this computer can reach it.
 
     Example: `lumigraph view views.zarr`
 
