@@ -96,7 +96,7 @@ class Objective:
         object.__setattr__(self, "aberrations", tuple((int(j), float(w)) for j, w in pairs))
         if self.model == "rays" and (pairs or self.mismatch is not None or self.image_defocus):
             raise GeometryError(
-                "model 'rays' knows no aberrations, sample index or lenslet offset. "
+                "model 'rays' has no aberrations, sample index or lenslet offset. "
                 "Leave them out or use 'scalar'."
             )
 

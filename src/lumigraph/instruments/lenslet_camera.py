@@ -243,13 +243,13 @@ class LensletCamera(WithParts):
         plain = replace(super().optics(), model=self.model, lean=self.lean, surface=surface)
         if self.lean is not None and self.model != "paraxial":
             raise GeometryError(
-                f'model is "{self.model}" but array or sensor lean, which the paraxial model follows alone. '
+                f'model is "{self.model}" but array or sensor is tilted, which only the paraxial model follows. '
                 'Use model = "paraxial", or leave array_tilt, array_bow and sensor_tilt out of [built].'
             )
         if self.model == "exact" and self.main_lens.varies:
             raise GeometryError(
-                'model is "exact" but the main lens changes over the field, which the paraxial model follows '
-                'alone. Use model = "paraxial" or "auto", or leave over_field and prescription out.'
+                'model is "exact" but the main lens changes over the field, which only the paraxial model '
+                'follows. Use model = "paraxial" or "auto", or leave over_field and prescription out.'
             )
         if self.model == "exact" and not is_possible(plain):
             raise GeometryError(
@@ -340,11 +340,11 @@ class LensletCamera(WithParts):
         Raises
         ------
         GeometryError
-            Array or sensor lean: elements stand in planes square to the axis.
+            Array or sensor is tilted: elements stand in planes square to the axis.
         """
         if self.lean is not None:
             raise GeometryError(
-                "the array or the sensor leans, where fields go from plane to plane. Simulate in "
+                "the array or the sensor is tilted, but fields go from plane to plane. Simulate in "
                 "Incoherent(), Coherent() or PartiallyCoherent() light, or leave array_tilt, array_bow and "
                 "sensor_tilt out of [built]."
             )

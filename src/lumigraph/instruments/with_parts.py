@@ -36,7 +36,7 @@ class WithParts(SeesVolumes, Camera):
             length; the exact model behind a lens that changes over the field; a pair of other models, numbers
             of pixels or lenslets, or of which other lenslets are missing.
         SamplingError
-            Array or sensor lean farther than nine distances can follow.
+            Array or sensor is tilted farther than nine distances can follow.
 
         Examples
         --------

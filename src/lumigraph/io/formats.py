@@ -129,7 +129,7 @@ def format_of(path: str | os.PathLike[str]) -> Format:
     if place.is_dir() or not place.suffix:
         return FORMATS[-1]
     known = ", ".join(sorted({end for row in FORMATS for end in row.endings if end.startswith(".")}))
-    raise FormatError(f"{path} has no extension that lumigraph knows. Known extensions are {known}.")
+    raise FormatError(f"{path} has an unknown extension. Known extensions are {known}.")
 
 
 @overload
