@@ -243,7 +243,7 @@ class LensletCamera(WithParts):
         plain = replace(super().optics(), model=self.model, lean=self.lean, surface=surface)
         if self.lean is not None and self.model != "paraxial":
             raise GeometryError(
-                f'model is "{self.model}" but array or sensor is tilted, which only the paraxial model follows. '
+                f'model is "{self.model}" but array or sensor is tilted: only the paraxial model has that. '
                 'Use model = "paraxial", or leave array_tilt, array_bow and sensor_tilt out of [built].'
             )
         if self.model == "exact" and self.main_lens.varies:
