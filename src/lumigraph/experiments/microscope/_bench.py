@@ -1,4 +1,4 @@
-"""The microscope of these experiments, its noise, and the way back from its raw images."""
+"""The microscope of these experiments, its noise, and the deconvolution of its raw images."""
 
 from collections.abc import Sequence
 from typing import Any
