@@ -1,4 +1,4 @@
-"""What is asked for: depths and terms, checked; and the instrument with what is found."""
+"""Checks of depths and terms that are to be estimated, and the instrument with the estimated aberrations."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeVar
@@ -12,7 +12,7 @@ from lumigraph.instruments.capabilities import Decoded, WithPupil
 
 
 class Kind(NamedTuple):
-    """What an object explains itself, in words, and why for each term."""
+    """Kind of object: the terms that it explains itself, in words, and the reason for each."""
 
     all_of_it: str
     reasons: dict[int, str]

@@ -93,7 +93,7 @@ class Slopes:
 
     @property
     def rms(self) -> float:
-        """Of the wavefront [waves]."""
+        """Rms of the wavefront [waves]."""
         return float(np.linalg.norm(list(self.coefficients.values())))
 
 
@@ -243,7 +243,7 @@ def _views(
 def _spilled(
     places: np.ndarray, instrument: LightFieldMicroscope | PlenopticCamera, aperture: float
 ) -> np.ndarray:
-    """How far light from other lenslets moves the pictures (k, 2) that are seen from places in the pupil.
+    """Displacement (k, 2) of pictures, seen from places in the pupil, by light from neighbouring lenslets.
 
     In lenslets, behind square ones of a camera. Each lenslet's image of the pupil is blurred by its spot,
     sinc² along y and x; what falls into a neighbour's micro-image is a picture that is moved by a lenslet.
@@ -281,7 +281,7 @@ def _polynomials(places: np.ndarray, terms: Sequence[int]) -> np.ndarray:
 
 
 def _compared(pictures: np.ndarray, shifts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What pictures (k, t, s), moved back, differ by from their mean; its slopes (2, t, s), and their square.
+    """Differences of pictures (k, t, s), moved back, from their mean; its slopes (2, t, s), and their square.
 
     Inside the border, with a ridge that bounds shifts where there is little texture.
     """

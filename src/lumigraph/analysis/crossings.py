@@ -5,9 +5,9 @@ a sample where edges are as sharp as pixels. So two straight edges that cross ar
 
 .. math:: I = c + a\, E(d_1)\, E(d_2)
 
-with d the way from an edge and E from -1 to 1, as pixels 1 wide and a normal blur make it of a step. Where
-an edge passes from one sample to the next in less than a sample, no samples tell where: sharp edges that run
-along rows behind round lenslets, or pixels with gaps, remain 0.04 off. Edges turned by 10° do not.
+with d the distance from an edge and E from -1 to 1, a step as pixels 1 wide and a normal blur make it. Edges
+along rows that are sharper than a sample, behind round lenslets or pixels with gaps, remain 0.04 off; edges
+turned by 10° do not.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ _FARTHEST = 0.3
 
 
 def crossed(picture: np.ndarray, saddles: np.ndarray, radius: int) -> np.ndarray:
-    """Where the edges of saddles (n, 2) cross, by samples within `radius`, without the samples' pull.
+    """Crossings of the edges of saddles (n, 2), by samples within `radius`, without the samples' pull.
 
     Saddles whose edges are not found near them stay: such as those so blurred that samples do not pull.
 

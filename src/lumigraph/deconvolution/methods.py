@@ -1,4 +1,4 @@
-"""What methods share: the state of an iteration, when to stop, and what may be added to them."""
+"""Common parts of all methods: the state of an iteration, stopping rules, priors and filters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from lumigraph.errors import GeometryError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """Where an iteration stands.
+    """State of an iteration.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class State:
 
     @classmethod
     def even(cls, problem: Problem) -> "State":
-        """That of the even object as bright as the data."""
+        """State of the even object that is as bright as the data."""
         flat, light = problem.flat(), problem.scale.even
         model = problem.model(flat) if light is None else problem.read(problem.level * light)
         return cls(flat, model, problem.deviance(model))
@@ -64,7 +64,7 @@ class Method(Protocol):
 
 
 class Prior(Protocol):
-    """What is expected of objects; draws an estimate towards it."""
+    """Prior knowledge of objects, towards which an estimate is drawn."""
 
     def shrink(self, problem: Problem, before: Array, state: State, /) -> tuple[Array, dict[str, Array]]:
         """The estimate, and what the prior wants to remember.
@@ -85,7 +85,7 @@ class Filter(Protocol):
     """Applied to the factor of each step, such as `LowPass`."""
 
     def __call__(self, factor: Array, /) -> Array:
-        """The factor (y, x) or (z, y, x) of the estimate, filtered."""
+        """Factor (y, x) or (z, y, x) of the estimate, filtered."""
         ...
 
 

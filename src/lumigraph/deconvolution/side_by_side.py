@@ -1,7 +1,7 @@
-"""Several runs that share an operator: what they ask of it is answered by one product for all of them.
+"""Several runs that share an operator: one product answers the requests of all of them.
 
-Each run is a thread, and they take turns: one works until it asks for the operator. When all wait for it, it
-is applied to all that they ask for. So a method is written for one raw image, and knows nothing of others.
+Each run is a thread, and they take turns: one works until it needs the operator. When all wait for it, it is
+applied to all their arrays. So a method is written for one raw image, and knows nothing of others.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ Found = TypeVar("Found")
 
 @dataclass(slots=True)
 class _Question:
-    """An array that a run wants mapped, and what came of it."""
+    """An array that a run wants mapped, and its image."""
 
     back: bool
     array: Array
@@ -53,11 +53,11 @@ class Meeting(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of the operator."""
+        """Shape of the operator."""
         return self.of.shape
 
     def attended(self, run: Callable[[Linear], Found]) -> Found:
-        """What a run gives, which applies this."""
+        """Result of a run that applies this."""
         with self._turn:
             try:
                 return run(self)
@@ -105,7 +105,7 @@ class Meeting(Linear):
 
 
 def side_by_side(operator: Linear, runs: Sequence[Callable[[Linear], Found]]) -> list[Found | Exception]:
-    """What each run gives that is called with an operator, or the error that ended it.
+    """Result of each run that is called with an operator, or the error that ended it.
 
     At most ``operator.side_by_side`` of them.
     """

@@ -71,7 +71,7 @@ def check_count(raws: object, operator: Joint) -> Raws:
 
 
 def exposures_of(raws: Raws, given: Exposure | Sequence[Exposure] | None) -> tuple[Exposure, ...]:
-    """What is known of each raw image: as given, one for all or one for each, or as recorded.
+    """Exposure of each raw image: as given, one for all or one for each, or as recorded.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def together(raws: Raws, operator: Joint, exposures: Sequence[Exposure]) -> tupl
 
 
 def _row(data: Array, exposure: Exposure, first: float) -> tuple[Array, Array, Array, Array]:
-    """Of one raw image: data, response, background and weights (n,)."""
+    """Data, response, background and weights (n,) of one raw image."""
     xp, shape = arrays.namespace(data), tuple(data.shape)
     gain, zeros = exposure.gain or 1.0, xp.zeros_like(data)
     response = pixels("response", exposure.response, shape, data)

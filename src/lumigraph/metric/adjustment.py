@@ -185,7 +185,7 @@ class Problem:
         return result
 
     def residual(self, unknowns: np.ndarray) -> np.ndarray:
-        """Of the corners, in standard deviations, and of what is known beforehand."""
+        """Residual of the corners, in standard deviations, and of prior knowledge of the camera."""
         numbers, heights, _ = self.split(unknowns)
         known = [(numbers[k] - value) / error for k, value, error in self.priors]
         even = heights / self.bow if self.bow else heights
@@ -266,14 +266,14 @@ def adjust(
 
 
 def _check_poses(poses: np.ndarray) -> None:
-    """Whether boards (frames, 6) stood differently: otherwise lengths follow from noise alone."""
+    """Refuse boards (frames, 6) that stood alike on all pictures: lengths would follow from noise alone."""
     turn = float(np.linalg.norm(np.ptp(poses[:, :3], axis=0)))
     away = float(np.ptp(poses[:, 3]) / abs(np.median(poses[:, 3])))
     if turn < _SAME_TURN and away < _SAME_DISTANCE:
         raise CalibrationError(
             f"the board stands the same on all {len(poses)} pictures, to {math.degrees(turn):.2g}° and "
-            f"{away:.2%} of its distance, which does not tell the camera. Take it at different distances and "
-            "angles, 10° and 10 % apart or more."
+            f"{away:.2%} of its distance, which does not determine the camera. Take it at different "
+            "distances and angles, 10° and 10 % apart or more."
         )
 
 
@@ -388,7 +388,7 @@ def _solved(jacobian: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def _covariance(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
-    """Of the camera's numbers and the poses."""
+    """Covariance of the camera's numbers and of the poses."""
     camera, poses = problem.free.shape[1], problem.free.shape[1] + problem.heights
     _, root = _solved(problem.jacobian(unknowns), problem.residual(unknowns))
     out = np.zeros((len(problem.camera.numbers) + len(unknowns) - poses, len(unknowns)))

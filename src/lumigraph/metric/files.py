@@ -110,7 +110,7 @@ def _alike(name: str, found: dict[str, np.ndarray]) -> float:
 
 
 def load_compote(folder: str | os.PathLike[str]) -> tuple[Corners, Board, Nominal]:
-    """What COMPOTE keeps in a folder: bap.csv, centers.csv, camera.json, scene.json.
+    """Corners, board and nominal camera from a COMPOTE folder: bap.csv, centers.csv, camera.json, scene.json.
 
     The blur of each corner is not read: COMPOTE computes it from its own first camera.
 
@@ -225,7 +225,7 @@ def load(path: str | os.PathLike[str]) -> Measured:
 
 
 def is_measured(path: str | os.PathLike[str]) -> bool:
-    """Whether a JSON file is a camera that `save` wrote."""
+    """True if a JSON file is a camera that `save` wrote."""
     return read_json(source.regular_file(path)).get("kind") == KIND
 
 

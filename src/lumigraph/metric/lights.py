@@ -56,7 +56,7 @@ def usual_depths(camera: LensletCamera) -> tuple[float, ...]:
 
 
 def usual_exposures(camera: LensletCamera) -> int:
-    """Of each light: fewer of a large sensor, whose many places make up for it."""
+    """Exposures of each light: fewer for a large sensor, whose many places make up for it."""
     rows, columns = camera.sensor.shape
     return int(np.clip(_PIXELS / (rows * columns), 2, EXPOSURES))
 
@@ -105,7 +105,7 @@ def simulate_charts(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lights:
-    """What a camera's sensor would see of white images and charts, before its noise.
+    """Light on a camera's sensor of white images and charts, before noise.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class Lights:
         accuracy: float = ACCURACY,
         progress: Progress = silent,
     ) -> "Lights":
-        """By wave optics; parameters and errors as of `simulate_charts`.
+        """Light by wave optics; parameters and errors as in `simulate_charts`.
 
         Without `textured`, random patterns for depth are left out.
         """
@@ -162,7 +162,7 @@ class Lights:
     def exposed(
         self, rng: np.random.Generator, name: str = "camera", *, exposures: int = EXPOSURES
     ) -> Charts:
-        """Raw images with the sensor's noise, drawn when they are asked for."""
+        """Raw images with the sensor's noise, drawn when they are used."""
         sensor, top = self.camera.sensor, float(np.quantile(self.white, 0.999))
 
         def several(light: np.ndarray, fill: float = FILL, count: int = max(2, exposures)) -> Drawn:

@@ -1,4 +1,4 @@
-"""Which of the places found is which point of a board: checked, mended where that can be, or refused."""
+"""Order of a board's points among the places found: checked, mended where that is possible, or refused."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -41,7 +41,7 @@ def ordered(places: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def told_of(what: str) -> Iterator[None]:
-    """Errors about what is found name the picture."""
+    """Context in which errors name the picture."""
     try:
         yield
     except CalibrationError as error:
@@ -49,7 +49,7 @@ def told_of(what: str) -> Iterator[None]:
 
 
 def misplaced(places: np.ndarray, points: np.ndarray) -> float:
-    """How far a place is at most from the homography of them all, over the way to the nearest other place.
+    """Largest distance of a place from the homography of them all, over that to the nearest other place.
 
     Infinite where the board would be seen from behind, and where places coincide or lie on a line.
     """

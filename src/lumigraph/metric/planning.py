@@ -1,4 +1,4 @@
-"""How to take pictures of a board: poses that tell the camera's lengths best, and how well."""
+"""Plans for pictures of a board: the poses that determine the camera's lengths best, and how well."""
 
 import math
 from collections.abc import Iterator
@@ -84,7 +84,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """Pictures of a board, the most telling first.
+    """Pictures of a board, the most informative first.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class Plan:
         return 1.96 * errors / np.append(self.camera.numbers[:3], 1.0)
 
     def enough(self, part: float) -> tuple[int | None, ...]:
-        """Pictures that tell f, L, b and distances to a part of themselves, in 95 of 100 cases.
+        """Numbers of pictures that determine f, L, b and distances to a part, in 95 of 100 cases.
 
         None where all pictures do not.
 
@@ -214,7 +214,7 @@ class _Shot:
 
 
 def _distances(camera: MetricCamera) -> list[float]:
-    """At which micro-images can be compared, from near to far, evenly in the image."""
+    """Distances at which micro-images can be compared, from near to far, evenly in the image."""
     f, low = camera.focal_length, 1.02 * camera.focal_length
     every = 1 / np.linspace(1 / low, 1 / (_FARTHEST * f), 400)
     image = f * every / (every - f)
@@ -230,7 +230,7 @@ def _distances(camera: MetricCamera) -> list[float]:
 
 
 def _in_views(camera: MetricCamera, pitch: float) -> list[float]:
-    """At which views are sharp and can be compared, from near to far, evenly in the image."""
+    """Distances at which views are sharp and can be compared, from near to far, evenly in the image."""
     f = camera.focal_length
     every = 1 / np.linspace(1 / (1.02 * f), 1 / (_FARTHEST * f), 400)
     points = np.stack([every, 0 * every, 0 * every], 1)
@@ -257,7 +257,7 @@ class _Before:
     in_views: bool
 
     def shots(self, distances: list[float], *, aslant: bool) -> list[_Shot]:
-        """Of boards straight and tilted, their edges aslant to rows or not, where all corners can be used."""
+        """Shots of boards, straight and tilted, aslant to rows or not, where all corners can be used."""
         tilts = [(y, x) for y, x in product(_TILTS, _TILTS) if math.hypot(y, x) <= _STEEPEST]
         every = (
             self.shot(distance, (self.roll(distance, *tilt) if aslant else 0.0, *tilt))
@@ -285,14 +285,14 @@ class _Before:
         return _Shot(distance, turn, len(seen), told)
 
     def pose(self, distance: np.ndarray, turn: np.ndarray) -> np.ndarray:
-        """(k, 6) Of boards whose middles are on the axis, at distances (k,), turned by (k, 3)."""
+        """Poses (k, 6) of boards whose middles are on the axis, at distances (k,), turned by (k, 3)."""
         still = np.concatenate([turn, np.zeros_like(turn)], 1)
         place = -geometry.moved(self.board.middle, still)
         place[:, 0] += distance
         return np.concatenate([turn, place], 1)
 
     def usable(self, distance: float, turn: Turn) -> bool:
-        """Whether a board can be found, also as far from its pose as it may be."""
+        """True if a board can be found, also as far from its pose as it may be."""
         sides = np.array([*product((-1, 1), repeat=4), (0, 0, 0, 0)])
         nearer, angle = KEPT_TO
         poses = self.pose(distance * (1 + nearer * sides[:, 0]), turn + angle * sides[:, 1:])
@@ -309,7 +309,7 @@ class _Before:
         return nearest(self.camera.project(points, axis))
 
     def whole(self, poses: np.ndarray) -> bool:
-        """Whether boards (k, 6) are in the picture with what finding them needs.
+        """True if boards (k, 6) are in the picture with what finding them needs.
 
         That are the outer squares and half a square of white margin; of chessboards in views the corners
         alone, and some lenslets around them.

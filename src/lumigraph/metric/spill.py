@@ -1,12 +1,10 @@
-"""Light that lenslets spread and spill, and what it does to corners of boards.
+"""Displacement of board corners by light that lenslets spread and spill.
 
 Behind each lenslet stands a picture of the main lens' stop, spread by diffraction at the lenslet's opening
-(`lumigraph.metric.waves`). At a way from the middle of a micro-image of a camera 1.0 is light from lenslets
-beside it, too, which a view takes for its own lenslet's from that direction. So a part of each corner that it
-shows stands aside, and the corner is found aside: a point's image is as wide as λ over the stop's angle, and
-what spills comes from points that are imaged on lenslets' rims. Edges are found where `analysis.crossings`
-fits them to the light: what is farther aside than the edge is soft pulls no more. In micro-images of a
-camera 2.0 corners are found outwards (`lumigraph.metric.rims`).
+(`lumigraph.metric.waves`). Away from the middle of a micro-image of a camera 1.0 there is light of
+neighbouring lenslets, too, which a view takes for its own lenslet's: corners are displaced. Edges are found
+where `analysis.crossings` fits them to the light: light farther away than the edge is soft has no effect. In
+micro-images of a camera 2.0 corners are found outwards (`lumigraph.metric.rims`).
 """
 
 import itertools
@@ -59,7 +57,7 @@ _ROUNDS = 8
 
 @dataclass(frozen=True, slots=True)
 class Spill:
-    """What it depends on, but for the lenslets' distance from the sensor.
+    """Model of the light that lenslets spill, but for their distance from the sensor.
 
     Parameters
     ----------
@@ -101,7 +99,7 @@ class Spill:
         return self.wavelength * camera.lenslet_distance / lenslets / apart
 
     def unsure(self, camera: "MetricCamera") -> float:
-        """How well it is known how far corners are moved, over that: one standard deviation."""
+        """Relative uncertainty of the displacement of corners: one standard deviation."""
         if not self.sharp:
             return _UNSURE
         if not self.edges:
@@ -122,7 +120,7 @@ class Spill:
         return round(self.lattice.pitch, 1)
 
     def aside(self, way: np.ndarray, slope: np.ndarray, width: float) -> np.ndarray:
-        """How far (n, 2) [px] views at ways (n, 2) [px] show corners aside.
+        """Displacement (n, 2) of corners in views at ways (n, 2) [px].
 
         Parameters
         ----------
@@ -145,7 +143,7 @@ class Spill:
         return table(np.column_stack([ways, slope])) @ axes * pitch * (width / computed)
 
     def outwards(self, way: np.ndarray, moved: np.ndarray, width: float, kind: np.ndarray) -> np.ndarray:
-        """How far (n, 2) [px] micro-images of a camera 2.0 show corners at ways (n, 2) [px] aside.
+        """Displacement (n, 2) [px] of corners at ways (n, 2) [px] in micro-images of a camera 2.0.
 
         Parameters
         ----------
@@ -182,7 +180,7 @@ class Spill:
         return np.array([(down, right), (right, -down)]) / self.lattice.pitch
 
     def _waves(self, width: float) -> Waves:
-        """Of a lattice whose rows run along the first axis."""
+        """Waves behind a lattice whose rows run along the first axis."""
         lenslets = (np.array(self.lattice.basis) @ self._axes().T / self.lattice.pitch).round(9).tolist()
         return Waves(width, self.fill, tuple(map(tuple, lenslets)), self.sharp)
 
@@ -194,13 +192,13 @@ def _close(width: float) -> float:
 
 @lru_cache(maxsize=16)
 def _filled(waves: Waves) -> Waves:
-    """With the stop whose micro-images are seen to fill as much as its own do."""
+    """Waves with the stop whose micro-images are seen to fill as much as its own do."""
     return replace(waves, fill=2 * waves.fill - waves.seen_fill())
 
 
 @lru_cache(maxsize=16)
 def _edged(waves: Waves, edge: Pair, pitch: float) -> Waves:
-    """With the stop and the focus whose micro-images have this edge."""
+    """Waves with the stop and the focus whose micro-images have this edge."""
     sign = math.copysign(1.0, waves.sharp)
 
     def off(told: np.ndarray) -> np.ndarray:
@@ -215,13 +213,13 @@ def _edged(waves: Waves, edge: Pair, pitch: float) -> Waves:
 
 @lru_cache(maxsize=16)
 def _nearest(waves: Waves, edge: Pair, pitch: float) -> Pair:
-    """To an edge, of those that such waves make."""
+    """Nearest edge that such waves make."""
     return _edged(waves, edge, pitch).edge(pitch)
 
 
 @lru_cache(maxsize=16)
 def _table(waves: Waves, reach: int, slopes: tuple[int, int]) -> RegularGridInterpolator:
-    """What `_Waves.aside` gives, of ways up to so many steps and slopes from one to another."""
+    """Table of `_Waves.aside`, for ways up to so many steps and slopes from one to another."""
     line = np.arange(-max(reach, 2), max(reach, 2) + 1) * _WAYS
     moved = np.arange(slopes[0], slopes[1] + _SLOPES / 2, _SLOPES)
     ways = np.stack(np.meshgrid(line, line, indexing="ij"), -1).reshape(-1, 2)
@@ -243,7 +241,7 @@ def _views(waves: Waves, way: np.ndarray, slopes: np.ndarray) -> np.ndarray:
 
 
 def _edge(light: np.ndarray, at: np.ndarray) -> float:
-    """Where an edge is found in light (n,) that each point at (n,) gives [pitches]."""
+    """Position of an edge that is found in light (n,) of points at (n,) [pitches]."""
     place = 0.0
     for _ in range(_ROUNDS):
         place += float(light @ _half(at - place) / light.sum()) * _PULL
@@ -251,7 +249,7 @@ def _edge(light: np.ndarray, at: np.ndarray) -> float:
 
 
 def _half(way: np.ndarray) -> np.ndarray:
-    """How much of a soft edge, sampled by lenslets, lies on the near side of a way: -1/2 to 1/2."""
+    """Part of a soft edge, sampled by lenslets, on the near side of a way: -1/2 to 1/2."""
     ends = np.stack([way + 0.5, way - 0.5])
     risen = ends * erf(ends / (math.sqrt(2) * _SOFT)) + _SOFT * math.sqrt(2 / np.pi) * np.exp(
         -0.5 * (ends / _SOFT) ** 2

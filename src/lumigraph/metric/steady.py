@@ -66,7 +66,7 @@ def mean_within(values: Sequence[float] | np.ndarray) -> tuple[float, tuple[floa
 
 
 def without_strays(values: Sequence[float]) -> list[float]:
-    """Those nearer to the median than `_STRAY` standard deviations, told by the others; all of a few."""
+    """Values nearer to the median than `_STRAY` standard deviations by the others; all of a few."""
     known = np.array(values, float)
     away = np.abs(known - np.median(known))
     near = away <= _STRAY * _TO_SIGMA * np.median(away)
@@ -134,7 +134,7 @@ def _squares(values: np.ndarray) -> np.ndarray:
 
 
 def _parts(values: np.ndarray, told: Callable[[np.ndarray], Any]) -> np.ndarray:
-    """What is told of each piece of the field; NaN of those that have fewer than three known values."""
+    """Value of each piece of the field by a function; NaN for those with fewer than three known values."""
     pieces = [
         part[np.isfinite(part)]
         for rows in np.array_split(values, _BLOCKS, axis=0)
@@ -144,13 +144,13 @@ def _parts(values: np.ndarray, told: Callable[[np.ndarray], Any]) -> np.ndarray:
 
 
 def _over(parts: Sequence[np.ndarray]) -> np.ndarray:
-    """Of pieces (n,) of each exposure, the means over exposures of those that all know."""
+    """Means over exposures of those pieces (n,) that all exposures know."""
     together = np.mean(parts, axis=0)
     return together[np.isfinite(together)]
 
 
 def _apart(values: Sequence[float]) -> float | None:
-    """How far two means of as many exposures differ at most, in 95 of 100 cases, by how single ones do."""
+    """Largest difference of two means of as many exposures, in 95 of 100 cases, by their scatter."""
     n = len(values)
     if n < 2:
         return None

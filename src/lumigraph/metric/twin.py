@@ -1,18 +1,12 @@
-r"""What is out of place on a bench, by its white images: `twin` compares them with those of the camera file.
+r"""Misalignment of a bench by its white images: `twin` compares them with those of the camera file.
 
-White images of the camera file are simulated by its operator, with the array moved, turned and the stop
-opened a little, and measured exactly as the real ones: lattice, its slope over the picture, width and blur of
-micro-images. Differences y and derivatives J give what is out of place, by Gauss and Newton,
+White images of the camera file are simulated with small misalignments and measured as the real ones are.
+Differences y and derivatives J give the causes, by Gauss and Newton,
 
 .. math:: x = (J^T C^{-1} J)^{-1} J^T C^{-1} (y - y_0)
 
-What an array does when it is moved and turned follows from rays through the middle of the main lens' stop:
-at s on the sensor stands what an array at its place shows at
-
-.. math:: s_0 = \frac{s}{1 + \tan\theta \cdot s / (L + b)} ,
-
-drawn out by 1/cos θ along the tilt. A tilted sensor before an upright array looks the same but for that
-factor: which of the two is out of place no white image tells, and the array is taken to be.
+A tilted sensor before an upright array cannot be told from a tilted array; the array is taken to be tilted.
+Rays through a moved and turned array: docs/theory/metric.md.
 """
 
 import math
@@ -74,7 +68,7 @@ _FARTHEST = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shown:
-    """What a white image shows: two lattice vectors, origin and slope [px], width and blur [px]."""
+    """Measures of a white image: two lattice vectors, origin and slope [px], width and blur [px]."""
 
     values: np.ndarray
     errors: np.ndarray
@@ -82,7 +76,7 @@ class _Shown:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Twin:
-    """What is out of place on a bench.
+    """Misalignment of a bench.
 
     Parameters
     ----------
@@ -126,7 +120,7 @@ class Twin:
         return (*found, blur, Quantity("misfit_probability", self.misfit))
 
     def instructions(self) -> tuple[str, ...]:
-        """What to do on the bench, the surest first; nothing that is not three standard deviations from 0."""
+        """Instructions for the bench, the surest first; none for values within three deviations of 0."""
         sure = np.abs(self.values) / np.maximum(self.errors, 1e-300)
         found = zip(CAUSES, self.values.tolist(), (1.96 * self.errors).tolist(), strict=True)
         told = [_told(*one) for one in found]
@@ -171,7 +165,7 @@ class Bench:
     camera: LensletCamera
 
     def white(self, values: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Its white image (y, x) by wave optics, with `CAUSES` of these values."""
+        """White image (y, x) of the misaligned camera by wave optics, with `CAUSES` of these values."""
         height, tilt_y, tilt_x, shift_y, shift_x, turn, aperture = (float(v) for v in values)
         optics = self.camera.optics()
         b, L = optics.lenslet_distance, optics.separation
@@ -198,7 +192,7 @@ class Bench:
 
     @cached_property
     def start(self) -> _Shown:
-        """What the white image of the camera file shows."""
+        """Measures of the white image of the camera file."""
         return shown(self.white(np.zeros(len(CAUSES))))
 
     @cached_property
@@ -286,7 +280,7 @@ def twin(
     pitch_error: float | None = None,
     progress: Progress = silent,
 ) -> Twin:
-    """What is out of place, by white images of one state of the bench.
+    """Misalignment by white images of one state of the bench.
 
     Parameters
     ----------
@@ -357,7 +351,7 @@ def _far(height: float, b: float) -> tuple[str, ...]:
 
 
 def _of_pitch(covariance: np.ndarray) -> Iterator[str]:
-    """What height and stop rest on if nobody says how well the pitch is known."""
+    """Remark on the height and the stop where the error of the pitch is not given."""
     height, stop = 1.96 * np.sqrt(covariance[[0, -1], [0, -1]])
     yield (
         f"the lenslets' pitch over the pixels' is taken as known to {PITCH_ERROR:.2%}, so the height is known"

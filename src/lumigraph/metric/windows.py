@@ -32,7 +32,7 @@ def nearest(places: np.ndarray) -> float:
 
 
 def radius(ways: np.ndarray, board: Board, frame: int, where: str) -> int:
-    """Of the windows about places of a board, by the way from each to the nearest (n,) [px].
+    """Radius of the windows about places of a board, by the way from each to the nearest (n,) [px].
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # pyright: reportMissingImports=false
-"""What the widgets share: choices of layers, a button, progress, and what was found."""
+"""Common parts of the widgets: choices of layers, a button, progress, and the result."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -46,7 +46,7 @@ class Panel(Container):
             event.connect(self._refresh)
 
     def job(self) -> Job:
-        """What is to be computed, from what the controls say; called in the main thread."""
+        """Job to compute, by the controls; called in the main thread."""
         raise NotImplementedError  # each verb's panel has its own
 
     def take(self, found: Any) -> str:
@@ -111,7 +111,7 @@ class Panel(Container):
 
 
 def chosen(box: ComboBox, kind: type, what: str) -> Any:
-    """What the chosen layer holds.
+    """Noun that the chosen layer holds.
 
     Raises
     ------

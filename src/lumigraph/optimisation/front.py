@@ -33,7 +33,7 @@ class Towards:
         return self.cameras.rows
 
     def cost(self, item: Mapping[str, Any]) -> float:
-        """Of an item."""
+        """Cost of an item."""
         return self.by(self.cameras.row(item))
 
 

@@ -62,7 +62,7 @@ class Optimum:
     front
         With two goals: the rows that no other beats in both, from the best in the first on.
     tried
-        By "start" and "best", what fits or reconstructions reach in drawn raw images; empty without trials.
+        By "start" and "best", errors of fits or reconstructions in drawn raw images; empty without trials.
     held_out
         By "start", "swept" and "best", errors of scenes that took no part in the search; empty without any.
     """
@@ -83,7 +83,7 @@ class Optimum:
     __repr__ = brief
 
     def gain(self, beside: Mapping[str, Any]) -> float:
-        """By what part of it the goal is better than that of other values; NaN where those have none."""
+        """Relative gain of the goal over other values; NaN where those have none."""
         other = beside.get(self.goal.name, float("nan"))
         change = (self.best[self.goal.name] - other) / abs(other)
         return change if self.goal.largest else -change
@@ -246,7 +246,7 @@ def optimise(
 
 
 def _other(text: str) -> dict[str, Any]:
-    """What a second goal has of its own."""
+    """Name and direction of a second goal."""
     found = Goal.parse(text)
     return {"name": found.name, "largest": found.largest}
 
@@ -287,7 +287,7 @@ def _elsewhere(cameras: Evaluations, items: Mapping[str, Mapping[str, Any]]) -> 
 def _tried(
     cameras: Evaluations, items: Mapping[str, Mapping[str, Any]], how: tuple[int, int]
 ) -> dict[str, Tried]:
-    """What reconstruction reaches before some items."""
+    """Errors that reconstruction reaches before some items."""
     goal, found = cameras.goal, {}
     for which, item in items.items() if how[0] else ():
         row = cameras.row(item)
@@ -356,7 +356,7 @@ def _warn_of_luck(found: Optimum) -> None:
 
 
 def _luck_of_depths(found: Optimum) -> Iterator[str]:
-    """Where a bound is worse half-way between its depths, ends left out, or others are better in all."""
+    """Warnings where a bound is worse half-way between its depths, ends left out, or others are better."""
     label, told, best = found.goal.label, found.goal.told, found.checked["best"]
     both = math.hypot(best.value, best.between)
     if best.between > best.value * (1 + LUCK):

@@ -33,7 +33,7 @@ class Costs(Protocol):
         ...
 
     def cost(self, item: Mapping[str, Any]) -> float:
-        """Of an item; infinite where there is no such camera."""
+        """Cost of an item; infinite where there is no such camera."""
         ...
 
 

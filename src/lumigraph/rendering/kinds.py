@@ -1,4 +1,4 @@
-"""Which kind of lenslets of a multi-focus array is sharp at which patch, by the raw image itself."""
+"""Kinds of lenslets of a multi-focus array, matched with their sharp patches by the raw image itself."""
 
 from collections.abc import Sequence
 from itertools import permutations

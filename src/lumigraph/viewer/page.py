@@ -43,7 +43,7 @@ def site(exhibits: Sequence[Exhibit]) -> Site:
 
 
 def site_of(parts: Sequence[Parts], pack: Pack = lambda name, part, coded: coded.as_bytes()) -> Site:
-    """As `site`, of exhibits that are described already."""
+    """Site of exhibits that are described already; see `site`."""
     resources = {"": Resource(MEDIA[".html"], static("index.html").encode())}
     for name in (*MODULES, "style.css"):
         resources[f"app/{name}"] = Resource(MEDIA[PurePath(name).suffix], static(name).encode())
@@ -55,7 +55,7 @@ def site_of(parts: Sequence[Parts], pack: Pack = lambda name, part, coded: coded
 
 
 def about(parts: Sequence[Parts]) -> dict[str, Any]:
-    """What the page must know before any array."""
+    """Description of the exhibits, which the page reads before any array."""
     return {"version": version("lumigraph"), "exhibits": [part.about for part in parts]}
 
 

@@ -1,4 +1,4 @@
-"""An exhibit as a description (JSON) and arrays that are sent when they are asked for."""
+"""An exhibit as a description (JSON) and arrays that are sent on request."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

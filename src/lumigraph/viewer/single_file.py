@@ -22,7 +22,7 @@ LARGEST = 400 << 20
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """What was written.
+    """Result of an export: path and sizes [bytes].
 
     Parameters
     ----------
