@@ -22,7 +22,7 @@ TERMS = tuple(range(5, 16))
 
 REMEDY = {
     "beads": "Ask for more terms, more depths or regions of the field, or look for a volume.",
-    "volume": "Give depths that are closer together or reach farther, or ask for more terms.",
+    "volume": "Give depths that are closer together or reach farther, or more terms.",
     "picture": "Ask for more terms, give the picture's own depth, or crop what is not flat.",
 }
 """Where an object does not explain the raw image."""

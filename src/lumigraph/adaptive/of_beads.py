@@ -35,7 +35,7 @@ FINE = 1e-2
 to 3e-2 left 1.084 times its variance, those to 1e-2 left 1.002, in 17 CPU s for 15."""
 
 COARSE = 0.3
-"""Accuracy asked of their derivatives, which then are off by 4 to 11 %, and single ones by up to 36 %."""
+"""Accuracy of their derivatives, which then are off by 4 to 11 %, and single ones by up to 36 %."""
 
 ROUNDS = 3
 """How often beads are looked for at most: in the raw image, then in what those before leave."""

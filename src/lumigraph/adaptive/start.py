@@ -206,7 +206,7 @@ def _seen(instrument: LightFieldMicroscope | PlenopticCamera) -> tuple[float, fl
         return instrument.lenslets.pitch / instrument.magnification, instrument.pupil_diameter / 2 / distance
     if not isinstance(instrument, WithPupil) or instrument.configuration != "1.0":
         raise GeometryError(
-            "slopes are those of a PlenopticCamera or a LightFieldMicroscope of configuration '1.0'."
+            "only a PlenopticCamera or a LightFieldMicroscope of configuration '1.0' has slopes of views."
         )
     return instrument.lenslet_size, instrument.objective.numerical_aperture
 

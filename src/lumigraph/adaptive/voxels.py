@@ -280,7 +280,7 @@ class Voxels:
         return step / max(1.0, float(np.linalg.norm(step)) / LONGEST)
 
     def _steep(self, told: Told, around: Around, free: np.ndarray) -> float:
-        """Chi square of the step that the slope asks for."""
+        """Chi square of the step that the slope implies."""
         whole, slope = self._free(told, around, free)
         return float(slope @ solved(whole, slope))
 

@@ -26,7 +26,7 @@ _ASKEW = 0.5  # sine of the least angle between the sides of a square that is se
 _PART = 0.8  # of a square's edge, far enough from its corners
 _LONGEST = 48  # samples of an edge that are taken
 LEAST_BENT = 12
-"""Corners from which a distortion is told."""
+"""Corners from which a distortion is measured."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

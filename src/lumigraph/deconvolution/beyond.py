@@ -138,7 +138,7 @@ def cut(estimate: Array, inside: Inside, pictured: Array | None) -> Array:
 
 
 def continued(start: Array, shape: tuple[int, ...], inside: Inside) -> Array:
-    """A first estimate of the inside as one of the whole, whose border goes on outwards."""
+    """First estimate of the whole from one of the inside, whose border is continued outwards."""
     if tuple(start.shape) == shape:
         return start
     margins = [(0, 0)] * (len(shape) - 2)

@@ -145,7 +145,7 @@ def _absorb(digest: Any, thing: Any) -> None:
 
 
 def _trace(problem: Problem) -> np.ndarray:
-    """Some of the sensitivity's values: they tell one operator from another."""
+    """Some of the sensitivity's values, which identify the operator."""
     values: Array = arrays.to_numpy(problem.scale.sensitivity).ravel()
     return values[:: max(1, values.size // 997)]
 

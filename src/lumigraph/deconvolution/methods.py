@@ -127,7 +127,7 @@ class Stop:
                 checks.positive(name, value, "1")
 
     def reached(self, done: int, deviance: float, change: float) -> str:
-        """Why to stop here; empty to go on."""
+        """Reason to stop here; empty to continue."""
         if self.deviance is not None and deviance <= self.deviance:
             return f"deviance {deviance:.4g} per pixel is at most {self.deviance:g}"
         if self.change is not None and change < self.change:
@@ -136,7 +136,7 @@ class Stop:
 
 
 def check_offers(name: str, thing: Any, wanted: tuple[str, ...], remedy: str) -> None:
-    """Refuse what has not all of the wanted attributes, such as a camera where its operator is needed."""
+    """Refuse an object without all wanted attributes, such as a camera where its operator is needed."""
     if not all(hasattr(thing, attribute) for attribute in wanted):
         raise GeometryError(
             f"{name} is of type {type(thing).__name__} but must have {', '.join(wanted)}. {remedy}"

@@ -37,7 +37,7 @@ class Step:
     elapsed, remaining
         Time [s] so far, and still to go at the present pace.
     stopped
-        Why it stops before the last iteration; empty while it goes on.
+        Reason to stop before the last iteration; empty while it continues.
     """
 
     iteration: int

@@ -28,7 +28,7 @@ class _Question:
 
 @dataclass(slots=True)
 class _Table:
-    """Runs that have not ended, what some of them ask, and what ends them all."""
+    """Runs that have not ended, the requests of some of them, and the error that ends them all."""
 
     runs: int
     asked: list[_Question] = field(default_factory=list)
@@ -37,7 +37,7 @@ class _Table:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Meeting(Linear):
-    """An operator that waits until all runs ask for it.
+    """An operator that waits until all runs need it.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Meeting(Linear):
                 self._answer()
 
     def dismiss(self, error: BaseException) -> None:
-        """End all runs by an error, at the latest the next time that they ask."""
+        """End all runs by an error, at the latest at their next request."""
         with self._turn:
             self._table.stop = error
             self._turn.notify_all()
@@ -87,7 +87,7 @@ class Meeting(Linear):
         return question.answer
 
     def _answer(self) -> None:
-        """Apply the operator, once all runs that have not ended ask for it."""
+        """Apply the operator, once all runs that have not ended need it."""
         questions = tuple(self._table.asked)
         if not questions or len(questions) < self._table.runs or self._table.stop is not None:
             return

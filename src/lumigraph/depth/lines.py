@@ -43,7 +43,7 @@ def refined(
     well. Two are both refined on some of the views; each place takes the one that the views agree with, and
     what is so joined is refined on all.
 
-    Each round asks every view that sees a place by how much it should move there, r = g Δ: the residual r
+    Each round computes by how much a place should move for every view that sees it, r = g Δ: the residual r
     against the middle view, and the gradient g along the view's own direction. The answers, weighted by what
     they say, are joined by a smooth surface.
     """
@@ -122,7 +122,7 @@ class _Lines:
 def _evidence(lines: _Lines, asked: "_Asked", moves: np.ndarray, rivals: np.ndarray) -> Evidence:
     """Evidence for a map (y, x), by the pull of views on it.
 
-    Noise has gradients of its own, which say nothing.
+    Noise has gradients, too, which carry no information.
     """
     pictures, usual = lines.pictures, box(asked.information, _WINDOW)
     nothing = 0.25 * pictures.noise**2 * _lever(pictures)

@@ -58,7 +58,7 @@ def update(
     information
         Inverse variance of each place, up to a factor; 0 where the data say nothing.
     pull
-        Information times the change that the data ask for.
+        Information times the change that the data imply.
     how
         Of the smoothness.
     edges

@@ -109,7 +109,7 @@ def slopes(
 
 
 def _variance(seen: np.ndarray, sensor: Sensor, light: Light, part: slice) -> tuple[float, np.ndarray]:
-    """Mean variance of what is asked, and its slopes (4, ny, nx) by a point's parts of the light."""
+    """Mean variance of the bound, and its slopes (4, ny, nx) by a point's parts of the light."""
     known, noise = Seen.of(sensor, light, seen), reading(sensor)
     if not np.isfinite(deviations(known.fisher)[part]).all():
         return math.inf, np.zeros_like(seen)

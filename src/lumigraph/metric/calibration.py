@@ -24,7 +24,7 @@ LEAST_FRAMES = 3
 """Pictures of the board."""
 
 _TIED = 0.95
-"""Correlation of two numbers that are named as hard to tell apart."""
+"""Correlation above which two numbers are reported as hardly separable."""
 
 _BENT = 5e-4
 """Rms height of a board's corners over its diagonal from which on a note says so."""
@@ -124,7 +124,7 @@ class Measured:
         return float(np.sqrt(np.mean(np.square(self.board.heights or 0.0))))
 
     def tied(self) -> Iterator[tuple[str, str, float]]:
-        """Pairs of numbers that the pictures hardly tell apart, with their correlation."""
+        """Pairs of numbers that the pictures hardly separate, with their correlation."""
         table = self.correlation
         for j, k in combinations(range(len(geometry.NAMES)), 2):
             if abs(table[j, k]) > _TIED:

@@ -81,7 +81,7 @@ def find_corners(
     ------
     CalibrationError
         No pictures, one without the whole board, corners in no order that a flat board has, or squares too
-        small to be told apart.
+        small to be resolved.
     LumigraphError
         OpenCV, which finds boards but for chessboards in views, is not installed.
 

@@ -52,7 +52,7 @@ class _Known:
 
     @property
     def deviations(self) -> float:
-        """The same, in standard deviations of it; 0 where pictures tell nothing."""
+        """The same, in standard deviations of it; 0 where the pictures add nothing."""
         return self.pull / math.sqrt(self.told) if self.told > _TOLD else 0.0
 
     @property
@@ -82,7 +82,7 @@ def disagreement(
     squares = next((one for one in every if one.name == "b"), None)
     if squares is None:
         yield (
-            "nothing that was given tells whether the board's spacing is right: if it is wrong by a "
+            "nothing that was given shows whether the board's spacing is right: if it is wrong by a "
             "part, b, distances and sizes are, too. Give how far the lenslets are from the sensor "
             "(--lenslet-distance)"
         )

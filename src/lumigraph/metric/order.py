@@ -25,7 +25,7 @@ def ordered(places: np.ndarray, points: np.ndarray) -> np.ndarray:
     Raises
     ------
     CalibrationError
-        Places that no order makes a flat board.
+        If no order of the places makes a flat board.
     """
     off = misplaced(places, points)
     if off <= _OFF:

@@ -228,7 +228,7 @@ def _expected(found: DepthMap, name: str, of_values: str, unit: str) -> Iterator
     """The median of the errors that a map expects, and the range of its values."""
     trust = np.asarray(to_numpy(found.confidence)) >= TRUSTED
     if found.error is None:
-        yield _not(name, "the method does not tell its error")
+        yield _not(name, "the method does not estimate its error")
     else:
         error = float(np.nanmedian(np.asarray(to_numpy(found.error))[trust]))
         how = f"median of the errors that the depth map expects, {trust.mean():.0%} of the places trusted"

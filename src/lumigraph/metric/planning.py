@@ -151,7 +151,7 @@ def plan(
     in_views: bool = False,
     noise_px: tuple[float, float] | None = None,
 ) -> Plan:
-    """Poses of a board, one after the other those that tell f, L and b best together.
+    """Poses of a board, one after the other those that determine f, L and b best together.
 
     Boards stand on the axis where three lenslets or more show each corner, straight or tilted; before a
     camera 1.0, where views over the stop move no corner by more than three lenslets, and turned about the

@@ -68,7 +68,7 @@ def chart(what: str | Board, paper: str | tuple[float, float] = "A4", *, turn: f
     GeometryError
         A chart that does not fit; the message says what does.
     LumigraphError
-        Markers without OpenCV, or of a dictionary that it has not.
+        Markers without OpenCV, or of a dictionary that it does not have.
 
     Examples
     --------

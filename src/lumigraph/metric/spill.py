@@ -69,10 +69,10 @@ class Spill:
         Of the light [m].
     sharp
         How far micro-images of a point in focus move, over the way from lenslet to lenslet; 0 of a camera
-        1.0. Where the edge is known it only tells whether they look at an image behind them.
+        1.0. Where the edge is known only its sign counts: whether the image lies behind the lenslets.
     edges
         Width and blur of micro-images on a white image, over their pitch (`analysis.pupil_edge`), of each
-        kind of lenslets, or of all: they tell the stop's width and what is in focus. Empty if not measured.
+        kind of lenslets, or of all: they give the stop's width and the focus. Empty if not measured.
 
     Raises
     ------

@@ -21,7 +21,7 @@ TRUSTED = 0.5
 """Confidence from which on a place counts for depth."""
 
 REPEATED = 2.0
-"""Per cent by which two sheets of a camera may differ: from there on, more exposures are asked for."""
+"""Per cent by which two sheets of a camera may differ: beyond it the sheet recommends more exposures."""
 
 _BLOCKS = 4
 """Pieces of the field along each axis: places closer together do not err independently."""

@@ -5,7 +5,7 @@ Differences y and derivatives J give the causes, by Gauss and Newton,
 
 .. math:: x = (J^T C^{-1} J)^{-1} J^T C^{-1} (y - y_0)
 
-A tilted sensor before an upright array cannot be told from a tilted array; the array is taken to be tilted.
+A tilted sensor before an upright array looks like a tilted array; the array is taken to be tilted.
 Rays through a moved and turned array: docs/theory/metric.md.
 """
 
@@ -53,7 +53,7 @@ SURE = 3.0
 PITCH_ERROR = 3e-4
 """Of the lenslets' pitch over the pixels', one standard deviation, unless one is given.
 
-A moulded array's scale changes by 7e-5 a kelvin (PMMA), and no white image tells it from the array's height.
+A moulded array's scale changes by 7e-5 a kelvin (PMMA), which white images cannot separate from the array's height.
 """
 
 _STEPS = (50e-6, 2e-3, 2e-3, 3e-6, 3e-6, 2e-3, 0.01)  # of the derivatives
@@ -344,7 +344,7 @@ def _far(height: float, b: float) -> tuple[str, ...]:
     if abs(height) <= _FARTHEST * b:
         return ()
     return (
-        f"the pitch of the micro-images asks for an array {abs(height) * 1e3:.3g} mm from its place, "
+        f"the pitch of the micro-images implies an array {abs(height) * 1e3:.3g} mm from its place, "
         f"{b * 1e3:.4g} mm above the sensor: more likely the camera file's pitch, pixels or distances "
         "are wrong, so height and stop have no instructions",
     )

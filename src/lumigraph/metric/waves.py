@@ -46,7 +46,7 @@ class Waves:
     sharp: float = 0.0
 
     def directions(self, across: int) -> np.ndarray:
-        """(y, x, 2) So close that light is told over so many lenslets."""
+        """Directions (y, x, 2), close enough to cover so many lenslets with light."""
         step = self.width / across
         half = int(self.fill / 2 / step) + 1
         line = np.arange(-half, half + 1) * step

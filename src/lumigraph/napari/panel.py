@@ -50,11 +50,11 @@ class Panel(Container):
         raise NotImplementedError  # each verb's panel has its own
 
     def take(self, found: Any) -> str:
-        """Show what was found, and say it in a line."""
+        """Show the result, and summarise it in a line."""
         raise NotImplementedError  # each verb's panel has its own
 
     def start(self) -> None:
-        """Compute, unless a computation goes on; what is wrong with the controls is said at once."""
+        """Compute, unless a computation is running; wrong controls are reported at once."""
         if self.work.is_running:
             return
         try:

@@ -29,7 +29,7 @@ class Work:
     failed
         Called in the main thread with the error.
     shown
-        Called in the main thread with the fraction that is done and what goes on.
+        Called in the main thread with the fraction that is done and the present step.
     """
 
     def __init__(

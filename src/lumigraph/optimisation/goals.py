@@ -162,7 +162,7 @@ class Goal:
         return replace(self, scenes=usual_scenes(instrument))
 
     def check(self, instrument: Instrument) -> None:
-        """Refuse what a kind of instrument has not.
+        """Refuse a goal that a kind of instrument does not have.
 
         Raises
         ------

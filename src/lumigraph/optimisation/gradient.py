@@ -9,7 +9,7 @@ SPREAD = 0.15
 """Longest first step of a search, as a part of each range."""
 
 SHORT = 1e-3
-"""Part of a step to which it is shortened at most, where cameras on its way cannot be or are worse."""
+"""Part of a step to which it is shortened at most, where cameras on its way are impossible or worse."""
 
 ENOUGH = 1e-4
 """Relative gain of two steps, below which they lead no farther."""

@@ -51,7 +51,7 @@ class Optimum:
     active
         Values of the best at an end of their range, by key: another range would give a better camera.
     rows
-        All cameras, in the order of the search; those that cannot be have an "error".
+        All cameras, in the order of the search; impossible ones have an "error".
     checked
         Of bounds and errors of reconstruction: by "start", "swept" and "best", the bound at other places than
         those of the search, by derivatives of two steps where they are not exact, its relative error, at
@@ -158,8 +158,8 @@ def optimise(
         reconstruction: 16 squares of them at most are seen with noise by the camera as given, the best of the
         grid and the best, and reconstructed as if they were the goal's scenes.
     output
-        File, beside which each camera is noted as it is done: the same call goes on after a kill, to the same
-        result. None for nowhere. The best camera is not written.
+        File, beside which each camera is noted as it is done. Safe to interrupt: the same call resumes, to
+        the same result. None for nowhere. The best camera is not written.
     progress
         Called as ``progress(fraction)``.
     estimated
@@ -170,8 +170,8 @@ def optimise(
     FormatError
         An unknown key or number, a range that does not go up, an output of another search.
     GeometryError
-        A goal that the instrument has not, or none of the first values gives a camera. Gradients of another
-        instrument or goal than bounds of those, by its sensor, or with a second goal.
+        A goal that the instrument does not have, or none of the first values gives a camera. Gradients of
+        another instrument or goal than bounds of those, by its sensor, or with a second goal.
 
     Warns
     -----
@@ -228,7 +228,7 @@ def optimise(
         swept = grid(cameras, space)
         if swept is None:
             reason = cameras.rows[1].get(ERROR, f"{aim.name} is not known of it")
-            raise GeometryError(f"none of the first {len(items)} cameras can be, such as: {reason}")
+            raise GeometryError(f"none of the first {len(items)} cameras is possible, such as: {reason}")
         best = _refined(cameras, space, swept, (search, most, seed))
         if other is not None and beyond:
             trace(cameras, space, (aim, other), (search, most, seed))

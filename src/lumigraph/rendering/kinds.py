@@ -41,7 +41,7 @@ def match_kinds(
     Raises
     ------
     GeometryError
-        A lattice of one kind, a map of another shape, or patches that cannot be.
+        A lattice of one kind, a map of another shape, or impossible patches.
     """
     raw = raw if isinstance(raw, RawImage) else RawImage(raw)
     check_raw(raw, calibration)

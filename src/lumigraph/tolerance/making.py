@@ -23,7 +23,7 @@ _SCATTERS = {
     "focal_length": "focal_length_scatter", "decentre": "decentre_scatter", "missing": "missing",
     "tilt": "tilt_scatter", "form": "form_scatter",
 }  # fmt: skip
-"""Keys of ``[built]`` by what each lenslet has of its own."""
+"""Keys of ``[built]`` by the error that differs from lenslet to lenslet."""
 
 
 def check_camera(camera: AnyCamera | LensletCamera | Instrument) -> LensletCamera:
@@ -98,7 +98,7 @@ def built(camera: LensletCamera, errors: Mapping[str, float]) -> LensletCamera:
     Parameters
     ----------
     camera
-        What is meant.
+        The camera as described.
     errors
         What is added to its values, in SI, by the names of `Tolerance`; of several lenslet focal lengths to
         each. Names below "lenslets.each" have a standard deviation, or the part that is missing, of lenslets
@@ -174,7 +174,7 @@ def drawn(
 ) -> dict[str, float]:
     """Errors [SI] by name of one camera of many, by chance.
 
-    Each tolerance has random numbers of its own: one more or less leaves those of the others. Where
+    Each tolerance has separate random numbers: one more or less leaves those of the others. Where
     lenslets have errors of their own, these are standard deviations, and "built.seed" draws them.
 
     Parameters
@@ -216,7 +216,7 @@ def cameras(
     Parameters
     ----------
     camera
-        What is meant.
+        The camera as described.
     tolerances
         Beside those of the camera file, or instead of them.
     count

@@ -18,7 +18,7 @@ import numpy as np
 from lumigraph.core.brief import brief
 
 PERCENTS = (2.5, 50.0, 97.5)
-"""Percentiles that are told."""
+"""Percentiles that are reported."""
 
 _SURE = 3.0  # statistical errors beyond which two deviations differ
 _LINEAR = 0.1  # part by which they may differ where errors count as small

@@ -208,7 +208,7 @@ def _slope(camera: LensletCamera, differ: Differ, sight: Sight) -> float:
     if there.sum() < 2:
         raise GeometryError(
             f"{int(there.sum())} of the {len(there)} lenslets that see a point are there, and one alone "
-            "tells no depth. Let fewer be missing."
+            "measures no depth. Let fewer be missing."
         )
     places, shares = camera.lattice.position(sight.indices[there]), sight.shares[there][:, None]
     places = places - (shares * places).sum(0) / shares.sum()

@@ -35,7 +35,7 @@ class Study:
     draws
         Cameras that were drawn.
     failures
-        Why those among them cannot be.
+        Reasons why some of them are impossible.
     """
 
     tolerances: tuple[Tolerance, ...]
@@ -53,8 +53,8 @@ class Study:
         Raises
         ------
         GeometryError
-            The camera cannot be measured as described, or with one deviation of an error, or too few of
-            those drawn.
+            If the camera cannot be measured as described, or with one deviation of an error, or if too few
+            of those drawn are possible.
         """
         for row in rows[: trials.steps]:
             if ERROR in row:
@@ -63,7 +63,7 @@ class Study:
         good = [row for row in taken if ERROR not in row]
         bad = tuple(str(row[ERROR]) for row in taken if ERROR in row)
         if len(good) < 2:
-            raise GeometryError(f"{len(bad)} of {len(taken)} cameras drawn cannot be, such as: {bad[0]}")
+            raise GeometryError(f"{len(bad)} of {len(taken)} cameras drawn are impossible, such as: {bad[0]}")
         given = {CAMERA, SEED, *(column(one.name, one.unit) for one in trials.tolerances)}
         headings = [heading for heading in rows[0] if heading not in given]
         found = (_outcome(heading, rows[: trials.steps], good) for heading in headings)
@@ -103,7 +103,7 @@ class Study:
         """Remarks, one sentence each."""
         if self.failures:
             yield (
-                f"{len(self.failures)} of {self.draws} cameras drawn cannot be and are left out of all "
+                f"{len(self.failures)} of {self.draws} cameras drawn are impossible and left out of all "
                 f"numbers, such as: {self.failures[0]}"
             )
         for one in self.outcomes:
