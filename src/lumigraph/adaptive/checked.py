@@ -82,8 +82,8 @@ def _require_known(instrument: LightFieldMicroscope | PlenopticCamera, kind: Kin
     if isinstance(instrument, LensletCamera) and isinstance(instrument, Decoded):
         if kind is not PICTURE:
             raise GeometryError(
-                "aberrations of a PlenopticCamera need a 'picture', flat and at one known depth. For a point of "
-                "light use adaptive.sense."
+                "aberrations of a PlenopticCamera need a 'picture', flat and at one known depth. For a point "
+                "of light use adaptive.sense."
             )
     elif not isinstance(instrument, WithPupil) or instrument.configuration != "1.0":
         raise GeometryError(

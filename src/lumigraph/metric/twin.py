@@ -53,7 +53,7 @@ SURE = 3.0
 PITCH_ERROR = 3e-4
 """Of the lenslets' pitch over the pixels', one standard deviation, unless one is given.
 
-A moulded array's scale changes by 7e-5 a kelvin (PMMA), which white images cannot separate from the array's height.
+A moulded array's scale changes by 7e-5 a kelvin (PMMA), which white images cannot separate from its height.
 """
 
 _STEPS = (50e-6, 2e-3, 2e-3, 3e-6, 3e-6, 2e-3, 0.01)  # of the derivatives
