@@ -25,7 +25,7 @@ REMEDY = {
     "volume": "Give depths that are closer together or reach farther, or more terms.",
     "picture": "Ask for more terms, give the picture's own depth, or crop what is not flat.",
 }
-"""Where an object does not explain the raw image."""
+"""Remedies, by kind of object, if it does not explain the raw image."""
 
 
 def estimate(

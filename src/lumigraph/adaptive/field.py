@@ -15,7 +15,7 @@ ALIKE = 0.3
 """Standard deviation that is expected, at first, of its difference between neighbouring nodes [waves rms]."""
 
 LEAST = 1e-3
-"""What it may fall to."""
+"""Least value of `alike` [waves rms]."""
 
 LEARNT = 30
 """Steps to the expectation that explains a fit best."""

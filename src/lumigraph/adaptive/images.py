@@ -19,7 +19,7 @@ OWN = PLACES + 1
 """Unknowns of a bead: y, x, dz and the logarithm of its light."""
 
 STEP = 0.05
-"""Of spread, in which a difference shows how images change by it."""
+"""Step of the spread, for differences of images."""
 
 Q = (18 - math.sqrt(30)) / 7
 P, S = (9 - Q) / 5, 9 - 2 * Q
@@ -33,7 +33,7 @@ BALL *= np.array([1, P, Q, S])[KINDS, None] ** -0.5
 
 WEIGHTS = np.array([0, P**3 / 63, Q**3 / 630, S**3 / 2520])[KINDS]
 WEIGHTS[KINDS == 0] = 1 - WEIGHTS.sum()
-"""Their parts of its light."""
+"""Parts of a ball's light at its points."""
 
 SMALL = np.concatenate([np.eye(3), -np.eye(3)]) * math.sqrt(3 / 5)
 """Points, alike, that stand for a ball whose spread is no more than `STEP`: they have its moments up to the

@@ -11,11 +11,11 @@ SURE = 5.0
 """Standard deviations of noise above which a misfit is none of noise."""
 
 SMALL = 0.05
-"""Variances of noise by which what is left may exceed 1: models to 1e-2 leave as much in 600 electrons."""
+"""Variances of noise by which residuals may exceed 1: models to 1e-2 leave as much in 600 electrons."""
 
 
 class Misfit(NamedTuple):
-    """Mean over the pixels of what is left of them, in variances of noise.
+    """Mean square of the pixels' residuals, in variances of noise.
 
     Parameters
     ----------

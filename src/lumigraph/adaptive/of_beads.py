@@ -28,7 +28,7 @@ from lumigraph.operators.microscope_pupil import PLACES
 from lumigraph.scene import Points
 
 ACCURACY = 3e-2
-"""Of points' images: their errors are not alike from bead to bead, and below noise but in bright images."""
+"""Accuracy of points' images: their errors differ from bead to bead, below noise but in bright images."""
 
 FINE = 1e-2
 """Accuracy of the last steps where beads leave more than noise: with 2·10⁵ photons in each of 6, images
@@ -38,10 +38,10 @@ COARSE = 0.3
 """Accuracy of their derivatives, which then are off by 4 to 11 %, and single ones by up to 36 %."""
 
 ROUNDS = 3
-"""How often beads are looked for at most: in the raw image, then in what those before leave."""
+"""Searches for beads at most: in the raw image, then in what those before leave."""
 
 STEPS = {"places": 4, "all": 40}
-"""Of the fit, at most."""
+"""Steps of the fit, at most."""
 
 SPREAD = 3.0
 """Pixels that beads light through aberrations of 1 wave rms, over those without: 2.7 before a 20x/0.5."""

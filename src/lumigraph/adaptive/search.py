@@ -22,10 +22,10 @@ COARSE = 0.1
 """Accuracy of the images by which beads are looked for."""
 
 SAMPLES = 3
-"""Of the volume in which beads are looked for, along a lenslet."""
+"""Samples along a lenslet of the volume in which beads are searched."""
 
 ITERATIONS = 30
-"""Of Richardson-Lucy, by which beads are looked for."""
+"""Iterations of Richardson-Lucy in a search for beads."""
 
 APART = (1.6, 1.25)
 """Half axes of the spheroids in which light is one bead's, in lenslets: at first, at whatever depth, for
@@ -35,7 +35,7 @@ FAINT = (0.15, 0.05)
 """Light of a bead that counts, over the brightest's at first, and over the median of those found later."""
 
 BEYOND = 6e-6
-"""How far beyond the outermost depths beads may stand [m]."""
+"""Distance beyond the outermost depths within which beads may stand [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

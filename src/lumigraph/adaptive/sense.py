@@ -27,7 +27,7 @@ MODES = tuple(range(4, 22))
 """Noll indices up to the fifth order that a point's place does not explain."""
 
 STEPS = 30
-"""Of the fit, at most."""
+"""Steps of the fit, at most."""
 
 PLACED = {
     1: PISTON,

@@ -21,7 +21,7 @@ from lumigraph.operators.microscope_pupil import PLACES, Lit, PupilImages
 from lumigraph.scene import Points
 
 SHARE = 0.5
-"""Of the accuracy, rms, that cells which are left out may take."""
+"""Share of the accuracy, rms, that omitted cells may take."""
 
 COARSE = 0.1
 """Accuracy of derivatives: they show the way, and the images themselves where it ends."""

@@ -14,7 +14,7 @@ from lumigraph.operators.resampling import Part
 from lumigraph.scene import Points
 
 ACCURACY = 1e-2
-"""Of points' images."""
+"""Accuracy of points' images."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

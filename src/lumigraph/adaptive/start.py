@@ -26,13 +26,13 @@ from lumigraph.instruments.capabilities import Decoded, WithPupil
 from lumigraph.rendering import decode
 
 EDGE = 0.9
-"""Of the pupil's radius, within which views count: beyond it they are dark, or half of them is."""
+"""Part of the pupil's radius within which views count: beyond it they are dark, or half of them is."""
 
 SMOOTH = (2.0, 1.2, 0.7, 0.5)
 """Standard deviations by which pictures are smoothed, in turn: large shifts come first [lenslets]."""
 
 TURNS = 8
-"""Of comparing and moving, for each of them."""
+"""Rounds of comparing and moving, for each of them."""
 
 DEFOCUS = 4
 """Noll's index."""
@@ -41,7 +41,7 @@ BASE = (2, 3, DEFOCUS)
 """Tilts and defocus, which are the scene's place and depth: fitted and dropped."""
 
 STEP = 1e-4
-"""Of central differences, in pupil radii."""
+"""Step of central differences, in pupil radii."""
 
 TILE, TILES = 2, 8
 """Least lenslets along a side of the parts whose scatter gives the deviations, for neighbours share light and

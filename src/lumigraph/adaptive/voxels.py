@@ -39,7 +39,7 @@ TRIES = 4
 """Steps, each shorter than the one before, of which one must be likelier."""
 
 STEPS = 25
-"""At most."""
+"""Steps, at most."""
 
 SETTLED, SETTLING = 0.1, 6
 """Chi square of a step, all coefficients together, that need not be taken any more; and steps at most."""
@@ -146,7 +146,7 @@ class Voxels:
         return float(self._weights(told.problem).sum()) / told.problem.scale.gain
 
     def misfit(self, told: Told) -> Misfit:
-        """Misfit: what is left of the raw image."""
+        """Misfit of the raw image."""
         shown, data = arrays.to_numpy(told.state.model), arrays.to_numpy(told.problem.data)
         return Misfit.of(self._weights(told.problem), told.problem.scale.gain, data, shown)
 

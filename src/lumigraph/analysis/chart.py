@@ -76,7 +76,7 @@ class Chart:
         return self._squares()[2] / self.spacing
 
     def _squares(self) -> tuple[np.ndarray, np.ndarray, float]:
-        """Vectors (2, 2) of a square's sides, covariance (2, 2) along an axis, and rms of what is left."""
+        """Vectors (2, 2) of a square's sides, covariance (2, 2) along an axis, and rms residual."""
         design = np.column_stack([self.indices - self.indices.mean(0), np.ones(len(self))])
         fit = np.linalg.lstsq(design, self.corners, rcond=None)[0]
         left = ((self.corners - design @ fit) ** 2).sum()

@@ -20,7 +20,7 @@ _SHARP = 0.3  # samples: blur to begin with
 _KNOWN = 0.05  # of the contrast, by which the blur's logarithm is held there
 _LONGEST = np.array([0.3, 0.3, 0.2, 0.2, 0.5, np.inf, np.inf])  # step of each unknown of `_samples`
 _FARTHEST = 0.3
-"""From a saddle to where its edges cross [samples]: what samples pull at most, and noise."""
+"""Largest distance from a saddle to its edges' crossing [samples]: the pull of samples, and noise."""
 
 
 def crossed(picture: np.ndarray, saddles: np.ndarray, radius: int) -> np.ndarray:

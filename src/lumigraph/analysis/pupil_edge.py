@@ -15,7 +15,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.errors import CalibrationError
 
 LEAST_PITCH = 6.0
-"""Of micro-images [px]: smaller ones have no profile."""
+"""Least pitch of micro-images [px]: smaller ones have no profile."""
 
 _STRIP = 0.06  # pitches on either side of the line between two centres, or half a pixel
 _BIN = 0.1  # px along it

@@ -25,7 +25,7 @@ In that crop those just beside it are up to 17 times as bright as the inside, th
 """
 
 Inside = tuple[slice, slice]
-"""Where an object (y, x) stands in a larger one."""
+"""Slices (y, x) of an object in a larger one."""
 
 
 @runtime_checkable

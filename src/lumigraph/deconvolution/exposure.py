@@ -27,7 +27,7 @@ class Exposure:
     background
         b: what a pixel reads without light, in the raw image's values: a number or (ny, nx).
     response
-        v: what a pixel makes of light over what the model expects (ny, nx); None for 1.
+        v: response of each pixel to light, over that of the model (ny, nx); None for 1.
     weights
         How much each pixel counts (ny, nx), from 0 to 1: 0 for dead or saturated ones, whose values are
         not read and may be NaN. None for 1.

@@ -20,7 +20,7 @@ MOST_VIEWS = 9
 """Along one axis: views between these look much the same, and cost as much."""
 
 LEAST_NOISE = 2e-3
-"""Of a picture from 0 to 1: what rounding to eight bits leaves."""
+"""Least noise of a picture from 0 to 1: that of rounding to eight bits."""
 
 FEWEST_VIEWS, LEAST_SIDE = 2, 8
 """Along one axis, and lenslets across a view: fewer show no lines."""

@@ -19,7 +19,7 @@ _ENOUGH = 1e-10
 
 
 Tears = tuple[np.ndarray, np.ndarray]
-"""Whether there is a tear between each sample (y, x) and the next, along y and along x."""
+"""Masks of tears between each sample (y, x) and the next, along y and along x."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ def tears(values: np.ndarray, least: float) -> Tears:
 def _torn(down: np.ndarray, right: np.ndarray, size: int) -> tuple[np.ndarray | int, Tears]:
     """Mask of blocks of size² samples that are of one piece, and the tears between them.
 
-    The mean of a torn block is nobody's: it says nothing, and no block bends towards it.
+    The mean of a torn block belongs to neither side: it has no weight, and no block bends towards it.
     """
     if size == 1:
         return 1, (down, right)

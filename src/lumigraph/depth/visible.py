@@ -7,7 +7,7 @@ import numpy as np
 from lumigraph.depth.pictures import Pictures
 
 BEFORE = 1.2
-"""How much nearer an occluder is [px in the outermost view]."""
+"""Least distance of an occluder before a place [px in the outermost view]."""
 
 
 def visible(pictures: Pictures, moves: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:

@@ -138,4 +138,4 @@ class MicroscopeLayout:
 
 
 _FAR = 1e3
-"""From the native image to a pupil whose rays count as parallel to the axis [m]."""
+"""Distance from the native image to a pupil whose rays count as parallel to the axis [m]."""

@@ -29,7 +29,7 @@ from lumigraph.sensor import Sensor
 MOST_PLACES, MOST_DEPTHS = 1000, 1000
 
 PARTS = {"lateral": slice(0, 2), "depth": slice(2, 3), "brightness": slice(3, 4)}
-"""Of what is unknown of a point, by name."""
+"""Unknowns of a point, by name."""
 
 DOUBTFUL = 0.05
 """Relative error of a derivative that is warned of."""

@@ -103,7 +103,7 @@ def followed(
 
 
 OPTICAL = ("pixel_pitch", "shape"), ("pixel_pitch", "shape", "fill_factor", "angular_response")
-"""What of sensors images follow from, not their noise: of microscopes and of cameras."""
+"""Keys of sensors that images, not their noise, follow from: of microscopes and of cameras."""
 
 
 def require_alike(instrument: Instrument, other: Instrument) -> None:

@@ -21,10 +21,10 @@ from lumigraph.sensor import Sensor
 from lumigraph.simulation.microscope_scene import SAMPLES
 
 ENOUGH = 1e-3
-"""Of a sum, what conjugate gradients may leave."""
+"""Part of a sum that conjugate gradients may leave."""
 
 STEPS = 500
-"""Of conjugate gradients, at most."""
+"""Steps of conjugate gradients, at most."""
 
 Seeing = tuple[Linear, np.ndarray, Sensor]
 """Operator of planes, the object's area whose light is 1 in a pixel (nz,) [m²], and the sensor."""
@@ -98,7 +98,7 @@ class Imaging:
         )
 
     def covered(self, z: np.ndarray) -> np.ndarray:
-        """P z, what is left times an object (nz, n, n)."""
+        """P z: the remaining covariance times an object (nz, n, n)."""
         return coloured(self.solved(coloured(z, self.power)), self.power)
 
     def reconstructed(self, raw: np.ndarray) -> np.ndarray:

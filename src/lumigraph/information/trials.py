@@ -13,13 +13,13 @@ from lumigraph.instruments.instrument import Instrument
 from lumigraph.sensor import Sensor
 
 REACH = 5.0
-"""How far from the truth places are looked for, in bounds."""
+"""Distance from the truth within which places are searched, in bounds."""
 
 NODES = 5
 """Places along each axis at which images are known; between, polynomials of this many terms."""
 
 STEPS, SMALL = 25, 1e-3
-"""Of Fisher's scoring, at most; and of which length, in bounds, they end."""
+"""Steps of Fisher's scoring, at most, and the length, in bounds, at which they end."""
 
 DARK = 1e-7
 """Pixels that get less light than this, of the brightest, are left out."""

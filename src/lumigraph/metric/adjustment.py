@@ -20,7 +20,7 @@ _ROUNDS = 3
 """Adjustments, each with the noise of the one before."""
 
 _STEPS, _STEADY = 40, 3e-3
-"""Of the noise in a round, at most, and the part of it by which the last one may change it."""
+"""Rounds of the noise, at most, and its relative change in the last one."""
 
 _WILD = 6.0
 """Standard deviations beyond which a place is another corner's."""
@@ -30,7 +30,7 @@ _SAME_TURN, _SAME_DISTANCE = 0.05, 0.02
 """Boards that turn by less [rad], and stand no farther apart, of their distance, count as the same."""
 
 _FLAT = 1e-3
-"""To which a board is taken to be flat at first, over its diagonal: paper on a plate."""
+"""Flatness that is assumed of a board at first, over its diagonal: paper on a plate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -337,7 +337,7 @@ def placed(
 
 
 def _again(first: Problem, unknowns: np.ndarray) -> tuple[Problem, np.ndarray]:
-    """The problem with the noise of what is left over, without its wild corners."""
+    """The problem with the noise of its residuals, without its outliers."""
     kind, misfit, blur = first.corners.kind, first.misfit(unknowns), first.magnification(unknowns)
     typical = np.array([
         np.median(np.abs(misfit[kind == k])) if np.any(kind == k) else 1.0 for k in range(int(kind.max()) + 1)
@@ -354,7 +354,7 @@ def _again(first: Problem, unknowns: np.ndarray) -> tuple[Problem, np.ndarray]:
 
 
 def _noisy(problem: Problem, unknowns: np.ndarray, blur: np.ndarray | None) -> Problem:
-    """The problem with the noise that explains what is left over, and what the unknowns took out of it.
+    """The problem with the noise that explains its residuals and the part that the unknowns absorb.
 
     A camera and poses that are adjusted follow the noise, the more so the fewer the corners: what is left
     over is less than the noise, by the covariance of computed places (expectation-maximisation).

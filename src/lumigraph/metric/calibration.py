@@ -32,7 +32,7 @@ _BENT = 5e-4
 _LENGTHS = ("f", "L", "b")
 
 _ROUNDS = 2
-"""In which light that lenslets spread and spill is taken out."""
+"""Rounds that correct for light that lenslets spread and spill."""
 
 WELL = 0.01
 """Half a 95 % interval over a length, beyond which a note names it."""

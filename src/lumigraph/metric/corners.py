@@ -26,7 +26,7 @@ _WRITTEN = (
 )
 
 PATTERNS = ("corners", "dots", "asymmetric dots", "charuco")
-"""What boards show.
+"""Patterns of boards.
 
 - corners: the inner ones of a chessboard
 - dots: dark ones on a white ground, on a square lattice
@@ -39,7 +39,7 @@ LEAST = 3
 """Corners along either side of a board."""
 
 FARTHEST = 1e6
-"""What no picture reaches to [px]."""
+"""Coordinate beyond all pictures [px]."""
 
 _COLUMNS = ("frame", "corner", "place", "center", "kind")
 

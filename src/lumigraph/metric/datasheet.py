@@ -140,7 +140,7 @@ def _missing(section: str, name: str, why: Exception | str) -> Entry:
 def _grid(
     white: RawImage, lattice: Calibration, whites: Sequence[RawImage]
 ) -> tuple[Calibration, list[Entry]]:
-    """The lattice through the lenslets well inside the array, its pitch, its rotation and what is off it."""
+    """The lattice through the lenslets well inside the array, its pitch, its rotation and its residual."""
 
     def placed(image: RawImage) -> Fitted:
         return places(np.asarray(to_numpy(image.data)), lattice)

@@ -23,7 +23,7 @@ from lumigraph.metric.spill import Spill
 from lumigraph.store import write_bytes
 
 COLUMNS = ("frame", "corner", "y", "x", "center_y", "center_x", "kind")
-"""Of a table of corners: lengths in pixels."""
+"""Columns of a table of corners, lengths in pixels."""
 
 IN_VIEWS = "in_views"
 """A column of ones in a table of corners that were found in views."""
@@ -302,7 +302,7 @@ def _whole(name: str, found: dict[str, np.ndarray]) -> np.ndarray:
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Context in which whatever a file holds that a camera cannot have is its own fault, in one line."""
+    """Context in which values that no camera can have become errors of the file, in one line."""
     try:
         yield
     except LumigraphError as error:

@@ -29,7 +29,7 @@ LEAST_SEEN = 3
 """Lenslets that must show a corner."""
 
 _DIM = 0.7
-"""How far a beam may reach beyond the main lens' stop where edges are looked for, over half its width."""
+"""Largest reach of a beam beyond the main lens' stop where edges are searched, over half its width."""
 
 _APART = 0.96  # pitches: width of micro-images up to which their edges tell stop and focus
 

@@ -15,7 +15,7 @@ import numpy as np
 NAMES = (
     "f", "L", "b", "L/E", "axis y", "axis x", "tilt y", "tilt x", "k1", "k2", "k3", "p1", "p2",
 )  # fmt: skip
-"""Of a camera's numbers; the gains of its kinds of lenslets follow."""
+"""Names of a camera's numbers; the gains of its kinds of lenslets follow."""
 
 _TINY = 1e-24
 

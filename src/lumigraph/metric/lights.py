@@ -23,13 +23,13 @@ FILL = 0.8
 """Part of a full well that white images and charts fill."""
 
 ACCURACY = 1e-2
-"""Of simulated charts, as good as their noise: at 1e-3 an image out of focus may take minutes."""
+"""Accuracy of simulated charts, as good as their noise: at 1e-3 an image out of focus may take minutes."""
 
 EXPOSURES = 16
-"""Of each light, of small sensors. What noise of depth needs more for, the sheet says."""
+"""Exposures of each light, for small sensors. The sheet says where the noise of depth needs more."""
 
 _PIXELS = 40e6
-"""Of all exposures of a light together: the sheet of five planes then takes some minutes."""
+"""Pixels of all exposures of a light together: the sheet of five planes then takes some minutes."""
 
 _FLATS = (0.1, 0.25, 0.45, 0.65)  # the same of further white images, for photon transfer
 _CELL = 22.0  # samples of the picture to a square, of the farthest chart

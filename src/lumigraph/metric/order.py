@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, KDTree, QhullError
 from lumigraph.errors import CalibrationError
 
 _OFF = 0.3
-"""Of the way to the nearest place: how far a place may be from where the others of a flat board lead to."""
+"""Largest error of a place on a flat board, by the others, over the distance to the nearest one."""
 
 _FLAT = 0.02
 """Width over length of a board seen from the side that no detector finds any more."""

@@ -27,13 +27,13 @@ Turn = tuple[float, float, float]
 _TILTS = (0.0, 0.35, -0.35, 0.7, -0.7)  # rad: beyond, the squares are too narrow
 _STEEPEST = 0.8  # rad, about both axes together
 _ASLANT = math.radians(18)
-"""From edges in views to rows of lenslets: edges that run along them may be anywhere between two."""
+"""Angle from edges in views to rows of lenslets: edges that run along them may be anywhere between two."""
 
 _ROLLS = np.array(sorted(np.linspace(-0.8, 0.8, 65), key=abs))
 """Turns about the line of sight that are tried [rad], the smallest first."""
 
 KEPT_TO = (0.02, math.radians(5))
-"""How far pictures may be from a plan: of their distance, and in each angle [rad]."""
+"""Tolerances of a plan: in distance, relative, and in each angle [rad]."""
 
 _RATIOS = (0.08, 0.6)  # how far a corner moves against a lenslet, as `depth.correlation` looks for it
 _DISTANCES = 24
@@ -52,7 +52,7 @@ _SWAY = 0.01
 """Noise of how far a corner moves from view to view (see `Noise`)."""
 
 _SURE = (0.1, 0.3)
-"""Of L and b: how well they are known without any picture, over themselves."""
+"""Relative uncertainty of L and b without any picture."""
 
 
 @dataclass(frozen=True, slots=True)

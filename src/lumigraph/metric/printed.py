@@ -26,12 +26,12 @@ PAPERS = {
 """Short and long side [m]."""
 
 EDGE_TURN = math.radians(5)
-"""Of a slanted edge: ISO 12233."""
+"""Angle of a slanted edge: ISO 12233."""
 
 SPOKES = 36
 
 GROUPS = (-2, 1)
-"""Of USAF-1951: 0.25 to 3.56 line pairs per millimetre, which a printer can."""
+"""Groups of USAF-1951: 0.25 to 3.56 line pairs per millimetre, which printers resolve."""
 
 ROUND = 240
 """Corners of the polygons that are printed for circles: 0.01 % of their radius off."""

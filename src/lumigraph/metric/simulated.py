@@ -20,7 +20,7 @@ from lumigraph.preparation import decode, prepare
 from lumigraph.rendering import refocus
 
 MEASURES = ("mtf50_middle", "mtf50_border", "mtf10_middle", "mtf10_border", "sample_on_chart", "distortion")
-"""What is measured, and the contrast ``mtf@F/mm`` of F cycles per millimetre of the object, in the middle."""
+"""Measures, and the contrast ``mtf@F/mm`` of F cycles per millimetre of the object, in the middle."""
 
 _ACCURACY = 1e-3  # cameras that differ little are compared
 _CONTRAST = re.compile(r"mtf@(\d+\.?\d*)/mm")

@@ -38,7 +38,7 @@ NARROW, _APART = 0.1, 1.1
 to it, within 4 % down to 0.015."""
 
 _UNSURE, _UNSURE_BEHIND, _UNSURE_EDGE = 0.15, 0.4, 0.2
-"""Of what is taken out, over itself: by wave optics, up to 0.009 of 0.065 is left from view to view; in
+"""Relative uncertainty of the correction: by wave optics, up to 0.009 of 0.065 is left from view to view; in
 micro-images of a camera 2.0, where the stop's width is taken from `Calibration.fill` and the lenslets' focus
 from the corners, by 2 % and 10 to 30 %; and where both follow from edges on a white image, within 0.6 %.
 """
@@ -258,4 +258,4 @@ def _half(way: np.ndarray) -> np.ndarray:
 
 
 _PULL = 1 / float((np.diff(_half(np.arange(-3, 3, 0.01))) ** 2).sum() / 0.01)
-"""How far an edge moves with each part of light that is on one side of it [pitches]."""
+"""Shift of an edge for each part of light on one side of it [pitches]."""

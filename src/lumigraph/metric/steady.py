@@ -159,7 +159,7 @@ def _apart(values: Sequence[float]) -> float | None:
 
 def _repeats(apart: float | None, count: int, unit: str) -> str:
     if apart is None:
-        return "one exposure, so that nobody knows how well it repeats"
+        return "one exposure, so that its repeatability is unknown"
     told = f"{count} exposures, two such sets differ by {apart:.2g} {unit} at most"
     if unit == "%" and apart > REPEATED:
         told += f" ({math.ceil(count * (apart / REPEATED) ** 2)} exposures: {REPEATED:g} %)"

@@ -36,7 +36,7 @@ from lumigraph.instruments.capabilities import Rendered
 from lumigraph.operators.white import white_image
 
 CAUSES = ("height", "tilt_y", "tilt_x", "shift_y", "shift_x", "turn", "aperture")
-"""What may be out of place.
+"""Possible misalignments.
 
 - height: of the array above its place, away from the sensor [m]
 - tilt: of the array, positive where it is farther from the sensor at larger y (x) of the raw image [rad]
@@ -51,7 +51,7 @@ SURE = 3.0
 """Standard deviations from which on an instruction is given."""
 
 PITCH_ERROR = 3e-4
-"""Of the lenslets' pitch over the pixels', one standard deviation, unless one is given.
+"""Standard deviation of the lenslets' pitch over the pixels', unless one is given.
 
 A moulded array's scale changes by 7e-5 a kelvin (PMMA), which white images cannot separate from its height.
 """
@@ -63,7 +63,7 @@ _ROUNDS = 3
 _BLUR = 0.03  # part by which the blur of micro-images may differ before it is a cause of its own
 _ACCURACY = 1e-3
 _FARTHEST = 0.1
-"""Of the lenslets' distance from the sensor: an array that is farther from its place is another camera."""
+"""Largest misplacement of an array, over its distance from the sensor: beyond, it is another camera."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

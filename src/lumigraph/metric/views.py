@@ -19,7 +19,7 @@ from lumigraph.preparation import decode, of_raw
 from lumigraph.rendering.geometry import raw_places
 
 LEAST_VIEWS = 5
-"""In which a corner must be seen."""
+"""Views in which a corner must be seen."""
 
 DIRECTIONS = 7
 """Views along an axis: the fewer, the less noise and the less of it is shared."""

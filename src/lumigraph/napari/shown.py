@@ -15,7 +15,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.errors import FormatError
 
 KEY = "lumigraph"
-"""Where a layer's metadata hold what it was made of."""
+"""Key of a layer's metadata that holds the noun it was made of."""
 
 _MICRO = {"meter": 1.0, "millimeter": 1e-3, "micrometer": 1e-6, "nanometer": 1e-9}
 _SURE = (1, 99)  # percentiles that the colours of a depth map span

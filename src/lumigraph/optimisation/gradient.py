@@ -15,7 +15,7 @@ ENOUGH = 1e-4
 """Relative gain of two steps, below which they lead no farther."""
 
 SLIGHT, LEAST = 1e-3, 1e-6
-"""Of what a gradient promises, what a step must keep; and what counts as no slope."""
+"""Part of a gradient's promise that a step must keep, and the least slope."""
 
 
 def downhill(

@@ -20,7 +20,7 @@ from lumigraph.elements.zernike import noll_to_nm, zernike
 from lumigraph.errors import GeometryError
 
 RADIUS, SAMPLES = 16, 72
-"""Of the pupil in samples, and the window's: all of its autocorrelation has room."""
+"""Radius of the pupil in samples, and width of the window: all of its autocorrelation has room."""
 
 EDGE = 1.9
 """Highest frequency that counts, of the pupil's radius; 2 is the cut-off, where nothing is left."""

@@ -16,7 +16,7 @@ from lumigraph.instruments.instrument import Instrument
 from lumigraph.optimisation.goals import BOUNDS, ERRORS, Goal
 
 ACCURACY = 1e-2
-"""Of images of points."""
+"""Accuracy of images of points."""
 
 MOST = 10_000
 """Raw images at each depth."""

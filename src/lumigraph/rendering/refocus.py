@@ -143,7 +143,7 @@ def _inverse(seen: np.ndarray) -> np.ndarray:
 
 
 _Taps = list[tuple[int, float]]
-"""By how many samples a neighbour stands off, and its weight."""
+"""Offset of a neighbour in samples, and its weight."""
 
 
 @dataclass(frozen=True, slots=True)

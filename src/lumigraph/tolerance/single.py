@@ -29,10 +29,10 @@ _ACROSS = 128
 """Rays across the stop."""
 
 _NODES = 24
-"""Of quadrature across a lenslet."""
+"""Nodes of quadrature across a lenslet."""
 
 Errors = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Of lenslets: factors of focal lengths, decentres along columns and rows [m], and presence."""
+"""Errors of lenslets: factors of focal lengths, decentres along columns and rows [m], and presence."""
 
 
 class Differ(Protocol):

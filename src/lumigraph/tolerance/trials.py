@@ -25,7 +25,7 @@ MOST = 1_000_000
 """Cameras that are drawn at most."""
 
 VIEWS = "lenslets that see a point"
-"""Of cameras 2.0, in the place of the views that matched f-numbers would give."""
+"""Measure of cameras 2.0, in place of the views that matched f-numbers would give."""
 
 USUAL = (
     "focus shift", "depth error", "blur at the object", "lateral resolution", "views per axis",
@@ -34,10 +34,10 @@ USUAL = (
 """Measures that are taken where none are named."""
 
 OF_LENSLETS = ("lenslet focus shift", "light of a point")
-"""Those that are taken besides where lenslets differ from each other."""
+"""Additional measures where lenslets differ from each other."""
 
 OF_LEANING = ("corner focus shift", "corner depth error")
-"""Those that are taken besides where array or sensor lean."""
+"""Additional measures where array or sensor lean."""
 
 CAMERA, ERROR = "camera", "error"
 """Columns: which camera it is, and why there is none."""

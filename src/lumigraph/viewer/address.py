@@ -22,7 +22,7 @@ class Address:
     Parameters
     ----------
     token
-        First part of every path: nobody guesses it who does not have the secret.
+        First part of every path, which only the holder of the secret can derive.
     port
         Tried first; any free one where it is taken.
     """

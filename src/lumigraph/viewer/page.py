@@ -19,7 +19,7 @@ MODULES = (
     "rays.js", "sections.js", "models.js", "pane.js", "quilt.js", "histogram.js", "play.js", "saving.js",
     "webm.js", "film.js", "controls.js", "keys.js", "main.js",
 )  # fmt: skip
-"""In the order of their imports: a module comes after those it uses."""
+"""Modules in the order of their imports: a module comes after those it uses."""
 
 MEDIA = {
     ".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8",
@@ -28,7 +28,7 @@ MEDIA = {
 """Media types of the page's files by their endings."""
 
 Pack = Callable[[str, Parts, Coded], bytes]
-"""How an array travels: function of its name, what it belongs to, and its numbers."""
+"""Encoding of an array: function of its name, what it belongs to, and its numbers."""
 
 
 @cache
