@@ -70,7 +70,7 @@ def of_volume(
 
 
 def _improved(voxels: Voxels, told: Told, free: np.ndarray, iterations: Sequence[int]) -> tuple[Told, Around]:
-    """Step by step with volumes that are followed farther and farther, at last by the slope."""
+    """Volume and coefficients after steps with more and more iterations, at last by the slope."""
     found = voxels.improved(told, free)
     for n in iterations[1:]:
         found = voxels.improved(voxels.begun(found[0].coefficients, n, found[0].steps), free)

@@ -135,7 +135,7 @@ class Scene:
         return Clusters.of(self.instrument.calibration if self.pixels is None else self.pixels, terms)
 
     def counted(self, exposure: Exposure) -> Exposure:
-        """Without the pixels that see where a camera's array ends."""
+        """Exposure without the pixels that see the edge of a camera's array."""
         if not isinstance(self.instrument, LensletCamera):
             return exposure
         inner = inner_pixels(self.instrument, self.pixels)

@@ -74,7 +74,7 @@ def quadratic(y: np.ndarray, x: np.ndarray, width: float) -> np.ndarray:
 
 
 def _towards_rest(terms: np.ndarray, dots: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Step (n, 2) [px], at most 1, to where the gradient is 0, and which quadratics are saddles (hollows)."""
+    """Step (n, 2) [px], at most 1, to where the gradient is 0, and a mask of saddles (or hollows)."""
     _, gy, gx, yy, yx, xx = terms.T
     determinant = yy * xx - yx**2
     right = (determinant > 0) & (yy > 0) if dots else determinant < 0

@@ -53,7 +53,7 @@ class Checkpoint:
 
     @classmethod
     def of(cls, place: "Checkpoint | str | os.PathLike[str]") -> "Checkpoint":
-        """Itself, or a checkpoint at a path."""
+        """Checkpoint at a path, or the given one."""
         if isinstance(place, Checkpoint):
             return place
         if not isinstance(place, str | os.PathLike):

@@ -91,7 +91,7 @@ class Filter(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """When to stop.
+    """Rule by which a deconvolution stops.
 
     Richardson-Lucy fits the noise in the end: it is to be stopped before. Where the electrons are counted
     (`Exposure.gain`), the deviance per pixel of the true object is 1 on average (a little more at one or

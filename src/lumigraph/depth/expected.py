@@ -187,7 +187,7 @@ def terms(values: np.ndarray, evidence: Evidence, *, slants: bool = True) -> dic
 
 
 def _range(values: np.ndarray, width: int) -> np.ndarray:
-    """Between the nearest and the farthest in a window (y, x)."""
+    """Range (y, x) from the farthest to the nearest value in a window."""
     return maximum_filter(values, width) - minimum_filter(values, width)
 
 

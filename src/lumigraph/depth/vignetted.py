@@ -80,7 +80,7 @@ def _seen(data: np.ndarray, views: list[tuple[int, int]]) -> np.ndarray:
 
 
 def _sum(image: np.ndarray, radius: int) -> np.ndarray:
-    """Over (2 radius + 1)² samples, 0 beyond the edges, as a part of them all."""
+    """Sum over (2 radius + 1)² samples, 0 beyond the edges, as a part of them all."""
     return uniform_filter(image, 2 * radius + 1, mode="constant")
 
 

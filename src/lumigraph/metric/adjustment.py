@@ -112,7 +112,7 @@ class Problem:
 
     @property
     def free(self) -> np.ndarray:
-        """See `freedom`."""
+        """Matrix from unknowns to the camera's numbers; see `freedom`."""
         return freedom(self.camera)
 
     @property

@@ -185,7 +185,7 @@ class Lights:
 
 
 def _sample(camera: LensletCamera, depth: float) -> float:
-    """Between samples of a picture, on a chart at a depth [m]."""
+    """Distance between samples of a picture, on a chart at a depth [m]."""
     per = max(1, abs(round(camera.patch_at(depth)))) if isinstance(camera, Rendered) else 1
     return camera.lenslets.pitch * camera.defocused(depth) / camera.separation / per
 

@@ -313,7 +313,7 @@ def _shape(tried: Tried, spacing: float | None) -> list[Entry]:
 
 
 def _half(error: float, freedom: int, sway: float) -> float:
-    """Half a 95 % interval, of a standard deviation by few corners (Student's t) and what else sways."""
+    """Half width of a 95 % interval, by the deviation of few corners (Student's t) and other variation."""
     return math.hypot(float(student.ppf(0.975, max(freedom, 1))) * error, 1.96 * sway)
 
 

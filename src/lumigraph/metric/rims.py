@@ -54,7 +54,7 @@ def outwards(waves: Waves, pitch: float, slopes: tuple[float, ...]) -> RegularGr
 
 
 def _directions(waves: Waves) -> Iterator[np.ndarray]:
-    """Along a row of lenslets, and halfway to the next."""
+    """Unit vectors along a row of lenslets, and halfway to the next."""
     row = np.array(waves.basis[0]) / math.hypot(*waves.basis[0])
     for turn in (0.0, np.arccos(waves.basis[0] @ np.array(waves.basis[1])) / 2):
         yield np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ row

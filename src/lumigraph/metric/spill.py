@@ -175,7 +175,7 @@ class Spill:
         return rims.outwards(told, apart, slopes)
 
     def _axes(self) -> np.ndarray:
-        """Along the lattice's rows, and across them (2, 2)."""
+        """Unit vectors (2, 2) along the lattice's rows, and across them."""
         down, right = self.lattice.basis[0]
         return np.array([(down, right), (right, -down)]) / self.lattice.pitch
 

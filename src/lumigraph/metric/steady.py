@@ -32,7 +32,7 @@ _TO_SIGMA = 1.4826  # of a normal distribution, over the median distance from it
 
 
 def inner(values: np.ndarray) -> np.ndarray:
-    """Without the outermost tenth of the field."""
+    """Values of the field without its outermost tenth."""
     return values[tuple(slice(n // 10, n - n // 10) for n in values.shape)]
 
 

@@ -58,7 +58,7 @@ class Work:
         self._worker.start()
 
     def stop(self) -> None:
-        """Let the computation end where it next reports its progress; its result does not count then."""
+        """Stop the computation at its next report of progress; its result does not count then."""
         self._stop = True
 
     def _run(self, job: Job) -> tuple[Any, BaseException | None]:

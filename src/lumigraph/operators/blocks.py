@@ -261,7 +261,7 @@ class Builder:
         return ranks, parts()
 
     def forget(self) -> None:
-        """Let go what only computing needs."""
+        """Release the arrays that only computing needs."""
         self.apart, self.chosen = None, {}
         memory.give_back()
 

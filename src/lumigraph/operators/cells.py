@@ -103,7 +103,7 @@ class Cells:
         return range(2 if self.staggered else 1)
 
     def shift(self, dy: int) -> int:
-        """Half cells from an even row to cell (dy, 0), as offsets from even rows are counted."""
+        """Half cells by which cell (dy, 0) is shifted from an even row, as offsets are counted."""
         return dy % 2 if self.staggered else 0
 
     def mirrored(self, dy: int, dx: int) -> int:

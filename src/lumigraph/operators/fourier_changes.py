@@ -63,7 +63,7 @@ class Pupil:
     def of(
         cls, seen: tuple[Objective, Mosaic, int], depths: np.ndarray, share: float, like: Self | int
     ) -> Self:
-        """Behind a lenslet at a wavelength, by a share of the light; sampled like another or for a window."""
+        """Pupil of a lenslet at a wavelength, by a share of the light; sampled like another or by window."""
         objective, mosaic, j = seen
         made_of = (
             objective, *mosaic.centers[j].tolist(), float(mosaic.focal_lengths[j]), share,

@@ -121,7 +121,7 @@ class FourierMicroscopeOperator(Linear):
 
     @property
     def error(self) -> float:
-        """Not known: NaN."""
+        """Relative error: unknown, NaN."""
         return math.nan
 
     def _forward(self, intensity: Array) -> Array:

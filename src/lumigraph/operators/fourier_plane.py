@@ -113,7 +113,7 @@ class FourierPlane(WholePlane):
         return found
 
     def _spread(self, end: FourierPoints) -> Linear:
-        """Onto points that stand as the pixels do."""
+        """Resampling onto points that stand as the pixels do."""
         pitch = end.mosaic.pixel_pitch / end.mosaic.total_magnification
         return represented(self.grid, Grid(self._field, (pitch, pitch)), upright=True)
 

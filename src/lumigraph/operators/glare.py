@@ -155,7 +155,7 @@ def _places(cells: Cells, shape: Offset) -> Offset:
 
 
 def glare(means: Sequence[Means], cells: Cells, even: np.ndarray | None = None) -> Glare:
-    """Beyond the offsets of `means`.
+    """Glare of cells beyond the offsets of `means`.
 
     At the end of the reach light may not fall as the cube yet. So what all pictures add up to is made right
     for an endless even object, in all directions alike.

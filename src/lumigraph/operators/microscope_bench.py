@@ -260,7 +260,7 @@ class Bench:
         return image * np.float32(area), lost
 
     def fields(self, dz: float) -> Callable[[tuple[float, float]], np.ndarray]:
-        """Gives the field (modes, n, n) before the lenslets of a point (ky, kx) at a depth [samples]."""
+        """Function that returns the field (modes, n, n) before the lenslets of a point (ky, kx) [samples]."""
         s, pitch = self.sampling.points, self.lenslet.pitch / self.lenslet.magnification
         at, step = self.at / self.lenslet.magnification, self.fine // s
 

@@ -191,7 +191,7 @@ class PupilImages:
         return whole
 
     def cells_at(self, dz: float) -> int:
-        """Along the window that holds the image of a point at a depth [m], without coefficients."""
+        """Number of cells along the window of a point's image at a depth [m], without coefficients."""
         return max(self._size(objective, dz)[0] for objective in self.objectives)
 
     def share(self, dz: float) -> float:

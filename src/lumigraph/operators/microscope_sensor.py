@@ -44,11 +44,11 @@ class Samples:
     placement: Linear | None
 
     def parted(self, raw: Array) -> Array:
-        """See `Sensor`."""
+        """Patterns of each cell; see `Sensor`."""
         return parted(raw if self.placement is None else self.placement._adjoint(raw), self.patterns)
 
     def whole(self, parts: Array) -> Array:
-        """See `Sensor`."""
+        """Pixels (ny, nx); see `Sensor`."""
         plane = whole(parts, self.patterns)
         return plane if self.placement is None else self.placement._forward(plane)
 
@@ -76,7 +76,7 @@ class Straight:
     shape: Sequence[int]
 
     def parted(self, raw: Array) -> Array:
-        """See `Sensor`."""
+        """Patterns of each cell; see `Sensor`."""
         xp, n, rows = arrays.namespace(raw), len(self.patterns.along), len(self.y)
         down = xp.concat([m @ raw[pixels, :] for pixels, m in self.y])
         sides = self._sides(raw)
@@ -88,7 +88,7 @@ class Straight:
         return xp.reshape(xp.concat(found, axis=-1), (rows, len(self.x), -1))
 
     def whole(self, parts: Array) -> Array:
-        """See `Sensor`."""
+        """Pixels (ny, nx); see `Sensor`."""
         xp, n, rows = arrays.namespace(parts), len(self.patterns.along), len(self.y)
         flat, first, sides = xp.reshape(parts, (-1, self.patterns.count)), 0, self._sides(parts)
         for one, v in self._flat(sides, parts):

@@ -212,7 +212,7 @@ class Spectra:
 
     @property
     def _points(self) -> int:
-        """Along a side of a cell."""
+        """Number of points along a side of a cell."""
         return math.isqrt(len(self.points[0].basis))
 
     def adjoint(self, images: Sequence[Array]) -> list[Array]:

@@ -149,7 +149,7 @@ class Crossed:
     def _fields(
         self, turns: np.ndarray, modes: Sequence[Pair], points: Sequence[Point]
     ) -> Callable[[Point], list[Pair]]:
-        """Gives what of a point's light does not interfere, along y and along x."""
+        """Function that returns the incoherent parts of a point's light, along y and along x."""
         waves = self._waves(turns)
 
         def moved(told: tuple[int, float]) -> list[np.ndarray]:
@@ -219,7 +219,7 @@ class Crossed:
         return (u[:, :rank] * s[:rank]).T @ down, v[:rank] @ across, float(left[rank:][:1].sum())
 
     def _waves(self, turns: np.ndarray) -> np.ndarray:
-        """Behind the lenslets (m, nodes × samples): of each of a pixel's nodes, or on a grid for splines."""
+        """Waves behind the lenslets (m, nodes × samples): at a pixel's nodes, or on a grid for splines."""
         N, finest = self.sampling.pixels, finest_of(self.objective, self.lenslet, self.fine)
         told = self.lenslet, self.objective.wavelength, turns, finest
         if self.sampling.degree:

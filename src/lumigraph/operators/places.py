@@ -80,7 +80,7 @@ class Place:
 
 
 def bands(optics: Optics, axis: int, parity: int = 0) -> list[Band]:
-    """Along y (0) or x (1, of rows of a parity); the first is all of the array's cells, without a border."""
+    """Bands along y (0) or x (1, of rows of a parity); the first is all of the array, without a border."""
     cells, extent = optics.cells, optics.array.extent
     size, n, pitch = cells.size[axis], cells.count[axis], optics.array.lattice.pitch
     first = cells.ring[axis]
@@ -106,7 +106,7 @@ def _near(border: float, far: float) -> float:
 
 
 def flipped(limits: Limits) -> Limits:
-    """Seen in a mirror."""
+    """Limits as seen in a mirror."""
     return -limits[1], -limits[0]
 
 

@@ -276,7 +276,7 @@ class Goal:
         return float(getattr(found, self.name))
 
     def _halves(self) -> tuple[float, ...]:
-        """Half-way between neighbouring depths."""
+        """Depths half-way between neighbouring ones."""
         depths = np.unique(self.depths)
         return tuple(float(dz) for dz in (depths[1:] + depths[:-1]) / 2)
 

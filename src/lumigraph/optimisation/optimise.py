@@ -313,7 +313,7 @@ def _reached(
 
 
 def _warn_of_held_out(found: Optimum) -> None:
-    """Say where others reconstruct held-out scenes as well as the best."""
+    """Warn where other cameras reconstruct held-out scenes as well as the best."""
     best, told = found.held_out.get("best", Tried(reason="there are none")), found.goal.told
     for which, words in BEFORE.items():
         other = found.held_out.get(which, best)
@@ -332,7 +332,7 @@ def _warn_of_held_out(found: Optimum) -> None:
 
 
 def _warn_of_luck(found: Optimum) -> None:
-    """Say where a bound is of the places or depths at which it was searched, not of the camera."""
+    """Warn where a bound owes its value to the places or depths at which it was searched."""
     if "best" not in found.checked:
         return
     name, told, label = found.goal.name, found.goal.told, found.goal.label

@@ -53,7 +53,7 @@ class Parts:
 
     @classmethod
     def of(cls, exhibit: Exhibit, *, written: bool = False) -> "Parts":
-        """Everything of an exhibit."""
+        """All parts of an exhibit."""
         facts = [list(fact) for fact in exhibit.facts]
         parts = cls({"name": exhibit.name, "facts": facts}, written=written)
         parts._add_views(exhibit)

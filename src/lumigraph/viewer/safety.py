@@ -29,7 +29,7 @@ def hosts(port: int) -> frozenset[str]:
 
 
 def refusal(headers: Iterable[tuple[bytes, bytes]], known: frozenset[str]) -> str | None:
-    """Why a request is refused before its path is looked at; None where it is not.
+    """Reason to refuse a request before its path is looked at; None where there is none.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ Call = Callable[[dict[str, Any]], Any]
 
 
 class Resource:
-    """Something to send: bytes, or a function that gives them.
+    """Content to send: bytes, or a function that returns them.
 
     Parameters
     ----------
