@@ -1,4 +1,4 @@
-"""`lumigraph tolerance`: effects of manufacturing errors on a camera, and which tolerances matter."""
+"""`lumigraph tolerance`: effects of manufacturing tolerances on a camera."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -44,7 +44,7 @@ def tolerance(
     hands: Hands = ALONE,
     common: Reported = REPORTED,
 ) -> Result:
-    """Draw cameras within manufacturing tolerances, and report which tolerance costs most.
+    """Draw cameras with manufacturing errors, and rank the tolerances by their effect.
 
     Each drawn camera is built with errors and not readjusted, so that its plane of focus moves. Each measure
     gets its mean and deviation over the cameras drawn, and the share of each tolerance by first-order
@@ -135,7 +135,7 @@ def _result(study: "Study", output: Path) -> Result:
     counts = (Quantity("cameras", study.draws), Quantity("impossible", len(study.failures)))
     words = [f"{study.draws} cameras drawn with {len(study.names)} tolerances"]
     words += [_line(one, study.names) for one in study.outcomes]
-    about = "Effects of manufacturing errors on a camera, and the tolerances that matter."
+    about = "Effects of manufacturing tolerances on a camera, ranked."
     return Result(
         "Tolerances", about, study, tuple(words), (*counts, *study.quantities()),
         lambda: _figures(study), tuple(study.notes()), (output, beside), {"tolerances": study.rows()},
