@@ -17,11 +17,11 @@ from collections.abc import Callable
 import numpy as np
 
 import lumigraph as lg
-from lumigraph.adaptive import estimate, start
-from lumigraph.adaptive.checked import bent
 from lumigraph.core.cache import SHARED
 from lumigraph.core.grid import Grid
 from lumigraph.deconvolution import Exposure
+from lumigraph.studies.adaptive import estimate, start
+from lumigraph.studies.adaptive.checked import bent
 
 CAMERA = lg.PlenopticCamera(
     wavelength="600 nm",
@@ -42,15 +42,15 @@ CASES = ((0.0, 100.0, 0.0), (0.3, 100.0, 0.0), (0.5, 100.0, 3e-3), (1.0, 100.0, 
 
 def spent(work: Callable) -> tuple:
     """Result and CPU seconds, with nothing kept from before."""
-    before = os.environ.get("LUMIGRAPH_CACHE")
+    before = os.environ.get("lumigraphCACHE")
     with tempfile.TemporaryDirectory() as folder:
-        os.environ["LUMIGRAPH_CACHE"] = folder
+        os.environ["lumigraphCACHE"] = folder
         SHARED.empty()
         began = time.process_time()
         found = work(), time.process_time() - began
-    os.environ.pop("LUMIGRAPH_CACHE")
+    os.environ.pop("lumigraphCACHE")
     if before is not None:
-        os.environ["LUMIGRAPH_CACHE"] = before
+        os.environ["lumigraphCACHE"] = before
     return found
 
 

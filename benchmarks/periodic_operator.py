@@ -28,8 +28,8 @@ from benchmarks import _point_sums, plenoptic_snapshots
 from lumigraph.core import memory
 from lumigraph.core.arrays import WORKERS
 from lumigraph.operators import periodic_operator
-from lumigraph.operators.optics import Optics
-from lumigraph.operators.sizes import build_bytes
+from lumigraph.operators.periodic.sizes import build_bytes
+from lumigraph.operators.sampling.optics import Optics
 from lumigraph.units import mm, nm, um
 
 Row = dict[str, Any]
@@ -233,7 +233,7 @@ def apart(function: str, *arguments: Any) -> list[Row]:
         "--call",
         json.dumps([function, *arguments]),
     ]
-    environment = {**os.environ, "LUMIGRAPH_CACHE": "off"}
+    environment = {**os.environ, "lumigraphCACHE": "off"}
     done = subprocess.run(words, env=environment, capture_output=True, text=True)
     if done.returncode:
         return [{"failed": " ".join(words[3:]), "because": (done.stderr.splitlines() or [""])[-1]}]

@@ -32,8 +32,8 @@ import numpy as np
 
 import lumigraph as lg
 from lumigraph import io, store
-from lumigraph.experiments.registry import Context
 from lumigraph.store import atomic
+from lumigraph.studies.thesis.registry import Context
 
 CALLS = (
     "openat,write,pwrite64,writev,ftruncate,fsync,fdatasync,rename,renameat,renameat2,link,unlink,unlinkat,"
@@ -301,7 +301,7 @@ def kept_files() -> dict[str, dict[str, np.ndarray]]:
     """What a camera, a microscope, a deconvolution and an experiment really keep."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        os.environ["LUMIGRAPH_CACHE"] = str(folder)
+        os.environ["lumigraphCACHE"] = str(folder)
         camera = lg.FocusedPlenopticCamera.from_catalogue("thesis-plenoptic-2-m050")
         camera.replace(lenslets={"count": (3, 3)}).operator(accuracy=1e-2)
         microscope = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(lenslets={"count": (3, 3)})

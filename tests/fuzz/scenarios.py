@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 
 import lumigraph as lg
-from lumigraph import demo, experiments, store
+from lumigraph import demo, store
 from lumigraph.deconvolution import Checkpoint
-from lumigraph.experiments import run as reproduce
 from lumigraph.store import atomic
+from lumigraph.studies import thesis
+from lumigraph.studies.thesis import run as reproduce
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from fuzz.faults import forked
@@ -40,7 +41,7 @@ def deconvolution(folder: Path) -> bytes:
 
 def _experiment(name: str) -> Callable[[Path], bytes]:
     def run(folder: Path) -> bytes:
-        (one,) = experiments.find([name])
+        (one,) = thesis.find([name])
         found = reproduce.run([one], folder, quick=True)
         return repr([(row.quantity, row.got) for result in found for row in result.rows]).encode()
 
@@ -67,8 +68,8 @@ def _started(run: Callable[[Path], bytes], folder: Path, seconds: float | None) 
     """Exit code of a start in a folder, killed after a time of the processor [s] if one is given."""
 
     def child() -> None:
-        os.environ["LUMIGRAPH_CACHE"] = str(folder / "cache")
-        os.environ.pop("LUMIGRAPH_MEMORY", None)
+        os.environ["lumigraphCACHE"] = str(folder / "cache")
+        os.environ.pop("lumigraphMEMORY", None)
         atomic._SWEPT.clear()
         if seconds is not None:
             signal.signal(signal.SIGPROF, signal.SIG_DFL)
@@ -120,7 +121,7 @@ def cache(processes: int, count: int, *, seed: int = 0) -> tuple[int, list[str]]
             failures += _ended(pid)
 
         def next_start() -> None:
-            os.environ["LUMIGRAPH_CACHE"] = place
+            os.environ["lumigraphCACHE"] = place
             atomic._SWEPT.clear()
             for key in range(KEYS):
                 _look(key)
@@ -144,7 +145,7 @@ def _user(folder: Path, seed: float) -> int:
         return pid
     code = 70
     try:
-        os.environ["LUMIGRAPH_CACHE"] = str(folder)
+        os.environ["lumigraphCACHE"] = str(folder)
         atomic._SWEPT.clear()
         rng = random.Random(seed)
         while True:

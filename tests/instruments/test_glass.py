@@ -11,8 +11,8 @@ from lumigraph.elements import noll_to_nm
 from lumigraph.errors import FormatError, GeometryError, LumigraphError, ParaxialWarning
 from lumigraph.instruments import glass
 from lumigraph.io.prescription import FirstOrder, Rays
-from lumigraph.operators.points import points_image as lens_points
-from lumigraph.operators.seen import distorted, seen_points
+from lumigraph.operators.lenslets.points import points_image as lens_points
+from lumigraph.operators.sampling.glass_distortion import distorted, seen_points
 from lumigraph.operators.single_lens import points_image, single_lens_operator
 
 F, Z1, D = 0.1, 1.0, 0.01
@@ -57,7 +57,7 @@ class Lens:
 
 @pytest.fixture
 def known(monkeypatch):
-    monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
+    monkeypatch.setenv("lumigraphCACHE", "off")
     monkeypatch.setattr(glass, "Prescription", Lens)
     glass._glass.cache_clear()
     glass._first_order.cache_clear()
@@ -343,7 +343,7 @@ def test_what_is_no_prescription_is_one_line(value, others, match):
 
 
 def test_without_optiland_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
+    monkeypatch.setenv("lumigraphCACHE", "off")
     monkeypatch.setitem(sys.modules, "optiland", None)
     path = tmp_path / "lens.zmx"
     path.write_text("MODE SEQ\n")

@@ -9,7 +9,7 @@ import lumigraph as lg
 from data_folder import real
 from lumigraph import viewer
 from lumigraph.calibration import calibrate
-from lumigraph.cli.origin import Origin
+from lumigraph.cli.origin import RawOptions
 from lumigraph.core.prepared import Reason
 from lumigraph.core.stack import Stack
 from lumigraph.deconvolution import Exposure
@@ -43,7 +43,7 @@ def test_python_verbs_and_viewer_see_the_same_picture(kind, bench):
     ending = "zarr" if kind else "tiff"
     raw, white, dark = (bench / f"{name}{kind}.{ending}" for name in ("raw", "white", "dark"))
     ready = lg.prepare(lg.open(raw), white=lg.open(white), dark=lg.open(dark))
-    verb = Origin(white=white, dark=dark).prepared(lg.open(raw))
+    verb = RawOptions(white=white, dark=dark).prepared(lg.open(raw))
     shown = viewer.open_exhibit(raw, viewer.Origin(white=white, dark=dark))
     np.testing.assert_array_equal(verb.data, ready.data)
     np.testing.assert_array_equal(shown.raw.data, ready.data)
@@ -72,7 +72,7 @@ def test_a_calibration_that_does_not_fit_is_refused_by_each(bench):
     wrong = replace(found, lattice=lattice, residual_px=0.0)
     lg.save(wrong, bench / "wrong.toml")
     with pytest.raises(CalibrationError, match="slip by"):
-        Origin(calibration=bench / "wrong.toml").prepared(raw)
+        RawOptions(calibration=bench / "wrong.toml").prepared(raw)
     with pytest.raises(CalibrationError, match="slip by"):
         viewer.open_exhibit(bench / "raw.tiff", viewer.Origin(calibration=bench / "wrong.toml"))
     for verb in (lg.prepare, lg.decode, lg.depth.correlation):

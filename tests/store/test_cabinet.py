@@ -10,7 +10,7 @@ import pytest
 
 from lumigraph import store
 from lumigraph.errors import FormatError
-from lumigraph.store import cabinet
+from lumigraph.store import array_cache
 
 ARRAYS = {"left": np.arange(6.0).reshape(2, 3), "right": np.array([1, 2], np.int32)}
 
@@ -18,7 +18,7 @@ ARRAYS = {"left": np.arange(6.0).reshape(2, 3), "right": np.array([1, 2], np.int
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
     """A folder of this test's own."""
-    monkeypatch.setenv("LUMIGRAPH_CACHE", str(tmp_path / "kept"))
+    monkeypatch.setenv("lumigraphCACHE", str(tmp_path / "kept"))
     return tmp_path / "kept"
 
 
@@ -48,7 +48,7 @@ def test_nothing_is_found_under_another_key():
 
 
 def test_off_keeps_nothing(folder, monkeypatch):
-    monkeypatch.setenv("LUMIGRAPH_CACHE", "OFF")
+    monkeypatch.setenv("lumigraphCACHE", "OFF")
     assert store.folder() is None
     found = store.kept("key", built)
     np.testing.assert_array_equal(found["left"], ARRAYS["left"])
@@ -59,7 +59,7 @@ def test_off_keeps_nothing(folder, monkeypatch):
 
 @pytest.mark.parametrize("name", ["XDG_CACHE_HOME", "LOCALAPPDATA"])
 def test_without_a_choice_it_is_the_users_cache_folder(name, tmp_path, monkeypatch):
-    for other in ("LUMIGRAPH_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+    for other in ("lumigraphCACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
         monkeypatch.delenv(other, raising=False)
     assert store.folder() == Path.home() / ".cache" / "lumigraph"
     monkeypatch.setenv(name, str(tmp_path))
@@ -70,7 +70,7 @@ def test_a_user_without_a_home_keeps_nothing(monkeypatch):
     def homeless():
         raise RuntimeError("Could not determine home directory.")
 
-    for name in ("LUMIGRAPH_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+    for name in ("lumigraphCACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(Path, "home", homeless)
     assert store.folder() is None
@@ -93,7 +93,7 @@ def test_a_damaged_file_is_built_again(folder, damage):
 @pytest.mark.parametrize("where", ["kept", "off"])
 def test_the_order_in_memory_is_the_one_that_was_built(order, where, monkeypatch):
     if where == "off":
-        monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
+        monkeypatch.setenv("lumigraphCACHE", "off")
     array = np.arange(24.0).reshape(2, 3, 4).astype(">f4", order=order)
     for _ in range(2):
         found = store.kept("key", lambda: {"array": array, "part": array[:, 1:], "one": np.float32(3)})
@@ -110,7 +110,7 @@ def test_pickles_are_neither_written_nor_read():
 
 
 def test_the_files_not_used_for_longest_go(folder, monkeypatch):
-    monkeypatch.setattr(cabinet, "LIMIT", 5000)  # three of 1000 bytes and their headers
+    monkeypatch.setattr(array_cache, "LIMIT", 5000)  # three of 1000 bytes and their headers
     folder.mkdir()
     (folder / "mine.npz").write_bytes(bytes(9000))
 
@@ -133,7 +133,7 @@ def test_clocks_that_jump_change_nothing_but_what_goes_first(folder):
 
 
 def test_what_is_larger_than_the_limit_is_not_kept(folder, monkeypatch):
-    monkeypatch.setattr(cabinet, "LIMIT", 47)
+    monkeypatch.setattr(array_cache, "LIMIT", 47)
     store.kept("key", lambda: {"left": ARRAYS["left"]})
     assert not folder.exists()
 
@@ -146,7 +146,7 @@ def test_a_disk_that_cannot_be_written_is_no_error_unless_the_folder_is_the_call
 
 
 def test_a_folder_of_the_callers_has_no_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr(cabinet, "LIMIT", 1)
+    monkeypatch.setattr(array_cache, "LIMIT", 1)
     for build in (built, never):
         np.testing.assert_array_equal(store.kept("key", build, tmp_path)["left"], ARRAYS["left"])
 

@@ -13,7 +13,7 @@ from lumigraph.cli import files, standing
 from lumigraph.cli.console import line, progress
 from lumigraph.cli.frames import KINDS, Frames, items_of, runs
 from lumigraph.cli.options import COMMAND, COMMON, Common, Output
-from lumigraph.cli.standing import Standing
+from lumigraph.cli.standing import StatusPage
 from lumigraph.core import memory
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
@@ -35,7 +35,7 @@ _SHOWN = 5
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Hands:
+class WorkerOptions:
     """Workers that do the job.
 
     Parameters
@@ -109,7 +109,7 @@ def batch(
     output: Output | None = None,
     page: str | None = None,
     run: Annotated[int, Parameter(allow_leading_hyphen=True)] = RUN,
-    hands: Hands = Hands(),
+    hands: WorkerOptions = WorkerOptions(),
     common: Common = COMMON,
 ) -> Result:
     """Run another verb for each of many frames: pages of a stack, or files by a pattern.
@@ -165,7 +165,7 @@ def batch(
         line(f"how it stands: {cluster.page(output)}")
         found = cluster.batch(
             work, items, output, what=what, workers=workers, part=part,
-            progress=Standing(output, shown),
+            progress=StatusPage(output, shown),
             estimated=lambda needed: line(str(needed)),
         )  # fmt: skip
     if kind.is_table:

@@ -70,7 +70,7 @@ def interrupts() -> Iterator[None]:
 @contextmanager
 def _bar(task: str) -> Iterator[Callable[..., None]]:
     if not sys.stderr.isatty():
-        yield _Lines(task)
+        yield _ProgressLines(task)
         return
     from rich.console import Console
     from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeRemainingColumn
@@ -82,7 +82,7 @@ def _bar(task: str) -> Iterator[Callable[..., None]]:
         yield lambda **changes: bar.update(number, **changes)
 
 
-class _Lines:
+class _ProgressLines:
     """Progress where there is no terminal: a line after ten seconds, then each time as long again."""
 
     def __init__(self, task: str) -> None:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.batch import Hands, kept
+from lumigraph.cli.batch import WorkerOptions, kept
 from lumigraph.cli.console import line, progress
 from lumigraph.cli.deconvolve_options import depths
 from lumigraph.cli.options import COMMAND, COMMON, Common, Output
-from lumigraph.cli.standing import Standing
+from lumigraph.cli.standing import StatusPage
 from lumigraph.cli.tolerance import Tolerances, given_tolerances
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
@@ -20,7 +20,7 @@ from lumigraph.errors import FormatError, LumigraphError
 if TYPE_CHECKING:
     from lumigraph.instruments import Instrument
 
-ALONE = Hands()
+ALONE = WorkerOptions()
 
 MOST = 1_000_000
 """Samples."""
@@ -41,7 +41,7 @@ def dataset(
     seed: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0,
     accuracy: Annotated[float, Parameter(allow_leading_hyphen=True)] = 1e-2,
     volume: Annotated[bool, Parameter(negative="")] = False,
-    hands: Hands = ALONE,
+    hands: WorkerOptions = ALONE,
     common: Common = COMMON,
 ) -> Result:
     """Simulate raw images of drawn scenes with their truth, to train and test methods on.
@@ -113,7 +113,7 @@ def dataset(
     with progress("dataset") as shown, kept(output):
         made = make(
             work, count, output, workers=hands.cluster(), part=hands.share(),
-            progress=Standing(output, shown), estimated=lambda needed: line(str(needed)),
+            progress=StatusPage(output, shown), estimated=lambda needed: line(str(needed)),
             command=shlex.join(["lumigraph", *COMMAND.get()]),
         )  # fmt: skip
     if made.failures:
@@ -135,7 +135,7 @@ def _as_built(
         )
     if not count:
         return meant
-    from lumigraph.tolerance import making
+    from lumigraph.studies.tolerance import making
 
     given = given_tolerances(tolerance or [])
     found = [

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Kind:
+class FrameKind:
     """Output of a verb for one frame.
 
     Parameters
@@ -40,10 +40,15 @@ class Kind:
 
 
 KINDS = {
-    "simulate": Kind(".tiff"), "decode": Kind(".zarr"), "render": Kind(".tiff"), "refocus": Kind(".tiff"),
-    "depth": Kind(".tiff"), "deconvolve": Kind(".zarr"), "calibrate": Kind(".toml", is_table=True),
-    "measure": Kind("", 1, is_table=True),
-}  # fmt: skip
+    "simulate": FrameKind(".tiff"),
+    "decode": FrameKind(".zarr"),
+    "render": FrameKind(".tiff"),
+    "refocus": FrameKind(".tiff"),
+    "depth": FrameKind(".tiff"),
+    "deconvolve": FrameKind(".zarr"),
+    "calibrate": FrameKind(".toml", is_table=True),
+    "measure": FrameKind("", 1, is_table=True),
+}
 """Verbs that are taken."""
 
 _INPUTS = {"calibration", "white", "dark"}
@@ -73,10 +78,10 @@ class Frames:
 
     def __call__(self, item: dict[str, Any]) -> Any:
         """Output of the verb for one frame, as if it had been run for it alone."""
-        from lumigraph.cluster import Several, Values
+        from lumigraph.cluster import FrameGroup, Values
 
         if "frames" in item:
-            return Several(item["first"], item["count"], self._run(item["frames"]))
+            return FrameGroup(item["first"], item["count"], self._run(item["frames"]))
         os.chdir(self.folder)
         _check_unchanged(item)
         with tempfile.TemporaryDirectory(prefix="lumigraph-") as place, redirect_stderr(StringIO()):

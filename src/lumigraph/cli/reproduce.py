@@ -13,8 +13,8 @@ from lumigraph.core.result import Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
-    from lumigraph.experiments.registry import Experiment
-    from lumigraph.experiments.run import Result as Computed
+    from lumigraph.studies.thesis.registry import Experiment
+    from lumigraph.studies.thesis.run import StoredResult as Computed
 
 Flag = Annotated[bool, Parameter(negative="")]
 
@@ -47,13 +47,13 @@ def reproduce(
     output
         Folder for the results; made if it does not exist.
     """
-    from lumigraph import experiments
+    from lumigraph.studies import thesis
 
-    chosen = experiments.find(ids)
+    chosen = thesis.find(ids)
     if list_:
         return _listed(chosen)
     _check_folder(output)
-    from lumigraph.experiments import pages, run
+    from lumigraph.studies.thesis import pages, run
 
     output.mkdir(exist_ok=True)
     with progress("reproduce") as shown:
@@ -95,7 +95,7 @@ def _tell(result: "Computed") -> None:
 
 def _table(result: "Computed") -> str:
     """Rows of an experiment in columns."""
-    from lumigraph.experiments import pages
+    from lumigraph.studies.thesis import pages
 
     lines = [pages.HEADER[:-1], *(pages.cells(row)[:-1] for row in result.rows)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]

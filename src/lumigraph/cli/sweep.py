@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.batch import TABLES, Hands, kept, require_table, save_table
+from lumigraph.cli.batch import TABLES, WorkerOptions, kept, require_table, save_table
 from lumigraph.cli.console import line, progress
 from lumigraph.cli.options import Output
-from lumigraph.cli.reporting import REPORTED, Reported
-from lumigraph.cli.standing import Standing
+from lumigraph.cli.reporting import REPORTED, ReportOptions
+from lumigraph.cli.standing import StatusPage
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
 
@@ -37,7 +37,7 @@ def sweep(
     measure: str | None = None,
     output: Output,
     workers: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None,
-    common: Reported = REPORTED,
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Vary a camera's values and write the quantities of each combination into a table.
 
@@ -84,7 +84,7 @@ def sweep(
     with progress("sweep") as shown, kept(output):
         found = cluster.batch(
             Designs(source, tuple(names)), items, output, what={"camera": given.to_toml(), "measure": names},
-            workers=Hands(workers).cluster(), progress=Standing(output, shown),
+            workers=WorkerOptions(workers).cluster(), progress=StatusPage(output, shown),
             estimated=lambda needed: line(str(needed)),
         )  # fmt: skip
     save_table(output, axes)
@@ -130,15 +130,15 @@ class Designs:
 
     def _simulated(self, camera: "Instrument") -> "Iterable[Quantity]":
         """Quantities measured on a simulated picture."""
-        from lumigraph import metric
+        from lumigraph import metrology
         from lumigraph.core.cache import SHARED
-        from lumigraph.metric.charts import check_camera
+        from lumigraph.metrology.datasheet.charts import check_camera
 
-        names = [name for name in self.names if metric.is_measure(name)]
+        names = [name for name in self.names if metrology.is_measure(name)]
         if not names:
             return ()
         try:
-            return metric.simulated(check_camera(camera), names).values()
+            return metrology.simulated(check_camera(camera), names).values()
         finally:
             SHARED.empty()  # the next camera is another one
 
@@ -162,7 +162,7 @@ def _names(measure: str | None, known: Sequence[str]) -> list[str]:
     """Requested quantities."""
     if measure is None:
         return list(known)
-    from lumigraph.metric import is_measure
+    from lumigraph.metrology import is_measure
 
     names = [name.strip() for name in measure.split(",")]
     for name in names:
@@ -175,8 +175,8 @@ def _names(measure: str | None, known: Sequence[str]) -> list[str]:
 
 def check_measures(camera: "Instrument", names: Sequence[str]) -> None:
     """Refuse measures on simulated pictures of cameras that have none."""
-    from lumigraph.metric import is_measure
-    from lumigraph.metric.charts import check_camera
+    from lumigraph.metrology import is_measure
+    from lumigraph.metrology.datasheet.charts import check_camera
 
     if any(map(is_measure, names)):
         check_camera(camera)

@@ -11,19 +11,19 @@
 
 from lumigraph.cluster import slurm
 from lumigraph.cluster.estimate import Estimate
-from lumigraph.cluster.ledger import Entry
+from lumigraph.cluster.ledger import LedgerEntry
 from lumigraph.cluster.run import Cluster, Local, Report, batch, page, rows, status
 from lumigraph.cluster.scheduler import Dask
-from lumigraph.cluster.task import Several, Values
+from lumigraph.cluster.task import FrameGroup, Values
 
 __all__ = [
     "Cluster",
     "Dask",
-    "Entry",
     "Estimate",
+    "FrameGroup",
+    "LedgerEntry",
     "Local",
     "Report",
-    "Several",
     "Values",
     "batch",
     "page",

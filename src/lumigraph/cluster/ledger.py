@@ -39,7 +39,7 @@ _MEMORY = 1 << 26
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class LedgerEntry:
     """Record of a frame that is done.
 
     Parameters
@@ -139,15 +139,15 @@ class Ledger:
         run = self.job()["what"].get("run")
         return f"run of {run} frames" if run else "frame"
 
-    def entry(self, number: int) -> Entry | None:
+    def entry(self, number: int) -> LedgerEntry | None:
         """Entry of a frame; None if there is none, or it is incomplete."""
         with suppress(OSError, ValueError, TypeError, AttributeError):
             found = json.loads(self._path(_DONE, number).read_bytes())
             found["files"] = {name: tuple(pair) for name, pair in found["files"].items()}
-            return Entry(**found)
+            return LedgerEntry(**found)
         return None
 
-    def entries(self) -> dict[int, Entry]:
+    def entries(self) -> dict[int, LedgerEntry]:
         """All of them, by the numbers of their frames."""
         found = ((number, self.entry(number)) for number in self._numbers(_DONE))
         return {number: entry for number, entry in found if entry is not None}
@@ -175,9 +175,9 @@ class Ledger:
         kept = [step for step in steps if step <= max(_PAUSE * usual, 1.0)]
         return len(kept) / sum(kept) if sum(kept) > 0 else 0.0
 
-    def record(self, entry: Entry) -> None:
+    def record(self, entry: LedgerEntry) -> None:
         """Note that a frame is done; its shards are in place."""
-        content = {name: getattr(entry, name) for name in Entry.__slots__}
+        content = {name: getattr(entry, name) for name in LedgerEntry.__slots__}
         store.write_bytes(self._path(_DONE, entry.number), json.dumps(content).encode(), flush=False)
         self._path(_FAILED, entry.number).unlink(missing_ok=True)
 

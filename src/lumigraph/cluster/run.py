@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from lumigraph.cluster.estimate import Estimate, many
-from lumigraph.cluster.ledger import LINK, PAGE, Entry, Ledger, require_free
+from lumigraph.cluster.ledger import LINK, PAGE, Ledger, LedgerEntry, require_free
 from lumigraph.cluster.pool import Pool
 from lumigraph.cluster.task import BUSY, FULL, Outcome, Task, Work
 from lumigraph.core import arrays, checks
@@ -97,7 +97,7 @@ class Report:
     """
 
     count: int
-    entries: dict[int, Entry] = field(repr=False)
+    entries: dict[int, LedgerEntry] = field(repr=False)
     failures: dict[int, str] = field(repr=False)
     seconds: float = 0.0
     pace: float = 0.0
@@ -278,18 +278,18 @@ def _tried(rest: list[int], done: int, workers: int, seconds: float) -> list[int
     return [rest[(2 * k + 1) * len(rest) // (2 * count)] for k in range(count)]
 
 
-def _quickest(known: list[Entry]) -> float:
+def _quickest(known: list[LedgerEntry]) -> float:
     """Least time of a frame [s]: those that made what their worker keeps took more."""
     return min((entry.seconds for entry in known), default=math.inf)
 
 
-def _entries(task: Task, numbers: list[int]) -> list[Entry]:
+def _entries(task: Task, numbers: list[int]) -> list[LedgerEntry]:
     """Entries of the frames that did not fail."""
     return [entry for number in numbers if (entry := task.ledger.entry(number)) is not None]
 
 
 def _need(
-    task: Task, who: tuple[Cluster, Group], frames: int, known: list[Entry], starting: float,
+    task: Task, who: tuple[Cluster, Group], frames: int, known: list[LedgerEntry], starting: float,
     estimated: Callable[[Estimate], None] | None = None,
 ) -> None:  # fmt: skip
     """Tell what so many frames need, by those that are known, and refuse what cannot fit."""

@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from lumigraph.cluster.ledger import Entry, Ledger
+from lumigraph.cluster.ledger import Ledger, LedgerEntry
 from lumigraph.core.threads import single_products
 from lumigraph.errors import LumigraphError
 from lumigraph.io import series
@@ -40,7 +40,7 @@ class Values:
 
 
 @dataclass(frozen=True, slots=True)
-class Several:
+class FrameGroup:
     """Results of frames in a row, which one item makes: all are done, or none.
 
     Parameters
@@ -59,7 +59,7 @@ class Several:
 
 
 @runtime_checkable
-class SideBySide(Protocol):
+class BatchedWork(Protocol):
     """Work that does some items in less time than one after the other."""
 
     @property
@@ -104,7 +104,7 @@ class Task:
     @property
     def side_by_side(self) -> int:
         """Frames that a worker is given at a time, at most."""
-        return self.work.side_by_side if isinstance(self.work, SideBySide) else 1
+        return self.work.side_by_side if isinstance(self.work, BatchedWork) else 1
 
     def do(self, numbers: Sequence[int]) -> Iterator[Outcome]:
         """Compute frames unless they are done or somebody does so: `DONE`, `FAILED`, `BUSY`, `FULL`."""
@@ -134,7 +134,7 @@ class Task:
 
     def _results(self, items: list[Any]) -> Iterator[Sequence[Any]]:
         """Results of some items at a time, or the exceptions that they raise."""
-        if isinstance(self.work, SideBySide):
+        if isinstance(self.work, BatchedWork):
             yield from self.work.several(items)
         else:
             yield from ([_tried(self.work, item)] for item in items)
@@ -156,7 +156,7 @@ class Task:
         with _measured() as cost:
             files, values = self._written_of(number, thing)
         notes = list(dict.fromkeys(made.notes + cost.notes))
-        self.ledger.record(Entry(
+        self.ledger.record(LedgerEntry(
             number, made.seconds + cost.seconds, peak(), sum(size for size, _ in files.values()),
             f"{platform.node()}:{os.getpid()}", files, values, notes, made.busy + cost.busy,
         ))  # fmt: skip
@@ -170,14 +170,14 @@ class Task:
         """Files that were written, and values."""
         if isinstance(found, Values):
             return {}, dict(found.row)
-        if not isinstance(found, Several):
-            return self._written(number, series.Frame.of(found), self.count), {}
+        if not isinstance(found, FrameGroup):
+            return self._written(number, series.SeriesFrame.of(found), self.count), {}
         files: series.Checksums = {}
         for place, thing in enumerate(found.things, found.first):
-            files |= self._written(place, series.Frame.of(thing), found.count)
+            files |= self._written(place, series.SeriesFrame.of(thing), found.count)
         return files, {}
 
-    def _written(self, number: int, frame: series.Frame, count: int) -> series.Checksums:
+    def _written(self, number: int, frame: series.SeriesFrame, count: int) -> series.Checksums:
         if not (self.output / "zarr.json").exists():
             with self.ledger.alone():
                 if not (self.output / "zarr.json").exists():

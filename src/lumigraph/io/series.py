@@ -39,7 +39,7 @@ Checksums = dict[str, tuple[int, int]]
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class SeriesFrame:
     """One result as arrays.
 
     Parameters
@@ -57,7 +57,7 @@ class Frame:
     attributes: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, thing: Any) -> "Frame":
+    def of(cls, thing: Any) -> "SeriesFrame":
         """A picture, several, views, a volume, a depth map, or arrays by name.
 
         Raises
@@ -72,7 +72,7 @@ class Frame:
         return found
 
     @classmethod
-    def _of(cls, thing: Any) -> "Frame":
+    def _of(cls, thing: Any) -> "SeriesFrame":
         match thing:
             case Volume():
                 about = {**header.describe_volume(thing), "ome": ngff.describe(thing, times=True)}
@@ -118,7 +118,7 @@ class Frame:
         return {name: [list(array.shape), str(array.dtype)] for name, array in self.arrays.items()}
 
 
-def create(path: Path, first: Frame, count: int) -> None:
+def create(path: Path, first: SeriesFrame, count: int) -> None:
     """An empty store for `count` frames like the first one; complete, or not there at all.
 
     Raises
@@ -142,7 +142,7 @@ def create(path: Path, first: Frame, count: int) -> None:
             )  # fmt: skip
 
 
-def write(path: Path, number: int, frame: Frame) -> Checksums:
+def write(path: Path, number: int, frame: SeriesFrame) -> Checksums:
     """Write one frame into its shards, each in one step.
 
     Raises
@@ -153,7 +153,7 @@ def write(path: Path, number: int, frame: Frame) -> Checksums:
     known = described(path)["layout"]
     if frame.layout != known:
         raise FormatError(f"it gives {_told(frame.layout)} where the first frame gave {_told(known)}.")
-    writer = _Writer(LocalStore(path))
+    writer = _SeriesWriter(LocalStore(path))
     group = zarr.open_group(writer, mode="r+", zarr_format=3, use_consolidated=False)
     for name, values in frame.arrays.items():
         array = group[name]
@@ -251,7 +251,7 @@ def described(path: Path) -> dict[str, Any]:
     raise FormatError(f"{path} is not a series of frames. Check the path.")
 
 
-def _leading(frame: Frame) -> str:
+def _leading(frame: SeriesFrame) -> str:
     return "t" if "ome" in frame.attributes else "frame"
 
 
@@ -265,7 +265,7 @@ def _told(layout: Mapping[str, Any]) -> str:
     )
 
 
-class _Writer(WrapperStore[LocalStore]):
+class _SeriesWriter(WrapperStore[LocalStore]):
     """A store that writes each file in one step and notes its checksum."""
 
     def __init__(self, inner: LocalStore) -> None:

@@ -106,7 +106,7 @@ def export_folder(
     check_quality(quality)
     target, progress = check_folder(Path(path)), progress or silent
     with store.replacing(target) as place:
-        writer, parts = _Writer(place, quality), []
+        writer, parts = _FolderWriter(place, quality), []
         for k, exhibit in enumerate(exhibits):
             parts.append(
                 _streamed(exhibit, _Tiles(writer, k, coarse, tile, part(progress, k, len(exhibits))))
@@ -148,7 +148,7 @@ def _with_policy(page: bytes) -> bytes:
     )
 
 
-class _Writer:
+class _FolderWriter:
     """Files in a folder, and how large they are."""
 
     def __init__(self, place: Path, quality: int) -> None:
@@ -171,7 +171,7 @@ class _Writer:
 class _Tiles:
     """Writer of the tiles of one exhibit."""
 
-    writer: _Writer
+    writer: _FolderWriter
     number: int
     coarse: int
     tile: int
