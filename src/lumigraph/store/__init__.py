@@ -9,8 +9,8 @@ first. Arrays come back with the values, the type and the memory layout (C or Fo
 were given, so that a computation gives the same bits whether they were built a moment ago or read.
 """
 
-from lumigraph.store.atomic import replacing, restored, write_bytes
+from lumigraph.store.atomic import replacing, restored, sweep, write_bytes
 from lumigraph.store.cabinet import LIMIT, folder, kept
 from lumigraph.store.sealed import DamagedError, read, write
 
-__all__ = ["LIMIT", "DamagedError", "folder", "kept", "read", "replacing", "restored", "write", "write_bytes"]
+__all__ = ["LIMIT", "DamagedError", "folder", "kept", "read", "replacing", "restored", "sweep", "write", "write_bytes"]
