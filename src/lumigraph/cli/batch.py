@@ -164,7 +164,7 @@ def batch(
     with progress("batch") as shown, kept(output):
         line(f"how it stands: {cluster.page(output)}")
         found = cluster.batch(
-            work, items, output, what=what, workers=workers, part=part,
+            work, items, output, what=what, inputs=work.inputs(first), workers=workers, part=part,
             progress=Standing(output, shown),
             estimated=lambda needed: line(str(needed)),
         )  # fmt: skip

@@ -12,6 +12,7 @@ from lumigraph.cli.console import line, progress
 from lumigraph.cli.options import Output
 from lumigraph.cli.reporting import REPORTED, Reported
 from lumigraph.cli.standing import Standing
+from lumigraph.cli.sweep import anywhere
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
 
@@ -89,13 +90,16 @@ def tolerance(
     files.check_output(output, TABLES)
     require_table(output)
     names = None if measure is None else [name.strip() for name in measure.split(",")]
-    trials = Trials.of(check_camera(load_camera(camera)), given_tolerances(tolerance or []), names, seed=seed)
+    trials = Trials.of(
+        check_camera(load_camera(anywhere(camera))), given_tolerances(tolerance or []), names, seed=seed
+    )
     items = trials.items(draws)
     if hands.slurm is not None:
         return hands.submitted(output)
     with progress("tolerance") as shown, kept(output):
         found = cluster.batch(
-            trials, items, output, what=trials.what, workers=hands.cluster(), part=hands.share(),
+            trials, items, output, what=trials.what, inputs=cluster.inputs.named_in(trials.camera),
+            workers=hands.cluster(), part=hands.share(),
             progress=Standing(output, shown), estimated=lambda needed: line(str(needed)),
         )  # fmt: skip
     save_table(output)

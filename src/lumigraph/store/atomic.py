@@ -3,9 +3,9 @@
 What is new is written in a workplace, a hidden folder beside the target that its writer holds locked. The
 system gives the lock back when the writer ends, however it ends: an unlocked workplace is a dead writer's.
 
-Somebody else's folder may have such a name. A workplace is removed only where this user owns it, its name is one
-that a writer draws, it holds a mark with that name, and nothing but what a writer puts there. It is opened once,
-without following links, and what is in it is reached through that opening alone.
+Somebody else's folder may have such a name. A workplace is removed only where this user owns it, its name is
+one that a writer draws, it holds a mark with that name, and nothing but what a writer puts there. It is
+opened once, without following links, and what is in it is reached through that opening alone.
 """
 
 import ctypes
@@ -262,7 +262,7 @@ def _put_back(folder: int, parent: Path) -> None:
     with suppress(FileNotFoundError):
         old = os.open(_OLD, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=folder)
         try:
-            for name in os.listdir(old):
+            for name in os.listdir(old):  # noqa: PTH208 - of an open folder
                 if not os.path.lexists(parent / name):
                     os.rename(name, parent / name, src_dir_fd=old)
         finally:
