@@ -43,7 +43,8 @@ class Hands:
     workers
         Processes on this machine; one for each processor if left out.
     scheduler
-        Address of a running dask cluster instead, such as tcp://10.0.0.1:8786.
+        Address of a running dask cluster instead, such as tcp://10.0.0.1:8786, or tls:// with dask's own
+        configuration of certificates. A cluster without them trusts everybody who reaches its port.
     slurm
         Hand it to SLURM instead, as an array of so many jobs.
     sbatch

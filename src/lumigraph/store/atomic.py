@@ -170,7 +170,13 @@ def _locked_folder(folder: Path) -> tuple[Path, int | None]:
         lock = _lock(place, wait=True)
         if lock is not None or place.exists():
             break
-    (place / _MARK).write_bytes(_mark(place.name))
+    try:
+        (place / _MARK).write_bytes(_mark(place.name))
+    except OSError:
+        shutil.rmtree(place, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+        raise
     return place, lock
 
 
@@ -234,10 +240,11 @@ def _marked(folder: int, name: str) -> bool:
         return False
     try:
         about, expected = os.fstat(mark), _mark(name)
-        own = stat.S_ISREG(about.st_mode) and about.st_uid == os.geteuid() and about.st_nlink == 1
-        # A writer that dies while it marks has nothing else there yet.
-        whole = len(os.listdir(folder)) > 1 or about.st_size > 0
-        return own and (not whole or os.read(mark, len(expected) + 1) == expected)
+        if not stat.S_ISREG(about.st_mode) or about.st_uid != os.geteuid() or about.st_nlink != 1:
+            return False
+        found = os.read(mark, len(expected) + 1)
+        # A writer that dies while it marks has put nothing else there yet.
+        return found == expected or (expected.startswith(found) and os.listdir(folder) == [_MARK])
     finally:
         os.close(mark)
 

@@ -1,7 +1,7 @@
 """The viewer: a page in the browser, served on the loopback interface or written as one file.
 
 - `server`: what is served: a fixed table of resources behind a random token; knows nothing of light fields
-- `address`: the same address for the same file
+- `address`: a private file that leads a browser to the page
 - `safety`: which requests are answered, and the headers of every answer
 - `exhibit`: what one page shows: views, raw image, focal stack, depth, volume
 - `opening`: a file, or a raw image with its calibration, as an exhibit
@@ -16,7 +16,7 @@
 - `static/`: HTML, CSS, JavaScript modules and shaders, as they are
 """
 
-from lumigraph.viewer.address import Address, address_of
+from lumigraph.viewer.address import redirecting
 from lumigraph.viewer.designer import designer_site
 from lumigraph.viewer.exhibit import Exhibit
 from lumigraph.viewer.folder import check_folder, export_folder, serve_folder
@@ -27,17 +27,16 @@ from lumigraph.viewer.server import Resource, Site, serve
 from lumigraph.viewer.single_file import export
 
 __all__ = [
-    "Address",
     "Exhibit",
     "Origin",
     "Resource",
     "Site",
-    "address_of",
     "check_folder",
     "designer_site",
     "export",
     "export_folder",
     "open_exhibit",
+    "redirecting",
     "serve",
     "serve_folder",
     "site",
