@@ -53,7 +53,7 @@ class Dask:
             client = Client(self.address, timeout=_WAIT, set_as_default=False)
         except (OSError, ValueError, TypeError, RuntimeError) as error:  # the last two: no certificates
             raise LumigraphError(
-                f"no dask scheduler answers at {self.address} ({type(error).__name__}). Check the address, and "
+                f"no dask scheduler answers at {self.address} ({type(error).__name__}). Check it, and "
                 "for tls:// the certificates of dask's configuration (distributed.comm.tls)."
             ) from None
         try:
