@@ -256,6 +256,6 @@ def test_metadata_beside_a_frame_is_read_up_to_8_mib_and_no_byte_more(tmp_path, 
     path.write_bytes(padded(seeds.frame_metadata((16, 12), 16, "little", "r", illum=True), limit + more))
     if more:
         with pytest.raises(FormatError, match=f"has {limit + 1} bytes, too many for metadata"):
-            io.open(path, what="calibration")
+            io.open(path)
     else:
-        assert isinstance(io.open(path, what="calibration"), lg.Calibration)
+        assert isinstance(io.open(path), lg.Calibration)
