@@ -1,4 +1,4 @@
-"""What of a job is done: a folder beside its output, which any number of processes and machines write.
+"""Record of a job's finished frames: a folder beside its output, written by any number of processes.
 
 An entry is a file of its own, written in one step after the frame's shards, with a checksum of itself and
 those of the shards: it counts while all are as it says. The files that describe the store are kept here, too,
@@ -48,14 +48,14 @@ class Ledger:
     Parameters
     ----------
     folder
-        That holds them.
+        Folder of the ledger's files.
     """
 
     folder: Path
 
     @classmethod
     def beside(cls, output: Path) -> "Ledger":
-        """That of an output."""
+        """Ledger of an output."""
         return cls(output.with_name(output.name + ENDING))
 
     def open(self, what: Mapping[str, Any], items: Sequence[Any]) -> None:
@@ -81,7 +81,7 @@ class Ledger:
                 )
 
     def job(self) -> dict[str, Any]:
-        """What the job is.
+        """Description of the job.
 
         Raises
         ------
@@ -107,7 +107,7 @@ class Ledger:
 
     @property
     def noun(self) -> str:
-        """What an item is: a frame, or as many in a row as the job says."""
+        """Name of an item: a frame, or a run of as many as the job says."""
         run = self.job()["what"].get("run")
         return f"run of {run} frames" if is_kind(run, int) and run > 0 else "frame"
 
@@ -278,7 +278,7 @@ def _put(path: Path, content: bytes) -> None:
 
 _HELD: set[tuple[str, int]] = set()
 _GUARD = threading.Lock()
-"""Locks of files are the process' own: threads of one are told apart here."""
+"""Locks of files are the process' own: threads of one are distinguished here."""
 
 
 @contextmanager
@@ -354,7 +354,7 @@ def _difference(begun: Any, asked: Any, name: str) -> str:
 
 
 def _of_file(begun: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
-    """How a file differs that has the same name."""
+    """Difference between two files of the same name, in words."""
     name = Path(str(begun["file"])).name
     if begun.get("size") != asked.get("size"):
         return f"{name} had {begun.get('size')} bytes, now {asked.get('size')}"

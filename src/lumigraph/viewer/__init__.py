@@ -12,8 +12,6 @@
 - `single_file`: the same page as one file that works from disk
 - `pyramid`, `folder`: the same page as a folder for any web server, with pictures in several steps, in tiles
 - `designer`, `designer_parameters`, `designer_curves`, `designer_point`: a camera as sliders
-- `inline`: the page inside a notebook
-- `static/`: HTML, CSS, JavaScript modules and shaders, as they are
 """
 
 from lumigraph.viewer.address import redirecting
