@@ -121,22 +121,19 @@ def view(
     if page.serve_folder:
         if beside is not None:
             raise FormatError("--serve-folder serves one folder. Leave the second file out.")
-        _serve(viewer.serve_folder(file), (file,), page, common)
+        _serve(viewer.serve_folder(file), page, common)
         return None
     exhibits = [_opened(path, origin) for path in (file, beside) if path is not None]
     if page.export is None:
-        _serve(viewer.site(exhibits), (file,) if beside is None else (file, beside), page, common)
+        _serve(viewer.site(exhibits), page, common)
         return None
     return _exported(exhibits, page, page.export)
 
 
-def _serve(site: Any, files: tuple[Path, ...], page: PageOptions, common: Common) -> None:
+def _serve(site: Any, page: PageOptions, common: Common) -> None:
     from lumigraph import viewer
 
-    viewer.serve(
-        site, port=page.port, address=viewer.address_of(files),
-        ready=lambda address: announce(address, common, no_open=page.no_open),
-    )  # fmt: skip
+    viewer.serve(site, port=page.port, ready=lambda address: announce(address, common, no_open=page.no_open))
 
 
 def _exported(exhibits: list[Any], page: PageOptions, path: Path) -> Result:
