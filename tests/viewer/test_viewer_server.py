@@ -284,7 +284,7 @@ def test_tokens_differ(monkeypatch):
 def test_a_browser_is_given_a_private_file_and_not_the_address(tmp_path, monkeypatch, capsys):
     opened = threading.Event()
     given = []
-    monkeypatch.setenv("lumigraphCACHE", str(tmp_path))
+    monkeypatch.setenv("LUMIGRAPH_CACHE", str(tmp_path))
     monkeypatch.setattr("webbrowser.open", lambda uri: (given.append(uri), opened.set()))
     address = "http://127.0.0.1:8000/" + "t" * 32 + "/"
     announce(address, Common(), no_open=False)
