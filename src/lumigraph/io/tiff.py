@@ -229,7 +229,9 @@ def _about(planes: ome.Planes | None, told: Declared | None) -> dict[str, Any]:
     """What is kept of axes and places that a stack has no fields for."""
     axes, sizes = (planes.axes, planes.counts) if planes is not None else ("", ())
     axes, sizes = (told.axes, told.sizes) if told is not None else (axes, sizes)
-    found: dict[str, Any] = {"axes": f"{axes.upper()}YX", "axes_sizes": list(sizes)} if axes.strip("n") else {}
+    found: dict[str, Any] = (
+        {"axes": f"{axes.upper()}YX", "axes_sizes": list(sizes)} if axes.strip("n") else {}
+    )
     if planes is not None and None not in planes.center:
         found["position"] = [*planes.depths[:1], *planes.center]
     return found

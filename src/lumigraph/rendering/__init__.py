@@ -4,7 +4,7 @@
   `squared`: hexagonal lattices onto a square grid, and finer; `pixels`: hot pixels found and filled;
   `kind_check`: recognises a raw image of a camera 2.0
 - `views`: single views, points of view, a smaller aperture, mosaics of views and of micro-images;
-  `paths`: a point of view that moves
+  `paths`: a point of view that moves; `arrangement`: whether views stand where their numbers say
 - `focus_range`: refocus factors worth looking at
 - `refocus`: shear and sum, for one depth or a stack; `sharp`: one picture focused everywhere
 - `fourier_slice`: the same by a slice through the four-dimensional spectrum
@@ -14,6 +14,7 @@
 - `interpolate`: values between samples, by gathering and weights, for every array library
 """
 
+from lumigraph.rendering.arrangement import check_arrangement
 from lumigraph.rendering.decode import decode
 from lumigraph.rendering.encode import encode
 from lumigraph.rendering.focus_range import focus_range, focus_span
@@ -40,6 +41,7 @@ __all__ = [
     "AllInFocus",
     "all_in_focus",
     "arranged",
+    "check_arrangement",
     "decode",
     "encode",
     "focus_range",
