@@ -27,6 +27,7 @@ _LOADERS: dict[str, Callable[..., object]] = {
 }  # fmt: skip
 _SIDES = range(3, 31)  # what a guess may be
 _LEAST = 0.02  # share of the variance from which something repeats
+_BLOCKS = 4  # along each side, where sides are no multiples
 _SHARE = 0.8  # of the best score that the smallest side must have: its multiples score as well
 
 
@@ -107,7 +108,7 @@ def guess(mosaic: np.ndarray) -> int:
     whole = [n for n in _SIDES if height % n == 0 and width % n == 0]
     scores = {n: _score(grey, n) for n in whole}
     if max(scores.values(), default=0.0) <= _LEAST:
-        scores = {n: _score(grey, n) for n in _SIDES if 2 * n <= min(height, width)}
+        scores = {n: _score(grey, n) for n in _SIDES if _BLOCKS * n <= min(height, width)}
     best = max(scores.values(), default=0.0)
     if best <= _LEAST:
         raise FormatError(f"nothing repeats in {height} x {width} pixels. Give views= yourself.")

@@ -84,7 +84,7 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> LightField:
 
 def _room(path: Path, shape: tuple[int, ...], dtype: np.dtype, held: int, max_pixels: int) -> np.ndarray:
     """Zeros for all views; where most of them are there, it is their memory alone that bounds them."""
-    if 2 * held < shape[0] * shape[1]:
+    if 2 * held < shape[0] * shape[1] or max_pixels < source.MAX_PIXELS:
         source.check_size(path, shape, max_pixels)
     needed = float(np.prod(shape, dtype=float)) * dtype.itemsize
     memory.require(needed, f"{path}: its views", "Use fewer or smaller ones.", FormatError)
