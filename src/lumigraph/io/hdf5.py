@@ -36,7 +36,7 @@ Noun = RawImage | LightField | Volume | Stack
 def load(
     path: Path, *, what: str | None = None, axes: str | None = None, max_pixels: int = source.MAX_PIXELS
 ) -> Noun:
-    """What lumigraph wrote, a Heidelberg light field, or one array.
+    """Content of an HDF5 file: an object that lumigraph saved, a Heidelberg light field, or one array.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _writing(path: Path) -> Iterator[h5py.File]:
 
 
 class _Spool(FileIO):
-    """A file whose failures libhdf5 does not see: it crashes where the disk is full."""
+    """File that hides its failures from libhdf5, which crashes on a full disk."""
 
     failure: OSError | None = None
 
@@ -163,7 +163,7 @@ def _at(file: BinaryIO, place: int) -> bytes:
 
 
 def _header(path: Path, file: h5py.File) -> dict[str, Any] | None:
-    """What lumigraph wrote beside the pixels, None in files by others."""
+    """Header that lumigraph saved beside the pixels; None in files by others."""
     if not isinstance(file.get(_KEY, getlink=True), h5py.HardLink):
         return None
     text = file[_KEY]

@@ -27,7 +27,7 @@ _MOST_PLANES = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Planes:
-    """What an OME-XML text says of its first image.
+    """Planes of the first image of an OME-XML text.
 
     Parameters
     ----------
@@ -82,13 +82,13 @@ def text(
     Parameters
     ----------
     shape, dtype
-        Of the data.
+        Shape and type of the data.
     pitch
         Physical sizes (z, y, x) [m]; None is left out.
     depths
         Positions of the planes [m].
     name
-        Of the image.
+        Name of the image.
     note
         Kept in an annotation.
     """
@@ -118,7 +118,7 @@ def text(
 
 
 def parse(description: str, name: str = "") -> Planes | None:
-    """What an OME-XML text says of the image that a file holds; None for any other text.
+    """Planes that an OME-XML text describes of the image in a file; None for any other text.
 
     Parameters
     ----------
