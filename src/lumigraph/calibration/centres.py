@@ -14,6 +14,7 @@ from lumigraph.core.lattice import Lattice
 _CHUNK = 1 << 18  # pixels gathered at a time: as many as a processor's cache holds
 _ITERATIONS = 4
 _FOLLOWED = 0.9  # pitches: sigma of the window over which gaps are followed
+_UPRIGHT = 0.1  # rad by which the cells of a rectangular lattice may be turned before boxes hold two
 _SOFT = 0.2  # of the cell: over how much its window fades, so that pixels do not jump in and out
 
 
@@ -159,6 +160,9 @@ def _cell(lattice: Lattice) -> tuple[float, float]:
     first, second = lattice.pitches[1], lattice.pitches[0]
     if lattice.layout == "square":
         return first, second
+    if lattice.layout == "rectangular":
+        turned = abs(lattice.rotation) > _UPRIGHT
+        return (min(first, second),) * 2 if turned else (first, second)
     rows = lattice.pitch * math.sqrt(3) / 2
     return (rows, second) if abs(lattice.rotation) < math.pi / 12 else (lattice.pitch, rows)
 

@@ -7,14 +7,15 @@ import numpy as np
 
 from lumigraph.calibration.autocorrelation import SMALLEST_PITCH
 from lumigraph.calibration.devignette import as_raw, grey
+from lumigraph.calibration.few import few_discs
 from lumigraph.calibration.period import Request
 from lumigraph.calibration.tiles import LARGEST, in_tiles
 from lumigraph.calibration.unlit import saturated, unlit
-from lumigraph.calibration.whole import whole
+from lumigraph.calibration.whole import Found, whole
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
-from lumigraph.core.lattice import Layout
+from lumigraph.core.lattice import LAYOUTS, Layout
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 
@@ -48,9 +49,10 @@ def calibrate(
         Picture (y, x[, c]) of an evenly lit surface, or a list of several, or a raw image of any scene; a
         Bayer pattern is scaled to grey first.
     layout
-        "square" or "hex"; found by itself where None.
+        "square", "hex" or "rectangular" (two pitches); found by itself where None.
     pitch
-        Distance of neighbouring micro-images [px], to 10 %; found by itself where None.
+        Distance of neighbouring micro-images [px], to 10 %, of a rectangular lattice the mean of its two;
+        found by itself where None.
     rotation
         Of the rows of lenslets from +x towards +y [rad], to 2°; found by itself where None.
     pixel_pitch
@@ -86,7 +88,7 @@ def calibrate(
     first, original = _light(white)
     _check_request(layout, pitch, rotation)
     request, shape = Request(layout, pitch, rotation), (original.shape[0], original.shape[1])
-    found = in_tiles(original, request) if max(shape) > LARGEST else whole(original, request)
+    found = _found(original, request)
     spots, model = found.fitted.spots, found.fitted.model(shape)
     rms = float(np.sqrt(((spots.centers - model.position(spots.indices)) ** 2).sum(-1).mean()))
     bright = max(float(np.percentile(spots.light, 95)), 1e-30)
@@ -95,9 +97,16 @@ def calibrate(
         rms if found.measured else math.nan,
         pixel_pitch if pixel_pitch is not None else first.pixel_pitch, separation, lenslet_distance,
         warp=found.fitted.warp, light=np.round(spots.light / bright, _DECIMALS), fill=found.fill,
-        missing=unlit(original, model, spots.centers, white=found.white), sharpness=found.sharpness,
+        missing=unlit(original, model, spots.centers, white=found.white, few=found.how == "edges"), sharpness=found.sharpness,
         notes=(*found.notes, *_overexposed(first, model, spots.indices)),
     )  # fmt: skip
+
+
+def _found(original: np.ndarray, request: Request) -> Found:
+    """The lattice by the edges of a few large discs, or by many small ones as a whole or in tiles."""
+    if (few := few_discs(original, request)) is not None:
+        return Found(few.fitted, "edges", white=True, fill=few.fill)
+    return in_tiles(original, request) if max(original.shape) > LARGEST else whole(original, request)
 
 
 def _overexposed(image: RawImage, model: Calibration, indices: np.ndarray) -> tuple[str, ...]:
@@ -131,8 +140,10 @@ def _light(white: RawImage | Array | Sequence[RawImage | Array]) -> tuple[RawIma
 
 
 def _check_request(layout: str | None, pitch: float | None, rotation: float | None) -> None:
-    if not (layout is None or isinstance(layout, str)) or layout not in (None, "square", "hex"):
-        raise CalibrationError(f"layout is {layout!r} but must be 'square' or 'hex', or left out.")
+    if not (layout is None or isinstance(layout, str)) or layout not in (None, *LAYOUTS):
+        raise CalibrationError(
+            f"layout is {layout!r} but must be 'square', 'hex' or 'rectangular', or left out."
+        )
     if pitch is not None and checks.positive("pitch", pitch, "px", CalibrationError) < SMALLEST_PITCH:
         raise CalibrationError(
             f"pitch is {pitch:g} px but micro-images below {SMALLEST_PITCH:g} px cannot be separated. "

@@ -37,8 +37,9 @@ _UNMEASURED = (
 )
 
 
-How = Literal["light", "sharp", "gaps", "logarithm", "discs", "nothing"]
-"""How centres were found: first harmonics of the light, the mean micro-image, the dark gaps, the logarithm
+How = Literal["light", "sharp", "edges", "gaps", "logarithm", "discs", "nothing"]
+"""How centres were found: first harmonics of the light, the mean micro-image, the edges of
+a few large discs, the dark gaps, the logarithm
 of the picture, overlapping discs; or nothing, where none was measured."""
 
 
