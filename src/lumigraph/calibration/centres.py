@@ -157,14 +157,13 @@ def _phases(model: Calibration, shape: tuple[int, int]) -> tuple[np.ndarray, np.
 
 def _cell(lattice: Lattice) -> tuple[float, float]:
     """Height and width of the box around a centre that holds one micro-image [px]."""
-    first, second = lattice.pitches[1], lattice.pitches[0]
-    if lattice.layout == "square":
-        return first, second
-    if lattice.layout == "rectangular":
-        turned = abs(lattice.rotation) > _UPRIGHT
-        return (min(first, second),) * 2 if turned else (first, second)
+    down, along = lattice.pitches
+    if lattice.layout == "rectangular" and abs(lattice.rotation) > _UPRIGHT:
+        return min(down, along), min(down, along)
+    if lattice.layout != "hex":
+        return down, along
     rows = lattice.pitch * math.sqrt(3) / 2
-    return (rows, second) if abs(lattice.rotation) < math.pi / 12 else (lattice.pitch, rows)
+    return (rows, along) if abs(lattice.rotation) < math.pi / 12 else (lattice.pitch, rows)
 
 
 def windows(picture: np.ndarray, reach: Sequence[int]) -> np.ndarray:

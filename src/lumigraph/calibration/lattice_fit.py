@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from lumigraph.calibration.few import few_discs
 from lumigraph.calibration.period import Request
 from lumigraph.calibration.tiles import LARGEST, in_tiles
 from lumigraph.calibration.unlit import saturated, unlit
+from lumigraph.calibration.vectors import UNEQUAL
 from lumigraph.calibration.whole import Found, whole
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
@@ -106,7 +108,12 @@ def _found(original: np.ndarray, request: Request) -> Found:
     """The lattice by the edges of a few large discs, or by many small ones as a whole or in tiles."""
     if (few := few_discs(original, request)) is not None:
         return Found(few.fitted, "edges", white=True, fill=few.fill)
-    return in_tiles(original, request) if max(original.shape) > LARGEST else whole(original, request)
+    found = in_tiles(original, request) if max(original.shape) > LARGEST else whole(original, request)
+    lattice = found.fitted.lattice
+    if lattice.layout == "hex" or request.layout is not None:
+        return found
+    layout = "rectangular" if max(lattice.pitches) > UNEQUAL * min(lattice.pitches) else "square"
+    return found._replace(fitted=found.fitted._replace(lattice=replace(lattice, layout=layout)))
 
 
 def _overexposed(image: RawImage, model: Calibration, indices: np.ndarray) -> tuple[str, ...]:

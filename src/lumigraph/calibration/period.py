@@ -139,9 +139,11 @@ def _oblong(looked: _Looked, request: Request, regular: Vectors | None) -> Vecto
     lines = [Lines.of(_middle(feature, _FOLLOWED)) for feature in looked.middles[:2]]
     polished = [one for c in ranked for one in _straightened(lines, c.vectors)]
     again = [c for c in _ranked(looked.spectra, _distinct(polished, _NEAR)) if request.allows(c.vectors)]
-    if not again or again[0].score < max(_CERTAIN, _CLEARLY * _rival(looked, regular, again[0].vectors)):
+    if not again:
         return None
-    return again[0].vectors
+    clearly = _CLEARLY if regular is not None and regular.is_regular else 1.0
+    rival = _rival(looked, regular, again[0].vectors)
+    return again[0].vectors if again[0].score > max(_CERTAIN, clearly * rival) else None
 
 
 def _rival(looked: _Looked, regular: Vectors | None, vectors: Vectors) -> float:

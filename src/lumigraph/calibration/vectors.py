@@ -9,6 +9,7 @@ from lumigraph.core.lattice import Layout
 
 _RATIO, _ANGLES = 1.25, (52.0, 75.0)  # of neighbours: lengths, and what is hexagonal
 _OBLONG, _RIGHT = 3.4, 84.0  # lengths of neighbours of a rectangular lattice, and their angle [degrees]
+_SHEAR = 0.05  # cosine, by which a regular lattice may lean
 UNEQUAL = 1.03
 """Lengths of neighbours from which a lattice is called rectangular, not square."""
 
@@ -50,6 +51,14 @@ class Vectors(NamedTuple):
     def pitch(self) -> float:
         """Mean length [px]."""
         return (math.hypot(*self.row) + math.hypot(*self.column)) / 2
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether lengths and angle are those of a square or hexagonal lattice, but for a few per cent."""
+        first, second = math.hypot(*self.row), math.hypot(*self.column)
+        wanted = 0.5 if self.layout == "hex" else 0.0
+        cosine = float(self.row @ self.column) / (first * second)
+        return max(first, second) < UNEQUAL * min(first, second) and abs(cosine - wanted) < _SHEAR
 
     @property
     def area(self) -> float:
