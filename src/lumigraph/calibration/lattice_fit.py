@@ -18,6 +18,7 @@ from lumigraph.core import checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import LAYOUTS, Layout
+from lumigraph.core.progress import Progress
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 
@@ -33,6 +34,7 @@ def calibrate(
     pixel_pitch: float | None = None,
     separation: float | None = None,
     lenslet_distance: float | None = None,
+    progress: Progress | None = None,
 ) -> Calibration:
     """Micro-image lattice of a white image, or of a raw image alone, with the centre of every micro-image.
 
@@ -62,6 +64,8 @@ def calibrate(
     separation, lenslet_distance
         Main lens to lenslets and lenslets to sensor [m], where known: kept in the result, which `decode`
         and `rendered_grid` need for lengths in metres.
+    progress
+        Called with the fraction that is done.
 
     Returns
     -------
@@ -90,7 +94,7 @@ def calibrate(
     first, original = _light(white)
     _check_request(layout, pitch, rotation)
     request, shape = Request(layout, pitch, rotation), (original.shape[0], original.shape[1])
-    found = _found(original, request)
+    found = _found(original, request, progress)
     spots, model = found.fitted.spots, found.fitted.model(shape)
     rms = float(np.sqrt(((spots.centers - model.position(spots.indices)) ** 2).sum(-1).mean()))
     bright = max(float(np.percentile(spots.light, 95)), 1e-30)
@@ -104,11 +108,12 @@ def calibrate(
     )  # fmt: skip
 
 
-def _found(original: np.ndarray, request: Request) -> Found:
+def _found(original: np.ndarray, request: Request, progress: Progress | None) -> Found:
     """The lattice by the edges of a few large discs, or by many small ones as a whole or in tiles."""
     if (few := few_discs(original, request)) is not None:
         return Found(few.fitted, "edges", white=True, fill=few.fill)
-    found = in_tiles(original, request) if max(original.shape) > LARGEST else whole(original, request)
+    large = max(original.shape) > LARGEST
+    found = in_tiles(original, request, progress) if large else whole(original, request, progress)
     lattice = found.fitted.lattice
     if lattice.layout == "hex" or request.layout is not None:
         return found

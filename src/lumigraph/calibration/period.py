@@ -12,7 +12,7 @@ import numpy as np
 
 from lumigraph.calibration.autocorrelation import SMALLEST_PITCH, Peaks, autocorrelation, reduced, refined
 from lumigraph.calibration.following import Lines, followed
-from lumigraph.calibration.multiples import AROUND, faint, finest, singles, without_beats
+from lumigraph.calibration.multiples import AROUND, faint, finest, singles, without_beats, without_lines
 from lumigraph.calibration.spectrum import Gaps, Spectrum, polished, single_direction
 from lumigraph.calibration.vectors import Vectors
 from lumigraph.core.lattice import Layout
@@ -139,7 +139,7 @@ def _oblong(looked: _Looked, request: Request, regular: Vectors | None) -> Vecto
     lines = [Lines.of(_middle(feature, _FOLLOWED)) for feature in looked.middles[:2]]
     polished = [one for c in ranked for one in _straightened(lines, c.vectors)]
     again = [c for c in _ranked(looked.spectra, _distinct(polished, _NEAR)) if request.allows(c.vectors)]
-    if not again:
+    if not again or (regular is not None and without_lines(looked.light, again[0].vectors, regular)):
         return None
     clearly = _CLEARLY if regular is not None and regular.is_regular else 1.0
     rival = _rival(looked, regular, again[0].vectors)
