@@ -152,7 +152,9 @@ def _around(places: np.ndarray, reach: int, shape: tuple[int, ...]) -> tuple[sli
     if not len(places):
         return slice(0, shape[0]), slice(0, shape[1])
     first, last = np.floor(places.min(0)).astype(int) - reach, np.ceil(places.max(0)).astype(int) + reach
-    rows, columns = (slice(max(0, int(k)), min(n, int(e) + 1)) for k, e, n in zip(first, last, shape, strict=True))
+    rows, columns = (
+        slice(max(0, int(k)), min(n, int(e) + 1)) for k, e, n in zip(first, last, shape, strict=True)
+    )
     return rows, columns
 
 
@@ -170,7 +172,7 @@ def _carrier(model: Calibration, order: tuple[int, int], area: tuple[slice, slic
 
 
 def _averaged(turned: np.ndarray, places: np.ndarray, sigma: float, reach: float) -> np.ndarray:
-    """Normal averages (k,) of a picture (y, x) around places (k, 2), over blocks that are small beside them."""
+    """Normal averages (k,) of a picture (y, x) around places (k, 2), over blocks small beside them."""
     step = max(1, int(sigma / _BLOCKS))
     if step > 1:
         pad = [(0, -n % step) for n in turned.shape]

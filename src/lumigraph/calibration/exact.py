@@ -45,8 +45,8 @@ def exactly(found: Calibration, pitch: float, rotation: float = 0.0) -> Calibrat
     if found.lattice.layout == "rectangular":
         down, along = found.lattice.pitches
         raise CalibrationError(
-            f"the picture has a rectangular lattice of {down:.2f} x {along:.2f} px, which has no single exact "
-            "pitch. Leave out --exact."
+            f"the picture has a rectangular lattice of {down:.2f} x {along:.2f} px, which has no single "
+            "exact pitch. Leave out --exact."
         )
     regular = Lattice.hex if found.lattice.layout == "hex" else Lattice.square
     lattice = replace(regular(pitch, _nearest(found.lattice, rotation)), kinds=found.lattice.kinds)

@@ -1,4 +1,4 @@
-"""A few large micro-images, such as a Fourier microscope's: the lattice through the centres of their edges."""
+"""A few large micro-images, such as a Fourier microscope's: the lattice through the centres of edges."""
 
 import math
 from typing import NamedTuple
@@ -119,7 +119,9 @@ def _found(picture: np.ndarray) -> tuple[np.ndarray, float]:
         return np.zeros((0, 2)), 0.0
     peaks = (room == ndimage.maximum_filter(room, 2 * int(0.7 * radius) + 1)) & (room > _WHOLE * radius)
     labels, count = ndimage.label(ndimage.binary_dilation(peaks, iterations=2))
-    if not 0 < count <= 2 * _MOST or lit.sum() > _COVERED * math.pi * radius**2 * (count + 4 * math.sqrt(count)):
+    if not 0 < count <= 2 * _MOST or lit.sum() > _COVERED * math.pi * radius**2 * (
+        count + 4 * math.sqrt(count)
+    ):
         return np.zeros((0, 2)), 0.0
     places = np.array(ndimage.center_of_mass(peaks, labels, range(1, count + 1)))
     return places * step + (step - 1) / 2, radius * step

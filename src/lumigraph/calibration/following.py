@@ -78,6 +78,7 @@ class Lines:
 
     @classmethod
     def of(cls, picture: np.ndarray) -> "Lines":
+        """Lines of a picture (y, x)."""
         window = [np.hanning(n + 2)[1:-1].astype(np.float32) for n in picture.shape]
         wave = (picture - picture.mean()) * window[0][:, None] * window[1]
         size = [scipy.fft.next_fast_len(3 * n // 2, real=True) for n in picture.shape]
@@ -119,9 +120,7 @@ class _Found(NamedTuple):
     surroundings: float
 
 
-def _nearest(
-    lines: Lines, waves: np.ndarray, is_hex: bool, lenslets: float, share: float
-) -> _Found | None:
+def _nearest(lines: Lines, waves: np.ndarray, is_hex: bool, lenslets: float, share: float) -> _Found | None:
     """The lattice around the expected one, stretched and turned, whose first lines are strongest together.
 
     A scene's own lattice may have a few of them, and be far stronger there; gaps have all. What is best at

@@ -103,7 +103,8 @@ def calibrate(
         rms if found.measured else math.nan,
         pixel_pitch if pixel_pitch is not None else first.pixel_pitch, separation, lenslet_distance,
         warp=found.fitted.warp, light=np.round(spots.light / bright, _DECIMALS), fill=found.fill,
-        missing=unlit(original, model, spots.centers, white=found.white, few=found.how == "edges"), sharpness=found.sharpness,
+        missing=unlit(original, model, spots.centers, white=found.white, few=found.how == "edges"),
+        sharpness=found.sharpness,
         notes=(*found.notes, *_overexposed(first, model, spots.indices)),
     )  # fmt: skip
 

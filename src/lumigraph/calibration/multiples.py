@@ -126,7 +126,7 @@ def faint(picture: Gaps, vectors: Vectors, best: Vectors) -> bool:
 
 
 def without_lines(picture: Gaps, vectors: Vectors, other: Vectors) -> bool:
-    """Whether the first harmonics of a lattice that another one has not are next to nothing beside its own."""
+    """Whether the first harmonics that a lattice has and another one has not are next to nothing."""
     steps = np.stack(np.meshgrid(*2 * [np.arange(-3, 4)], indexing="ij"), -1).reshape(-1, 2)
     waves = steps @ np.linalg.inv(np.stack([vectors.column, vectors.row], -1))
     waves = waves[(waves[:, 1] > 0) | ((waves[:, 1] == 0) & (waves[:, 0] > 0))]

@@ -35,6 +35,7 @@ _LONGEST = 3.4  # lengths of a rectangular lattice's vectors
 _HALF, _CLEARLY = 0.6, 1.2  # of a regular lattice's score: what a rectangular one must have, and at the end
 _CERTAIN = 12.0  # of the score of a rectangular one: twice that of a regular one
 _ASIDE = 0.16  # of 25 % of the pitch and 6 degrees that a candidate may lie beside the lattice
+_DIVISIONS = ((3, 1), (1, 3), (2, 2), (2, 1), (1, 2))  # cells along a row, and down, in one of an alias
 _FOLLOWED = 1024  # px of the middle that it is followed in
 _SIZE = 2048  # px of the middle of the picture that is looked at
 
@@ -104,11 +105,11 @@ def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
         picture does not support.
     """
     looked, regular, refusal = _Looked.at(features), None, None
-    if request.layout != "rectangular":
-        try:
-            regular = _regular(looked, request)
-        except CalibrationError as error:
-            refusal = error
+    oblong_only = request.layout == "rectangular"
+    try:
+        regular = _regular(looked, Request() if oblong_only else request)
+    except CalibrationError as error:
+        refusal = error
     if regular is None and (pitch := single_direction(looked.light)) is not None:
         raise CalibrationError(
             f"the image shows a one-dimensional (cylindrical) lens array: it repeats every {pitch:.2f} px in "
@@ -118,10 +119,8 @@ def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
     oblong = _oblong(looked, request, regular) if request.layout in (None, "rectangular") else None
     if oblong is not None:
         return oblong
-    if regular is None:
-        raise refusal or CalibrationError(
-            f"the image has no lattice of {_asked(request)}. Leave out what does not fit."
-        )
+    if regular is None or oblong_only:
+        raise refusal or CalibrationError(_unlike(request, regular))
     return regular
 
 
@@ -139,15 +138,30 @@ def _oblong(looked: _Looked, request: Request, regular: Vectors | None) -> Vecto
     lines = [Lines.of(_middle(feature, _FOLLOWED)) for feature in looked.middles[:2]]
     polished = [one for c in ranked for one in _straightened(lines, c.vectors)]
     again = [c for c in _ranked(looked.spectra, _distinct(polished, _NEAR)) if request.allows(c.vectors)]
-    if not again or (regular is not None and without_lines(looked.light, again[0].vectors, regular)):
+    if not again:
+        return None
+    best = _undivided(looked.light, again[0].vectors)
+    if regular is not None and without_lines(looked.light, best, regular):
         return None
     clearly = _CLEARLY if regular is not None and regular.is_regular else 1.0
-    rival = _rival(looked, regular, again[0].vectors)
-    return again[0].vectors if again[0].score > max(_CERTAIN, clearly * rival) else None
+    score = max(again[0].score, _total(looked.spectra, best, math.sqrt(best.area)))
+    return best if score > max(_CERTAIN, clearly * _rival(looked, regular, best)) else None
+
+
+def _undivided(light: Gaps, vectors: Vectors) -> Vectors:
+    """The finest rectangular lattice that has all lines of one that may hold several of its cells."""
+    for parts in _DIVISIONS:
+        row, column = vectors.row / parts[0], vectors.column / parts[1]
+        if min(math.hypot(*row), math.hypot(*column)) < SMALLEST_PITCH:
+            continue
+        finer = Vectors.rectangular(row, column)
+        if finer is not None and without_lines(light, vectors, finer):
+            return finer
+    return vectors
 
 
 def _rival(looked: _Looked, regular: Vectors | None, vectors: Vectors) -> float:
-    """Score of a regular lattice over the harmonics that it, or a rectangular one, has in its first orders."""
+    """Score of a regular lattice over the first orders of the coarser of it and a rectangular one."""
     if regular is None:
         return 0.0
     return _total(looked.spectra, regular, math.sqrt(max(regular.area, vectors.area)))
@@ -305,10 +319,7 @@ def _best(
     allowed = [c for c in ranked if request.allows(c.vectors, c.vectors.pitch / min(shape) / 2)]
     if not allowed:
         best = ranked[0].vectors
-        raise CalibrationError(
-            f"the image has no lattice of {_asked(request)}: it has a {_told(best)}. "
-            f"Leave out what does not fit, or pass pitch={best.pitch:.1f}."
-        )
+        raise CalibrationError(_unlike(request, best))
     best = allowed[0]
     if best.score < _EVIDENCE:
         raise CalibrationError(
@@ -326,6 +337,13 @@ def _best(
             f"a {_told(best.vectors)} and a {_told(others[0].vectors)}. Pass pitch=, layout= or rotation=."
         )
     return best.vectors
+
+
+def _unlike(request: Request, best: Vectors) -> str:
+    return (
+        f"the image has no lattice of {_asked(request)}: it has a {_told(best)}. "
+        f"Leave out what does not fit, or pass pitch={best.pitch:.1f}."
+    )
 
 
 def _told(vectors: Vectors) -> str:

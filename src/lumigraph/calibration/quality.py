@@ -5,7 +5,6 @@ from scipy import ndimage
 
 from lumigraph.core.calibration import Calibration
 
-
 _SPOT = 0.03  # of the pitch: radius in which the middle of the smallest spots is bright
 
 

@@ -56,7 +56,9 @@ def saturated(image: RawImage, model: Calibration, indices: np.ndarray) -> int:
     if image.bit_depth is None:
         return 0
     data = to_numpy(image.data)
-    cores = _cores(data if data.ndim == 2 else data.max(-1), model.position(indices), min(model.lattice.pitches))
+    cores = _cores(
+        data if data.ndim == 2 else data.max(-1), model.position(indices), min(model.lattice.pitches)
+    )
     return int(((cores >= 2**image.bit_depth - 1).mean(-1) > _MOST).sum())
 
 

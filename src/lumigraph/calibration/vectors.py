@@ -33,7 +33,9 @@ class Vectors(NamedTuple):
         return cls(*oriented(first, second, layout), layout)
 
     @classmethod
-    def rectangular(cls, first: np.ndarray, second: np.ndarray, longest: float = math.inf) -> "Vectors | None":
+    def rectangular(
+        cls, first: np.ndarray, second: np.ndarray, longest: float = math.inf
+    ) -> "Vectors | None":
         """Row and column vector where the basis is that of a rectangular lattice."""
         a, b = sorted((math.hypot(*first), math.hypot(*second)))
         if not UNEQUAL < b / a < _OBLONG or b > longest:

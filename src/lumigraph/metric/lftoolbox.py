@@ -95,7 +95,8 @@ def info_of(
     lattice = calibration.lattice
     if lattice.layout != "square":
         raise FormatError(
-            f"the lattice is {lattice.layout} but LFToolbox' matrix counts on a square one. Give a square array."
+            f"the lattice is {lattice.layout} but LFToolbox' matrix counts on a square one. "
+            "Give a square array."
         )
     if views < 2:
         raise FormatError(f"views is {views} but must be at least 2.")

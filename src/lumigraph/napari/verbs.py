@@ -17,7 +17,12 @@ from lumigraph.napari.shown import depth_beside, layer_of
 from lumigraph.napari.work import Job
 from lumigraph.preparation import decode, prepare
 
-_LAYOUTS: list[tuple[str, Any]] = [("found", None), ("square", "square"), ("hexagonal", "hex"), ("rectangular", "rectangular")]
+_LAYOUTS: list[tuple[str, Any]] = [
+    ("found", None),
+    ("square", "square"),
+    ("hexagonal", "hex"),
+    ("rectangular", "rectangular"),
+]
 _FOCI = 21
 
 
