@@ -56,7 +56,7 @@ class Vectors(NamedTuple):
 
     @property
     def is_regular(self) -> bool:
-        """Whether lengths and angle are those of a square or hexagonal lattice, but for a few per cent."""
+        """True if lengths and angle are those of a square or hexagonal lattice, but for a few per cent."""
         first, second = math.hypot(*self.row), math.hypot(*self.column)
         wanted = 0.5 if self.layout == "hex" else 0.0
         cosine = float(self.row @ self.column) / (first * second)
@@ -64,11 +64,11 @@ class Vectors(NamedTuple):
 
     @property
     def area(self) -> float:
-        """Of a cell [px²]."""
+        """Area of a cell [px²]."""
         return abs(float(self.row[0] * self.column[1] - self.row[1] * self.column[0]))
 
     def same(self, other: "Vectors", slack: float) -> bool:
-        """Whether two bases span one lattice, to a part of a pitch."""
+        """True if two bases span one lattice, to a part of a pitch."""
         matrix = np.stack([other.row, other.column], -1)
         steps = np.linalg.solve(matrix, np.stack([self.row, self.column], -1))
         whole = np.rint(steps)

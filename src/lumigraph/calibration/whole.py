@@ -42,8 +42,8 @@ _UNMEASURED = (
 
 
 How = Literal["light", "sharp", "edges", "gaps", "logarithm", "discs", "nothing"]
-"""How centres were found: first harmonics of the light, the mean micro-image, the edges of
-a few large discs, the dark gaps, the logarithm
+"""Source of the centres: first harmonics of the light, the mean micro-image, the edges of a few large discs,
+the dark gaps, the logarithm
 of the picture, overlapping discs; or nothing, where none was measured."""
 
 
@@ -62,7 +62,7 @@ class Found(NamedTuple):
 
     @property
     def measured(self) -> bool:
-        """Whether single centres were."""
+        """True if single centres were measured."""
         return self.how != "nothing"
 
 
@@ -159,7 +159,7 @@ def _followed(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, vectors:
 
 
 def _sparse(cell: np.ndarray) -> bool:
-    """Whether the mean micro-image (m, m) is a small spot on dark ground, which no scene can move far."""
+    """True if the mean micro-image (m, m) is a small spot on dark ground, which no scene can move far."""
     fill, dark = fill_of(cell), float(cell.min())
     aside = max(float(cell[part].mean()) for part in _aside(len(cell)))
     center = float(cell[near_centre(len(cell), _CORE)].mean())
@@ -204,7 +204,7 @@ def _on_light(flat: np.ndarray, above: np.ndarray, found: Found) -> Found | None
 
 
 def _agrees(fitted: Fitted, vectors: Vectors) -> bool:
-    """Whether a fit kept to the lattice that all harmonics tell, but for two pitches and shear."""
+    """True if a fit kept to the lattice of all harmonics, apart from two pitches and shear."""
     steps = np.linalg.solve(
         np.stack([vectors.row, vectors.column]).T,
         np.array([fitted.lattice.basis[0], fitted.lattice.basis[1]]).T,
