@@ -95,8 +95,11 @@ class _Looked(NamedTuple):
         return max(self.middles[0].shape) / _FEWEST
 
 
-def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
+def lattice_vectors(features: list[np.ndarray], request: Request) -> list[Vectors]:
     """Lattice vectors of a picture, from its features (y, x): light, gaps, smoother gaps.
+
+    Those of a rectangular lattice, where it explains the picture better, come before those of the square or
+    hexagonal one: a scene may have lines between those of its lenslets, a white image has none.
 
     Raises
     ------
@@ -117,11 +120,12 @@ def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
             "lenslets; if they are round, take a white image with dark gaps on all sides."
         )
     oblong = _oblong(looked, request, regular) if request.layout in (None, "rectangular") else None
-    if oblong is not None:
-        return oblong
-    if regular is None or oblong_only:
-        raise refusal or CalibrationError(_unlike(request, regular))
-    return regular
+    found = [oblong, None if oblong_only else regular]
+    if regular is not None and oblong_only and oblong is None:
+        raise CalibrationError(_unlike(request, regular))
+    if refusal is not None and oblong is None:
+        raise refusal
+    return [one for one in found if one is not None]
 
 
 def _oblong(looked: _Looked, request: Request, regular: Vectors | None) -> Vectors | None:

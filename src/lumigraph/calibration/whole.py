@@ -79,10 +79,9 @@ def whole(original: np.ndarray, request: Request, progress: Progress | None = No
     gaps = valleys(original, 1.0)
     tell = within(progress, 0, 1)
     tell(Stage(0.0, "period of the lattice"))
-    vectors = lattice_vectors([flat, gaps, valleys(original, 2.0)], request)
-    _check_size(vectors, shape)
+    candidates = lattice_vectors([flat, gaps, valleys(original, 2.0)], request)
     tell(Stage(0.4, "centres of micro-images"))
-    found = _followed(original, flat, gaps, vectors)
+    found = _likelier(original, flat, gaps, candidates)
     start = found.fitted if found.measured else _by_lines(flat, found.fitted)
     cell = mean_cell(flat, start.model(shape))
     discs = overlapping(cell, start.lattice)
@@ -90,6 +89,28 @@ def whole(original: np.ndarray, request: Request, progress: Progress | None = No
     _check_spread(found)
     tell(Stage(0.9, "micro-images"))
     return found._replace(sharpness=sharpness_of(original, found.fitted.model(shape)))
+
+
+def _likelier(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, candidates: list[Vectors]) -> Found:
+    """The fit to the first lattice that micro-images stand on as on a white image, or to the last."""
+    shape = (flat.shape[0], flat.shape[1])
+    for vectors in candidates[:-1]:
+        try:
+            _check_size(vectors, shape)
+            if (found := _followed(original, flat, gaps, vectors)).white:
+                return found
+        except CalibrationError:
+            continue  # the last one says what is wrong
+    last = candidates[-1]
+    _check_size(last, shape)
+    found = _followed(original, flat, gaps, last)
+    if last.layout == "rectangular" and not found.white:
+        raise CalibrationError(
+            f"the likeliest lattice is rectangular, of pitches {np.hypot(*last.column):.2f} x "
+            f"{np.hypot(*last.row):.2f} px, but its micro-images stand {_spread(found.fitted):.2f} px from it, "
+            f"where {_CLEAR:g} px are allowed. Take a white image."
+        )
+    return found
 
 
 def _check_spread(found: Found) -> None:
