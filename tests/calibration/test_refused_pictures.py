@@ -46,7 +46,7 @@ def with_nan():
             {},
             r"2\.\d x 7\.\d lenslets of pitch 4\d",
         ),
-        (two_lattices, {}, r"pitches|one direction|no lattice|micro-images"),
+        (two_lattices, {}, r"pitches|rectangular|one direction|no lattice|micro-images"),
         (
             lambda: np.tile(np.sin(np.arange(120) / 3), (120, 1)),
             {},

@@ -107,7 +107,7 @@ def _likelier(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, candidat
     if last.layout == "rectangular" and not found.white:
         raise CalibrationError(
             f"the likeliest lattice is rectangular, of pitches {np.hypot(*last.column):.2f} x "
-            f"{np.hypot(*last.row):.2f} px, but its micro-images stand {_spread(found.fitted):.2f} px from it, "
+            f"{np.hypot(*last.row):.2f} px, but its micro-images are {_spread(found.fitted):.2f} px off it, "
             f"where {_CLEAR:g} px are allowed. Take a white image."
         )
     return found
