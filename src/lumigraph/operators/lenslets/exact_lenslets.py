@@ -26,18 +26,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from lumigraph.elements import GlassSurface, LensletArray
-from lumigraph.operators.lenslets.cell_response import (
-    MIDDLE,
-    Accepted,
-    Box,
-    CellAxis,
-    CellLenslets,
-    Pair,
-    bent,
-    focal_lengths,
-    sphere,
-)
+from lumigraph.operators.lenslets.cell_response import CellLenslets, bent, focal_lengths, sphere
 from lumigraph.operators.sampling import cells as _cells
+from lumigraph.operators.sampling.cell_axis import MIDDLE, Accepted, Box, CellAxis, Pair
 from lumigraph.operators.sampling.optics import Optics
 
 KEPT = 0.2
