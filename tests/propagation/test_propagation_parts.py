@@ -15,6 +15,11 @@ from lumigraph.propagation.pruned import Band, Transfer, convolve, nonzero_rows
 from lumigraph.propagation.window import smooth_size, window_shape
 from lumigraph.propagation.zoom import Samples, _chirp_z, _fourier_matrix
 
+pytestmark = pytest.mark.filterwarnings(  # noise fills its window, and all of its frequencies
+    "ignore:.* of the light left the window:lumigraph.errors.SamplingWarning",
+    "ignore:.* goes beyond the Fresnel approximation:lumigraph.errors.SamplingWarning",
+)
+
 
 @given(n=st.integers(1, 20000), multiple=st.integers(1, 3))
 def test_a_smooth_size_is_quick_close_and_a_multiple(n, multiple):
