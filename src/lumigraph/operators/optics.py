@@ -13,7 +13,7 @@ from lumigraph.operators.cell_response import SLACK, Axis
 from lumigraph.operators.cells import Cells
 from lumigraph.operators.fineness import Edges, Fineness
 
-VERSION = 23
+VERSION = 24
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 
