@@ -14,7 +14,7 @@ Lenslets of glass take the path of their `Surface` away instead, and have its am
 three is a product of a function of y and one of x, as their paraxial forms are, but each is a sum
 of few: singular values of what is left of them beside their own axes' phases.
 
-A curved side that faces the sensor is followed where it stands (`Curved`), before its vertex by the sagitta s:
+A curved side that faces the sensor is followed where it stands (`Curved`), the sagitta s before its vertex:
 
 .. math:: R^2 = (b + s)^2 + |S - v|^2, \quad t = e^{-i k n s}, \quad \frac{1}{2} (\cos\theta_t + n \cdot r)
 
