@@ -80,7 +80,7 @@ def sphere_of_glass(optics):
 
 
 def side(optics, y, x):
-    """Sagitta, normal (z, y, x) and its cosine with refracted rays, of a curved side; None of ideal lenslets."""
+    """Sagitta, normal (z, y, x) and its cosine with refracted rays, of a curved side; None of ideal ones."""
     if optics.surface is None:
         return None
     radius, index = sphere_of_glass(optics)
