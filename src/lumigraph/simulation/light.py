@@ -12,7 +12,7 @@ from lumigraph.simulation import error
 from lumigraph.simulation.camera import Camera
 from lumigraph.simulation.coherence import Coherence, Incoherent, PartiallyCoherent
 
-FEW = 4
+FEW = 3
 """Shots in a block, from which on their error falls as that of many does: 16 tilted waves in blocks of two
 were off by 0.12 where 0.08 was stated."""
 
