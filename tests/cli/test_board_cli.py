@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
-from lumigraph import metric
+from lumigraph import metrology
 from lumigraph.cli import main
-from metric.scenes import BOARD, corners
+from metrology.scenes import BOARD, corners
 
 KNOWN = ["--focal-length", "50 mm", "--pixel-pitch", "5.5 um", "--shape", "3068", "4080"]
 
@@ -108,13 +108,13 @@ def test_half_of_what_is_known_of_the_array_is_refused(table, capsys, words, sai
 
 
 def test_a_plan_knows_how_much_of_a_micro_image_is_lit(monkeypatch, capsys) -> None:
-    asked, plan = [], metric.plan
+    asked, plan = [], metrology.plan
 
     def noted(camera, calibration, *given, **options):
         asked.append(calibration)
         return plan(camera, calibration, *given, **options)
 
-    monkeypatch.setattr(metric, "plan", noted)
+    monkeypatch.setattr(metrology, "plan", noted)
     words = ["--camera", "thesis-plenoptic-1", "--board", "4 x 3 corners, 3 mm", "--pictures", "3"]
     assert main(["board", "plan", *words]) == 0
     camera = lg.load_camera("thesis-plenoptic-1")

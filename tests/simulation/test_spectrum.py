@@ -9,9 +9,9 @@ import cameras
 import lumigraph as lg
 from lumigraph.core.grid import Grid
 from lumigraph.errors import FormatError, GeometryError, SamplingError
-from lumigraph.information.points import CameraSource
 from lumigraph.scene import Points, Scene, Slice, SpectralLine
 from lumigraph.simulation import Incoherent, Spectrum, simulate
+from lumigraph.studies.information.points import CameraSource
 from lumigraph.units import nm, um
 
 ROUGH = Incoherent(accuracy=1e-2)

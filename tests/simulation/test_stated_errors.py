@@ -7,9 +7,10 @@ import pytest
 
 import cameras
 from lumigraph.core.grid import Grid
-from lumigraph.elements import Surface
-from lumigraph.elements.lean import Lean
-from lumigraph.operators import cells, leaning
+from lumigraph.elements import GlassSurface
+from lumigraph.elements.tilt import TiltAndBow
+from lumigraph.operators.lenslets import tilted_planes
+from lumigraph.operators.sampling import cells
 from lumigraph.scene import Points, Slice
 from lumigraph.simulation import error
 from lumigraph.simulation.light import Shots
@@ -36,7 +37,7 @@ def test_white_images_of_narrow_arrays_state_more():
 def test_glass_states_what_light_aslant_is_off_by():
     """At 0.04 rad by 1e-2 to 4e-2, where 2e-3 was stated."""
     plain = cameras.plenoptic().optics()
-    camera = replace(plain, model="exact", surface=Surface(1.5))
+    camera = replace(plain, model="exact", surface=GlassSurface(1.5))
     distance = camera.object_distance
     place = 0.04 * distance
     for part in (
@@ -45,21 +46,21 @@ def test_glass_states_what_light_aslant_is_off_by():
     ):
         aslant = error.aslant(part, camera)
         assert aslant == pytest.approx(0.04)
-        stated = error.beside(error.Reached(2e-3, "points"), camera, aslant)
+        stated = error.beside(error.ReachedError(2e-3, "points"), camera, aslant)
         assert 1e-2 <= stated.rms <= 4e-2
         assert stated.source.endswith("glass at 0.04 rad")
-        assert error.beside(error.Reached(2e-3, "points"), plain, aslant).rms == 2e-3
+        assert error.beside(error.ReachedError(2e-3, "points"), plain, aslant).rms == 2e-3
 
 
 @pytest.mark.parametrize(("lenslets", "more"), [({}, 1.0), ({"fill_factor": 0.9}, 2.7)])
 def test_neighbours_of_leaning_arrays_count_more_with_gaps(lenslets, more):
-    camera = replace(cameras.focused(**lenslets).optics(), lean=Lean((0.02, 0.0)))
+    camera = replace(cameras.focused(**lenslets).optics(), lean=TiltAndBow((0.02, 0.0)))
     array, b = camera.array, camera.lenslet_distance
     assert array is not None
     assert b is not None
     pitch = array.lattice.pitch
     phase = np.pi * (pitch / 2) ** 2 * 0.02 * pitch / (camera.wavelength * b**2)
-    assert leaning._beside(camera) == pytest.approx(0.07 * more * phase)
+    assert tilted_planes._beside(camera) == pytest.approx(0.07 * more * phase)
 
 
 def test_few_tilted_waves_state_what_random_ones_would():
