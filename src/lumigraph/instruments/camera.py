@@ -127,6 +127,14 @@ class Camera(Instrument):
         """Grid of the focused plane within the field of the sensor."""
         return self.sampling.object_grid
 
+    @cached_property
+    def point_pitch(self) -> float:
+        """Width of the area in the focused plane whose light a point of intensity 1 sends [m].
+
+        It is the pitch of `object_grid`, which the camera's own wavelength sets: `at_wavelength` keeps it.
+        """
+        return self.sampling.object_pitch
+
     @property
     def pupil_grid(self) -> Grid:
         """Samples of the main lens."""
@@ -199,6 +207,7 @@ class Camera(Instrument):
         other = self._in_light_of(wavelength)
         if self.main_lens.prescription is not None:
             vars(other).update(exit_pupil=self.exit_pupil, glass=self.glass, traced=self.traced)
+        vars(other).update(point_pitch=self.point_pitch)  # or a white point would be coloured
         return other
 
     def _in_light_of(self, wavelength: float) -> Self:
@@ -286,7 +295,7 @@ class Camera(Instrument):
             warnings.warn(text, ParaxialWarning, stacklevel=2)
         thin = CameraOptics(
             self.wavelength, self.object_distance, self.separation, self.pupil_diameter, self.lens_train(),
-            self.sensor, self.sampling.object_pitch, self.lenslet_array(), self.lenslet_distance,
+            self.sensor, self.point_pitch, self.lenslet_array(), self.lenslet_distance,
         )  # fmt: skip
         if self.glass is None or self.traced is None:
             return thin
