@@ -227,3 +227,17 @@ def test_values_that_do_not_fit_are_not_packed():
         bits.pack(np.array([4096]), 12, "big")
     with pytest.raises(FormatError, match="4 pixels of 10 bits need 5 bytes but there are 4"):
         bits.unpack(bytes(4), 4, 10, "little")
+
+
+def test_metadata_of_8_mib_is_read_and_a_byte_more_is_not(tmp_path):
+    """In a container, and beside a bare frame."""
+    longest = 8 * 2**20
+    known = json.dumps(METADATA).encode()
+    for length in (longest, longest + 1):
+        padded = known + bytes(length - len(known))
+        frame = {"frame": {"metadataRef": seeds.reference(padded), "imageRef": seeds.reference(bytes(288))}}
+        content = seeds.container({"picture": {"frameArray": [frame]}}, [padded, bytes(288)])
+        (tmp_path / f"{length}.lfp").write_bytes(content)
+    assert io.open(tmp_path / f"{longest}.lfp").shape == (16, 12)
+    with pytest.raises(FormatError, match="its metadata has 8388609 bytes, at most 8388608 are read"):
+        io.open(tmp_path / f"{longest + 1}.lfp")

@@ -44,7 +44,10 @@ def test_a_number_with_a_known_optimum_is_found(search):
 
 def test_the_largest_is_the_other_end():
     vary = {"lenslets.magnification": "0.3:0.6:3"}
-    found = lg.optimise(CAMERA, vary, "largest cross-talk", evaluations=20)
+    seen = []
+    found = lg.optimise(CAMERA, vary, "largest cross-talk", evaluations=20, progress=seen.append)
+    assert seen == sorted(seen)
+    assert 0 < seen[0] < 0.1 < seen[-1] <= 1
     assert found.active == {"lenslets.magnification": 0.6}
     assert 0 < found.gain(found.start) < 0.1
 
