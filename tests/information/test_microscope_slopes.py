@@ -131,13 +131,15 @@ def check(key: Key, name, part):
     assert found.changes[0] == pytest.approx((8 * near - far) / 6, rel=1e-4, abs=0)
 
 
-@pytest.mark.parametrize("key", ["pitch", "phase of the pupil"])
-def test_slopes_are_central_differences(key):
-    check(PLAIN[key], "depth", slice(2, 3))
+QUICK = "phase of the pupil"
+
+
+def test_slopes_are_central_differences():
+    check(PLAIN[QUICK], "depth", slice(2, 3))
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("key", PLAIN | OTHER | ROUND)
+@pytest.mark.parametrize("key", [key for key in PLAIN | OTHER | ROUND if key != QUICK])
 def test_slopes_of_all_parts_are_central_differences(key):
     check((PLAIN | OTHER | ROUND)[key], "depth", slice(2, 3))
 
