@@ -220,7 +220,7 @@ def optimise(
         if estimated is not None and count == 1 and cameras.computed:
             estimated(cameras.seconds * (total - 1), total - 1)
         if progress is not None:
-            progress(Stage(min(total / count, 1.0), f"camera {count} of at most {total}"))
+            progress(Stage(min(count / total, 1.0), f"camera {count} of at most {total}"))
 
     with noted(None if output is None else Path(output), what) as ledger:
         cameras = Evaluations(start, aim, collected(start), ledger, done, list(space.grid), other)
