@@ -23,7 +23,10 @@ def apart(found, expected):
 
 @pytest.mark.parametrize(
     ("scene", "count"),
-    [(lg.targets.points([(3e-6, -2e-6, 9e-6)]), 5), (lg.targets.white(), 3)],
+    [
+        (lg.targets.points([(3e-6, -2e-6, 9e-6)]), 5),
+        pytest.param(lg.targets.white(), 3, marks=pytest.mark.long),
+    ],
     ids=["point", "white"],
 )
 def test_a_pixel_active_in_part_reads_a_ninth_of_what_a_third_of_it_does(scene, count):
