@@ -423,14 +423,14 @@ def test_a_slice_of_a_plenoptic_camera_is_the_sum_of_its_points(plenoptic):
     assert np.linalg.norm(thin - expected) > 2e-2 * np.linalg.norm(expected)
 
 
-@pytest.mark.long  # a white image of 93 lenslets, 20 px each
+@pytest.mark.long  # a white image of 25 lenslets, 20 px each
 def test_micro_images_move_where_chief_rays_are_less_steep(plenoptic, monkeypatch):
     """Inwards at the side of the field, by the slope's difference from the exit pupil's middle times b."""
     here = sys.modules[__name__]
     monkeypatch.setattr(here, "LEAN", -200.0)
     monkeypatch.setattr(here, "D", 0.005)  # gaps between micro-images
     glass._glass.cache_clear()
-    one = plenoptic.replace(main_lens={"diameter": 0.005}, lenslets={"count": (3, 31)})
+    one = plenoptic.replace(main_lens={"diameter": 0.005}, lenslets={"count": (1, 25)})
     white = np.asarray(lg.simulate(one, lg.targets.white(), lg.Incoherent(1e-2)).data)
     lattice, b = one.calibration.lattice, 2.6e-3
     for j in (-12, 12):

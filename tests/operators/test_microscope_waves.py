@@ -96,6 +96,7 @@ def test_the_grid_of_the_light_is_made_finer_where_it_misses_too_much():
     assert stated < 1e-3
 
 
+@pytest.mark.long  # margins of eight
 def test_the_grid_of_round_lenslets_is_made_finer_where_it_misses_too_much():
     """They were off by up to twice what was asked for, without a word."""
     image, stated, finer = middle_of(PIXELS, -9e-6, 3.4, ROUND, 3e-4)
