@@ -130,7 +130,7 @@ def centroid(raw):
     return np.array([raw.sum(1) @ y, raw.sum(0) @ x], float) / raw.sum() * 20e-6
 
 
-@pytest.mark.parametrize("dz", [0.0, 0.3])
+@pytest.mark.parametrize("dz", [0.0, pytest.param(0.3, marks=pytest.mark.long)])
 def test_a_point_stands_where_its_chief_ray_arrives(camera, dz):
     """Distorted, and as seen from the entrance pupil, 20 mm before the lens; rays of coma have a mean."""
     coarse = camera.replace(sensor={"pixel_pitch": "20 um", "shape": (21, 501)})

@@ -138,6 +138,7 @@ def test_bounds_fall_and_the_best_is_a_camera_that_has_them():
     assert again.depth == pytest.approx(found.best["depth"], rel=1e-6)
 
 
+@pytest.mark.long  # 18 s
 def test_the_best_bound_carries_the_error_of_its_derivatives():
     """A step that is far too long shows: what is said holds the bound by the right one."""
     camera = lg.load_camera(CAMERA).replace(main_lens={"diameter": "3 mm"}, model="exact")
@@ -354,6 +355,7 @@ def test_the_verb_writes_a_camera_and_says_before_and_after(tmp_path, capsys):
     assert capsys.readouterr().err.startswith("lumigraph: error: ")
 
 
+@pytest.mark.long  # 9 s
 def test_gradients_move_single_lenslets_where_a_simplex_stalls():
     """Twelve keys, 14 cameras: the bound falls as slopes say, at the two depths and not between them."""
     start = lg.load_camera(SCOPE).replace(
