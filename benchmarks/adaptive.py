@@ -16,9 +16,9 @@ from collections.abc import Callable
 import numpy as np
 
 import lumigraph as lg
-from lumigraph.adaptive import estimate
 from lumigraph.core.cache import SHARED
 from lumigraph.deconvolution import Exposure
+from lumigraph.studies.adaptive import estimate
 
 UNIT = 14.6  # photons on the sensor of a point of intensity 1
 DEPTHS = tuple(np.arange(-24e-6, 25e-6, 6e-6))

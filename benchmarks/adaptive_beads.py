@@ -18,8 +18,8 @@ import numpy as np
 import lumigraph as lg
 from benchmarks.adaptive import SCOPE, UNIT
 from benchmarks.adaptive_pulls import summary
-from lumigraph.adaptive import estimate
 from lumigraph.deconvolution import Exposure
+from lumigraph.studies.adaptive import estimate
 
 SEEN = SCOPE.replace(lenslets={"count": (7, 7)}, sensor={"shape": (135, 135)})
 TERMS = (5, 6, 7, 8, 11)

@@ -13,8 +13,8 @@ import time
 import numpy as np
 
 from benchmarks.adaptive import EXPOSURE, SCOPE, TERMS, UNIT, bent, timed
-from lumigraph.adaptive import estimate
 from lumigraph.deconvolution import deconvolve
+from lumigraph.studies.adaptive import estimate
 
 LENSLETS, REGIONS = 16, (4, 4)
 BIG = SCOPE.replace(

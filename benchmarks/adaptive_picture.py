@@ -17,11 +17,11 @@ from collections.abc import Callable
 import numpy as np
 
 import lumigraph as lg
-from lumigraph.adaptive import estimate, start
-from lumigraph.adaptive.checked import bent
 from lumigraph.core.cache import SHARED
 from lumigraph.core.grid import Grid
 from lumigraph.deconvolution import Exposure
+from lumigraph.studies.adaptive import estimate, start
+from lumigraph.studies.adaptive.checked import bent
 
 CAMERA = lg.PlenopticCamera(
     wavelength="600 nm",

@@ -20,9 +20,9 @@ import lumigraph as lg
 from benchmarks import adaptive_picture
 from benchmarks.adaptive import SCOPE
 from benchmarks.adaptive_picture import CAMERA
-from lumigraph.adaptive import estimate
-from lumigraph.adaptive.checked import bent
 from lumigraph.deconvolution import Exposure
+from lumigraph.studies.adaptive import estimate
+from lumigraph.studies.adaptive.checked import bent
 
 TERMS = (4, 5, 6, 7, 8)
 EXPOSURE = Exposure(background=0.01, gain=1.0)

@@ -13,9 +13,9 @@ import numpy as np
 
 import lumigraph as lg
 from benchmarks.adaptive import BEADS, DEPTHS, EXPOSURE, SCOPE, TERMS, bent, noisy
-from lumigraph.adaptive import estimate
 from lumigraph.core.grid import Grid
 from lumigraph.deconvolution import RichardsonLucy
+from lumigraph.studies.adaptive import estimate
 
 PLANES = tuple(np.arange(-14e-6, 23e-6, 2e-6))
 SAMPLES, ITERATIONS, PHOTONS = 5, 60, 2e4

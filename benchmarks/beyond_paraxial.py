@@ -16,11 +16,11 @@ from scipy.interpolate import CubicSpline
 
 from lumigraph import FocusedPlenopticCamera, PlenopticCamera
 from lumigraph.operators import CameraOptics
-from lumigraph.operators.exact import terms_of
-from lumigraph.operators.optics import Optics
-from lumigraph.operators.paraxial import paraxial_error
-from lumigraph.operators.point_light import point_light
-from lumigraph.operators.relay import relay
+from lumigraph.operators.lenslets.exact_lenslets import terms_of
+from lumigraph.operators.lenslets.paraxial_error import paraxial_error
+from lumigraph.operators.lenslets.point_light import point_light
+from lumigraph.operators.lenslets.relay import relay
+from lumigraph.operators.sampling.optics import Optics
 
 CASES = (
     ("2.0", 52, 150e-6, 1e-3), ("1.0", 52, 150e-6, 1e-3),

@@ -35,7 +35,7 @@ import numpy as np
 import lumigraph as lg
 from benchmarks.boards import NAMES, planned_poses, summary
 from lumigraph.cli import main as command
-from lumigraph.metric import geometry
+from lumigraph.metrology.boards import geometry
 
 STEP = {"views": 6e-3, "focused": 2e-3, "kinds": 2e-3}
 """Between slices near the focus [m]: from one to the next, views of a corner move by 0.15 of a sample, places
@@ -102,7 +102,7 @@ class Bench:
 
     def board(self, board, pose):
         """Light (y, x) on the sensor of a board at a pose."""
-        from metric import drawn
+        from metrology import drawn
 
         grid = self.camera.operator_grid()
         at, distance = on_board(pose, grid)

@@ -30,7 +30,7 @@ ENOUGH = (1e-2, 1e-2, 1e-2, 3e-3)
 
 def camera_2_0(rng, kinds):
     """Keplerian or Galilean, in focus near 0.45 m."""
-    from metric import drawn
+    from metrology import drawn
 
     meant = drawn.camera(rng.choice([-1.0, 1.0]), kinds)
     gains = 1 + rng.normal(0, 5e-3, kinds)
@@ -53,7 +53,7 @@ def beside(rng, meant):
 
 def camera_1_0(rng):
     """In focus near 0.41 m."""
-    from metric import drawn_views
+    from metrology import drawn_views
 
     meant = drawn_views.CAMERA
     return replace(
@@ -64,7 +64,7 @@ def camera_1_0(rng):
 
 def pose(rng, distance, board):
     """Where a board is: its middle near the axis, leaning up to 0.45 rad about both axes."""
-    from metric import drawn
+    from metrology import drawn
 
     turn = (rng.uniform(-0.1, 0.1), *rng.uniform(-0.45, 0.45, 2))
     return drawn.pose(turn, float(distance + rng.uniform(-3e-3, 3e-3)), board)
@@ -78,7 +78,7 @@ def drawn_poses(rng, board, views):
 
 def planned_poses(rng, camera, board, nominal, count, views):
     """The same, as `lg.metric.plan` asks for by what data sheets say, to 3 degrees and 1 %."""
-    from metric import drawn
+    from metrology import drawn
 
     plan = lg.metric.plan(*camera, board, nominal, pictures=count, in_views=views)
 
@@ -91,7 +91,7 @@ def planned_poses(rng, camera, board, nominal, count, views):
 
 def pictures(rng, true, white, found, poses):
     """Corners on pictures, and how many were taken again."""
-    from metric import drawn, drawn_views
+    from metrology import drawn, drawn_views
 
     kinds, board, draws = poses
     views, again, frames = not kinds, 0, []
@@ -117,7 +117,7 @@ def pictures(rng, true, white, found, poses):
 
 def run(rng, what, known, pitch=None, planned=None):
     """Deviations of `NAMES` over the truth, and over what is said; residual [px]; pictures taken again."""
-    from metric import drawn, drawn_views
+    from metrology import drawn, drawn_views
 
     kinds = {"focused": 1, "kinds": 3, "views": 0}[what]
     drawing = drawn if kinds else drawn_views
@@ -152,7 +152,7 @@ def run(rng, what, known, pitch=None, planned=None):
 def sighted(true, point, found, views):
     """Places and centres of the micro-images that show a point."""
     if views:
-        from metric import scenes
+        from metrology import scenes
 
         way = np.stack(np.meshgrid(*2 * [np.linspace(-4, 4, 7)]), -1).reshape(-1, 2)
         center = scenes.in_views(true, point, way)

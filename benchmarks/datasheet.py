@@ -15,7 +15,7 @@ from collections import defaultdict
 import numpy as np
 
 import lumigraph as lg
-from lumigraph.metric.lights import FILL, Lights
+from lumigraph.metrology.datasheet.lights import FILL, Lights
 
 SEEDS = (1, 2)
 

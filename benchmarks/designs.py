@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 import lumigraph as lg
-from lumigraph.information import Light, bounds, trials
 from lumigraph.instruments import LightFieldMicroscope
 from lumigraph.instruments.varied import changed
-from lumigraph.optimisation import Goal
+from lumigraph.studies.information import Light, bounds, trials
+from lumigraph.studies.optimisation import Goal
 from lumigraph.units import mm, um
 
 SCOPE = lg.LightFieldMicroscope.from_catalogue("lfm-fourier")

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from lumigraph.information import Light, bounds, trials
 from lumigraph.instruments import FocusedPlenopticCamera
+from lumigraph.studies.information import Light, bounds, trials
 from lumigraph.units import mm, nm, um
 
 MIDDLE, FOCAL_LENGTH, STOP = 120 * mm, 60 * mm, 8 * mm

@@ -19,10 +19,10 @@ from skimage.transform import downscale_local_mean
 
 import lumigraph as lg
 from benchmarks import designs
-from lumigraph.information import Light, Scenes, reconstruction_error, reconstruction_trials
 from lumigraph.instruments import LightFieldMicroscope
 from lumigraph.instruments.varied import changed
-from lumigraph.optimisation import Goal
+from lumigraph.studies.information import Light, Scenes, reconstruction_error, reconstruction_trials
+from lumigraph.studies.optimisation import Goal
 from lumigraph.units import mm, um
 
 SCENES, FEW = Scenes(4 * um, 24), Scenes(4 * um, 16)

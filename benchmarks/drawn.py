@@ -22,8 +22,8 @@ import numpy as np
 import lumigraph as lg
 from benchmarks import accuracy
 from benchmarks.periodic_operator import relative
-from lumigraph.operators.kernels import operations
-from lumigraph.operators.optics import Optics
+from lumigraph.operators.periodic.kernels import operations
+from lumigraph.operators.sampling.optics import Optics
 from lumigraph.units import mm, nm, um
 
 ASKED, FINER = (1e-2, 1e-3), 2e-4

@@ -9,7 +9,7 @@ import argparse
 import numpy as np
 
 from lumigraph.analysis import find_chart
-from lumigraph.metric import planes
+from lumigraph.metrology.datasheet import planes
 
 FINE = 8  # points to a sample
 
@@ -39,7 +39,7 @@ def measured(rng):
     shape = 53 if cell < 27 and rng.random() < 0.5 else 110
     chart = find_chart(picture(shape, cell, np.radians(rng.uniform(5, 9)), cut, rng))
     frequency = np.linspace(0, 1, 4001)
-    found = {q.name: q for q in planes.of_chart(planes.Tried(chart), None)}
+    found = {q.name: q for q in planes.of_chart(planes.TriedChart(chart), None)}
     for percent in (50, 10):
         q = found[f"mtf{percent}_middle"]
         if q.value is not None and q.interval:

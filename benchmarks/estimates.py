@@ -21,7 +21,7 @@ import numpy as np
 import lumigraph as lg
 from benchmarks import accuracy, accuracy_microscope, references
 from benchmarks.periodic_operator import relative
-from lumigraph.operators.white import white_image
+from lumigraph.operators.periodic.white import white_image
 from lumigraph.units import mm, nm, um
 
 METHODS = ("points", "incoherent", "incoherent", "coherent", "tilted waves", "snapshots")

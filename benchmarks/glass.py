@@ -5,7 +5,7 @@
 Along the axis one square lenslet, as `tests/elements/test_surface.py` has it; aslant one cylindrical lenslet
 of the same width, whose waves have two dimensions, around the place where its chief ray arrives. n = 1.5,
 550 nm, the curved side towards the sensor in its focal plane; relative rms within 8 λ f/p, aslant 6 λ f/p, at
-equal power. *model* is `Surface`, *sagitta* the path (n - 1) s of the surface at the same height, *ideal* a
+equal power. *model* is `GlassSurface`, *sagitta* the path (n - 1) s of the surface at the same height, *ideal* a
 lenslet free of spherical aberration.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from scipy.special import hankel1
 
-from lumigraph.elements import Surface
+from lumigraph.elements import GlassSurface
 from lumigraph.units import um
 
 INDEX, WAVELENGTH = 1.5, 550e-9
@@ -47,7 +47,7 @@ def square(half: float, f: float, conic: float) -> tuple[np.ndarray, dict[str, n
     inside = np.arctan(np.sqrt(squared) / root)
     outside = np.arcsin(INDEX * np.sin(inside))
     light = np.exp(-1j * K * INDEX * sag) * np.sqrt(np.cos(inside) / np.cos(outside))
-    truth, glass = [], Surface(INDEX, conic)
+    truth, glass = [], GlassSurface(INDEX, conic)
     for v, u in zip(0.8 * at, 0.6 * at, strict=True):
         dy, dx, dz = v - half * y, u - half * x, f + sag
         way = np.sqrt(dy**2 + dx**2 + dz**2)
@@ -98,7 +98,7 @@ def cylinder(half: float, f: float, angle: float) -> tuple[np.ndarray, dict[str,
     wide = float(seen[-1] + (half - v[-1]) * (seen[-1] - seen[-2]) / (v[-1] - v[-2]))
     own = np.interp(wide * nodes, seen, v)
     density = np.gradient(own, wide * nodes) / np.cos(np.interp(own, v, turned))
-    path = Surface(INDEX).path((wide * nodes) ** 2, half, f)
+    path = GlassSurface(INDEX).path((wide * nodes) ** 2, half, f)
     return np.abs(truth) ** 2, {
         "model": plane(wide, np.sqrt(density) * np.exp(-1j * K * path)),
         "sagitta": plane(half, np.exp(-1j * K * (INDEX - 1) * sag)),

@@ -22,11 +22,12 @@ import numpy as np
 import lumigraph as lg
 from benchmarks.periodic_operator import camera, plenoptic
 from lumigraph.core.arrays import WORKERS
-from lumigraph.operators import kernels, periodic_operator
-from lumigraph.operators.blocks import Builder
-from lumigraph.operators.optics import Optics
-from lumigraph.operators.sizes import Factors, build_bytes, wanted
-from lumigraph.operators.streamed import stream_bytes
+from lumigraph.operators import periodic_operator
+from lumigraph.operators.periodic import kernels
+from lumigraph.operators.periodic.blocks import BlockBuilder
+from lumigraph.operators.periodic.sizes import Factors, build_bytes, wanted
+from lumigraph.operators.periodic.streamed import stream_bytes
+from lumigraph.operators.sampling.optics import Optics
 from lumigraph.units import mm, um
 
 KINDS = (5.2 * mm, 5 * mm, 5.4 * mm)
@@ -78,7 +79,7 @@ def counted(name: str) -> str:
     build, accuracy = CAMERAS[name]
     found = build()
     optics = Optics.of(found.optics(), found.object_distance, accuracy).bricks
-    builder, said = Builder(optics, lambda _: None, WORKERS), Factors.of(optics)
+    builder, said = BlockBuilder(optics, lambda _: None, WORKERS), Factors.of(optics)
     inside = sum(left.shape[1] for blocks in builder.periodic()[0] for left, _ in blocks.values())
     first: list[int] = []
     whole = builder._border_blocks

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
 from lumigraph import FocusedPlenopticCamera, PlenopticCamera, Points
-from lumigraph.operators.points import points_image
+from lumigraph.operators.lenslets.points import points_image
 
 COUNT = 15
 PLACES = (((0, 0), "axis"), ((3, 4), "off, (3, 4)"), ((-4, 4), "off, (-4, 4)"))

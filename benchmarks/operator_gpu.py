@@ -25,7 +25,7 @@ from lumigraph.core import arrays
 from lumigraph.core.linear import Linear
 from lumigraph.deconvolution import deconvolve
 from lumigraph.instruments import LightFieldMicroscope
-from lumigraph.operators.periodic import PeriodicOperator, periodic_operator
+from lumigraph.operators.periodic.incoherent import PeriodicOperator, periodic_operator
 
 Row = dict[str, Any]
 Work = tuple[str, Callable[[Any], Any], np.ndarray, Linear | None]

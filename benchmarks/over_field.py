@@ -42,7 +42,7 @@ def timed(what: Callable[[], Any]) -> tuple[Any, float]:
 def off(operator: Any, camera: Any) -> float:
     """Relative rms by which images of twelve samples are off those of points, but for their brightness."""
     import lumigraph as lg
-    from lumigraph.operators.points import points_image
+    from lumigraph.operators.lenslets.points import points_image
 
     rng, grid = np.random.default_rng(1), operator.object_grid
     places = [tuple(int(rng.integers(0, n)) for n in grid.shape) for _ in range(12)]

@@ -28,8 +28,8 @@ from benchmarks import _point_sums, plenoptic_snapshots
 from lumigraph.core import memory
 from lumigraph.core.arrays import WORKERS
 from lumigraph.operators import periodic_operator
-from lumigraph.operators.optics import Optics
-from lumigraph.operators.sizes import build_bytes
+from lumigraph.operators.periodic.sizes import build_bytes
+from lumigraph.operators.sampling.optics import Optics
 from lumigraph.units import mm, nm, um
 
 Row = dict[str, Any]

@@ -12,9 +12,9 @@ import numpy as np
 
 import lumigraph as lg
 from lumigraph.deconvolution import Exposure, RichardsonLucy
-from lumigraph.information import Light, Scenes, reconstruction_error, reconstruction_trials
-from lumigraph.information.bounds import reading
-from lumigraph.information.imaging import Imaging, imaging
+from lumigraph.studies.information import Light, Scenes, reconstruction_error, reconstruction_trials
+from lumigraph.studies.information.bounds import reading
+from lumigraph.studies.information.imaging import SceneImaging, imaging
 
 SCENES = Scenes(30e-6, 24)
 PHOTONS, DRAWS, DEPTHS = 3000, 6, (0.0, 4e-3)
@@ -41,7 +41,7 @@ def cameras() -> dict[str, Any]:
     }
 
 
-def deconvolved(seen: Imaging, raw: np.ndarray, scene: np.ndarray) -> float:
+def deconvolved(seen: SceneImaging, raw: np.ndarray, scene: np.ndarray) -> float:
     """Error of Richardson and Lucy's best iteration, over the contrast."""
     light = float(seen.light[0])
     more = seen.noise**2 - seen.mean  # reading counts as so many electrons, known in the mean

@@ -24,9 +24,9 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.depth.dense import moves_of
 from lumigraph.depth.expected import MICRO_IMAGES, terms
-from lumigraph.depth.flat import Flat
+from lumigraph.depth.flat import FlatImage
 from lumigraph.depth.sightings import Sightings
-from lumigraph.rendering.patches import Layout, Patches, checked_focus
+from lumigraph.rendering.patches import Patches, PatchLayout, checked_focus
 
 Surface = tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any] | None]
 """Texture, patch [px] and, but for the farthest, mask: functions of (y, x) in the plane of the lattice."""
@@ -147,7 +147,7 @@ def measured(name: str) -> dict[str, Any]:
     raw, calibration, focus, truth = scene_of(name)
     lenslets = lg.depth.correlation(raw, calibration)
     depth = lg.depth.dense(raw, calibration, lenslets, focus=focus)
-    layout = Layout.of(calibration, Patches.of(lenslets.values, calibration), None)
+    layout = PatchLayout.of(calibration, Patches.of(lenslets.values, calibration), None)
     error, trust = (
         np.abs(np.asarray(depth.values) - truth(layout.y[:, None], layout.x)),
         np.asarray(depth.confidence),
@@ -169,8 +169,8 @@ def parts_of(name: str) -> Parts:
     raw, calibration, focus, truth = scene_of(name)
     lenslets = lg.depth.correlation(raw, calibration)
     sizes = Patches.of(lenslets.values, calibration)
-    layout = Layout.of(calibration, sizes, None)
-    flat = Flat.of(lg.RawImage(raw), calibration)
+    layout = PatchLayout.of(calibration, sizes, None)
+    flat = FlatImage.of(lg.RawImage(raw), calibration)
     sights = Sightings(flat, calibration, layout, checked_focus(focus, calibration))
     found, evidence, _ = moves_of(sights, (sizes, np.asarray(lenslets.confidence)))
     sides = [terms(side * found, evidence, slants=False) for side in (1, -1)]

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 import lumigraph as lg
-from lumigraph.metric.twin import CAUSES, SURE
+from lumigraph.metrology.twin import CAUSES, SURE
 
 ACCURACY = 5e-4
 """Of the bench's white images; the twin's own are at twice of it."""
@@ -78,7 +78,7 @@ def main():
     parser.add_argument("--untold", action="store_true")
     parser.add_argument("--claimed", type=float)
     given = parser.parse_args()
-    rng, bench = np.random.default_rng(given.seed), lg.metric.Bench(camera(given.lenslets))
+    rng, bench = np.random.default_rng(given.seed), lg.metric.BenchModel(camera(given.lenslets))
     sensor, off, sure, wrong, started = bench.camera.sensor, [], [], 0, time.process_time()
     for _ in range(given.runs):
         tilt, shift = np.radians(rng.uniform(-1, 1, 2)), rng.uniform(-30e-6, 30e-6, 2)

@@ -19,13 +19,13 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 import lumigraph as lg
-from lumigraph.adaptive import MODES, sense, start
-from lumigraph.adaptive.checked import bent
-from lumigraph.adaptive.star import Star
 from lumigraph.deconvolution import Exposure
 from lumigraph.elements.zernike import noll_to_nm, zernike
-from lumigraph.information.points import CameraSource
 from lumigraph.scene import Points
+from lumigraph.studies.adaptive import MODES, sense, start
+from lumigraph.studies.adaptive.checked import bent
+from lumigraph.studies.adaptive.star import StarImages
+from lumigraph.studies.information.points import CameraSource
 
 CAMERA = lg.PlenopticCamera(
     wavelength="600 nm",
@@ -145,7 +145,7 @@ def places() -> None:
         at, rows = np.array([y * pitch, y * pitch, dz]), []
         for seed in range(FRAMES):
             true = turbulence(np.random.default_rng(seed))
-            lit = next(Star(CAMERA, MODES).lit(Points(at[None], np.ones(1)), true))
+            lit = next(StarImages(CAMERA, MODES).lit(Points(at[None], np.ones(1)), true))
             flat = 1e5 * np.concatenate([lit.changes[:-1], lit.image[None]]).reshape(len(MODES) + 3, -1)
             flat[-1] = np.maximum(flat[-1], 0)
             covariance = np.linalg.inv((flat / (flat[-1] + BACKGROUND)) @ flat.T)

@@ -2,7 +2,7 @@
 A camera measured with a board
 ==============================
 
-`lumigraph.metric.board` finds the lengths of a plenoptic camera from the corners of a board, each with its
+`lumigraph.metrology.board` finds the lengths of a plenoptic camera from the corners of a board, each with its
 uncertainty. Here the corners are drawn through a known camera, with noise of 0.3 pixels, so that the answer
 can be checked.
 """
@@ -10,7 +10,8 @@ can be checked.
 import numpy as np
 
 import lumigraph as lg
-from lumigraph.metric import Board, Corners, MetricCamera, Nominal, geometry
+from lumigraph.metrology import Board, Corners, MetricCamera, Nominal
+from lumigraph.metrology.boards import geometry
 from lumigraph.units import mm, um
 
 target = Board((5, 7), 10 * mm)

@@ -8,7 +8,7 @@ A search from noise for the phase that leaves detail alike over a range of defoc
 import numpy as np
 
 import lumigraph as lg
-from lumigraph.optimisation import depth_mask
+from lumigraph.studies.optimisation import depth_mask
 from lumigraph.units import mm, um
 
 WAVES = 2.0  # of defocus at the pupil's edge, either way

@@ -8,8 +8,8 @@ The wavefront before a main lens, from one raw image of a star on the corner of 
 import numpy as np
 
 import lumigraph as lg
-from lumigraph.adaptive import sense, wavefront_map
 from lumigraph.deconvolution import Exposure
+from lumigraph.studies.adaptive import sense, wavefront_map
 
 camera = lg.PlenopticCamera(
     wavelength="600 nm",

@@ -55,7 +55,7 @@ from .instruments import (
     scan as scan,
 )
 from .io import contents as contents, open as open, save as save
-from .optimisation import Goal as Goal, optimise as optimise
+from .studies.optimisation import Goal as Goal, optimise as optimise
 from .preparation import (
     PreparedImage as PreparedImage,
     decode as decode,

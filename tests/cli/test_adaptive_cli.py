@@ -9,9 +9,9 @@ import tifffile
 from tests.cli.test_deconvolve_cli import LENS, SCOPE
 
 import lumigraph as lg
-from lumigraph.adaptive import Wavefront
 from lumigraph.cli.adaptive import Adaptive, with_wavefront
 from lumigraph.core.result import Result
+from lumigraph.studies.adaptive import Wavefront
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import lumigraph as lg
 from cluster_jobs import Here, picture
 from lumigraph.cli import main
 from lumigraph.cli.batch import _failures
-from lumigraph.cli.standing import Standing
+from lumigraph.cli.standing import StatusPage
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +141,7 @@ def test_the_page_of_what_goes_on_is_read_again_and_says_what_failed(tmp_path):
     lg.cluster.batch(picture, [{"seed": 1}, {"seed": 2, "bad": True}, {"seed": 3}], out, workers=Here())
     (tmp_path / "out.zarr.ledger/dashboard.txt").write_text("http://10.0.0.1:8787/status")
     told = []
-    page = Standing(out, told.append)
+    page = StatusPage(out, told.append)
     page(0.5)
     text = lg.cluster.page(out).read_text()
     assert told == [0.5]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
-from lumigraph import metric
+from lumigraph import metrology
 from lumigraph.cli import main
-from metric.scenes import BOARD, corners
+from metrology.scenes import BOARD, corners
 
 KNOWN = ["--focal-length", "50 mm", "--pixel-pitch", "5.5 um", "--shape", "3068", "4080"]
 
@@ -43,13 +43,13 @@ def test_what_is_missing_is_named(table, capsys, words, said) -> None:
 
 
 def test_a_plan_for_a_camera_1_knows_what_is_lit_and_says_what_stays_unknown(monkeypatch, capsys) -> None:
-    asked, plan = [], metric.plan
+    asked, plan = [], metrology.plan
 
     def noted(camera, calibration, *given, **options):
         asked.append(calibration)
         return plan(camera, calibration, *given, **options)
 
-    monkeypatch.setattr(metric, "plan", noted)
+    monkeypatch.setattr(metrology, "plan", noted)
     words = [
         "board",
         "plan",

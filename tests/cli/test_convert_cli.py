@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
-from metric.scenes import BOARD, NOMINAL, corners
+from metrology.scenes import BOARD, NOMINAL, corners
 
 SHAPE = (600, 800)
 

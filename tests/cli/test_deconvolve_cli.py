@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter
 import lumigraph as lg
 from lumigraph.cli.deconvolve_options import depths
 from lumigraph.cli.frames import Frames, items_of
-from lumigraph.operators.microscope_operator import MicroscopeOperator
+from lumigraph.operators.microscope.volume_operator import MicroscopeOperator
 from lumigraph.preparation import vignetting
 
 FOCUSED = """

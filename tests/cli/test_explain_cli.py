@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import lumigraph.io as io
-from lumigraph.experiments.thesis.white_images import laboratory_camera, tilted_white, white
+from lumigraph.studies.thesis.figures.white_images import laboratory_camera, tilted_white, white
 
 TURN, TILT, MOVE, SHIFT = 1.5, 4.0, 0.4e-3, (12e-6, -30e-6)
 CAMERA = """

@@ -272,7 +272,7 @@ def test_volumes_become_a_series_over_time(tmp_path):
 @pytest.mark.parametrize("thing", [np.zeros((2, 2), complex), "text", {"a": np.zeros((0, 3))}, 3])
 def test_what_no_series_holds_is_refused(thing):
     with pytest.raises(lg.FormatError):
-        series.Frame.of(thing)
+        series.SeriesFrame.of(thing)
 
 
 def test_a_ledger_that_is_none_is_told(tmp_path):

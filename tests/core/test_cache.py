@@ -57,7 +57,7 @@ def test_several_caches_stay_within_one_budget():
 def test_every_cache_of_the_package_shares_the_budget_that_the_user_chose():
     """Six of them could once hold 6.5 GiB, each within a limit of its own."""
     program = """
-import gc, lumigraph, lumigraph.operators.kernels, lumigraph.operators.microscope_operator
+import gc, lumigraph, lumigraph.operators.periodic.kernels, lumigraph.operators.microscope.volume_operator
 from lumigraph.core.cache import SHARED, ByteCache
 caches = [thing for thing in gc.get_objects() if isinstance(thing, ByteCache)]
 assert len(caches) >= 4 and all(cache._budget is SHARED for cache in caches), caches

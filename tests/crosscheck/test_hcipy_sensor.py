@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
-from lumigraph.adaptive import sense
 from lumigraph.deconvolution import Exposure
-from lumigraph.information.points import CameraSource
+from lumigraph.studies.adaptive import sense
+from lumigraph.studies.information.points import CameraSource
 
 hcipy = pytest.importorskip("hcipy")
 pytestmark = pytest.mark.filterwarnings("ignore")

@@ -6,10 +6,10 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
-from lumigraph.depth.blurred import Blurred
-from lumigraph.depth.flat import Flat
+from lumigraph.depth.blurred import BlurLevels
+from lumigraph.depth.flat import FlatImage
 from lumigraph.depth.sightings import Sightings
-from lumigraph.rendering.patches import Layout, Patches
+from lumigraph.rendering.patches import Patches, PatchLayout
 
 MOST, PITCH, EVEN = 0.1, 13.0, 5.2
 
@@ -18,8 +18,8 @@ MOST, PITCH, EVEN = 0.1, 13.0, 5.2
 def sights(rng):
     shape, none = (110, 120), np.zeros((0, 2))
     calibration = Calibration(Lattice.square(PITCH, 0.02, (6, 7)), shape, none.astype(int), none, 0.0)
-    flat = Flat(rng.random(shape).astype(np.float32), EVEN, EVEN, np.ones(1))
-    return Sightings(flat, calibration, Layout.of(calibration, Patches.of(4.0, calibration), None), None)
+    flat = FlatImage(rng.random(shape).astype(np.float32), EVEN, EVEN, np.ones(1))
+    return Sightings(flat, calibration, PatchLayout.of(calibration, Patches.of(4.0, calibration), None), None)
 
 
 def differ(sights, y, x, size):
@@ -60,7 +60,7 @@ def test_kinds_of_lenslets_are_blurred_as_the_most_blurred_one(rng):
     """At patches of 8 px kinds sharp at 7, 6 and 8.5 px spread over 1, 2 and 0.5 px, a quarter the sigma."""
     image, focus = rng.random((40, 50)).astype(np.float32), np.array([7.0, 6.0, 8.5])
     trust = np.array([0.5, 0.3, 1.0])
-    blurred = Blurred.of(image, focus, [(8.0, trust)])
+    blurred = BlurLevels.of(image, focus, [(8.0, trust)])
     at, kind = rng.uniform(5, 30, (2, 300)).astype(np.float32), rng.integers(0, 3, 300)
     found = blurred.read(list(at), kind, 8.0, trust)
     for number, sigma in enumerate(np.sqrt(0.5**2 - np.array([0.25, 0.5, 0.125]) ** 2)):
@@ -73,5 +73,5 @@ def test_kinds_of_lenslets_are_blurred_as_the_most_blurred_one(rng):
 def test_of_one_kind_nothing_is_blurred(rng):
     image = rng.random((20, 30)).astype(np.float32)
     at = rng.uniform(2, 17, (2, 100)).astype(np.float32)
-    found = Blurred.of(image, None, []).read(list(at), np.zeros(100, np.int8), 8.0, None)
+    found = BlurLevels.of(image, None, []).read(list(at), np.zeros(100, np.int8), 8.0, None)
     assert found == pytest.approx(map_coordinates(image, at, order=1), abs=1e-5)

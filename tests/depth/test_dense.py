@@ -16,7 +16,7 @@ from lumigraph.errors import CalibrationError, GeometryError, SamplingWarning
 from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.preparation import prepare
 from lumigraph.rendering import render, sight_grid
-from lumigraph.rendering.patches import Layout, Patches
+from lumigraph.rendering.patches import Patches, PatchLayout
 from lumigraph.scene import Scene, Slice
 from lumigraph.simulation import Incoherent, simulate
 
@@ -28,7 +28,7 @@ def measured(name, surfaces, truth, noise=0.01):
     raw = raw + noise * np.random.default_rng(5).standard_normal(raw.shape)
     lenslets = correlation(raw, calibration)
     found = dense(raw, calibration, lenslets, focus=focus if len(focus) > 1 else None)
-    layout = Layout.of(calibration, Patches.of(lenslets.values, calibration), None)
+    layout = PatchLayout.of(calibration, Patches.of(lenslets.values, calibration), None)
     assert found.shape == render(raw, calibration, lenslets.values).shape
     return found, truth(layout.y[:, None], layout.x)
 

@@ -11,7 +11,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import silent
 from lumigraph.depth import alpha_of, disparity_of, epi
 from lumigraph.depth.pictures import Pictures
-from lumigraph.depth.shading import Fit
+from lumigraph.depth.shading import ShadingFit
 from lumigraph.depth.smooth import Stiffness, tears, update
 from lumigraph.depth.sweep import costs, span
 from lumigraph.depth.visible import visible
@@ -212,7 +212,7 @@ def test_gloss_does_not_look_like_depth(rng):
 
 
 def test_shading_is_told_from_residuals_that_are_linear_in_the_views(rng):
-    fit, flat_place = Fit((40, 40), 0.001), np.zeros((40, 40))
+    fit, flat_place = ShadingFit((40, 40), 0.001), np.zeros((40, 40))
     for down in (-1, 0, 1):
         for right in (-1, 0, 1):
             noise = 0.001 * rng.standard_normal((40, 40))

@@ -10,7 +10,7 @@ from scipy.ndimage import map_coordinates
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.progress import silent
 from lumigraph.core.raw import RawImage
-from lumigraph.depth.micro_images import MicroImages, Reading
+from lumigraph.depth.micro_images import MicroImageReader, MicroImages
 
 LATTICES = {
     "square": Lattice.square(15.3, 0.01, (7, 7)),
@@ -88,8 +88,8 @@ def test_blocks_of_lenslets_make_no_difference(monkeypatch):
 
 def test_what_is_hardly_shared_is_not_compared():
     inside = drawn("square").inside
-    assert Reading.of(inside, np.array([0.0, 14.0])) is None
-    reading = Reading.of(inside, np.array([-2.5, 3.0]))
+    assert MicroImageReader.of(inside, np.array([0.0, 14.0])) is None
+    reading = MicroImageReader.of(inside, np.array([-2.5, 3.0]))
     assert reading is not None
     assert reading.weight.sum() == pytest.approx(1)
     assert len(reading.places) < inside.sum()
@@ -98,7 +98,7 @@ def test_what_is_hardly_shared_is_not_compared():
 def test_a_reading_is_linear_between_pixels(rng):
     inside = np.hypot(*np.mgrid[-8:9, -8:9]) < 7.2
     image, move = rng.random((17, 17)).astype(np.float32), np.array([2.3, -3.8])
-    reading = Reading.of(inside.astype(np.float32), move)
+    reading = MicroImageReader.of(inside.astype(np.float32), move)
     assert reading is not None
     at = np.stack(np.divmod(reading.places, 17)) + move[:, None]
     assert reading.matrix @ image.ravel() == pytest.approx(

@@ -176,7 +176,7 @@ def test_tests_named_in_the_errata_exist(reference):
 
 @pytest.mark.parametrize("name", sorted(set(re.findall(r"`lumigraph reproduce ([^`]+)`", ERRATA))))
 def test_experiments_named_in_the_errata_exist(name):
-    from lumigraph.experiments import find
+    from lumigraph.studies.thesis import find
 
     (found,) = find((name,))
     assert found.id == name

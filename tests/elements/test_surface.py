@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
 
-from lumigraph.elements import Surface
+from lumigraph.elements import GlassSurface
 from lumigraph.elements.surface import index_at
 from lumigraph.errors import GeometryError
 
@@ -20,9 +20,9 @@ def test_indices_are_those_of_bk7(line, n):
 
 def test_a_hyperbola_brings_light_to_its_focus():
     heights, f = np.linspace(0, 7e-6, 20), 35e-6
-    path = Surface(1.5, conic=-(1.5**2)).path(heights**2, 7e-6, f)
+    path = GlassSurface(1.5, conic=-(1.5**2)).path(heights**2, 7e-6, f)
     np.testing.assert_allclose(path, np.hypot(f, heights) - f, atol=1e-15)
-    assert np.abs(Surface(1.5).path(heights**2, 7e-6, f) - path).max() > 1e-8
+    assert np.abs(GlassSurface(1.5).path(heights**2, 7e-6, f) - path).max() > 1e-8
 
 
 def through(surface, focal_length, height):
@@ -45,7 +45,9 @@ def refracted(ray, normal, ratio):
     return ratio * ray + (np.sqrt(1 - ratio**2 * (1 - along**2)) - ratio * along) * normal
 
 
-@pytest.mark.parametrize("surface", [Surface(1.5), Surface(1.46, -0.6), Surface(1.5, 0.3, 20e-6)])
+@pytest.mark.parametrize(
+    "surface", [GlassSurface(1.5), GlassSurface(1.46, -0.6), GlassSurface(1.5, 0.3, 20e-6)]
+)
 def test_rays_are_normal_to_the_wave_and_lose_no_power(surface):
     f, half = 56e-6, 7e-6
     height = np.linspace(0.5e-6, half, 9)
@@ -100,7 +102,7 @@ def behind_plane(path, amplitude, half, f, places):
     [(8, 0.0, 6e-4, 8e-3), (4, 0.0, 1.2e-2, 0.12), (4, -2.25, 1.2e-3, 2.5e-2)],
 )
 def test_a_lenslet_is_its_glass(f_number, conic, within, ideal):
-    half, f, surface = 20e-6, f_number * 40e-6, Surface(1.5, conic)
+    half, f, surface = 20e-6, f_number * 40e-6, GlassSurface(1.5, conic)
     at = np.linspace(-8, 8, 25) * WAVELENGTH * f_number
     places = np.stack([0.8 * at, 0.6 * at], axis=1)[np.abs(at) < half]
     truth = behind_glass(surface, half, f, places)
@@ -115,7 +117,7 @@ def test_a_lenslet_is_its_glass(f_number, conic, within, ideal):
 
 def test_glass_has_to_reach_the_corners():
     with pytest.raises(GeometryError, match=r"radius \(n - 1\) f is 14 µm, on which the corner, 9.8995 µm"):
-        Surface(1.5).check(7e-6, 28e-6)
+        GlassSurface(1.5).check(7e-6, 28e-6)
     with pytest.raises(GeometryError, match=r"thickness is 0\.5 µm but must be from 0\.88238 µm"):
-        Surface(1.5, thickness=5e-7).check(7e-6, 112e-6)
-    Surface(1.5, thickness=1e-6).check(7e-6, 112e-6)
+        GlassSurface(1.5, thickness=5e-7).check(7e-6, 112e-6)
+    GlassSurface(1.5, thickness=1e-6).check(7e-6, 112e-6)

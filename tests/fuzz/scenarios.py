@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 
 import lumigraph as lg
-from lumigraph import demo, experiments, store
+from lumigraph import demo, store
 from lumigraph.deconvolution import Checkpoint
-from lumigraph.experiments import run as reproduce
 from lumigraph.store import atomic
+from lumigraph.studies import thesis
+from lumigraph.studies.thesis import run as reproduce
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from fuzz.faults import forked
@@ -40,7 +41,7 @@ def deconvolution(folder: Path) -> bytes:
 
 def _experiment(name: str) -> Callable[[Path], bytes]:
     def run(folder: Path) -> bytes:
-        (one,) = experiments.find([name])
+        (one,) = thesis.find([name])
         found = reproduce.run([one], folder, quick=True)
         return repr([(row.quantity, row.got) for result in found for row in result.rows]).encode()
 

@@ -34,7 +34,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
-from lumigraph.metric.noise import Noise
+from lumigraph.metrology.boards.noise import Noise
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from fuzz.texts import ASCII_PLY, COMPOTE, PLENOPTOMOS, RAYTRIX

@@ -11,8 +11,8 @@ from lumigraph.elements import noll_to_nm
 from lumigraph.errors import FormatError, GeometryError, LumigraphError, ParaxialWarning
 from lumigraph.instruments import glass
 from lumigraph.io.prescription import FirstOrder, Rays
-from lumigraph.operators.points import points_image as lens_points
-from lumigraph.operators.seen import distorted, seen_points
+from lumigraph.operators.lenslets.points import points_image as lens_points
+from lumigraph.operators.sampling.glass_distortion import distorted, seen_points
 from lumigraph.operators.single_lens import points_image, single_lens_operator
 
 F, Z1, D = 0.1, 1.0, 0.01

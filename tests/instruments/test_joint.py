@@ -6,7 +6,7 @@ from benchmarks import scanned
 
 import lumigraph as lg
 from lumigraph.core.grid import Grid
-from lumigraph.instruments.joint import common_grid
+from lumigraph.metrology.scanning.joint import common_grid
 from lumigraph.units import mm, nm, um
 
 CAMERA = lg.PlenopticCamera(

@@ -5,7 +5,7 @@ import pytest
 
 import lumigraph as lg
 from lumigraph import FocusedPlenopticCamera, GeometryError, PlenopticCamera
-from lumigraph.elements import Surface
+from lumigraph.elements import GlassSurface
 from lumigraph.elements.surface import index_at
 
 
@@ -55,7 +55,7 @@ def test_colours_of_pictures_and_of_operators_are_those_of_the_glass(monkeypatch
 
 def test_a_camera_describes_its_glass():
     known = camera(index=1.5168, abbe=64.17, conic=-0.5, thickness="500 um")
-    assert known.optics().surface == Surface(index_at(550e-9, 1.5168, 64.17), -0.5, 500e-6)
+    assert known.optics().surface == GlassSurface(index_at(550e-9, 1.5168, 64.17), -0.5, 500e-6)
     text = str(known.describe())
     for part in ("lenslet Abbe number", "lenslet radius", "311.1", "K, given; faces the main lens"):
         assert part in text

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
-from lumigraph.operators.microscope_kernels import _near
+from lumigraph.operators.microscope.kernels import _near
 
 PIXEL = 125e-6 / 19
 
@@ -67,7 +67,7 @@ def test_interpolated_pixels_are_as_exact_as_asked_for_at_the_finest_depth(accur
 
 
 def test_an_operator_that_is_less_exact_than_asked_for_warns(monkeypatch):
-    monkeypatch.setattr("lumigraph.operators.microscope_layout.samples_needed", lambda *_: 17)
+    monkeypatch.setattr("lumigraph.operators.microscope.layout.samples_needed", lambda *_: 17)
     asked = scope((176, 140), "6.5789 um")
     with pytest.warns(lg.errors.SamplingWarning, match=r"accuracy of 0\.01 .* at -15 um are off by some 0"):
         operator = asked.operator((-15e-6, 0.0), 3, accuracy=1e-2)

@@ -10,9 +10,9 @@ import pytest
 import lumigraph as lg
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.io.prescription import Prescription
-from lumigraph.operators import varying
-from lumigraph.operators.point_light import point_light
-from lumigraph.operators.seen import seen_points
+from lumigraph.operators.lenslets.point_light import point_light
+from lumigraph.operators.sampling import field_lenses
+from lumigraph.operators.sampling.glass_distortion import seen_points
 from lumigraph.operators.single_lens import points_image
 from lumigraph.samples import lens_path
 
@@ -59,7 +59,7 @@ def test_a_point_is_imaged_as_by_huygens(camera, lens, part, wavelength):
 
     def off(field):
         seen = np.interp(field, camera.glass.aberrations.x, camera.traced.fields)
-        light = point_light(varying.at(one, 0.0, seen), one.object_distance, 4e-5)
+        light = point_light(field_lenses.at(one, 0.0, seen), one.object_distance, 4e-5)
         found, expected = np.abs(light.at(places, places + middle)).T ** 2, np.asarray(psf.psf)
         share = np.sum(found * expected) / np.sum(found**2)
         return np.linalg.norm(share * found - expected) / np.linalg.norm(expected)

@@ -7,8 +7,8 @@ from scipy.ndimage import gaussian_filter
 
 import lumigraph as lg
 from lumigraph.deconvolution import Exposure
-from lumigraph.instruments import texture
-from lumigraph.instruments.texture import Part, Textures
+from lumigraph.metrology.scanning import texture
+from lumigraph.metrology.scanning.texture import PicturePart, Textures
 from lumigraph.units import um
 
 CAMERA, SIZE = scanned.CAMERA, scanned.SIZE
@@ -183,7 +183,7 @@ def part(rng):
     """Square lenslets with soft rims, 3 x 4 of them, in three raw images."""
     places = np.stack(np.meshgrid(np.arange(3.0), np.arange(4.0), indexing="ij"), -1).reshape(-1, 2)
     values = 1 + 0.2 * rng.standard_normal((3, 12))
-    return Part(values, np.full((3, 12), 1e-3), places, Textures.of(BOX))
+    return PicturePart(values, np.full((3, 12), 1e-3), places, Textures.of(BOX))
 
 
 SHIFTS = np.array([(0.0, 0.0), (0.31, -0.2), (-0.12, 0.43)])

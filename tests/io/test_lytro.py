@@ -229,15 +229,33 @@ def test_values_that_do_not_fit_are_not_packed():
         bits.unpack(bytes(4), 4, 10, "little")
 
 
-def test_metadata_of_8_mib_is_read_and_a_byte_more_is_not(tmp_path):
-    """In a container, and beside a bare frame."""
-    longest = 8 * 2**20
-    known = json.dumps(METADATA).encode()
-    for length in (longest, longest + 1):
-        padded = known + bytes(length - len(known))
-        frame = {"frame": {"metadataRef": seeds.reference(padded), "imageRef": seeds.reference(bytes(288))}}
-        content = seeds.container({"picture": {"frameArray": [frame]}}, [padded, bytes(288)])
-        (tmp_path / f"{length}.lfp").write_bytes(content)
-    assert io.open(tmp_path / f"{longest}.lfp").shape == (16, 12)
-    with pytest.raises(FormatError, match="its metadata has 8388609 bytes, at most 8388608 are read"):
-        io.open(tmp_path / f"{longest + 1}.lfp")
+def padded(metadata: dict, size: int) -> bytes:
+    """Metadata as JSON of so many bytes: blanks mean nothing in it."""
+    return json.dumps(metadata).encode().ljust(size)
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_metadata_in_a_container_is_read_up_to_8_mib_and_no_byte_more(tmp_path, more):
+    limit, path = 8 << 20, tmp_path / "a.lfp"
+    metadata = seeds.frame_metadata((16, 12), 16, "little", "r", illum=False)
+    known, packed = padded(metadata, limit + more), bytes(16 * 12 * 2)
+    frame = {"frame": {"metadataRef": seeds.reference(known), "imageRef": seeds.reference(packed)}}
+    path.write_bytes(seeds.container({"picture": {"frameArray": [frame]}}, [known, packed]))
+    if more:
+        with pytest.raises(
+            FormatError, match=f"its metadata has {limit + 1} bytes, at most {limit} are read"
+        ):
+            io.open(path)
+    else:
+        assert io.open(path).data.shape == (16, 12)
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_metadata_beside_a_frame_is_read_up_to_8_mib_and_no_byte_more(tmp_path, more):
+    limit, path = 8 << 20, tmp_path / "b.json"
+    path.write_bytes(padded(seeds.frame_metadata((16, 12), 16, "little", "r", illum=True), limit + more))
+    if more:
+        with pytest.raises(FormatError, match=f"has {limit + 1} bytes, too many for metadata"):
+            io.open(path)
+    else:
+        assert isinstance(io.open(path), lg.Calibration)

@@ -7,10 +7,10 @@ import pytest
 import scipy.fft
 
 import lumigraph as lg
-from lumigraph.operators import white
-from lumigraph.operators.coherent import disc
-from lumigraph.operators.optics import Optics
-from lumigraph.operators.resampling import averaged
+from lumigraph.operators.periodic import white
+from lumigraph.operators.periodic.coherent import disc
+from lumigraph.operators.sampling.optics import Optics
+from lumigraph.operators.sampling.resampling import averaged
 from lumigraph.sensor import AngularResponse, Sensor, integrate
 from lumigraph.units import deg, mm, nm, um
 

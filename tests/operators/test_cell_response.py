@@ -10,9 +10,16 @@ from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.elements import LensletArray
-from lumigraph.operators.cell_response import INFINITE, SLACK, Axis, Lenslets, legendre, nodes
-from lumigraph.operators.cells import OVERSAMPLING
-from lumigraph.operators.lenslet_light import LensletLight, windows
+from lumigraph.operators.lenslets.cell_response import (
+    INFINITE,
+    SLACK,
+    CellAxis,
+    CellLenslets,
+    legendre,
+    nodes,
+)
+from lumigraph.operators.lenslets.lenslet_light import LensletLight, windows
+from lumigraph.operators.sampling.cells import OVERSAMPLING
 from lumigraph.propagation import propagate
 from lumigraph.units import mm, nm, um
 
@@ -21,7 +28,7 @@ BAND = 4.5e4
 
 
 def axis(size=PITCH, samples=40, neighbours=2):
-    return Axis(size, 2 * math.ceil(size * BAND * 2.9), samples, neighbours * PITCH, BAND)
+    return CellAxis(size, 2 * math.ceil(size * BAND * 2.9), samples, neighbours * PITCH, BAND)
 
 
 def test_samples_of_light_tell_what_is_between_them():
@@ -44,8 +51,8 @@ def test_light_around_a_lenslet_tells_what_is_in_it(accuracy):
     Their images are off by less: most of it is at the lenslet's edge, and of waves from the stop's edge.
     """
     band = 6 / (4 * PITCH) * SLACK / OVERSAMPLING
-    plain = Axis(PITCH, 6, 10, 0.0, band)
-    _, here = windows(Lenslets((plain, plain), ARRAYS["hexagonal"], WAVELENGTH, DISTANCE), accuracy)
+    plain = CellAxis(PITCH, 6, 10, 0.0, band)
+    _, here = windows(CellLenslets((plain, plain), ARRAYS["hexagonal"], WAVELENGTH, DISTANCE), accuracy)
     coefficients, values = here.basis()
     at, edge = np.linspace(-PITCH / 2, PITCH / 2, 201), band / SLACK
     frequencies = np.linspace(-edge, edge, 25)
@@ -55,7 +62,7 @@ def test_light_around_a_lenslet_tells_what_is_in_it(accuracy):
 
 
 def test_the_window_and_the_image_are_centred_on_the_cell():
-    here = Axis(1.0, 4, 5, 1.5, 1.0)
+    here = CellAxis(1.0, 4, 5, 1.5, 1.0)
     np.testing.assert_allclose(here.image, [-0.4, -0.2, 0, 0.2, 0.4], atol=1e-15)
     assert here.margin == 6
     np.testing.assert_allclose(here.window, np.arange(-6, 10, 2) / 4 + 0.125 - 0.5)
@@ -90,8 +97,8 @@ def light(y, x):
 
 
 def image_of(array, axes, center, limits=(INFINITE, INFINITE)):
-    """Field (y, x) on the samples of a cell, by `Lenslets` or lenslet by lenslet."""
-    lenslets = Lenslets(axes, array, WAVELENGTH, DISTANCE)
+    """Field (y, x) on the samples of a cell, by `CellLenslets` or lenslet by lenslet."""
+    lenslets = CellLenslets(axes, array, WAVELENGTH, DISTANCE)
     if array.shape != "square":
         return one_by_one(lenslets, center, limits)
     y, x = (c + a.window for c, a in zip(center, axes, strict=True))

@@ -11,16 +11,16 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.elements import RectangularAperture, Train
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.instruments import SingleLensCamera
-from lumigraph.operators import cells
-from lumigraph.operators.cells import Cells
-from lumigraph.operators.fineness import Fineness
+from lumigraph.operators.sampling import cells
+from lumigraph.operators.sampling.cells import Cells
+from lumigraph.operators.sampling.sampling_rules import SamplingRules
 from lumigraph.units import mm, nm, um
 
 focused = partial(cameras.focused, count=(5, 4))
 
 
 def of(camera):
-    return cells.cells_of(camera.optics(), cells.lenslet_array(camera.optics()), Fineness(1e-3))
+    return cells.cells_of(camera.optics(), cells.lenslet_array(camera.optics()), SamplingRules(1e-3))
 
 
 def test_samples_stand_evenly_inside_their_cells():
@@ -74,7 +74,7 @@ HEX = {"layout": "hex", "focal_length": (5 * mm, 5.2 * mm, 5.4 * mm), "offset": 
 def test_each_lenslet_of_a_hexagonal_array_stands_amid_a_brick_of_its_kind(lenslets):
     camera = focused(**lenslets).optics()
     array = cells.lenslet_array(camera)
-    found, (tall, wide) = cells.bricks_of(camera, array, Fineness(1e-3)), array.extent
+    found, (tall, wide) = cells.bricks_of(camera, array, SamplingRules(1e-3)), array.extent
     assert all(n % 2 == 0 for n in (found.points[1], found.samples[1]))
     pairs = array.lattice.indices((-tall / 2, tall / 2), (-wide / 2, wide / 2))
     kinds, seen = array.lattice.kind(pairs[:, 0], pairs[:, 1]), set()
@@ -163,7 +163,7 @@ def test_a_straightened_lattice_has_its_rows_along_x(lattice):
 
 
 def test_more_accuracy_asks_for_more_of_everything():
-    coarse, fine = Fineness(1e-2), Fineness(1e-4)
+    coarse, fine = SamplingRules(1e-2), SamplingRules(1e-4)
     for name, more in (("neighbours", (1.0,)), ("border", (1.0,)), ("corner", ())):
         assert getattr(fine, name)(3.0, *more) > getattr(coarse, name)(3.0, *more)
         assert getattr(fine, name)(3.0, *more) > getattr(fine, name)(9.0, *more), "wide: less goes aside"
@@ -178,7 +178,7 @@ def test_more_accuracy_asks_for_more_of_everything():
 @pytest.mark.parametrize("accuracy", [0.02, 9e-6, float("nan")])
 def test_an_accuracy_out_of_range_is_refused(accuracy):
     with pytest.raises(SamplingError, match="accuracy"):
-        Fineness(accuracy)
+        SamplingRules(accuracy)
 
 
 def test_a_camera_without_lenslets_is_refused():

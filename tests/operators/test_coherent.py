@@ -9,8 +9,8 @@ from benchmarks import references
 import cameras
 from lumigraph.core.grid import Grid
 from lumigraph.instruments import SingleLensCamera
-from lumigraph.operators import coherent
-from lumigraph.operators.coherent import coherent_image
+from lumigraph.operators.periodic import coherent
+from lumigraph.operators.periodic.coherent import coherent_image
 from lumigraph.scene import Scene, Slice
 from lumigraph.simulation import Coherent, simulate
 from lumigraph.units import mm, nm, um

@@ -10,7 +10,7 @@ from tests.operators.test_single_lens import TWO_F
 from lumigraph.core import arrays
 from lumigraph.core.banded import banded
 from lumigraph.core.grid import Grid
-from lumigraph.operators.periodic import periodic_operator
+from lumigraph.operators.periodic.incoherent import periodic_operator
 from lumigraph.units import um
 
 ELSEWHERE, PROCESSOR = strict.Device("device1"), strict.Device("CPU_DEVICE")

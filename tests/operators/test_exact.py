@@ -10,12 +10,17 @@ from numpy.polynomial import chebyshev, legendre
 import lumigraph as lg
 from lumigraph import FocusedPlenopticCamera, ParaxialWarning, PlenopticCamera
 from lumigraph.core.linear import Linear
-from lumigraph.operators import periodic
-from lumigraph.operators.optics import Optics
-from lumigraph.operators.over_field import over_field
-from lumigraph.operators.paraxial import field_error, interpolated_error, paraxial_error, resolved
-from lumigraph.operators.periodic import periodic_operator
-from lumigraph.operators.points import points_image
+from lumigraph.operators.lenslets.paraxial_error import (
+    field_error,
+    interpolated_error,
+    paraxial_error,
+    resolved,
+)
+from lumigraph.operators.lenslets.points import points_image
+from lumigraph.operators.periodic import incoherent
+from lumigraph.operators.periodic.incoherent import periodic_operator
+from lumigraph.operators.periodic.over_field import over_field
+from lumigraph.operators.sampling.optics import Optics
 from lumigraph.scene import Points, Scene, Slice
 
 PITCH = 14e-6
@@ -279,7 +284,7 @@ def test_slices_beside_the_axis_are_points_there(tmp_path, monkeypatch):
     exact = points_image(known, Points([[grid.y[2], grid.x[3], 0.0]], [1.0]), 1e-3)
     errors = []
     for interpolated in (False, True):
-        monkeypatch.setattr(periodic, "field_matters", lambda *_, on=interpolated: on)
+        monkeypatch.setattr(incoherent, "field_matters", lambda *_, on=interpolated: on)
         operator = periodic_operator(known, grid, accuracy=4e-3, folder=tmp_path)
         errors.append(off(operator.forward(plane), exact))
     assert errors[1] < 4e-3 < 6e-3 < errors[0]

@@ -9,7 +9,7 @@ from lumigraph.core.linear import Linear
 from lumigraph.elements import ThinLens
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.instruments import LightFieldMicroscope
-from lumigraph.operators.fourier_microscope import fourier_operator
+from lumigraph.operators.microscope.fourier_microscope import fourier_operator
 from lumigraph.propagation import propagate
 
 

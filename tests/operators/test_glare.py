@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lumigraph.core.arrays import to_numpy
-from lumigraph.operators.cells import Cells
-from lumigraph.operators.glare import aside, glare
+from lumigraph.operators.periodic.glare import aside, glare
+from lumigraph.operators.sampling.cells import Cells
 
 SIZE = (2.0, 1.5)
 REACH = (1, 2)

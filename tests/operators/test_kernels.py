@@ -10,14 +10,16 @@ import cameras
 from lumigraph.core.cache import Budget, ByteCache
 from lumigraph.errors import SamplingError
 from lumigraph.instruments import PlenopticCamera
-from lumigraph.operators import blocks, factors, few_points, kernels, lenslet_light, places, point_images
-from lumigraph.operators.fineness import Fineness
-from lumigraph.operators.kernels import matrix
-from lumigraph.operators.missing import Missing
-from lumigraph.operators.optics import Optics
-from lumigraph.operators.places import State
-from lumigraph.operators.sizes import build_bytes
-from lumigraph.operators.streamed import stream_bytes
+from lumigraph.operators.lenslets import lenslet_light, point_images, point_subset
+from lumigraph.operators.periodic import blocks, factors, kernels
+from lumigraph.operators.periodic.border_correction import BorderCorrection
+from lumigraph.operators.periodic.kernels import matrix
+from lumigraph.operators.periodic.sizes import build_bytes
+from lumigraph.operators.periodic.streamed import stream_bytes
+from lumigraph.operators.sampling import border_classes
+from lumigraph.operators.sampling.border_classes import BorderState
+from lumigraph.operators.sampling.optics import Optics
+from lumigraph.operators.sampling.sampling_rules import SamplingRules
 from lumigraph.units import mm, nm, um
 
 focused = partial(cameras.focused, pixel_pitch=9 * um, pitch=80 * um)
@@ -59,13 +61,13 @@ def difference(one, other):
 def test_mirrored_blocks_are_those_computed_one_by_one(layout, monkeypatch):
     """Folding left, right, up, down and across the diagonal changes nothing but rounding."""
     optics = Optics.of(focused(layout=layout, count=(3, 3)), 122 * mm, 1e-2).bricks
-    monkeypatch.setattr(Fineness, "rank", 1e-5)
+    monkeypatch.setattr(SamplingRules, "rank", 1e-5)
     monkeypatch.setattr(lenslet_light, "FAINTEST", 1e-2)
     monkeypatch.setattr(Optics, "lit", optics.lit + optics.array.lattice.pitch)
     monkeypatch.setattr(Optics, "reach", (2, 2))
     monkeypatch.setattr(Optics, "near", (1, 1))
     folded = whole(kernels._unpacked(kernels._build(optics), optics))
-    monkeypatch.setattr(point_images.Wave, "even", (False, False))
+    monkeypatch.setattr(point_images.LensletPlaneWave, "even", (False, False))
     assert difference(folded, whole(kernels._unpacked(kernels._build(optics), optics))) < 1e-4
 
 
@@ -87,7 +89,7 @@ def state_of(optics, row, column):
         middle = cells.edge[k] + place * cells.size[k]
         half = optics.array.extent[k] / 2
         limits.append((-half - middle, half - middle))
-    return State(limits[0], limits[1], (cells.kind + j - odd) % cells.kinds), odd
+    return BorderState(limits[0], limits[1], (cells.kind + j - odd) % cells.kinds), odd
 
 
 @pytest.mark.parametrize("name", ARRAYS)
@@ -96,18 +98,18 @@ def test_borders_and_corners_add_up_to_what_the_lenslets_there_bring(name, monke
 
     The arrays have few lenslets: all corners count. A larger sensor sees more cells beside the array.
     """
-    monkeypatch.setattr(Fineness, "ring", 1.9)
+    monkeypatch.setattr(SamplingRules, "ring", 1.9)
     camera, ring = ARRAYS[name]
     optics = Optics.of(camera, 122 * mm, 1e-2).bricks
     if ring:
         assert optics.cells.ring[0] == ring
-    monkeypatch.setattr(Fineness, "rank", 1e-5)
+    monkeypatch.setattr(SamplingRules, "rank", 1e-5)
     for method in ("border", "corner"):
-        monkeypatch.setattr(Fineness, method, lambda *_: 9.0)
+        monkeypatch.setattr(SamplingRules, method, lambda *_: 9.0)
     monkeypatch.setattr(Optics, "reach", (2, 2))
     monkeypatch.setattr(Optics, "near", (2, 2))
     parts = kernels._unpacked(kernels._build(optics), optics).parts
-    builder = blocks.Builder(optics, print, 1)
+    builder = blocks.BlockBuilder(optics, print, 1)
     builder.periodic()
     last = optics.cells.image[0] - 1
     for row, column in ((0, 0), (0, 2), (1, 1), (1, 2), (2, 3), (last, 1)):
@@ -179,7 +181,7 @@ def test_points_are_chosen_whatever_their_number_and_wherever_their_light_stands
     """150 patterns of 200 points, all in a twentieth of the samples, as light at the edge of a cell."""
     block = np.zeros((200, 4000), np.float32)
     block[:, 100:300] = rng.standard_normal((200, 150)) @ rng.standard_normal((150, 200))
-    found = few_points.chosen(block, 1e-3)
+    found = point_subset.chosen(block, 1e-3)
     assert len(found.numbers) == 150
     assert np.linalg.norm(found.weights @ block[found.numbers] - block) < 1e-4 * np.linalg.norm(block)
 
@@ -292,7 +294,7 @@ def test_the_points_chosen_of_a_block_give_the_others(rng):
     """Points between others in a smooth block: a few give all, but for what is told to be left out."""
     at = np.linspace(0, 1, 60)
     block = np.exp(-(((at[:, None] - rng.random(300)) / 0.3) ** 2)).astype(np.float32)
-    found = few_points.chosen(block, 1e-2)
+    found = point_subset.chosen(block, 1e-2)
     assert 4 < len(found.numbers) < 20
     assert np.linalg.norm(found.weights @ block[found.numbers] - block) < 5e-2
     turned = found.turned((6, 10), up=True, left=False)
@@ -317,7 +319,7 @@ def test_factors_of_half_precision_give_the_block_back(rng):
 def test_light_of_a_far_lenslet_comes_by_way_of_few_numbers():
     """But for as little as is left out of it anyway; that of a near one comes as it is."""
     camera = cameras.focused(shape="round", pitch=200 * um, pixel_pitch=9 * um)
-    builder = blocks.Builder(Optics.of(camera, 122 * mm, 1e-3), lambda _: None, 1)
+    builder = blocks.BlockBuilder(Optics.of(camera, 122 * mm, 1e-3), lambda _: None, 1)
     light, (focal_length,) = builder.apart, {builder.optics.array.focal_length}
     assert len(light.matrices(0.0, 0.0, focal_length)) == 1
     for pitches, most in ((2, 30), (4, 10)):
@@ -333,11 +335,13 @@ def test_lenslets_between_limits_are_sums_from_one_side_less_others(layout):
     """Amplitudes of all states at once are those of each state's own lenslets."""
     shape = {"layout": "hex"} if layout == "hex" else {"shape": "round"}
     optics = Optics.of(focused(count=(3, 3), **shape), 122 * mm, 1e-2).bricks
-    builder = blocks.Builder(optics, lambda _: None, 1)
-    points = few_points.Chosen(np.array([0, 5]), np.ones((math.prod(optics.cells.points), 2), np.float32))
-    states = {place.state for place in places.places(optics)}
+    builder = blocks.BlockBuilder(optics, lambda _: None, 1)
+    points = point_subset.ChosenPoints(
+        np.array([0, 5]), np.ones((math.prod(optics.cells.points), 2), np.float32)
+    )
+    states = {place.state for place in border_classes.places(optics)}
     assert any(math.inf not in (abs(state.x[0]), state.x[1]) for state in states)
-    missing = Missing(builder.lenslets, builder.apart, optics.cells, {(0, 1): points}, states, 1)
+    missing = BorderCorrection(builder.lenslets, builder.apart, optics.cells, {(0, 1): points}, states, 1)
     found, middle = missing.images([(0, 1)]), optics.cells.middle(0)
     for state in states:
         rows = list(builder.lenslets.rows(middle, (state.y, state.x)))

@@ -7,12 +7,12 @@ import pytest
 
 import lumigraph as lg
 from cameras import focused
-from lumigraph.elements import Lean
+from lumigraph.elements import TiltAndBow
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.instruments import Built
-from lumigraph.operators.leaning import flat
-from lumigraph.operators.points import points_image
-from lumigraph.operators.resampling import averaged
+from lumigraph.operators.lenslets.points import points_image
+from lumigraph.operators.lenslets.tilted_planes import flat
+from lumigraph.operators.sampling.resampling import averaged
 from lumigraph.scene import Diffuser, Scene
 
 POINT = lg.Points(np.array([[90e-6, -60e-6, 0.0]]), np.ones(1))
@@ -194,6 +194,6 @@ def test_a_point_is_what_sums_lenslet_by_lenslet_give(built, most):
 
 
 def test_a_lean_is_about_the_axis():
-    lean = Lean((1e-3, 0.0), 2.0, (0.0, 1e-2))
+    lean = TiltAndBow((1e-3, 0.0), 2.0, (0.0, 1e-2))
     assert lean.of_array(1e-3, 2e-3) == pytest.approx(1e-6 + 2.0 * 5e-6)
     assert lean.of_sensor(1e-3, 2e-3) == pytest.approx(2e-5)

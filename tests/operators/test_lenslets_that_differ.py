@@ -10,8 +10,8 @@ from cameras import focused
 from lumigraph.elements import LensletArray, Scatter, form
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import Built
-from lumigraph.operators.points import points_image
-from lumigraph.operators.resampling import averaged
+from lumigraph.operators.lenslets.points import points_image
+from lumigraph.operators.sampling.resampling import averaged
 from lumigraph.scene import Diffuser, Scene
 
 POINT = lg.Points(np.array([[20e-6, -30e-6, 1e-3]]), np.ones(1))

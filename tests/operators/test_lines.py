@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import cameras
-from lumigraph.operators import line_parts, lines
-from lumigraph.operators.lines import Lines
-from lumigraph.operators.optics import Optics
-from lumigraph.operators.points import points_image
-from lumigraph.operators.relay import Relays
+from lumigraph.operators.lenslets import line_parts, lines
+from lumigraph.operators.lenslets.lines import LineRelay
+from lumigraph.operators.lenslets.points import points_image
+from lumigraph.operators.lenslets.relay import RelaySet
+from lumigraph.operators.sampling.optics import Optics
 from lumigraph.scene import Points
 from lumigraph.units import mm, um
 
@@ -21,14 +21,14 @@ POINT = Points(np.array([[0.1 * mm, -0.05 * mm, 1 * mm]]), np.ones(1))
 @pytest.fixture
 def followed(monkeypatch):
     """Numbers of lenslets around the cells that a point lights, and of those that are followed."""
-    numbers, of = [], Lines.lit
+    numbers, of = [], LineRelay.lit
 
     def counted(self, light, rows, columns):
         found = list(of(self, light, rows, columns))
         numbers.append((len(self._around(rows, columns)), sum(map(len, found))))
         return found
 
-    monkeypatch.setattr(Lines, "lit", counted)
+    monkeypatch.setattr(LineRelay, "lit", counted)
     return numbers
 
 
@@ -44,7 +44,7 @@ def test_lenslets_that_a_point_leaves_dark_are_not_followed(followed, monkeypatc
 
 
 def test_a_dark_array_has_a_dark_image():
-    relay = Lines(Optics.of(WIDE, WIDE.object_distance, 1e-2))
+    relay = LineRelay(Optics.of(WIDE, WIDE.object_distance, 1e-2))
     y, x = relay.places(range(2), range(2))
     assert not relay.field(np.zeros((len(y), len(x))), range(2), range(2)).any()
 
@@ -61,12 +61,12 @@ def test_light_that_is_followed_farther_changes_images_by_less_than_was_asked(ac
 def test_depths_share_what_lenslets_do_where_they_are_followed_alike_alone():
     camera = WIDE.replace(lenslets={"pitch": 0.3 * mm, "count": (5, 5)}, main_lens={"diameter": 10 * mm})
     optics = camera.optics()
-    known, places = Relays(optics.object_distance + 6 * mm), np.array([[0.1 * mm, 0.0]])
+    known, places = RelaySet(optics.object_distance + 6 * mm), np.array([[0.1 * mm, 0.0]])
     near, middle, far = (known.of(optics, dz, 5e-3).optics for dz in (-5 * mm, -4 * mm, 6 * mm))
     assert near.axes == far.axes  # the cells are those of the most blurred
     assert near.beside == middle.beside < far.beside
     assert known.of(optics, -5 * mm, 5e-3)._pieces is known.of(optics, -4 * mm, 5e-3)._pieces
     for dz in (-4 * mm, 6 * mm):
         point = Points(np.column_stack([places, [dz]]), np.ones(1))
-        alone = points_image(camera, point, 1e-2, Relays(optics.object_distance + 6 * mm))
+        alone = points_image(camera, point, 1e-2, RelaySet(optics.object_distance + 6 * mm))
         np.testing.assert_array_equal(points_image(camera, point, 1e-2, known), alone)

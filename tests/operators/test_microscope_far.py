@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from lumigraph.elements.objective import Objective
-from lumigraph.operators.microscope_building import Layout, microscope_operator
-from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_far import Far, FarLight, far_numbers, shared
-from lumigraph.operators.microscope_kernels import SHARES
-from lumigraph.operators.microscope_operator import _norms
+from lumigraph.operators.microscope.building import SampledLenslets, microscope_operator
+from lumigraph.operators.microscope.cell import CellSampling, Lenslet
+from lumigraph.operators.microscope.far_light import FarCells, FarLight, far_numbers, shared
+from lumigraph.operators.microscope.kernels import SHARES
+from lumigraph.operators.microscope.volume_operator import _norms
 
 DEPTHS = (-8e-6, 0.0, 15e-6)
 
@@ -19,7 +19,7 @@ DEPTHS = (-8e-6, 0.0, 15e-6)
 @pytest.fixture(scope="module")
 def operator():
     lenslet = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)
-    layout = Layout((9, 8), CellSampling(3, 9, 1 / 9))
+    layout = SampledLenslets((9, 8), CellSampling(3, 9, 1 / 9))
     return microscope_operator([Objective(525e-9, 0.5)], lenslet, layout, DEPTHS, accuracy=1e-2)
 
 
@@ -75,7 +75,7 @@ def test_what_each_point_hardly_shows_counts_where_it_adds_up_in_even_planes(rng
     first, second = np.linalg.qr(rng.standard_normal((40, 2)))[0].T
     offsets = np.stack(np.divmod(np.arange(1000), 40), 1) - (12, 20)
     weights = np.full((1000, 2), 1e-3, np.float32)
-    far = Far(offsets, weights, np.stack([first, first + 0.1 * second]).astype(np.float32))
+    far = FarCells(offsets, weights, np.stack([first, first + 0.1 * second]).astype(np.float32))
     found, lost = shared([far], [(1.0, 1.0)], 1e-2)
     assert len(found[0].images) == 2
     assert lost < 1e-12

@@ -10,18 +10,18 @@ from lumigraph.core.linear import Linear
 from lumigraph.core.matrix import Matrix
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import FormatError, GeometryError, SamplingError
-from lumigraph.operators import microscope_building as building
-from lumigraph.operators import microscope_operator as module
-from lumigraph.operators.microscope_building import Layout, microscope_operator
-from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_kernels import Demand, octant, slice_kernel
-from lumigraph.operators.microscope_pixels import FRAME, placement
-from lumigraph.operators.resampling import Resampling
+from lumigraph.operators.microscope import building as building
+from lumigraph.operators.microscope import volume_operator as module
+from lumigraph.operators.microscope.building import SampledLenslets, microscope_operator
+from lumigraph.operators.microscope.cell import CellSampling, Lenslet
+from lumigraph.operators.microscope.kernels import KernelAccuracy, octant, slice_kernel
+from lumigraph.operators.microscope.pixels import FRAME, placement
+from lumigraph.operators.sampling.resampling import Resampling
 
 SCOPE = Objective(525e-9, 0.5)
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)
 SAMPLING = CellSampling(3, 8, 1 / 8)
-LAYOUT = Layout((5, 6), SAMPLING)
+LAYOUT = SampledLenslets((5, 6), SAMPLING)
 DEPTHS = (-8e-6, 0.0, 15e-6)
 
 
@@ -38,7 +38,7 @@ def lattice_calibration(shape, pitch, rotation=0.0, origin=(30.0, 31.0)):
 
 def test_a_points_image_is_that_of_one_direct_propagation():
     # Field, lenslet phases on the whole plane, Fresnel by a dense DFT along each axis: no cells, no symmetry.
-    kernel = slice_kernel([SCOPE], LENSLET, SAMPLING, 6e-6, Demand(1e-2, 9))
+    kernel = slice_kernel([SCOPE], LENSLET, SAMPLING, 6e-6, KernelAccuracy(1e-2, 9))
     p, n, T, M = LENSLET.pitch, 48, 9, LENSLET.magnification
     at = (np.arange(T * n) - (T * n - 1) / 2) * p / n
     for ky, kx in ((0, 1), (2, 0)):
@@ -127,7 +127,9 @@ def test_a_point_in_focus_lights_its_own_lenslet_and_grid_and_image_agree(operat
 def test_a_defocused_point_lights_lenslets_on_the_side_of_its_rays():
     # Farther than the focus: light spreads after its image, and lenslets to the right see it from the left,
     # which their micro-images, inverted, show to the right; nearer points the other way round.
-    operator = microscope_operator([SCOPE], LENSLET, Layout((7, 7), SAMPLING), (-20e-6, 20e-6), accuracy=2e-2)
+    operator = microscope_operator(
+        [SCOPE], LENSLET, SampledLenslets((7, 7), SAMPLING), (-20e-6, 20e-6), accuracy=2e-2
+    )
     at = np.arange(8) - 3.5
     for k, side in ((0, -1), (1, 1)):
         image = operator.psf((k, 10, 10)).reshape(7, 8, 7, 8)
@@ -233,7 +235,7 @@ def test_what_cannot_be_is_refused(operator, monkeypatch):
         GeometryError, match=r"a raw image has shape \(4,\) but the operator takes \(40, 48\)"
     ):
         operator.adjoint(np.ones(4))
-    many = Layout((5, 6), CellSampling(60, 8, 1 / 8))
+    many = SampledLenslets((5, 6), CellSampling(60, 8, 1 / 8))
     monkeypatch.setattr("lumigraph.core.memory.available", lambda: 4 * 10**8)
     with pytest.raises(SamplingError, match=r"images of points at 1 depths needs .* or folder= to keep them"):
         microscope_operator([SCOPE], LENSLET, many, (0.0,))
@@ -241,7 +243,7 @@ def test_what_cannot_be_is_refused(operator, monkeypatch):
 
 def test_what_is_left_out_is_the_same_in_every_direction(operator):
     # Mirrored and transposed points have mirrored and transposed images, to rounding.
-    square = microscope_operator([SCOPE], LENSLET, Layout((7, 7), SAMPLING), (12e-6,), accuracy=0.03)
+    square = microscope_operator([SCOPE], LENSLET, SampledLenslets((7, 7), SAMPLING), (12e-6,), accuracy=0.03)
     image = square.psf((0, 14, 16))
     for mirrored, index in (
         (image[::-1], (6, 16)), (image[:, ::-1], (14, 4)), (image.T, (16, 14)), (image[::-1, ::-1].T, (4, 6)),

@@ -12,17 +12,17 @@ from lumigraph.core.volume import Volume
 from lumigraph.deconvolution import deconvolve
 from lumigraph.elements.objective import Objective
 from lumigraph.instruments import LightFieldMicroscope
-from lumigraph.operators.microscope_building import Layout, microscope_operator
-from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_kernels import SHARES, Demand, slice_kernel
-from lumigraph.operators.microscope_operator import _MATRICES
-from lumigraph.operators.microscope_patterns import (
+from lumigraph.operators.microscope.building import SampledLenslets, microscope_operator
+from lumigraph.operators.microscope.cell import CellSampling, Lenslet
+from lumigraph.operators.microscope.kernels import SHARES, KernelAccuracy, slice_kernel
+from lumigraph.operators.microscope.patterns import (
     all_patterns,
     few_of_pixels,
     few_patterns,
     parted,
     whole,
 )
+from lumigraph.operators.microscope.volume_operator import _MATRICES
 
 SCOPE = Objective(525e-9, 0.5)
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)
@@ -33,13 +33,13 @@ DEPTHS = (-50e-6, 0.0, 40e-6)
 @pytest.fixture(scope="module")
 def kernel():
     """Of a depth at which neighbouring samples look alike."""
-    return slice_kernel([SCOPE], LENSLET, SAMPLING, -50e-6, Demand(2e-2, 20))
+    return slice_kernel([SCOPE], LENSLET, SAMPLING, -50e-6, KernelAccuracy(2e-2, 20))
 
 
 @pytest.fixture(scope="module")
 def operator():
     """Of three depths, by frequency."""
-    one = microscope_operator([SCOPE], LENSLET, Layout((7, 8), SAMPLING), DEPTHS, accuracy=2e-2)
+    one = microscope_operator([SCOPE], LENSLET, SampledLenslets((7, 8), SAMPLING), DEPTHS, accuracy=2e-2)
     return dataclasses.replace(one, by_frequency=True, _spectra={})
 
 
@@ -74,7 +74,8 @@ def test_patterns_are_as_few_as_singular_values_allow(kernel):
 def fine():
     """Kernels of two depths, sampled more finely than their light asks for."""
     return [
-        slice_kernel([SCOPE], LENSLET, CellSampling(3, 31, 1 / 31), z, Demand(2e-2, 20)) for z in DEPTHS[:2]
+        slice_kernel([SCOPE], LENSLET, CellSampling(3, 31, 1 / 31), z, KernelAccuracy(2e-2, 20))
+        for z in DEPTHS[:2]
     ]
 
 
@@ -104,7 +105,7 @@ def test_patterns_of_pixels_are_taken_from_a_plane_as_their_values_say(fine, xp,
 
 def test_images_by_few_patterns_of_pixels_differ_by_what_the_operator_says():
     """All s² patterns of points are followed there: what is lost the pixels' lose."""
-    layout = Layout((7, 8), CellSampling(3, 31, 1 / 31))
+    layout = SampledLenslets((7, 8), CellSampling(3, 31, 1 / 31))
     one = microscope_operator([SCOPE], LENSLET, layout, DEPTHS, accuracy=2e-2)
     one = dataclasses.replace(one, by_frequency=True, _spectra={})
     exact, lost = dataclasses.replace(one, by_frequency=False, _spectra={}), []
@@ -187,13 +188,15 @@ def test_they_take_fewer_operations_and_less_memory(operator):
 
 def test_rays_have_no_accuracy_of_which_to_leave_out():
     by_rays = Objective(525e-9, 0.5, model="rays")
-    one = microscope_operator([by_rays], LENSLET, Layout((5, 5), CellSampling(3, 8, 1 / 8)), (-20e-6,))
+    one = microscope_operator(
+        [by_rays], LENSLET, SampledLenslets((5, 5), CellSampling(3, 8, 1 / 8)), (-20e-6,)
+    )
     assert one.left_out == 0
 
 
 def test_beads_in_the_dark_come_out_the_same(operator, rng, monkeypatch):
     """Negative parts of images would ruin dark pixels, of which Richardson-Lucy takes quotients."""
-    monkeypatch.setattr("lumigraph.operators.microscope_operator.suits_frequencies", lambda *_: True)
+    monkeypatch.setattr("lumigraph.operators.microscope.volume_operator.suits_frequencies", lambda *_: True)
     beads = np.zeros(operator.shape[1], np.float32)
     beads[0, 20, 33] = beads[1, 41, 40] = beads[2, 35, 18] = 20000
     raw = rng.poisson(np.maximum(operator.forward(beads), 0)).astype(np.float32)
@@ -210,7 +213,7 @@ def test_beads_in_the_dark_come_out_the_same(operator, rng, monkeypatch):
 @pytest.mark.parametrize(("s", "N", "cells"), [(9, 8, (15, 14)), (3, 27, (21, 21))])
 def test_the_memory_that_is_said_is_that_which_is_held(s, N, cells, by_frequency):
     """By Python's own count of what NumPy allocates; matrices are made by the first application."""
-    layout = Layout(cells, CellSampling(s, N, 1 / N))
+    layout = SampledLenslets(cells, CellSampling(s, N, 1 / N))
     one = microscope_operator([SCOPE], LENSLET, layout, DEPTHS, accuracy=2e-2)
     one = dataclasses.replace(one, by_frequency=by_frequency, _spectra={})
     volume, said = np.ones(one.shape[1], np.float32), one.memory_bytes - one.nbytes

@@ -10,7 +10,7 @@ from tests.operators.test_part_images import off, peak
 import lumigraph as lg
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
-from lumigraph.operators.pupil_plane import Behind, PupilPlane
+from lumigraph.operators.microscope.pupil_plane import CellOptics, PupilPlane
 
 BEFORE = "pitch", "focal length of lenslets", "lenslets before the image"
 """Keys by which round lenslets, and the way behind them, change."""
@@ -30,7 +30,7 @@ def sampled_alike(one, like: PupilPlane, scope_like) -> PupilPlane:
     found = PupilPlane(images, [], GRID, DZ)
     found.__dict__["_behind"] = [
         replace(
-            Behind.of(images, which, DZ),
+            CellOptics.of(images, which, DZ),
             **dict(zip(("told", "waves"), waves_alike(images, like.images, which, DZ), strict=True)),
         )
         for which in range(len(images.objectives))

@@ -8,8 +8,8 @@ import pytest
 import lumigraph as lg
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.matrix import Matrix
-from lumigraph.operators.microscope_pupil import PLACES, PupilImages
-from lumigraph.operators.resampling import Resampling
+from lumigraph.operators.microscope.pupil import PLACES, PupilImages
+from lumigraph.operators.sampling.resampling import Resampling
 
 TERMS = tuple(range(4, 16))
 SCOPE = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(

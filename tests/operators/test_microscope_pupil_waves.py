@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
-from lumigraph.operators import microscope_pupil_waves
-from lumigraph.operators.microscope_pupil_waves import behind, waves_of, window_of
-from lumigraph.operators.microscope_waves import bloch, centred, over_cells
+from lumigraph.operators.microscope import pupil_waves
+from lumigraph.operators.microscope.pupil_waves import behind, waves_of, window_of
+from lumigraph.operators.microscope.waves import bloch, centred, over_cells
 
 CELLS, FINE, NODES = 3, 40, 56
 SCOPE = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
@@ -61,11 +61,11 @@ def test_round_lenslets_beyond_the_window_send_their_light_into_it(images, monke
     ways, told = 2 * [(images.objectives[0], lenslet)], (CELLS, FINE, NODES, "complex128")
 
     def seen(margin):
-        monkeypatch.setattr(microscope_pupil_waves, "margin_cells", lambda *given: margin)
+        monkeypatch.setattr(pupil_waves, "margin_cells", lambda *given: margin)
         (down, across), rng = behind(*ways, told), np.random.default_rng(3)
         pupil = rng.normal(size=(down.shape[1], across.shape[1]))
         return window_of(*ways, told).forward((down @ pupil @ across.T)[None])
 
-    own, true = microscope_pupil_waves.margin_cells(*ways[0]), seen(6)
+    own, true = pupil_waves.margin_cells(*ways[0]), seen(6)
     assert np.linalg.norm(seen(own) - true) < 0.05 * np.linalg.norm(true)
     assert np.linalg.norm(seen(0) - true) > 0.3 * np.linalg.norm(true)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from lumigraph.elements.objective import Objective
-from lumigraph.operators.microscope_building import Layout, microscope_operator
-from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_kernels import slice_kernel
+from lumigraph.operators.microscope.building import SampledLenslets, microscope_operator
+from lumigraph.operators.microscope.cell import CellSampling, Lenslet
+from lumigraph.operators.microscope.kernels import slice_kernel
 
 RAYS = Objective(500e-9, 1.2, 1.35, "rays")
 LENSLET = Lenslet(104e-6, 2.4375e-3, 2.4375e-3, 60.0, 104e-6)
@@ -21,7 +21,7 @@ def image_of(operator, index):
 
 def test_an_even_object_shows_the_solid_angle_of_each_pixel():
     # dΩ = q dq dφ / (n² cos θ) of a source that shines evenly in all directions.
-    operator = microscope_operator([RAYS], LENSLET, Layout((9, 9), SAMPLING), (2e-6,), accuracy=1e-2)
+    operator = microscope_operator([RAYS], LENSLET, SampledLenslets((9, 9), SAMPLING), (2e-6,), accuracy=1e-2)
     even = operator.forward(np.ones(operator.shape[1], np.float32))[64:80, 64:80]
     part = ((np.arange(16) - 7.5) / 7.5) ** 2
     sine = (part[:, None] + part) ** 0.5 * 1.2 / 1.35
@@ -34,7 +34,7 @@ def test_an_even_object_shows_the_solid_angle_of_each_pixel():
 
 @pytest.mark.parametrize("dz", [-6e-6, 9e-6])
 def test_a_pixel_sees_a_point_through_the_lenslet_on_its_ray(dz):
-    operator = microscope_operator([RAYS], LENSLET, Layout((15, 15), SAMPLING), (dz,), accuracy=1e-2)
+    operator = microscope_operator([RAYS], LENSLET, SampledLenslets((15, 15), SAMPLING), (dz,), accuracy=1e-2)
     image = image_of(operator, (0, 22, 22))  # on the middle lenslet's axis
     for pixel in (2, 4, 11, 13):
         sine = (pixel - 7.5) / 7.5 * 1.2 / 1.35
@@ -46,7 +46,7 @@ def test_a_pixel_sees_a_point_through_the_lenslet_on_its_ray(dz):
 
 def test_rays_are_waves_of_short_wavelength():
     scalar, lenslet = Objective(200e-9, 0.5), Lenslet(125e-6, 2.4e-3, 2.4e-3, 20.0, 125e-6)
-    layout = Layout((5, 5), CellSampling(3, 8, 1 / 8))
+    layout = SampledLenslets((5, 5), CellSampling(3, 8, 1 / 8))
     found = [
         microscope_operator([one], lenslet, layout, (9e-6,), accuracy=2e-2).forward(cube(15))
         for one in (scalar, Objective(200e-9, 0.5, model="rays"))
@@ -63,7 +63,7 @@ def cube(n):
 
 def test_the_adjoint_is_the_transpose_and_slow_lenslets_reach_into_their_neighbours(rng):
     slow = Lenslet(104e-6, 3.5e-3, 3.5e-3, 60.0, 104e-6)
-    operator = microscope_operator([RAYS], slow, Layout((7, 7), SAMPLING), (0.0, 3e-6))
+    operator = microscope_operator([RAYS], slow, SampledLenslets((7, 7), SAMPLING), (0.0, 3e-6))
     x, y = rng.random(operator.shape[1]), rng.random(operator.shape[0])
     assert np.vdot(operator.forward(x), y) == pytest.approx(np.vdot(x, operator.adjoint(y)), rel=1e-5)
     light = image_of(operator, (0, 10, 10)).sum((2, 3))

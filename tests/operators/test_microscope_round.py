@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.special import j1
 
-from lumigraph.operators.microscope_bench import round_series, transmission
-from lumigraph.operators.microscope_cell import Lenslet
-from lumigraph.operators.microscope_round import LensletWindow
+from lumigraph.operators.microscope.bench import round_series, transmission
+from lumigraph.operators.microscope.cell import Lenslet
+from lumigraph.operators.microscope.round_lenslets import LensletWindow
 
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 110e-6, is_round=True)
 RNG = np.random.default_rng(4)

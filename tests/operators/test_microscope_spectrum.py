@@ -8,16 +8,16 @@ import pytest
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.banded import banded
 from lumigraph.elements.objective import Objective
-from lumigraph.operators import microscope_spectrum as module
-from lumigraph.operators.microscope_building import Layout, microscope_operator
-from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_operator import suits_frequencies
-from lumigraph.operators.microscope_patterns import all_patterns, few_of_pixels
-from lumigraph.operators.microscope_pixels import b_spline
-from lumigraph.operators.microscope_sensor import Samples, Straight, sensor
-from lumigraph.operators.microscope_tiles import Row, Tiling
-from lumigraph.operators.microscope_transforms import add_cells, columns
-from lumigraph.operators.resampling import Resampling
+from lumigraph.operators.microscope import spectrum as module
+from lumigraph.operators.microscope.building import SampledLenslets, microscope_operator
+from lumigraph.operators.microscope.cell import CellSampling, Lenslet
+from lumigraph.operators.microscope.patterns import all_patterns, few_of_pixels
+from lumigraph.operators.microscope.pixels import b_spline
+from lumigraph.operators.microscope.sensor import CellSamples, SeparablePixels, sensor
+from lumigraph.operators.microscope.tiles import TileRow, Tiling
+from lumigraph.operators.microscope.transforms import add_cells, columns
+from lumigraph.operators.microscope.volume_operator import suits_frequencies
+from lumigraph.operators.sampling.resampling import Resampling
 
 SCOPE = Objective(525e-9, 0.5)
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)
@@ -26,7 +26,7 @@ DEPTHS = (-25e-6, 0.0, 15e-6)
 
 def operators(sampling, cells):
     """By offsets and by frequency."""
-    one = microscope_operator([SCOPE], LENSLET, Layout(cells, sampling), DEPTHS, accuracy=2e-2)
+    one = microscope_operator([SCOPE], LENSLET, SampledLenslets(cells, sampling), DEPTHS, accuracy=2e-2)
     return (dataclasses.replace(one, by_frequency=way, left_out=0.0, _spectra={}) for way in (False, True))
 
 
@@ -114,22 +114,24 @@ def test_single_precision_stays_and_a_points_image_has_no_rounding(pair, xp, rng
 
 def test_the_way_is_chosen_by_time_memory_and_symmetry(monkeypatch):
     sampling, cells = CellSampling(3, 8, 1 / 8), (15, 15)
-    deep = microscope_operator([SCOPE], LENSLET, Layout(cells, sampling), (-30e-6, 30e-6), accuracy=2e-2)
+    deep = microscope_operator(
+        [SCOPE], LENSLET, SampledLenslets(cells, sampling), (-30e-6, 30e-6), accuracy=2e-2
+    )
     assert deep.by_frequency
     assert deep.multiply_adds < dataclasses.replace(deep, by_frequency=False).multiply_adds / 5
-    flat = microscope_operator([SCOPE], LENSLET, Layout((3, 3), sampling), (0.0,), accuracy=2e-2)
+    flat = microscope_operator([SCOPE], LENSLET, SampledLenslets((3, 3), sampling), (0.0,), accuracy=2e-2)
     assert not flat.by_frequency
     coma = Objective(525e-9, 0.5, aberrations={8: 0.05})
     assert not microscope_operator(
-        [coma], LENSLET, Layout((9, 9), sampling), (10e-6,), accuracy=2e-2
+        [coma], LENSLET, SampledLenslets((9, 9), sampling), (10e-6,), accuracy=2e-2
     ).by_frequency
     assert suits_frequencies(deep.kernels, cells, 0)
-    monkeypatch.setattr("lumigraph.operators.microscope_spectrum.MOST", 4 * 10**5)
+    monkeypatch.setattr("lumigraph.operators.microscope.spectrum.MOST", 4 * 10**5)
     assert not suits_frequencies(deep.kernels, cells, 0)
 
 
 def test_no_bit_of_an_image_depends_on_the_memory_that_is_free(monkeypatch, rng):
-    layout = Layout((15, 15), CellSampling(3, 8, 1 / 8))
+    layout = SampledLenslets((15, 15), CellSampling(3, 8, 1 / 8))
     volume, images = rng.random((2, 45, 45)).astype(np.float32), []
     for free in (2**40, 14 * 10**5, None):  # the kernels fit, the matrices do not
         monkeypatch.setattr("lumigraph.core.memory.available", lambda free=free: free)
@@ -140,16 +142,16 @@ def test_no_bit_of_an_image_depends_on_the_memory_that_is_free(monkeypatch, rng)
 
 
 def test_large_matrices_are_no_reason_for_products_that_take_more(monkeypatch):
-    layout = Layout((15, 15), CellSampling(9, 8, 1 / 8))
+    layout = SampledLenslets((15, 15), CellSampling(9, 8, 1 / 8))
     deep = microscope_operator([SCOPE], LENSLET, layout, (-50e-6, 0.0, 40e-6), accuracy=2e-2)
-    monkeypatch.setattr("lumigraph.operators.microscope_spectrum.MOST", 4 * 10**5)
+    monkeypatch.setattr("lumigraph.operators.microscope.spectrum.MOST", 4 * 10**5)
     assert suits_frequencies(deep.kernels, (15, 15), 0, deep.left_out)
     assert deep.memory_bytes < dataclasses.replace(deep, by_frequency=False, _spectra={}).memory_bytes
 
 
 @pytest.mark.parametrize("depths", [DEPTHS, None])
 def test_objects_side_by_side_give_what_each_gives_and_no_bit_depends_on_the_others(depths, xp, rng):
-    layout = Layout((6, 7), CellSampling(3, 8, 1 / 8))
+    layout = SampledLenslets((6, 7), CellSampling(3, 8, 1 / 8))
     one = microscope_operator([SCOPE], LENSLET, layout, depths, accuracy=2e-2)
     one = dataclasses.replace(one, by_frequency=True, _spectra={})
     assert one.side_by_side == 4
@@ -172,13 +174,15 @@ def test_pixels_of_a_straight_lattice_see_patterns_as_samples_between_say(few, x
     along = [banded(y, np.arange(27 + 9 * k), lambda d: b_spline(d, 3), 2.0, 4) for k, y in enumerate(at)]
     placement, patterns = Resampling(*along), all_patterns(n)
     if few:
-        kernel = microscope_operator([SCOPE], LENSLET, Layout((3, 4), CellSampling(2, n, 1 / n)), (-30e-6,))
+        kernel = microscope_operator(
+            [SCOPE], LENSLET, SampledLenslets((3, 4), CellSampling(2, n, 1 / n)), (-30e-6,)
+        )
         patterns = few_of_pixels(kernel.kernels, 0.1)
         assert patterns.vectors is not None
     raw, parts = rng.random((25, 31)), rng.random((3, 4, patterns.count))
     found = sensor(patterns, placement, xp.asarray(raw))
-    assert isinstance(found, Straight)
-    expected = Samples(patterns, placement)
+    assert isinstance(found, SeparablePixels)
+    expected = CellSamples(patterns, placement)
     np.testing.assert_allclose(to_numpy(found.parted(xp.asarray(raw))), expected.parted(raw), atol=1e-12)
     np.testing.assert_allclose(to_numpy(found.whole(xp.asarray(parts))), expected.whole(parts), atol=1e-12)
 
@@ -186,7 +190,7 @@ def test_pixels_of_a_straight_lattice_see_patterns_as_samples_between_say(few, x
 @pytest.mark.parametrize("of_image", [False, True])
 def test_sums_are_the_transform_of_cells_turned_and_lead_back_to_them(of_image, rng):
     """By a fast transform: (-i)^odd times it, of an image its inverse, as real and imaginary parts."""
-    told, odd = Tiling(Row(4, 0, 2, 1), Row(5, 0, 2, 1)), np.array([[0, 0, 1, 1], [0, 1, 0, 1]])
+    told, odd = Tiling(TileRow(4, 0, 2, 1), TileRow(5, 0, 2, 1)), np.array([[0, 0, 1, 1], [0, 1, 0, 1]])
     cells, (ly, lx) = rng.random((4, 5, 4)), told.lengths
     found = columns([cells, 2 * cells], 2, told, odd, of_image=of_image)
     turned = np.fft.rfft2(cells, (ly, lx), axes=(0, 1)) * (1j if of_image else -1j) ** odd.sum(0)

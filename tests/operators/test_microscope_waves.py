@@ -8,11 +8,11 @@ import pytest
 import lumigraph as lg
 from lumigraph.core import memory
 from lumigraph.elements.objective import Objective
-from lumigraph.operators import microscope_bench, microscope_samples
-from lumigraph.operators.microscope_bench import Bench, spline_response
-from lumigraph.operators.microscope_cell import CellSampling, Lenslet
-from lumigraph.operators.microscope_kernels import Demand, margin_of
-from lumigraph.operators.microscope_waves import Crossed
+from lumigraph.operators.microscope import bench, samples
+from lumigraph.operators.microscope.bench import LensletBench, spline_response
+from lumigraph.operators.microscope.cell import CellSampling, Lenslet
+from lumigraph.operators.microscope.kernels import KernelAccuracy, margin_of
+from lumigraph.operators.microscope.waves import SeparableLenslets
 
 LENSLET = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6)
 PIXELS, SPLINES = CellSampling(3, 15, 1 / 15), CellSampling(3, 14, 1 / 15, 3)
@@ -42,8 +42,8 @@ def off(found, truth):
 )
 def test_products_and_transforms_give_the_same_images(objective, dz, sampling):
     points = [(0, 1), (1.3, 0.4)]  # also between samples
-    found = images(Crossed, sampling, points, dz, objective)
-    truth = images(Bench, sampling, points, dz, objective)
+    found = images(SeparableLenslets, sampling, points, dz, objective)
+    truth = images(LensletBench, sampling, points, dz, objective)
     for (image, lost), (right, missed) in zip(found, truth, strict=True):
         assert off(image, right) < 4e-4
         assert lost == pytest.approx(missed, abs=2e-4)
@@ -51,7 +51,7 @@ def test_products_and_transforms_give_the_same_images(objective, dz, sampling):
 
 def of_corner(way, asked, pixels, dz, **options):
     objective, sampling = Objective(525e-9, 0.5), CellSampling(3, pixels, 1 / pixels)
-    margin = margin_of(objective, LENSLET, dz, Demand(asked, 2))
+    margin = margin_of(objective, LENSLET, dz, KernelAccuracy(asked, 2))
     return next(way(objective, LENSLET, sampling, 2, margin, **options).images(dz, [(0, 0)]))[0]
 
 
@@ -59,9 +59,9 @@ def of_corner(way, asked, pixels, dz, **options):
 @pytest.mark.parametrize("dz", [-12e-6, -30e-6])
 def test_the_mean_over_a_pixel_has_enough_nodes(accuracy, pixels, dz, monkeypatch):
     """With as many as half the samples in a pixel, and one, off by up to 4.2 times the accuracy."""
-    monkeypatch.setattr(microscope_bench, "GRID", np.inf)  # of the same light
+    monkeypatch.setattr(bench, "GRID", np.inf)  # of the same light
     asked = accuracy, pixels, dz
-    found, truth = (of_corner(Crossed, *asked, accuracy=one) for one in (accuracy, accuracy * 1e-6))
+    found, truth = (of_corner(SeparableLenslets, *asked, accuracy=one) for one in (accuracy, accuracy * 1e-6))
     assert off(found, truth) < 0.7 * accuracy
 
 
@@ -69,8 +69,8 @@ def test_the_mean_over_a_pixel_has_enough_nodes(accuracy, pixels, dz, monkeypatc
 def test_the_mean_over_a_pixel_is_that_of_transforms(accuracy, pixels):
     """Off by 0.72 and 0.82 times the accuracy with half the samples in a pixel, and one."""
     asked = accuracy, pixels, -12e-6
-    found = of_corner(Crossed, *asked, accuracy=accuracy)
-    assert off(found, of_corner(Bench, *asked)) < 0.3 * accuracy
+    found = of_corner(SeparableLenslets, *asked, accuracy=accuracy)
+    assert off(found, of_corner(LensletBench, *asked)) < 0.3 * accuracy
 
 
 SPARSE = CellSampling(3, 53, 0.064, 3)
@@ -81,7 +81,7 @@ ROUND = Lenslet(125e-6, 2.5e-3, 2.5e-3, 20.0, 125e-6, is_round=True)
 
 
 def middle_of(sampling, dz, margin, lenslet=LENSLET, accuracy=1e-3):
-    way = Bench if lenslet.is_round else Crossed
+    way = LensletBench if lenslet.is_round else SeparableLenslets
     reach = 6 if lenslet.is_round else 3  # as at 1e-3
     bench = way(Objective(525e-9, 0.5), lenslet, sampling, reach, margin, accuracy=accuracy)
     before = bench.fine
@@ -136,13 +136,13 @@ def test_a_finer_grid_that_cannot_fit_is_refused(lenslet, monkeypatch):
 
 def test_samples_that_hold_no_more_of_the_light_are_not_looked_for(monkeypatch):
     """Points in focus at 60x/1.2 had no end: the grid itself is coarser than 1e-5 asks for."""
-    monkeypatch.setattr(microscope_samples, "MOST", 0.5)
-    assert 30 < microscope_samples.samples_needed(Objective(525e-9, 0.5), LENSLET, 1 / 15, (0.0,), 1e-7) < 100
+    monkeypatch.setattr(samples, "MOST", 0.5)
+    assert 30 < samples.samples_needed(Objective(525e-9, 0.5), LENSLET, 1 / 15, (0.0,), 1e-7) < 100
 
 
 def test_a_low_rank_leaves_out_what_it_says():
     points = [(ky, kx) for ky in range(3) for kx in range(3)]
-    whole, few = (images(Crossed, PIXELS, points, -20e-6, left_out=part) for part in (0.0, 0.02))
+    whole, few = (images(SeparableLenslets, PIXELS, points, -20e-6, left_out=part) for part in (0.0, 0.02))
     said = {lost for _, lost in few}
     assert len(said) == 1
     assert 0.01 < said.pop() < 0.02
@@ -152,7 +152,7 @@ def test_a_low_rank_leaves_out_what_it_says():
 
 @pytest.mark.parametrize("sampling", [CellSampling(9, 15, 1 / 15), CellSampling(9, 14, 1 / 15, 3)])
 def test_memory_is_bounded(sampling):
-    bench = Crossed(Objective(525e-9, 0.5), LENSLET, sampling, 4, 2.4, 1e-3)
+    bench = SeparableLenslets(Objective(525e-9, 0.5), LENSLET, sampling, 4, 2.4, 1e-3)
     points = [(ky, kx) for ky in range(9) for kx in range(9)]
     list(bench.images(-25e-6, points[:1]))  # radial tables are kept
     tracemalloc.start()

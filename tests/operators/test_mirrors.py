@@ -7,10 +7,12 @@ import pytest
 
 from cameras import focused
 from lumigraph.elements import ZernikePlate
-from lumigraph.operators import mirrors, periodic, point_images, varying
-from lumigraph.operators.mirrors import SAME, Mirror
-from lumigraph.operators.optics import Optics
-from lumigraph.operators.periodic import PeriodicOperator, mirrored_operator, periodic_operator
+from lumigraph.operators.lenslets import point_images
+from lumigraph.operators.periodic import incoherent, mirrors
+from lumigraph.operators.periodic.incoherent import PeriodicOperator, mirrored_operator, periodic_operator
+from lumigraph.operators.periodic.mirrors import SAME, Mirror
+from lumigraph.operators.sampling import field_lenses
+from lumigraph.operators.sampling.optics import Optics
 
 FIELD = 1.1e-3, 1.9e-3
 
@@ -42,7 +44,7 @@ def test_a_mirrored_operator_is_that_of_the_mirrored_field():
     assert turns == tuple(product((False, True), repeat=3))
 
     def of(field):
-        operator = periodic_operator(varying.at(camera.optics(), *field), grid, accuracy=1e-2)
+        operator = periodic_operator(field_lenses.at(camera.optics(), *field), grid, accuracy=1e-2)
         assert isinstance(operator, PeriodicOperator)
         return operator
 
@@ -56,13 +58,13 @@ def test_a_mirrored_operator_is_that_of_the_mirrored_field():
 def test_few_lenses_are_built_and_all_of_them_agree_with_those_built_alone(monkeypatch):
     camera = aberrated({**TABLE, "terms": {8: [0.0, 0.15]}}, count=(2, 2))
     built = []
-    build = periodic.matrix
-    monkeypatch.setattr(periodic, "matrix", lambda *given: built.append(1) or build(*given))
+    build = incoherent.matrix
+    monkeypatch.setattr(incoherent, "matrix", lambda *given: built.append(1) or build(*given))
     mirrored, few = camera.operator(accuracy=1e-2), len(built)
     monkeypatch.setattr(mirrors, "turns", lambda _: (SAME,))
     alone = camera.operator(accuracy=1e-2)
     assert 2 * few <= len(built) - few
-    assert isinstance(mirrored, varying.FieldOperator)
+    assert isinstance(mirrored, field_lenses.FieldOperator)
     assert few < len(mirrored.maps)
     assert mirrored.memory_bytes < alone.memory_bytes
     assert off(raw_of(mirrored), raw_of(alone)) < 1e-2
@@ -92,7 +94,7 @@ def test_fields_far_aside_are_not_mirrored():
         plates = [part for part in one.lens.elements if isinstance(part, ZernikePlate)]
         return np.array([1.0, *(rms for plate in plates for rms in dict(plate.coefficients).values())])
 
-    found = varying.lenses(camera, (aside, aside), image, 1e-2, matrices)
+    found = field_lenses.lenses(camera, (aside, aside), image, 1e-2, matrices)
     assert all(min(one.field) >= 1e-3 for one in found.chosen)
 
 
@@ -114,13 +116,13 @@ def test_light_that_is_even_along_one_axis_is_computed_for_one_side(monkeypatch)
         return raw_of(periodic_operator(optics, camera.object_grid, accuracy=1e-2))
 
     found = raw()
-    monkeypatch.setattr(point_images.Wave, "even", (False, False))
-    monkeypatch.setattr(periodic, "matrix", lambda of, *_: periodic_matrix(of))
+    monkeypatch.setattr(point_images.LensletPlaneWave, "even", (False, False))
+    monkeypatch.setattr(incoherent, "matrix", lambda of, *_: periodic_matrix(of))
     assert off(found, raw()) < 2e-4
 
 
 def periodic_matrix(optics):
     """Built anew, whatever is known."""
-    from lumigraph.operators import kernels
+    from lumigraph.operators.periodic import kernels
 
     return kernels._unpacked(kernels._build(optics), optics)

@@ -5,7 +5,7 @@ import pytest
 
 import lumigraph as lg
 from lumigraph.elements.objective import Objective
-from lumigraph.operators.multislice import Multislice
+from lumigraph.operators.microscope.multislice import Multislice
 from lumigraph.units import nm, um
 
 WAVE = 525 * nm

@@ -7,13 +7,13 @@ from tests.operators.test_part_images import off, peak
 import lumigraph as lg
 from cameras import focused
 from lumigraph.errors import GeometryError
-from lumigraph.information.points import small
-from lumigraph.operators.part_leaning import LeaningParts
-from lumigraph.operators.part_plane import PartPlane
-from lumigraph.operators.plane_of_points import PlaneOfPoints
-from lumigraph.operators.points import points_image
-from lumigraph.operators.resampling import averaged
+from lumigraph.operators.lenslets.part_leaning import TiltedImages
+from lumigraph.operators.lenslets.part_plane import PartPlane
+from lumigraph.operators.lenslets.plane_of_points import PlaneOfPoints
+from lumigraph.operators.lenslets.points import points_image
+from lumigraph.operators.sampling.resampling import averaged
 from lumigraph.scene import Points
+from lumigraph.studies.information.points import small
 from lumigraph.units import mm, nm, um
 
 POINTS = Points(np.array([[0.11, -0.23, -3], [0.3, 0.2, 2]]) * mm, np.array([1.0, 0.6]))
@@ -214,6 +214,6 @@ def test_lenslets_that_differ_in_an_array_that_leans_have_derivatives():
         return focused(**given).replace(built={"sensor_tilt": (0.02, 0.0), **scatter})
 
     images = one().part_images([(one(-1e-3), one(1e-3))])
-    assert isinstance(images, LeaningParts)
+    assert isinstance(images, TiltedImages)
     low, high = (one(by).part_images([]).forward(point) for by in (-2e-3, 2e-3))
     assert off(2 * images.derivative(point, np.ones(1)), high - low) < 1e-4

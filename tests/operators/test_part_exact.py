@@ -8,12 +8,12 @@ from tests.operators.test_part_images import FREE, KEYS, ONE, START, camera, mov
 
 import lumigraph as lg
 from lumigraph.errors import GeometryError
-from lumigraph.operators.cell_response import bent
-from lumigraph.operators.exact import Terms, products
-from lumigraph.operators.exact_waves import Beams
-from lumigraph.operators.part_exact import ExactImages, ExactSight
-from lumigraph.operators.part_images import PartImages
-from lumigraph.operators.points import points_image
+from lumigraph.operators.lenslets.cell_response import bent
+from lumigraph.operators.lenslets.exact_lenslets import Terms, products
+from lumigraph.operators.lenslets.exact_waves import DirectionSum
+from lumigraph.operators.lenslets.part_exact import ExactImages, SampledExactCamera
+from lumigraph.operators.lenslets.part_images import PartImages
+from lumigraph.operators.lenslets.points import points_image
 from lumigraph.scene import Points
 from lumigraph.units import mm, um
 
@@ -145,13 +145,13 @@ def test_beams_go_back_as_they_change(rng):
             tuple(a + step * b for a, b in zip(*both, strict=True)) if isinstance(both[0], tuple) else both
             for both in zip(at, by, strict=True)
         )
-        return Beams.of((y, x), (down, across), *(a + step * b for a, b in rest))
+        return DirectionSum.of((y, x), (down, across), *(a + step * b for a, b in rest))
 
     at, by = some(), some()
     given = rng.standard_normal((ny, nx)) + 1j * rng.standard_normal((ny, nx))
-    changed = Beams.of(*at).changed(by)
+    changed = DirectionSum.of(*at).changed(by)
     assert off(changed, (along(by, 1e-6).light - along(by, -1e-6).light) / 2e-6) < 1e-8
-    (down, across), directions, stop, bends = Beams.of(*at).back(given)
+    (down, across), directions, stop, bends = DirectionSum.of(*at).back(given)
     pairs = zip((down, across, *directions, stop, bends), (*by[0], *by[1], *by[2:]), strict=True)
     assert sum(np.sum(a * b).real for a, b in pairs) == pytest.approx(np.sum(given * changed).real, rel=1e-10)
 
@@ -183,7 +183,7 @@ def test_terms_go_over_into_those_of_others_whatever_singular_vectors_are():
 
 def test_lenslets_of_a_pair_are_as_many_terms():
     """Also where the accuracy would ask for more or fewer of them."""
-    own = ExactSight.of(camera(SMALL).optics(), ONE_POINT, 1e-2)
+    own = SampledExactCamera.of(camera(SMALL).optics(), ONE_POINT, 1e-2)
     key = 0, 1, range(8), range(8)
     for by, terms in ((-0.3, 5), (0.5, 3)):
         end = own.alike(camera(moved(SMALL, "wavelength", by)).optics())

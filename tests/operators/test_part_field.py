@@ -6,9 +6,9 @@ from tests.operators.test_part_images import off
 
 import lumigraph as lg
 from lumigraph.errors import GeometryError
-from lumigraph.operators.part_leaning import points_before
-from lumigraph.operators.part_points import PartPoints, SteppedPoints
-from lumigraph.operators.points import points_image
+from lumigraph.operators.lenslets.part_leaning import points_before
+from lumigraph.operators.lenslets.part_points import PartPoints, SteppedPoints
+from lumigraph.operators.lenslets.points import points_image
 from lumigraph.scene import Points
 from lumigraph.units import mm, nm, um
 

@@ -7,10 +7,10 @@ import pytest
 
 import lumigraph as lg
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators.optics import Optics
-from lumigraph.operators.point_changes import place_changes
-from lumigraph.operators.points import points_image, share
-from lumigraph.operators.relay import Relays
+from lumigraph.operators.lenslets.point_changes import place_changes
+from lumigraph.operators.lenslets.points import points_image, share
+from lumigraph.operators.lenslets.relay import RelaySet
+from lumigraph.operators.sampling.optics import Optics
 from lumigraph.scene import Points
 from lumigraph.units import mm, nm, um
 
@@ -183,7 +183,7 @@ def test_a_camera_that_moves_sees_what_points_show_that_move():
     """Before lenslets that stay: as deeper points by `place_changes`, but for how bright samples are."""
     place, step = np.array([0.11, -0.23, -5]) * mm, 1e-6 * START["object_distance"]
     images, one = camera(FREE).part_images([pair(FREE, "object_distance")]), Points(place[None], np.ones(1))
-    deeper = place_changes(camera(FREE).optics(), place, 1e-2, Relays())
+    deeper = place_changes(camera(FREE).optics(), place, 1e-2, RelaySet())
     light = np.log([share(Optics.of(end, end.object_distance + place[2], 1e-2)) for end in images.pairs[0]])
     expected = deeper[3] * 2 * step + deeper[0] * (light[1] - light[0])
     assert off(images.derivative(one, np.ones(1)), expected) < 2e-3

@@ -5,11 +5,11 @@ import pytest
 
 import lumigraph as lg
 from cameras import focused
-from lumigraph.operators.leaning import flat
-from lumigraph.operators.part_leaning import LeaningParts, LeaningPoints
-from lumigraph.operators.part_plane import PartPlane
-from lumigraph.operators.part_points import PartPoints
-from lumigraph.operators.points import points_image
+from lumigraph.operators.lenslets.part_leaning import TiltedImages, TiltedPoints
+from lumigraph.operators.lenslets.part_plane import PartPlane
+from lumigraph.operators.lenslets.part_points import PartPoints
+from lumigraph.operators.lenslets.points import points_image
+from lumigraph.operators.lenslets.tilted_planes import flat
 
 POINTS = lg.Points(np.array([[90e-6, -60e-6, 0.0], [-150e-6, 40e-6, 0.4e-3]]), np.array([1.0, 0.6]))
 STILL = {"sensor_tilt": (0.02, 0.0), "array_tilt": (0.0, 0.015), "array_bow": 4e-6}
@@ -52,7 +52,7 @@ def test_images_change_with_a_tilt_as_simulations_do(key, still):
     """From -4 to 4 mrad; the simulations' distances are others, each camera's own."""
     pair = tuple(camera(moved(still, key, step)) for step in (-1e-5, 1e-5))
     images = camera(still).part_images([pair], accuracy=2e-3)
-    assert isinstance(images, LeaningParts)
+    assert isinstance(images, TiltedImages)
     assert off(images.forward(POINTS), seen(still)) < 5e-3
     low, high = (seen(moved(still, key, step)) for step in (-4e-3, 4e-3))
     assert off(400 * images.derivative(POINTS, np.ones(1)), high - low) < 0.05
@@ -75,7 +75,7 @@ def test_the_gradient_is_the_derivatives_transpose(rng):
 
 def test_points_one_by_one_go_back_to_what_their_images_change_by(rng):
     images, one = camera(STILL).part_images(pairs()), lg.Points(POINTS.positions[1:], np.ones(1))
-    points = LeaningPoints(
+    points = TiltedPoints(
         [PartPoints(part, one, [(one, one)] * 3) for part in images.parts], images.weights, images.moved
     )
     lit, back = points.lit(0)
@@ -96,7 +96,7 @@ def test_planes_and_volumes_are_those_of_the_same_flat_cameras():
     assert np.array_equal(plane.weights, images.weights)
     assert np.array_equal(plane.moved, images.moved)
     volume = one.part_volume(both, grid, (0.0, 0.2e-3))
-    assert [type(part) for part in volume.planes] == [LeaningParts, LeaningParts]
+    assert [type(part) for part in volume.planes] == [TiltedImages, TiltedImages]
     assert volume.shape == (one.sensor.shape, (2, 6, 6))
 
 

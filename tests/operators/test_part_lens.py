@@ -6,8 +6,8 @@ from tests.operators.test_part_images import off
 
 import lumigraph as lg
 from lumigraph.operators.single_lens import points_image
-from lumigraph.optimisation.goals import Goal
 from lumigraph.scene import Points
+from lumigraph.studies.optimisation.goals import Goal
 from lumigraph.units import mm, nm, um
 
 START = {

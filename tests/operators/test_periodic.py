@@ -13,13 +13,15 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError, SamplingWarning
 from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera
-from lumigraph.operators import band, cells, kernels, periodic_operator, white
-from lumigraph.operators.optics import Optics
-from lumigraph.operators.point_images import Apart
-from lumigraph.operators.sizes import stream_operations
-from lumigraph.operators.streamed import stream_bytes, streamed
-from lumigraph.operators.wave_image import WaveImage
-from lumigraph.operators.white import endless, white_image
+from lumigraph.operators import periodic_operator
+from lumigraph.operators.lenslets.point_images import SquareLensletImages
+from lumigraph.operators.lenslets.wave_image import WaveImage
+from lumigraph.operators.periodic import kernels, white
+from lumigraph.operators.periodic.sizes import stream_operations
+from lumigraph.operators.periodic.streamed import stream_bytes, streamed
+from lumigraph.operators.periodic.white import endless, white_image
+from lumigraph.operators.sampling import band, cells
+from lumigraph.operators.sampling.optics import Optics
 from lumigraph.scene import targets
 from lumigraph.simulation import Snapshots, simulate
 from lumigraph.units import mm, nm, um
@@ -277,13 +279,13 @@ def test_operations_are_counted_truly(aberrations, monkeypatch):
     """Blocks that are computed for an image, and points of light that each is a product with."""
     camera = CAMERAS["1.0"].replace(lenslets={"count": (6, 6)}, main_lens={"aberrations": aberrations})
     optics, done = Optics.of(camera, camera.object_distance, 1e-2).bricks, []
-    plain = Apart._block
+    plain = SquareLensletImages._block
 
     def counted(self, dy, dx):
         done.append(8.0 * self.down.size * math.prod(optics.cells.points) * optics.cells.samples[1])
         return plain(self, dy, dx)
 
-    monkeypatch.setattr(Apart, "_block", counted)
+    monkeypatch.setattr(SquareLensletImages, "_block", counted)
     sum(1 for _ in streamed(optics).parts)
     offsets = [2 * n + 1 for n in optics.reach]
     applied = 2.0 * math.prod((*optics.cells.points, *optics.cells.samples, 36, *offsets))

@@ -13,16 +13,17 @@ from tests.operators.test_part_images import camera, off, pair, peak
 import lumigraph as lg
 from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError, SamplingWarning
-from lumigraph.information import Light
-from lumigraph.information.points import collected
-from lumigraph.operators import part_images, plane_of_points, single_lens
-from lumigraph.operators.film_plane import FilmPlane
-from lumigraph.operators.part_leaning import LeaningParts
-from lumigraph.operators.part_plane import PartPlane
-from lumigraph.operators.plane_of_points import PlaneOfPoints
-from lumigraph.operators.points import points_image
-from lumigraph.operators.sample_images import sample_images
+from lumigraph.operators import single_lens
+from lumigraph.operators.lenslets import part_images, plane_of_points
+from lumigraph.operators.lenslets.film_plane import FilmPlane
+from lumigraph.operators.lenslets.part_leaning import TiltedImages
+from lumigraph.operators.lenslets.part_plane import PartPlane
+from lumigraph.operators.lenslets.plane_of_points import PlaneOfPoints
+from lumigraph.operators.lenslets.points import points_image
+from lumigraph.operators.lenslets.sample_images import sample_images
 from lumigraph.scene import Points
+from lumigraph.studies.information import Light
+from lumigraph.studies.information.points import collected
 from lumigraph.units import mm, um
 
 DZ, GRID = -2 * mm, Grid((3, 2), (60 * um, 50 * um), (30 * um, -20 * um))
@@ -145,7 +146,7 @@ def test_planes_that_take_too_long_are_refused_and_minutes_are_told(monkeypatch)
     with pytest.raises(SamplingError, match=r"6 samples are as many points.*Use a smaller grid"):
         seen.forward(np.ones(GRID.shape))
     monkeypatch.setattr(plane_of_points, "LONGEST", 1e15)
-    monkeypatch.setattr("lumigraph.operators.kernels.A_MINUTE", 1e8)
+    monkeypatch.setattr("lumigraph.operators.periodic.kernels.A_MINUTE", 1e8)
     with pytest.warns(SamplingWarning, match="an image of 6 samples, as many points, takes some"):
         seen.forward(np.ones(GRID.shape))
 
@@ -164,7 +165,7 @@ def test_exact_cells_over_a_wide_field_are_points(monkeypatch):
 
 
 def test_images_of_samples_are_an_operator(rng, monkeypatch):
-    monkeypatch.setattr("lumigraph.operators.sample_images.TOGETHER", 4)
+    monkeypatch.setattr("lumigraph.operators.lenslets.sample_images.TOGETHER", 4)
     volume = each.camera(DIFFER).part_volume([], GRID, (DZ, 1 * mm))
     operator = sample_images(volume, (DZ, 1 * mm))
     x, raw = rng.random(volume.shape[1]), rng.random(volume.shape[0])
@@ -176,7 +177,7 @@ def test_images_of_samples_are_an_operator(rng, monkeypatch):
 def test_lenslets_that_differ_lean_as_well():
     one = each.camera(few(each.START | {"built": each.DIFFER | {"sensor_tilt": (0.01, 0.0)}}))
     seen = one.part_plane([], GRID, DZ)
-    assert isinstance(seen, LeaningParts)
+    assert isinstance(seen, TiltedImages)
     assert {type(part) for part in seen.parts} == {PlaneOfPoints}
 
 

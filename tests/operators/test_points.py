@@ -9,9 +9,9 @@ from benchmarks.references import Fineness
 
 import cameras
 from lumigraph.instruments import PlenopticCamera
-from lumigraph.operators import white
-from lumigraph.operators.optics import Optics
-from lumigraph.operators.wave_image import Side
+from lumigraph.operators.lenslets.wave_image import Side
+from lumigraph.operators.periodic import white
+from lumigraph.operators.sampling.optics import Optics
 from lumigraph.scene import targets
 from lumigraph.simulation import Incoherent, simulate
 from lumigraph.units import mm, nm, um

@@ -6,7 +6,7 @@ import pytest
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.banded import Banded, banded
 from lumigraph.core.grid import Grid
-from lumigraph.operators.resampling import averaged, represented
+from lumigraph.operators.sampling.resampling import averaged, represented
 
 
 def dense(matrix: Banded) -> np.ndarray:

@@ -14,7 +14,8 @@ from lumigraph.core.linear import Linear
 from lumigraph.elements import CircularAperture, ZernikePlate
 from lumigraph.errors import SamplingError, SamplingWarning
 from lumigraph.instruments import FocusedPlenopticCamera, SingleLensCamera
-from lumigraph.operators import band, single_lens, single_lens_operator
+from lumigraph.operators import single_lens, single_lens_operator
+from lumigraph.operators.sampling import band
 from lumigraph.scene import Scene, Slice, targets
 from lumigraph.simulation import Snapshots, simulate
 from lumigraph.units import mm, nm, um

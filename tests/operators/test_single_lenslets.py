@@ -8,8 +8,8 @@ from tests.operators.test_part_each import direct, off
 
 import lumigraph as lg
 from cameras import focused
-from lumigraph.core.aside import Aside
-from lumigraph.elements import LensletArray, Own, Scatter
+from lumigraph.core.lattice_offsets import LatticeOffsets
+from lumigraph.elements import LensletArray, Scatter, SingleLenslet
 from lumigraph.errors import CalibrationError, FormatError, GeometryError
 from lumigraph.scene import Points, Scene
 from lumigraph.units import mm, um
@@ -123,7 +123,7 @@ def test_the_gradient_is_the_derivatives_transpose(rng):
 def test_an_array_that_is_turned_turns_the_ways_of_its_lenslets():
     """A quarter turn: lenslets stand where others stood, and ways are of the picture, not of the array."""
     plain = LensletArray(lg.Lattice.square(PITCH), 5 * mm, fill_factor=FILL)
-    own = Own((1, 0), 0.1, (9 * um, -4 * um), (3 * um, 5 * um))
+    own = SingleLenslet((1, 0), 0.1, (9 * um, -4 * um), (3 * um, 5 * um))
     there = replace(plain, scatter=Scatter(own=(own,)))
     turned = replace(plain, lattice=lg.Lattice.square(PITCH, np.pi / 2), scatter=Scatter(own=(own,)))
     grid = lg.Grid.square(201, 1.5 * um)
@@ -134,7 +134,7 @@ def test_an_array_that_is_turned_turns_the_ways_of_its_lenslets():
 
 def test_apertures_that_touch_leave_no_gap_between_them():
     """Their border lies amid a sample, of which each covers half."""
-    own = Own((0, 0), aside=(0.0, 10 * um)), Own((0, 1), aside=(0.0, -10 * um))
+    own = SingleLenslet((0, 0), aside=(0.0, 10 * um)), SingleLenslet((0, 1), aside=(0.0, -10 * um))
     array = LensletArray(lg.Lattice.square(PITCH), 5 * mm, fill_factor=FILL, scatter=Scatter(own=own))
     line = np.abs(array.transmission(lg.Grid((1, 25), (4 * um, 4 * um), (0.0, 50 * um)), 600e-9))[0]
     assert line == pytest.approx(1, abs=1e-12)
@@ -145,7 +145,7 @@ def test_patches_are_placed_around_vertices(rng):
     none, size, pitch = np.zeros((0, 2)), 4.0, 10.0
     plain = lg.Calibration(lg.Lattice.square(pitch, origin=(5, 5)), (60, 60), none, none, 0.0)
     indices = plain.indices_within((0, 59), (0, 59))
-    aside = replace(plain, aside=Aside(indices, rng.uniform(-0.8, 0.8, indices.shape)))
+    aside = replace(plain, aside=LatticeOffsets(indices, rng.uniform(-0.8, 0.8, indices.shape)))
     for one, flat in ((aside, True), (plain, False)):
         y, x = np.mgrid[:60, :60]
         center = one.position(np.stack(aside.index(y, x), -1))
@@ -232,7 +232,7 @@ def test_other_operators_are_refused():
     with pytest.raises(GeometryError, match='model = "paraxial"'):
         lg.simulate(camera().replace(model="exact"), Scene([POINT]))
     with pytest.raises(GeometryError, match=r"lenslet \(1, 0\) has a focal_change of -1 but must be above"):
-        Scatter(own=(Own((1, 0), -1.0),))
-    far = Scatter(own=(Own((1, 0), 0.0, (11 * um, 0.0)),))
+        Scatter(own=(SingleLenslet((1, 0), -1.0),))
+    far = Scatter(own=(SingleLenslet((1, 0), 0.0, (11 * um, 0.0)),))
     with pytest.raises(GeometryError, match=r"lenslet \(1, 0\) stands 11 µm beside its place but has 10 µm"):
         LensletArray(lg.Lattice.square(PITCH), 5 * mm, fill_factor=FILL, scatter=far)

@@ -5,19 +5,22 @@ import pytest
 from tests.operators.test_part_exact import GLASS, ON_AXIS, ONE_POINT, SMALL, STEEP
 from tests.operators.test_part_images import POINTS, START, camera, off, pair
 
-from lumigraph.operators.exact import ExactLenslets
-from lumigraph.operators.part_exact import ExactSight
-from lumigraph.operators.part_sight import Sight
-from lumigraph.operators.passed import Slopes, changed_pieces
+from lumigraph.operators.lenslets.exact_lenslets import ExactLenslets
+from lumigraph.operators.lenslets.part_exact import SampledExactCamera
+from lumigraph.operators.lenslets.sampled_camera import SampledCamera
+from lumigraph.operators.lenslets.transmitted import LensletGradient, changed_pieces
 
 ANGLES = START | {"sensor": START["sensor"] | {"angular_response": {"power": 40.0}}}
 FINE = STEEP | {"lenslets": STEEP["lenslets"] | {"focal_length": 0.6e-3}}
 CASES = [
-    *((Sight, START, POINTS, f"lenslets.{key}") for key in ("pitch", "focal_length", "fill_factor")),
-    (Sight, ANGLES, POINTS, "lenslets.pitch"),
-    *((ExactSight, SMALL, ONE_POINT, f"lenslets.{key}") for key in ("pitch", "focal_length", "fill_factor")),
-    (ExactSight, GLASS, ONE_POINT, "lenslets.pitch"),
-    (ExactSight, STEEP, ON_AXIS, "lenslets.focal_length"),
+    *((SampledCamera, START, POINTS, f"lenslets.{key}") for key in ("pitch", "focal_length", "fill_factor")),
+    (SampledCamera, ANGLES, POINTS, "lenslets.pitch"),
+    *(
+        (SampledExactCamera, SMALL, ONE_POINT, f"lenslets.{key}")
+        for key in ("pitch", "focal_length", "fill_factor")
+    ),
+    (SampledExactCamera, GLASS, ONE_POINT, "lenslets.pitch"),
+    (SampledExactCamera, STEEP, ON_AXIS, "lenslets.focal_length"),
 ]
 NAMES = [f"{of.__name__} {given.get('model')} {key}" for of, given, _, key in CASES]
 
@@ -50,7 +53,7 @@ def test_matrices_change_as_those_of_cameras_a_little_apart(of, given, points, k
 def test_slopes_go_back_as_matrices_change(of, given, points, key, rng):
     own, keys = before(of, given, points)
     low, high = ends(own, given, key)
-    changed, slopes = changed_pieces(own.lenslets, [(1.0, low, high)], set(keys)), Slopes()
+    changed, slopes = changed_pieces(own.lenslets, [(1.0, low, high)], set(keys)), LensletGradient()
     whole = 0.0
     for name in keys:
         by = rng.standard_normal((2, *changed[name].shape)).T @ (1, 1j)
@@ -62,7 +65,7 @@ def test_slopes_go_back_as_matrices_change(of, given, points, key, rng):
 def test_changes_follow_from_more_places_where_lenslets_are_faster():
     counts = []
     for given in (SMALL, STEEP, FINE):
-        own, keys = before(ExactSight, given, ON_AXIS)
+        own, keys = before(SampledExactCamera, given, ON_AXIS)
         counts.append(own.lenslets._around(own.lenslets._seat(keys[0])).count)
     assert counts[0] == 8
     assert counts[0] < counts[1] < counts[2]

@@ -6,9 +6,9 @@ import pytest
 import lumigraph as lg
 from cameras import focused
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators import varying
-from lumigraph.operators.points import points_image
-from lumigraph.operators.resampling import averaged
+from lumigraph.operators.lenslets.points import points_image
+from lumigraph.operators.sampling import field_lenses
+from lumigraph.operators.sampling.resampling import averaged
 from lumigraph.scene import Diffuser, Scene
 
 COMA, BENT = 1.0, -6.0
@@ -146,7 +146,7 @@ def test_an_operator_sees_points_between_its_lenses(coarse):
     for index in ((1, 2), (8, 12), (13, 2)):
         place = np.array([[grid.y[index[0]], grid.x[index[1]], 0.0]])
         expected = points_image(camera, lg.Points(place, np.ones(1)), 1e-3)
-        axis = points_image(varying.at(camera.optics(), 0.0, 0.0), lg.Points(place, np.ones(1)), 1e-3)
+        axis = points_image(field_lenses.at(camera.optics(), 0.0, 0.0), lg.Points(place, np.ones(1)), 1e-3)
         shown.append(off(coarse.psf(index), expected))
         middle.append(off(axis, expected))
     assert max(shown) < 1.5 * coarse.error
@@ -191,7 +191,7 @@ def test_what_no_field_of_the_table_holds_is_refused():
 
 
 def test_aberrations_that_change_too_fast_are_refused_with_numbers(monkeypatch):
-    monkeypatch.setattr(varying, "COUNTS", (3,))
+    monkeypatch.setattr(field_lenses, "COUNTS", (3,))
     with pytest.raises(SamplingError, match=r"3 x 3 others are off by .* Ask for"):
         aberrated().operator()
 
@@ -220,12 +220,12 @@ def test_a_sketch_keeps_distances_of_images(rng):
     """Of smooth ones and of sharp ones: 8192 numbers for a million, to the few percent that lenses allow."""
     images = [rng.random(10**6) * np.linspace(0, 1, 10**6) ** power for power in (0, 5, 60)]
     images.append(np.eye(1, 10**6, 4321)[0])
-    sketches = [varying.sketch(image) for image in images]
-    assert {len(one) for one in sketches} == {varying.KEPT}
+    sketches = [field_lenses.sketch(image) for image in images]
+    assert {len(one) for one in sketches} == {field_lenses.KEPT}
     for k, (one, mine) in enumerate(zip(images, sketches, strict=True)):
         for other, its in zip(images[:k], sketches[:k], strict=True):
             assert np.linalg.norm(mine - its) == pytest.approx(np.linalg.norm(one - other), rel=0.05)
-    np.testing.assert_array_equal(varying.sketch(images[0][:100]), images[0][:100])
+    np.testing.assert_array_equal(field_lenses.sketch(images[0][:100]), images[0][:100])
 
 
 def test_the_lens_of_the_axis_is_chosen_first():
@@ -236,7 +236,7 @@ def test_the_lens_of_the_axis_is_chosen_first():
         waves = {j: rms for p in one.lens.elements for j, rms in dict(getattr(p, "coefficients", {})).items()}
         return np.array([1.0, waves.get(7, 0.0), waves.get(8, 0.0)])
 
-    first = varying.lenses(camera, (fields, fields), image, 1e-2).chosen[0]
+    first = field_lenses.lenses(camera, (fields, fields), image, 1e-2).chosen[0]
     assert first.field == pytest.approx((0.0, 0.0), abs=1e-15)
 
 
@@ -246,11 +246,11 @@ def test_counts_of_nodes_that_would_not_do_are_left_out(monkeypatch):
 
     def with_nodes(_, count):
         asked.append(count)
-        return varying.Lenses((), np.zeros((0, count, count)), (0.0, 0.0), (1.0, 1.0), left[count])
+        return field_lenses.FieldLenses((), np.zeros((0, count, count)), (0.0, 0.0), (1.0, 1.0), left[count])
 
-    monkeypatch.setattr(varying._Search, "with_nodes", with_nodes)
-    left = dict(zip(varying.COUNTS, (0.1, 0.03, 6e-3, 2e-3, 5e-4), strict=True))
-    assert varying.lenses(camera, (fields, fields), np.ravel, 1e-3).left == 5e-4
-    left = dict(zip(varying.COUNTS, (0.1, 0.2, 0.03, 5e-3, 5e-4), strict=True))
-    assert varying.lenses(camera, (fields, fields), np.ravel, 1e-2).left == 5e-3
+    monkeypatch.setattr(field_lenses._LensSearch, "with_nodes", with_nodes)
+    left = dict(zip(field_lenses.COUNTS, (0.1, 0.03, 6e-3, 2e-3, 5e-4), strict=True))
+    assert field_lenses.lenses(camera, (fields, fields), np.ravel, 1e-3).left == 5e-4
+    left = dict(zip(field_lenses.COUNTS, (0.1, 0.2, 0.03, 5e-3, 5e-4), strict=True))
+    assert field_lenses.lenses(camera, (fields, fields), np.ravel, 1e-2).left == 5e-3
     assert asked == [3, 5, 11, 3, 5, 7, 9]

@@ -9,12 +9,12 @@ import lumigraph as lg
 from data_folder import real
 from lumigraph import viewer
 from lumigraph.calibration import calibrate
-from lumigraph.cli.origin import Origin
+from lumigraph.cli.origin import RawOptions
 from lumigraph.core.prepared import Reason
 from lumigraph.core.stack import Stack
 from lumigraph.deconvolution import Exposure
 from lumigraph.errors import CalibrationError, FormatError, SamplingWarning
-from lumigraph.preparation import read_pages
+from lumigraph.preparation import given, read_pages
 
 PITCH, OFFSET = 12.4, 50.0
 
@@ -43,7 +43,7 @@ def test_python_verbs_and_viewer_see_the_same_picture(kind, bench):
     ending = "zarr" if kind else "tiff"
     raw, white, dark = (bench / f"{name}{kind}.{ending}" for name in ("raw", "white", "dark"))
     ready = lg.prepare(lg.open(raw), white=lg.open(white), dark=lg.open(dark))
-    verb = Origin(white=white, dark=dark).prepared(lg.open(raw))
+    verb = RawOptions(white=white, dark=dark).prepared(lg.open(raw))
     shown = viewer.open_exhibit(raw, viewer.Origin(white=white, dark=dark))
     np.testing.assert_array_equal(verb.data, ready.data)
     np.testing.assert_array_equal(shown.raw.data, ready.data)
@@ -72,7 +72,7 @@ def test_a_calibration_that_does_not_fit_is_refused_by_each(bench):
     wrong = replace(found, lattice=lattice, residual_px=0.0)
     lg.save(wrong, bench / "wrong.toml")
     with pytest.raises(CalibrationError, match="slip by"):
-        Origin(calibration=bench / "wrong.toml").prepared(raw)
+        RawOptions(calibration=bench / "wrong.toml").prepared(raw)
     with pytest.raises(CalibrationError, match="slip by"):
         viewer.open_exhibit(bench / "raw.tiff", viewer.Origin(calibration=bench / "wrong.toml"))
     for verb in (lg.prepare, lg.decode, lg.depth.correlation):
@@ -180,3 +180,18 @@ def test_a_raw_image_of_true_and_false_is_one_of_1_and_0(bench):
     bright = lg.open(bench / "raw.tiff").data > white.data.mean()
     views = [lg.decode(lg.prepare(one, calibrate(white))).data for one in (bright, bright.astype(np.uint8))]
     np.testing.assert_array_equal(*views)
+
+
+def test_frames_of_a_batch_share_one_finding_of_the_lattice_and_a_new_white_image_is_found_again(
+    bench, monkeypatch
+):
+    found = []
+    monkeypatch.setattr(given, "calibrate", lambda white: found.append(1) or calibrate(white))
+    files, raw = given.Given(white=bench / "white.tiff"), lg.open(bench / "raw.tiff")
+    for _ in range(3):
+        ready = files.prepared(raw)
+        assert "the lattice was found on the white image" in ready.notes
+    assert len(found) == 1
+    lg.save(lg.RawImage(lg.open(bench / "white.tiff").data * np.float32(0.9)), bench / "white.tiff")
+    files.prepared(raw)
+    assert len(found) == 2

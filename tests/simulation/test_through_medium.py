@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
-from lumigraph.operators.microscope_medium import Seen
+from lumigraph.operators.microscope.medium import MediumImages
 from lumigraph.units import um
 
 LIGHT = lg.Incoherent(1e-2)
@@ -79,7 +79,7 @@ def test_twice_as_many_slices_hold_an_index_that_goes_over_evenly():
 def test_planes_that_stand_too_far_apart_are_warned_of(scope, monkeypatch):
     grid = lg.Grid.square(8, 2 * um)
     medium = lg.Medium.of_index(lg.Volume(np.full((2, 8, 8), 1e-4), grid, (-20 * um, -10 * um)))
-    monkeypatch.setattr(Seen, "between_planes", lambda self, place: 0.03)
+    monkeypatch.setattr(MediumImages, "between_planes", lambda self, place: 0.03)
     with pytest.warns(lg.SamplingWarning) as told:
         found = lg.simulate(scope, lg.targets.points([(0, 0, 1 * um)]), LIGHT, medium=medium)
     assert "planes stand 10 µm apart" in str(told[0].message)
@@ -90,7 +90,7 @@ def test_planes_that_stand_too_far_apart_are_warned_of(scope, monkeypatch):
 def test_minutes_are_said_before_they_are_spent(scope, monkeypatch):
     grid = lg.Grid.square(8, 2 * um)
     medium = lg.Medium(np.full((2, 8, 8), 10e-9), grid, (-20 * um, -10 * um))
-    seen = Seen(scope.pupil_images((), farthest=20 * um, accuracy=1e-2), medium)
+    seen = MediumImages(scope.pupil_images((), farthest=20 * um, accuracy=1e-2), medium)
     one, four = (seen.seconds(np.full(n, 1 * um)) for n in (200, 800))
     assert four == pytest.approx(4 * one, rel=0.9)  # by the time of a transform
     assert seen.seconds(np.array([-30 * um])) == 0

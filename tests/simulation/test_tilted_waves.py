@@ -76,10 +76,10 @@ def test_exact_parts_of_a_scene_lower_the_relative_error():
 
 def test_waves_of_a_small_source_stay_within_it():
     waves = TiltedWaves(200, na=0.004)
-    from lumigraph.simulation.coherence import Plane
+    from lumigraph.simulation.coherence import ScenePlane
 
     part = chart().parts[0]
-    plane = Plane(np.sqrt(part.intensity), part.grid, CAMERA.object_distance, CAMERA.pupil_diameter)
+    plane = ScenePlane(np.sqrt(part.intensity), part.grid, CAMERA.object_distance, CAMERA.pupil_diameter)
     sines, weights = waves.directions(plane, CAMERA.wavelength)
     assert np.hypot(*sines.T).max() <= 0.004
     assert weights.mean() == pytest.approx(1, abs=0.1)  # the weights make up for the density

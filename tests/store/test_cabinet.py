@@ -10,7 +10,7 @@ import pytest
 
 from lumigraph import store
 from lumigraph.errors import FormatError
-from lumigraph.store import cabinet
+from lumigraph.store import array_cache
 
 ARRAYS = {"left": np.arange(6.0).reshape(2, 3), "right": np.array([1, 2], np.int32)}
 
@@ -110,7 +110,7 @@ def test_pickles_are_neither_written_nor_read():
 
 
 def test_the_files_not_used_for_longest_go(folder, monkeypatch):
-    monkeypatch.setattr(cabinet, "LIMIT", 5000)  # three of 1000 bytes and their headers
+    monkeypatch.setattr(array_cache, "LIMIT", 5000)  # three of 1000 bytes and their headers
     folder.mkdir()
     (folder / "mine.npz").write_bytes(bytes(9000))
 
@@ -133,7 +133,7 @@ def test_clocks_that_jump_change_nothing_but_what_goes_first(folder):
 
 
 def test_what_is_larger_than_the_limit_is_not_kept(folder, monkeypatch):
-    monkeypatch.setattr(cabinet, "LIMIT", 47)
+    monkeypatch.setattr(array_cache, "LIMIT", 47)
     store.kept("key", lambda: {"left": ARRAYS["left"]})
     assert not folder.exists()
 
@@ -146,7 +146,7 @@ def test_a_disk_that_cannot_be_written_is_no_error_unless_the_folder_is_the_call
 
 
 def test_a_folder_of_the_callers_has_no_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr(cabinet, "LIMIT", 1)
+    monkeypatch.setattr(array_cache, "LIMIT", 1)
     for build in (built, never):
         np.testing.assert_array_equal(store.kept("key", build, tmp_path)["left"], ARRAYS["left"])
 

@@ -13,7 +13,7 @@ from lumigraph.analysis.saddles import settle
 from lumigraph.analysis.slanted_edge import SlantedEdge, slanted_edge
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, to_numpy
-from lumigraph.core.brief import brief
+from lumigraph.core.short_repr import brief
 from lumigraph.errors import SamplingError
 
 LEAST_CELL = 20.0

@@ -10,8 +10,8 @@ import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import to_numpy
-from lumigraph.core.brief import brief
 from lumigraph.core.raw import RawImage
+from lumigraph.core.short_repr import brief
 from lumigraph.errors import CalibrationError, SamplingWarning
 
 LINEAR = 0.7

@@ -10,8 +10,8 @@ from scipy.stats import t as student
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import to_numpy
-from lumigraph.core.brief import brief
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.short_repr import brief
 from lumigraph.errors import CalibrationError
 
 LEAST_PITCH = 6.0

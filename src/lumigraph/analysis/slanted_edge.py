@@ -9,7 +9,7 @@ from scipy.signal.windows import tukey
 from lumigraph.analysis.transfer import cutoff
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, to_numpy
-from lumigraph.core.brief import brief
+from lumigraph.core.short_repr import brief
 from lumigraph.errors import SamplingError
 
 BIN = 0.25

@@ -25,7 +25,7 @@ class Spots(NamedTuple):
     light: np.ndarray
 
 
-class Tried(NamedTuple):
+class TriedSpots(NamedTuple):
     """Spots that may be unlit or far off: `light` (k, 3), and whether they are `near` their place (k,)."""
 
     indices: np.ndarray
@@ -34,7 +34,7 @@ class Tried(NamedTuple):
     near: np.ndarray
 
 
-def lit(*tried: Tried) -> Spots:
+def lit(*tried: TriedSpots) -> Spots:
     """Spots near their expected place that are bright and have dark edges, of all parts of a picture."""
     indices, centers, light, near = (np.concatenate(column) for column in zip(*tried, strict=True))
     keep = _lit(light) & near
@@ -53,7 +53,7 @@ def followed(picture: np.ndarray, model: Calibration, *, part: float = 1.0) -> S
 
 def measured(
     picture: np.ndarray, model: Calibration, *, part: float = 1.0, rounds: int = _ITERATIONS
-) -> Tried:
+) -> TriedSpots:
     """Centres of the micro-images that lie wholly inside the picture.
 
     The centre is where the phase of the first harmonic over one cell vanishes along y and along x:
@@ -87,14 +87,18 @@ def measured(
     parts = [_centre(around, guess[k : k + step], cell, rounds) for k in range(0, len(guess), step)]
     centers = np.concatenate([p[0] for p in parts]) if parts else guess
     light = np.concatenate([p[1] for p in parts]) if parts else np.zeros((0, 3))
-    return Tried(indices, centers, light, np.all(np.abs(centers - guess) < 0.35 * np.array(cell), axis=-1))
+    return TriedSpots(
+        indices, centers, light, np.all(np.abs(centers - guess) < 0.35 * np.array(cell), axis=-1)
+    )
 
 
-def placed(model: Calibration) -> Tried:
+def placed(model: Calibration) -> TriedSpots:
     """Whole micro-images of a picture at the places where they should be, taken to be lit."""
     margin, (ny, nx) = model.lattice.pitch / 2, model.shape
     indices = model.indices_within((margin, ny - 1 - margin), (margin, nx - 1 - margin))
-    return Tried(indices, model.position(indices), np.ones((len(indices), 3)), np.ones(len(indices), bool))
+    return TriedSpots(
+        indices, model.position(indices), np.ones((len(indices), 3)), np.ones(len(indices), bool)
+    )
 
 
 def traced(
@@ -104,7 +108,7 @@ def traced(
     part: float = 1.0,
     width: float = _FOLLOWED,
     reach: float = 2.5,
-) -> Tried:
+) -> TriedSpots:
     """Centres by the phases of the lattice's first harmonics, each over a few lenslets around.
 
     For raw images: what the scene adds to one micro-image differs from the next, the gaps do not.
@@ -142,7 +146,7 @@ def traced(
         rest = (rest - np.rint(rest)) / 3
         steps = steps + np.stack([rest, sign * rest], -1)
     light = np.stack([np.sum(sizes, 0), *sizes[:2]], -1)
-    return Tried(indices, guess + steps @ lattice.matrix.T, light, np.all(np.abs(steps) < 0.35, axis=-1))
+    return TriedSpots(indices, guess + steps @ lattice.matrix.T, light, np.all(np.abs(steps) < 0.35, axis=-1))
 
 
 def _phases(model: Calibration, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:

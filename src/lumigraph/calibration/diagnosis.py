@@ -48,7 +48,7 @@ class _Lenslets(Protocol):
     def shape(self) -> str | None: ...
 
 
-class Built(Protocol):
+class IntendedCamera(Protocol):
     """Protocol of a camera that `diagnose` compares with: its design."""
 
     @cached_property
@@ -129,7 +129,7 @@ class Diagnosis:
         return "\n".join(texts[fault] for fault in self.faults) or "the camera is as it was meant"
 
 
-def diagnose(white: RawImage | Array, camera: Built) -> Diagnosis:
+def diagnose(white: RawImage | Array, camera: IntendedCamera) -> Diagnosis:
     r"""Faults in the assembly of the camera that took a white image.
 
     The lattice gives rotation, offset and, by its pitch p (1 + b/L), the distance b. A tilted array has
@@ -276,7 +276,7 @@ def _between(lattice: Lattice) -> Lattice:
 class _Blur:
     """Blur of the main lens' image by a lenslet, as a function of the lattice's harmonics."""
 
-    def __init__(self, camera: Built, distances: tuple[float, float], pitch: float) -> None:
+    def __init__(self, camera: IntendedCamera, distances: tuple[float, float], pitch: float) -> None:
         b, separation = distances
         lenslets = camera.lenslets
         u = (np.arange(_PUPIL) + 0.5 - _PUPIL / 2) * 1.02 * lenslets.pitch / _PUPIL

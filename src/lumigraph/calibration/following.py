@@ -19,7 +19,7 @@ _COARSE, _SECOND = 8.0, 1.9  # px of pitch from which orders up to the second ar
 _SHARPEST, _HIGHEST = 0.14, 4.0  # 1/px, and orders, of the lines that gaps have after smoothing
 
 
-class Followed(NamedTuple):
+class FollowedLattice(NamedTuple):
     """Lattice on which a feature repeats.
 
     Parameters
@@ -38,7 +38,7 @@ class Followed(NamedTuple):
     errors: np.ndarray
 
 
-def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> Followed | None:
+def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> FollowedLattice | None:
     """The lattice near another one that a feature (y, x) repeats on, by the lines of its spectrum.
 
     Parameters
@@ -56,23 +56,23 @@ def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> Followed |
         None where its lines do not stand out.
     """
     pitch = math.sqrt(abs(float(np.linalg.det(basis))))
-    lines = _Lines.of(feature)
+    lines = _SpectrumLines.of(feature)
     found = _nearest(lines, np.linalg.inv(basis), is_hex, min(feature.shape) / pitch)
     if found is None or found.evidence < _EVIDENCE:
         return None
     waves, errors = _refined(lines, found, pitch)
-    return Followed(np.linalg.inv(waves), found.evidence, errors)
+    return FollowedLattice(np.linalg.inv(waves), found.evidence, errors)
 
 
 @dataclass(frozen=True, slots=True)
-class _Lines:
+class _SpectrumLines:
     """Amplitudes of a windowed picture's spectrum, between its own bins too; x is not below 0."""
 
     amplitude: np.ndarray
     size: np.ndarray
 
     @classmethod
-    def of(cls, picture: np.ndarray) -> "_Lines":
+    def of(cls, picture: np.ndarray) -> "_SpectrumLines":
         window = [np.hanning(n + 2)[1:-1].astype(np.float32) for n in picture.shape]
         wave = (picture - picture.mean()) * window[0][:, None] * window[1]
         size = [scipy.fft.next_fast_len(3 * n // 2, real=True) for n in picture.shape]
@@ -106,7 +106,7 @@ def _top(before: np.ndarray, here: np.ndarray, after: np.ndarray) -> np.ndarray:
     return np.clip((after - before) / (2 * np.maximum(2 * here - before - after, 1e-6)), -0.6, 0.6)
 
 
-class _Found(NamedTuple):
+class _FoundWaves(NamedTuple):
     """Waves of i and j (2, 2), their height over the surroundings, and those surroundings."""
 
     waves: np.ndarray
@@ -114,7 +114,7 @@ class _Found(NamedTuple):
     surroundings: float
 
 
-def _nearest(lines: _Lines, waves: np.ndarray, is_hex: bool, lenslets: float) -> _Found | None:
+def _nearest(lines: _SpectrumLines, waves: np.ndarray, is_hex: bool, lenslets: float) -> _FoundWaves | None:
     """The lattice around the expected one, stretched and turned, whose first lines are strongest together.
 
     A scene's own lattice may have a few of them, and be far stronger there; gaps have all. What is best at
@@ -135,7 +135,7 @@ def _nearest(lines: _Lines, waves: np.ndarray, is_hex: bool, lenslets: float) ->
     best = np.unravel_index(int(np.argmax(score)), score.shape)
     if around <= 0:
         return None
-    return _Found(tried[:2, best[0], best[1]], float(score[best]) / around, around)
+    return _FoundWaves(tried[:2, best[0], best[1]], float(score[best]) / around, around)
 
 
 def _first(waves: np.ndarray, is_hex: bool) -> np.ndarray:
@@ -157,7 +157,7 @@ def _is_peak(score: np.ndarray) -> np.ndarray:
     return found
 
 
-def _refined(lines: _Lines, found: _Found, pitch: float) -> tuple[np.ndarray, np.ndarray]:
+def _refined(lines: _SpectrumLines, found: _FoundWaves, pitch: float) -> tuple[np.ndarray, np.ndarray]:
     """Waves of i and j (2, 2) by least squares over ever more harmonics, each at its own maximum.
 
     Their standard errors (2, 2), too.

@@ -23,14 +23,14 @@ _BETTER = 0.35  # of what touching discs leave unexplained may overlapping ones 
 _ROUNDS = 4
 
 
-class Discs(NamedTuple):
+class OverlappingDiscs(NamedTuple):
     """Discs that explain a mean micro-image: size over the pitch, and way to their centre (i, j)."""
 
     size: float
     move: np.ndarray
 
 
-def overlapping(cell: np.ndarray, lattice: Lattice) -> Discs | None:
+def overlapping(cell: np.ndarray, lattice: Lattice) -> OverlappingDiscs | None:
     """The discs that the mean micro-image is the sum of, where they overlap so far that gaps turn bright.
 
     The harmonics of discs of all sizes, anywhere in the cell, are compared with those of the mean
@@ -61,10 +61,10 @@ def overlapping(cell: np.ndarray, lattice: Lattice) -> Discs | None:
         return None
     if 1 - likeness[best] > _BETTER * (1 - apart):
         return None
-    return Discs(float(SIZES[best]), places[best])
+    return OverlappingDiscs(float(SIZES[best]), places[best])
 
 
-def separated(picture: np.ndarray, fitted: Fitted, discs: Discs) -> Fitted:
+def separated(picture: np.ndarray, fitted: Fitted, discs: OverlappingDiscs) -> Fitted:
     """Lattice and centres by the mean micro-image alone, from where the discs have their centre."""
     shape, lattice = (picture.shape[0], picture.shape[1]), fitted.lattice
     lattice = lattice.moved(*(lattice.matrix @ discs.move))

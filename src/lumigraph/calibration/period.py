@@ -12,7 +12,7 @@ import numpy as np
 
 from lumigraph.calibration.autocorrelation import SMALLEST_PITCH, Peaks, autocorrelation, reduced, refined
 from lumigraph.calibration.multiples import AROUND, faint, finest, singles, without_beats
-from lumigraph.calibration.spectrum import Gaps, Spectrum, polished
+from lumigraph.calibration.spectrum import Gaps, PowerSpectrum, polished
 from lumigraph.calibration.vectors import Vectors
 from lumigraph.core.lattice import Layout
 from lumigraph.errors import CalibrationError
@@ -85,7 +85,7 @@ def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
             f"where a lattice gives over {_LEAST:g}. Use an evenly lit, focused white image with dark gaps "
             "between at least 3 x 3 micro-images."
         )
-    spectra = [Spectrum(feature) for feature in middles]
+    spectra = [PowerSpectrum(feature) for feature in middles]
     for spectrum in spectra:
         pairs += spectrum.pairs()
     longest = max(middles[0].shape) / _FEWEST
@@ -180,7 +180,7 @@ def _distinct(found: list[Vectors], slack: float) -> list[Vectors]:
     return result
 
 
-def _ranked(spectra: list[Spectrum], found: list[Vectors]) -> list[_Candidate]:
+def _ranked(spectra: list[PowerSpectrum], found: list[Vectors]) -> list[_Candidate]:
     """Candidates by their score over the harmonics that the coarsest good one has in its first orders.
 
     First each is judged by its own first orders. There one that is too fine may look as good as the true
@@ -195,7 +195,7 @@ def _ranked(spectra: list[Spectrum], found: list[Vectors]) -> list[_Candidate]:
     return sorted(ranked, key=lambda candidate: -candidate.score)
 
 
-def _total(spectra: list[Spectrum], vectors: Vectors, pitch: float) -> float:
+def _total(spectra: list[PowerSpectrum], vectors: Vectors, pitch: float) -> float:
     """Score over the first orders of a pitch, and again over more, which only edges that stand still have."""
     limits = [min(0.46, orders / pitch) for orders in _ORDERS]
     return sum(max(0.0, spectrum.score(vectors, limit)) for spectrum in spectra for limit in limits)

@@ -31,7 +31,7 @@ class _Basis(Protocol):
     def layout(self) -> str: ...
 
 
-class Spectrum:
+class PowerSpectrum:
     """Natural logarithm of the power spectrum of a picture (y, x) over its surroundings."""
 
     def __init__(self, picture: np.ndarray) -> None:

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from lumigraph.calibration.centres import Spots, Tried, lit, measured, placed, traced
+from lumigraph.calibration.centres import Spots, TriedSpots, lit, measured, placed, traced
 from lumigraph.calibration.fitting import Fitted, fit, recentred
 from lumigraph.calibration.period import Request
 from lumigraph.calibration.surface import flattened
 from lumigraph.calibration.template import sharpened
-from lumigraph.calibration.whole import Found, How, whole
+from lumigraph.calibration.whole import FoundLattice, How, whole
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.gaps import logarithm, valleys
 from lumigraph.core.lattice import Vector
@@ -32,7 +32,7 @@ _NONE = Spots(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0))
 Area = tuple[slice, slice]
 
 
-def in_tiles(original: np.ndarray, request: Request) -> Found:
+def in_tiles(original: np.ndarray, request: Request) -> FoundLattice:
     """The lattice of a large picture (y, x), and the centres of its micro-images.
 
     The lattice is found in the middle and fitted to ever more of the picture, by a few tiles at a time, so
@@ -100,7 +100,7 @@ def _measured(original: np.ndarray, tiles: list[Area], model: Calibration, how: 
     return lit(*(_tried(original, tile, model, how) for tile in tiles))
 
 
-def _tried(original: np.ndarray, tile: Area, model: Calibration, how: How) -> Tried:
+def _tried(original: np.ndarray, tile: Area, model: Calibration, how: How) -> TriedSpots:
     margin = math.ceil(_MARGIN.get(how, 1.0) * model.lattice.pitch) + 3
     wide = [
         slice(max(0, part.start - margin), min(n, part.stop + margin))
@@ -115,10 +115,10 @@ def _tried(original: np.ndarray, tile: Area, model: Calibration, how: How) -> Tr
     places = model.position(tried.indices)
     first, last = (np.array([getattr(part, end) for part in tile]) for end in ("start", "stop"))
     inside = ((places >= first) & (places < last)).all(-1)
-    return Tried(*(column[inside] for column in tried))
+    return TriedSpots(*(column[inside] for column in tried))
 
 
-def _centres(picture: np.ndarray, model: Calibration, how: How) -> Tried:
+def _centres(picture: np.ndarray, model: Calibration, how: How) -> TriedSpots:
     """Centres on one tile (y, x), found as those of the middle were."""
     if how == "gaps":
         gaps = valleys(picture, 1.0)

@@ -10,7 +10,7 @@ from lumigraph.calibration.borders import border, edges
 from lumigraph.calibration.centres import Spots, followed, measure
 from lumigraph.calibration.fitting import Fitted, fit, recentred
 from lumigraph.calibration.following import followed as light_followed
-from lumigraph.calibration.overlap import Discs, overlapping, separated
+from lumigraph.calibration.overlap import OverlappingDiscs, overlapping, separated
 from lumigraph.calibration.period import Request, lattice_vectors
 from lumigraph.calibration.quality import fill_of, sharpness_of
 from lumigraph.calibration.surface import Surface, flattened
@@ -42,7 +42,7 @@ How = Literal["light", "sharp", "gaps", "logarithm", "discs", "nothing"]
 of the picture, overlapping discs; or nothing, where none was measured."""
 
 
-class Found(NamedTuple):
+class FoundLattice(NamedTuple):
     """A fit, how it was found, and what is to be known of it."""
 
     fitted: Fitted
@@ -61,7 +61,7 @@ class Found(NamedTuple):
         return self.how != "nothing"
 
 
-def whole(original: np.ndarray, request: Request) -> Found:
+def whole(original: np.ndarray, request: Request) -> FoundLattice:
     """The lattice of a picture (y, x), and the centres of its micro-images.
 
     Raises
@@ -83,7 +83,7 @@ def whole(original: np.ndarray, request: Request) -> Found:
     return found._replace(sharpness=sharpness_of(original, found.fitted.model(shape)))
 
 
-def _check_spread(found: Found) -> None:
+def _check_spread(found: FoundLattice) -> None:
     lattice = found.fitted.lattice
     if found.spread > _STEADY * lattice.pitch:
         raise CalibrationError(
@@ -103,16 +103,16 @@ def _by_lines(flat: np.ndarray, fitted: Fitted) -> Fitted:
     return fitted._replace(lattice=replace(lattice, basis=(_vector(row), _vector(column))))
 
 
-def _overlapped(flat: np.ndarray, fitted: Fitted, discs: Discs) -> Found:
+def _overlapped(flat: np.ndarray, fitted: Fitted, discs: OverlappingDiscs) -> FoundLattice:
     """The fit to discs that overlap, with what is to be known of it."""
     note = (
         f"micro-images overlap, they are {discs.size:.2f} pitches wide: their centres were found by the sum "
         "of such discs; close the main lens for less cross-talk"
     )
-    return Found(separated(flat, fitted, discs), "discs", (note,), white=True, fill=discs.size)
+    return FoundLattice(separated(flat, fitted, discs), "discs", (note,), white=True, fill=discs.size)
 
 
-def _followed(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, vectors: Vectors) -> Found:
+def _followed(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, vectors: Vectors) -> FoundLattice:
     """The fit to the light of the micro-images, or to what is between them where that is steadier."""
     above = original - np.float32(original.min())
     found, refused = [], []
@@ -127,7 +127,7 @@ def _followed(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, vectors:
     features = ("gaps", gaps.max() - gaps), ("logarithm", logarithm(original))
     for how, picture in features:
         try:
-            found.append(Found(_outwards(picture, picture, vectors, followed), how))
+            found.append(FoundLattice(_outwards(picture, picture, vectors, followed), how))
         except CalibrationError as error:
             refused.append(error)
     steady = [one for one in found if _agrees(one.fitted, vectors)]
@@ -157,7 +157,7 @@ def _agrees(fitted: Fitted, vectors: Vectors) -> bool:
     return bool(np.abs(steps - np.eye(2)).max() < _AGREED)
 
 
-def _by_gaps(gaps: np.ndarray, original: np.ndarray, vectors: Vectors) -> Found:
+def _by_gaps(gaps: np.ndarray, original: np.ndarray, vectors: Vectors) -> FoundLattice:
     """The lattice of all harmonics of the gaps; none of its micro-images is measured.
 
     They stand between the gaps, or between the edges of the picture where those are clearer.
@@ -173,7 +173,7 @@ def _by_gaps(gaps: np.ndarray, original: np.ndarray, vectors: Vectors) -> Found:
     margin = lattice.pitch / 2
     indices = lattice.indices((margin, shape[0] - 1 - margin), (margin, shape[1] - 1 - margin))
     fitted = Fitted(Spots(indices, lattice.position(indices), np.ones(len(indices))), lattice, None)
-    return Found(fitted, "nothing", (_UNMEASURED,), spread=found.spread)
+    return FoundLattice(fitted, "nothing", (_UNMEASURED,), spread=found.spread)
 
 
 def _share(fitted: Fitted, shape: tuple[int, ...]) -> float:
@@ -214,7 +214,7 @@ def _spread(fitted: Fitted) -> float:
     return float(np.median(np.hypot(*(spots.centers - points).T)))
 
 
-def _by_light(flat: np.ndarray, above: np.ndarray, vectors: Vectors) -> Found:
+def _by_light(flat: np.ndarray, above: np.ndarray, vectors: Vectors) -> FoundLattice:
     """Fit to light, taken again evenly lit, and once more by the mean micro-image if that is steadier."""
     shape = (flat.shape[0], flat.shape[1])
     fitted = _outwards(flat, above, vectors)
@@ -226,8 +226,8 @@ def _by_light(flat: np.ndarray, above: np.ndarray, vectors: Vectors) -> Found:
             spots = sharpened(even, better.spots, better.model(shape))
             better = fit(spots, better.model(shape))
         if _spread(better) < _spread(fitted) and len(better.spots.indices) > 0.95 * len(fitted.spots.indices):
-            return Found(better, "sharp")
-    return Found(fitted, "light")
+            return FoundLattice(better, "sharp")
+    return FoundLattice(fitted, "light")
 
 
 def _outwards(

@@ -15,9 +15,9 @@ from lumigraph.errors import FormatError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from lumigraph.adaptive import Wavefront
     from lumigraph.core.prepared import PreparedImage
     from lumigraph.instruments import Instrument, LightFieldMicroscope
+    from lumigraph.studies.adaptive import Wavefront
 
 TERMS = "5-11"
 """Default terms: up to coma, trefoil and spherical aberration."""
@@ -88,8 +88,8 @@ class Adaptive:
         """Wavefront, if requested; `estimate` refuses cameras that have none."""
         if not self.adaptive:
             return None
-        from lumigraph.adaptive import estimate
         from lumigraph.instruments import LensletCamera
+        from lumigraph.studies.adaptive import estimate
 
         shown(0.0)
         focused = isinstance(camera, LensletCamera)
@@ -183,7 +183,7 @@ class Modes:
         import numpy as np
 
         from lumigraph import plots
-        from lumigraph.adaptive import wavefront_map
+        from lumigraph.studies.adaptive import wavefront_map
 
         phase = wavefront_map(self.coefficients)
         most = float(np.nanmax(np.abs(phase))) or 1.0

@@ -13,7 +13,7 @@ from lumigraph.cli import files, standing
 from lumigraph.cli.console import line, progress
 from lumigraph.cli.frames import KINDS, Frames, items_of, runs
 from lumigraph.cli.options import COMMAND, COMMON, Common, Output
-from lumigraph.cli.standing import Standing
+from lumigraph.cli.standing import StatusPage
 from lumigraph.core import memory
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
@@ -35,7 +35,7 @@ _SHOWN = 5
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Hands:
+class WorkerOptions:
     """Workers that do the job.
 
     Parameters
@@ -43,7 +43,8 @@ class Hands:
     workers
         Processes on this machine; one for each processor if left out.
     scheduler
-        Address of a running dask cluster instead, such as tcp://10.0.0.1:8786.
+        Address of a running dask cluster instead, such as tcp://10.0.0.1:8786, or tls:// with dask's own
+        configuration of certificates. A cluster without them trusts everybody who reaches its port.
     slurm
         Submit to SLURM instead, as an array of so many jobs.
     sbatch
@@ -109,7 +110,7 @@ def batch(
     output: Output | None = None,
     page: str | None = None,
     run: Annotated[int, Parameter(allow_leading_hyphen=True)] = RUN,
-    hands: Hands = Hands(),
+    hands: WorkerOptions = WorkerOptions(),
     common: Common = COMMON,
 ) -> Result:
     """Run another verb for each of many frames: pages of a stack, or files by a pattern.
@@ -164,8 +165,8 @@ def batch(
     with progress("batch") as shown, kept(output):
         line(f"how it stands: {cluster.page(output)}")
         found = cluster.batch(
-            work, items, output, what=what, workers=workers, part=part,
-            progress=Standing(output, shown),
+            work, items, output, what=what, inputs=work.inputs(first), workers=workers, part=part,
+            progress=StatusPage(output, shown),
             estimated=lambda needed: line(str(needed)),
         )  # fmt: skip
     if kind.is_table:

@@ -11,14 +11,14 @@ from cyclopts import Parameter
 from lumigraph.cli.console import progress
 from lumigraph.cli.files import check_output
 from lumigraph.cli.options import Output, length
-from lumigraph.cli.origin import NO_ORIGIN, Origin
-from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.cli.origin import NO_ORIGIN, RawOptions
+from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Figure, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
     from lumigraph.core.checks import Pair
-    from lumigraph.metric import Board, Corners, Measured, Nominal, Plan
+    from lumigraph.metrology import Board, Corners, Measured, Nominal, Plan
 
 
 _ARRAY = ("lenslet_pitch", "micro_images")
@@ -27,7 +27,7 @@ _ARRAY = ("lenslet_pitch", "micro_images")
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Known:
+class KnownCamera:
     """Camera properties that are known beforehand.
 
     Parameters
@@ -71,7 +71,7 @@ class Known:
 
     def nominal(self, given: dict[str, Any]) -> "Nominal":
         """Nominal camera: options come before values from files."""
-        from lumigraph.metric import Nominal
+        from lumigraph.metrology import Nominal
 
         apart, known = self._apart(given), self._lengths(given)
         nominal = self._sure(Nominal(**known))
@@ -131,13 +131,13 @@ def board(
     /,
     *,
     board: Annotated[str | None, Parameter(name="--board")] = None,
-    origin: Origin = NO_ORIGIN,
-    known: Known = Known(),
+    origin: RawOptions = NO_ORIGIN,
+    known: KnownCamera = KnownCamera(),
     views: Annotated[bool, Parameter(negative="")] = False,
     table: Path | None = None,
     pictures: Annotated[int, Parameter(allow_leading_hyphen=True)] = 8,
     output: Output | None = None,
-    common: Reported = REPORTED,
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Measure a plenoptic camera by a board of known size: its lengths, with their uncertainty.
 
@@ -177,26 +177,26 @@ def board(
     pictures
         Number of pictures to plan.
     output
-        File for the camera (.json), which lumigraph.metric.load reads.
+        File for the camera (.json), which lumigraph.metrology.load reads.
     """
     common.check()
     for path, endings in ((output, (".json",)), (table, (".csv",))):
         if path is not None:
             check_output(path, endings)
-    from lumigraph import metric
+    from lumigraph import metrology
 
-    target = None if board is None else metric.Board.from_text(board)
+    target = None if board is None else metrology.Board.from_text(board)
     if sources == (Path("plan"),):
         return _planned(origin, target, known, pictures)
     seen, target, given, told = _read(
         sources, target, origin, views, length("--wavelength", known.wavelength)
     )
-    found = metric.board(seen, target, known.nominal(given))
+    found = metrology.board(seen, target, known.nominal(given))
     written = [path for path in (output, table) if path is not None]
     if output is not None:
-        metric.save(found, output)
+        metrology.save(found, output)
     if table is not None:
-        metric.save_corners(seen, table)
+        metrology.save_corners(seen, table)
     return Result(
         "Board",
         f"A camera measured by {len(seen)} places of corners on {len(seen.frames)} pictures.",
@@ -210,38 +210,42 @@ def board(
 
 
 def _read(
-    sources: tuple[Path, ...], board: "Board | None", origin: Origin, views: bool, wavelength: float | None
+    sources: tuple[Path, ...],
+    board: "Board | None",
+    origin: RawOptions,
+    views: bool,
+    wavelength: float | None,
 ) -> "tuple[Corners, Board, dict[str, Any], tuple[str, ...]]":
     """Corners, their board, what the files say of the camera, and what was done to raw images."""
-    from lumigraph import metric
+    from lumigraph import metrology
 
     first, alone = sources[0], len(sources) == 1
     if alone and first.is_dir():
-        seen, told, known = metric.load_compote(first)
+        seen, told, known = metrology.load_compote(first)
         given = {name: getattr(known, name) for name in ("focal_length", "pixel_pitch", "shape")}
         return seen, board or told, given, ()
     if board is None:
         raise FormatError("give --board, such as '9 x 5 corners, 10 mm'.")
     if alone and first.suffix.lower() == ".csv":
-        return metric.load_corners(first), board, {}, ()
+        return metrology.load_corners(first), board, {}, ()
     return _found(sources, board, origin, views, wavelength)
 
 
 def _found(
-    sources: tuple[Path, ...], board: "Board", origin: Origin, views: bool, wavelength: float | None
+    sources: tuple[Path, ...], board: "Board", origin: RawOptions, views: bool, wavelength: float | None
 ) -> "tuple[Corners, Board, dict[str, Any], tuple[str, ...]]":
     """Corners found in raw images, with the board, known values and notes."""
-    from lumigraph import metric
+    from lumigraph import metrology
     from lumigraph.instruments import LensletCamera
     from lumigraph.instruments.capabilities import Rendered, WithMainLens
-    from lumigraph.metric.spill import GREEN
+    from lumigraph.metrology.boards.spill import GREEN
 
     camera = origin.described("decode" if views else None)
     in_views = views or (camera is not None and not isinstance(camera, Rendered))
     ready = [origin.prepared(origin.read(path)) for path in sources]
     with progress("board") as tell:
         light = wavelength or (GREEN if camera is None else camera.wavelength)
-        seen = metric.find_corners(ready, board, in_views=in_views, wavelength=light, progress=tell)
+        seen = metrology.find_corners(ready, board, in_views=in_views, wavelength=light, progress=tell)
     told = {"shape": ready[0].shape, "pixel_pitch": ready[0].pixel_pitch}
     if ready[0].calibration is not None and (origin.white or origin.calibration):
         told["micro_images"] = ready[0].calibration.lattice.pitch
@@ -253,22 +257,22 @@ def _found(
     return seen, board, known, ready[0].notes
 
 
-def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int) -> Result:
+def _planned(origin: RawOptions, board: "Board | None", known: KnownCamera, pictures: int) -> Result:
     """Plan of the pictures to take."""
-    from lumigraph import metric
+    from lumigraph import metrology
     from lumigraph.instruments import LensletCamera
     from lumigraph.instruments.capabilities import Rendered
 
     camera = origin.described()
     if board is None or not isinstance(camera, LensletCamera):
         raise FormatError("a plan needs --camera, a file of a plenoptic camera, and --board.")
-    ideal = metric.MetricCamera.of(camera)
+    ideal = metrology.MetricCamera.of(camera)
     told = {name: getattr(ideal, name) for name in ("focal_length", "pixel_pitch")}
     calibration = replace(camera.calibration, fill=camera.micro_image_fill)
     told |= {"lenslet_pitch": camera.lenslets.pitch, "micro_images": calibration.lattice.pitch}
     nominal = known.nominal(told | {"shape": camera.sensor.shape})
     in_views = not isinstance(camera, Rendered)
-    found = metric.plan(ideal, calibration, board, nominal, pictures=pictures, in_views=in_views)
+    found = metrology.plan(ideal, calibration, board, nominal, pictures=pictures, in_views=in_views)
     table = found.table()
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in table]
@@ -281,7 +285,7 @@ def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int)
 
 def _enough(found: "Plan") -> str:
     """Number of pictures after which lengths and distances are known to 1 %, and their final errors."""
-    from lumigraph.metric.calibration import WELL
+    from lumigraph.metrology.boards.calibration import WELL
 
     names, counts = ("f", "L", "b", "distances"), found.enough(WELL)
     well = [f"{name} from picture {n} on" for name, n in zip(names, counts, strict=True) if n is not None]

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, above_zero, length, pixels
-from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import CalibrationError
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Bench:
+class CameraOptions:
     """Camera properties that are known beforehand.
 
     Parameters
@@ -78,8 +78,8 @@ def calibrate(
     exact: Annotated[bool, Parameter(negative=())] = False,
     explain: Annotated[bool, Parameter(negative=())] = False,
     overlay: Path | None = None,
-    bench: Bench = Bench(),
-    common: Reported = REPORTED,
+    bench: CameraOptions = CameraOptions(),
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Find the micro-images on a white image, or on a raw image alone, and write their lattice.
 
@@ -147,7 +147,7 @@ def calibrate(
     )  # fmt: skip
 
 
-def _advice(white: "RawImage", bench: Bench) -> Any:
+def _advice(white: "RawImage", bench: CameraOptions) -> Any:
     """Adjustments to make on the bench."""
     from lumigraph.calibration import diagnose
     from lumigraph.instruments import load_camera

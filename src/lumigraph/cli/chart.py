@@ -44,11 +44,11 @@ def chart(
     output
         Page of true size (.pdf, .svg), or a picture of it (.png).
     """
-    from lumigraph import metric
+    from lumigraph import metrology
     from lumigraph.units import parse
 
     files.check_output(output, files.FIGURES)
-    figure = metric.chart(what, paper, turn=parse(turn, "angle"))
+    figure = metrology.chart(what, paper, turn=parse(turn, "angle"))
     files.save_figure(figure, output)
     wide, high = (float(side) * 25.4e-3 for side in figure.get_size_inches())
     return Result(

@@ -11,7 +11,7 @@ from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
     from lumigraph.core.calibration import Calibration
-    from lumigraph.metric import MetricCamera
+    from lumigraph.metrology import MetricCamera
 
 _ENDINGS = {"compote": (".json",), "lftoolbox": (".json",), None: (".toml", ".xml")}
 
@@ -71,7 +71,7 @@ def convert(
         File to write.
     """
     check_output(output, _ENDINGS[to])
-    from lumigraph import io, metric
+    from lumigraph import io, metrology
 
     camera, found = _read(source, calibration, shape, length("--pixel-pitch", pixel_pitch), view_pitch)
     notes = found.notes
@@ -81,7 +81,7 @@ def convert(
         raise FormatError(f"{source} holds no lengths of a camera. Give one that `lumigraph board` measured.")
     else:
         far = length("--distance", distance)
-        left = metric.save_camera(camera, found, output, to, distance=far, f_number=f_number, views=views)
+        left = metrology.save_camera(camera, found, output, to, distance=far, f_number=f_number, views=views)
         notes = (*notes, *left)
     return Result(
         "Converted", "A camera in the format of another program.", camera or found, (_headline(found),),
@@ -97,14 +97,14 @@ def _read(
     views: float | None,
 ) -> "tuple[MetricCamera | None, Calibration]":
     """Lengths, where the file has them, and micro-images."""
-    from lumigraph import io, metric
+    from lumigraph import io, metrology
     from lumigraph.core.calibration import Calibration
 
     if source.suffix.lower() != ".json":
         return None, io.open(source, Calibration, shape=shape)
-    if not metric.is_measured(source):
-        return metric.load_camera(source, pixel_pitch=pixel, view_pitch=views)
-    camera = metric.load(source).camera
+    if not metrology.is_measured(source):
+        return metrology.load_camera(source, pixel_pitch=pixel, view_pitch=views)
+    camera = metrology.load(source).camera
     if calibration is None:
         raise FormatError(
             f"{source} has no lattice of micro-images. Give --calibration, of `lumigraph calibrate`."

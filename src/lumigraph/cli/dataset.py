@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.batch import Hands, kept
+from lumigraph.cli.batch import WorkerOptions, kept
 from lumigraph.cli.console import line, progress
 from lumigraph.cli.deconvolve_options import depths
 from lumigraph.cli.options import COMMAND, COMMON, Common, Output
-from lumigraph.cli.standing import Standing
+from lumigraph.cli.standing import StatusPage
+from lumigraph.cli.sweep import anywhere
 from lumigraph.cli.tolerance import Tolerances, given_tolerances
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
@@ -20,7 +21,7 @@ from lumigraph.errors import FormatError, LumigraphError
 if TYPE_CHECKING:
     from lumigraph.instruments import Instrument
 
-ALONE = Hands()
+ALONE = WorkerOptions()
 
 MOST = 1_000_000
 """Samples."""
@@ -41,7 +42,7 @@ def dataset(
     seed: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0,
     accuracy: Annotated[float, Parameter(allow_leading_hyphen=True)] = 1e-2,
     volume: Annotated[bool, Parameter(negative="")] = False,
-    hands: Hands = ALONE,
+    hands: WorkerOptions = ALONE,
     common: Common = COMMON,
 ) -> Result:
     """Simulate raw images of drawn scenes with their truth, to train and test methods on.
@@ -97,7 +98,7 @@ def dataset(
         raise FormatError(f"--count is {count} but must be from 1 to {MOST}.")
     if seed < 0:
         raise FormatError(f"--seed is {seed} but must be at least 0.")
-    given, varied = load_camera(camera), dict(map(values, vary or []))
+    given, varied = load_camera(anywhere(camera)), dict(map(values, vary or []))
     given.check_accuracy(accuracy)
     meant = [changed(given, one) for one in combinations(varied)]
     taking = tuple(one.to_toml() for one in _as_built(meant, tolerance, cameras, seed))
@@ -113,7 +114,7 @@ def dataset(
     with progress("dataset") as shown, kept(output):
         made = make(
             work, count, output, workers=hands.cluster(), part=hands.share(),
-            progress=Standing(output, shown), estimated=lambda needed: line(str(needed)),
+            progress=StatusPage(output, shown), estimated=lambda needed: line(str(needed)),
             command=shlex.join(["lumigraph", *COMMAND.get()]),
         )  # fmt: skip
     if made.failures:
@@ -135,7 +136,7 @@ def _as_built(
         )
     if not count:
         return meant
-    from lumigraph.tolerance import making
+    from lumigraph.studies.tolerance import making
 
     given = given_tolerances(tolerance or [])
     found = [

@@ -16,7 +16,7 @@ from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
     from lumigraph.core.progress import Progress
-    from lumigraph.metric import Charts, Entry, Plane, Sheet
+    from lumigraph.metrology import ChartPlane, Charts, Sheet, SheetEntry
 
 _WIDTH = 320  # px of the page that a picture takes
 _MOST = 3  # cameras side by side
@@ -79,14 +79,14 @@ def datasheet(
         raise FormatError("--charts takes the pictures of one camera file. Give that alone.")
     planes = None if not depths else [length("--depths", one) or 0.0 for one in depths]
     sheets, written = [], []
-    from lumigraph import metric
+    from lumigraph import metrology
 
     for source in sources:
         with progress(f"data sheet of {source}") as tell:
             found = _charts(source, camera, (planes, accuracy, exposures), seed, tell)
             if charts is not None:
-                written += metric.save_charts(found, charts)
-            sheets.append(metric.datasheet(found))
+                written += metrology.save_charts(found, charts)
+            sheets.append(metrology.datasheet(found))
     result = _result(_distinct(sheets), written)
     if output is None:
         return result
@@ -103,16 +103,16 @@ def _charts(
 ) -> "Charts":
     import numpy as np
 
-    from lumigraph import metric
+    from lumigraph import metrology
     from lumigraph.instruments import load_camera
-    from lumigraph.metric.charts import check_camera
+    from lumigraph.metrology.datasheet.charts import check_camera
 
     if Path(source).is_dir():
-        return metric.read_charts(source, None if camera is None else check_camera(load_camera(camera)))
+        return metrology.read_charts(source, None if camera is None else check_camera(load_camera(camera)))
     rng, name = np.random.default_rng(seed), Path(source).stem
     one = check_camera(load_camera(source))
     depths, accuracy, exposures = how
-    return metric.simulate_charts(
+    return metrology.simulate_charts(
         one, depths, name=name, rng=rng, exposures=exposures, accuracy=accuracy, progress=tell
     )
 
@@ -189,7 +189,7 @@ def _table(sheets: "list[Sheet]", section: str) -> list[list[str]]:
     return rows
 
 
-def _how(sheets: "list[Sheet]", found: "Sequence[Entry | None]") -> str:
+def _how(sheets: "list[Sheet]", found: "Sequence[SheetEntry | None]") -> str:
     """Method by which a quantity was measured, camera by camera if methods differ."""
     told = {sheet.name: one.how for sheet, one in zip(sheets, found, strict=True) if one is not None}
     if len(told) == 1 or len(set(told.values())) == 1:
@@ -203,7 +203,7 @@ _COLUMNS = (
 )  # fmt: skip
 
 
-def _planes(planes: "Sequence[Plane]") -> list[list[str]]:
+def _planes(planes: "Sequence[ChartPlane]") -> list[list[str]]:
     """Measures down, distances of the charts across."""
     rows = [["chart at", *(plane.label for plane in planes)]]
     for name in _COLUMNS:

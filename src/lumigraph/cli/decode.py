@@ -9,8 +9,8 @@ from cyclopts import Parameter
 from lumigraph.cli import files, pictures
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output
-from lumigraph.cli.origin import NO_ORIGIN, Origin, notes_of
-from lumigraph.cli.reporting import REPORTED, Reported, enlarged
+from lumigraph.cli.origin import NO_ORIGIN, RawOptions, notes_of
+from lumigraph.cli.reporting import REPORTED, ReportOptions, enlarged
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
@@ -24,7 +24,7 @@ _MOST_SAMPLES = 64
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Sampling:
+class SamplingOptions:
     """Sampling of the views.
 
     Parameters
@@ -62,10 +62,10 @@ def decode(
     /,
     *,
     output: Output,
-    origin: Origin = NO_ORIGIN,
+    origin: RawOptions = NO_ORIGIN,
     devignette: Annotated[bool | None, Parameter(negative="--no-devignette")] = None,
-    sampling: Sampling = Sampling(),
-    common: Reported = REPORTED,
+    sampling: SamplingOptions = SamplingOptions(),
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Decode a raw image of a plenoptic camera 1.0 into views.
 

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 from lumigraph.cli import files
 from lumigraph.cli.adaptive import ADAPTIVE, Adaptive, with_wavefront
 from lumigraph.cli.console import progress
-from lumigraph.cli.deconvolve_options import SEEN, WANTED, WAY, Seen, Wanted, Way
+from lumigraph.cli.deconvolve_options import SEEN, WANTED, WAY, MethodOptions, ObjectOptions, RawImageOptions
 from lumigraph.cli.deconvolved import reached, result
 from lumigraph.cli.options import Output
-from lumigraph.cli.reporting import REPORTED, Reported
-from lumigraph.cli.several import SEVERAL, Several, Shifts, with_shifts
+from lumigraph.cli.reporting import REPORTED, ReportOptions
+from lumigraph.cli.several import SEVERAL, SeveralOptions, Shifts, with_shifts
 from lumigraph.core.progress import Progress, Stage, silent, within
 from lumigraph.core.result import Result
 from lumigraph.errors import FormatError, LumigraphError
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from lumigraph.core.linear import Linear
     from lumigraph.core.prepared import PreparedImage
     from lumigraph.core.raw import RawImage
-    from lumigraph.deconvolution import Deconvolver, Step
+    from lumigraph.deconvolution import Deconvolver, RunStep
     from lumigraph.instruments import Instrument
 
 
@@ -38,12 +38,12 @@ def deconvolve(
     *others: Path,
     output: Output,
     camera: str,
-    seen: Seen = SEEN,
-    wanted: Wanted = WANTED,
-    way: Way = WAY,
-    several: Several = SEVERAL,
+    seen: RawImageOptions = SEEN,
+    wanted: ObjectOptions = WANTED,
+    way: MethodOptions = WAY,
+    several: SeveralOptions = SEVERAL,
     bent: Adaptive = ADAPTIVE,
-    common: Reported = REPORTED,
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Reconstruct what was in front of a microscope or a camera from raw images, or a time series.
 
@@ -112,7 +112,7 @@ def deconvolve(
 
 
 def _pages(
-    frames: "list[tuple[str, RawImage]]", first: Any, seen: Seen, camera: "Instrument"
+    frames: "list[tuple[str, RawImage]]", first: Any, seen: RawImageOptions, camera: "Instrument"
 ) -> "Iterator[tuple[str, Any]]":
     """Pages, each judged by its own pixels when its turn comes; the first one is."""
     yield frames[0][0], first
@@ -121,7 +121,10 @@ def _pages(
 
 
 def _check(
-    options: "tuple[Reported, Seen, Way]", wanted: Wanted, more: tuple[Several, Adaptive], count: int
+    options: "tuple[ReportOptions, RawImageOptions, MethodOptions]",
+    wanted: ObjectOptions,
+    more: tuple[SeveralOptions, Adaptive],
+    count: int,
 ) -> None:
     """Refuse a line that contradicts itself, before anything is read."""
     for one in options:
@@ -239,7 +242,7 @@ class _Task:
     """Settings that the pages of a series share."""
 
     engine: "Deconvolver"
-    way: Way
+    way: MethodOptions
     output: Path
     lights: tuple[float, ...] | None = None
 
@@ -253,14 +256,14 @@ class _Task:
         return found, found[0].gain
 
     def run(
-        self, pages: "Iterator[tuple[str, Any]]", followed: "tuple[list[Step], Progress]"
+        self, pages: "Iterator[tuple[str, Any]]", followed: "tuple[list[RunStep], Progress]"
     ) -> "Iterator[tuple[str, Any, Any]]":
         """Each page's name, the page and its object; the steps of one are kept, and shown."""
         from lumigraph import deconvolution, io
 
         (steps, shown), name, gain = followed, "", None
 
-        def follow(step: "Step") -> None:
+        def follow(step: "RunStep") -> None:
             steps.append(step)
             what = f"{name[1:]} {reached(step, gain)}".strip()
             shown(Stage(step.iteration / step.iterations, what))
@@ -280,7 +283,7 @@ class _Task:
             raise KeyboardInterrupt(f"{stopped.iterations} iterations are in {kept}.") from None
 
 
-def _check_gain(way: Way, gain: float | None) -> None:
+def _check_gain(way: MethodOptions, gain: float | None) -> None:
     if way.deviance is not None and gain is None:
         raise FormatError(
             "--deviance counts electrons, but the raw image does not say how many make a value. "
@@ -293,8 +296,8 @@ class _Asked:
     """Settings of a deconvolution; equal if the same result follows from them."""
 
     described: str
-    wanted: Wanted
-    way: Way
+    wanted: ObjectOptions
+    way: MethodOptions
     lattice: str
     shifts: Shifts | None
     camera: "Instrument" = field(compare=False)
@@ -303,9 +306,14 @@ class _Asked:
 
     @classmethod
     def of(
-        cls, camera: "Instrument", wanted: Wanted, way: Way, calibration: "Calibration | None",
-        progress: Progress, shifts: Shifts | None = None,
-    ) -> "_Asked":  # fmt: skip
+        cls,
+        camera: "Instrument",
+        wanted: ObjectOptions,
+        way: MethodOptions,
+        calibration: "Calibration | None",
+        progress: Progress,
+        shifts: Shifts | None = None,
+    ) -> "_Asked":
         """Settings, compared by the content of the camera's description and of the calibration."""
         from lumigraph.deconvolution.checkpoint import fingerprint
 
@@ -343,7 +351,7 @@ def operator_of(
     calibration: "Calibration | None", progress: Progress = silent, shifts: Shifts | None = None,
 ) -> "Linear":  # fmt: skip
     """Operator of the camera for planes [m], or for an object that was moved by shifts [m]."""
-    from lumigraph.instruments.joint import joint_operator_for
+    from lumigraph.metrology.scanning.joint import joint_operator_for
 
     if camera.calibration is None and samples is not None:
         raise FormatError(f"a {camera.noun} camera has no lenslets to count --samples by. Leave it out.")

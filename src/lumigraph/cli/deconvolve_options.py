@@ -24,7 +24,7 @@ MOST_DEPTHS = 1000
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Seen:
+class RawImageOptions:
     """Raw image and its corrections.
 
     Parameters
@@ -87,7 +87,7 @@ class Seen:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Wanted:
+class ObjectOptions:
     """Sampling of the object.
 
     Parameters
@@ -111,7 +111,7 @@ class Wanted:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Way:
+class MethodOptions:
     """Method of the deconvolution.
 
     Parameters
@@ -203,4 +203,4 @@ def depths(option: str, text: str) -> tuple[float, ...]:
     return tuple(0.0 if abs(dz) < 1e-9 * step else dz for dz in planes)  # no 1.7e-21 for the focused plane
 
 
-SEEN, WANTED, WAY = Seen(), Wanted(), Way()
+SEEN, WANTED, WAY = RawImageOptions(), ObjectOptions(), MethodOptions()

@@ -9,17 +9,17 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from lumigraph.core.prepared import PreparedImage
-    from lumigraph.deconvolution import Step
+    from lumigraph.deconvolution import RunStep
 
 
-def reached(step: "Step", gain: float | None) -> str:
+def reached(step: "RunStep", gain: float | None) -> str:
     """Quality of the fit: deviance if electrons are known, else the change by the last step."""
     if gain is None:
         return f"the last step changed {100 * step.change:.2g} %"
     return f"deviance {step.deviance:.4g} per pixel"
 
 
-def result(found: Any, raw: "PreparedImage", steps: "list[Step]", written: tuple[Path, ...]) -> Result:
+def result(found: Any, raw: "PreparedImage", steps: "list[RunStep]", written: tuple[Path, ...]) -> Result:
     """The object in numbers and pictures, beside its raw image, the first of several."""
     from lumigraph.core.volume import Volume
     from lumigraph.deconvolution import Exposure
@@ -45,7 +45,7 @@ def result(found: Any, raw: "PreparedImage", steps: "list[Step]", written: tuple
     )  # fmt: skip
 
 
-def _figures(found: Any, raw: "PreparedImage", steps: "list[Step]") -> "Iterator[Figure]":
+def _figures(found: Any, raw: "PreparedImage", steps: "list[RunStep]") -> "Iterator[Figure]":
     from lumigraph import plots
     from lumigraph.core.volume import Volume
 

@@ -10,9 +10,9 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, above_zero, length
-from lumigraph.cli.origin import NO_ORIGIN, Origin
+from lumigraph.cli.origin import NO_ORIGIN, RawOptions
 from lumigraph.cli.refocus import range_of
-from lumigraph.cli.reporting import REPORTED, Reported, enlarged
+from lumigraph.cli.reporting import REPORTED, ReportOptions, enlarged
 from lumigraph.core.progress import Progress, silent
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
@@ -35,7 +35,7 @@ _OF_RAW = ("dense", "correlation")
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Search:
+class SearchOptions:
     """Method of measuring depth.
 
     Parameters
@@ -148,7 +148,7 @@ class _Measured:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Lengths:
+class LengthOptions:
     """Lengths that convert a map to metres, if there is no camera file.
 
     Parameters
@@ -187,10 +187,10 @@ def depth(
     output: Output,
     confidence: Path | None = None,
     lowest: float = 0.5,
-    origin: Origin = NO_ORIGIN,
-    search: Search = Search(),
-    lengths: Lengths = Lengths(),
-    common: Reported = REPORTED,
+    origin: RawOptions = NO_ORIGIN,
+    search: SearchOptions = SearchOptions(),
+    lengths: LengthOptions = LengthOptions(),
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Measure the depth of what views or a raw image show.
 
@@ -240,7 +240,7 @@ def depth(
     )
 
 
-def _measured(source: Path, how: tuple[Origin, Search], shown: Progress) -> _Measured:
+def _measured(source: Path, how: tuple[RawOptions, SearchOptions], shown: Progress) -> _Measured:
     from lumigraph import preparation
     from lumigraph.core.lightfield import LightField
     from lumigraph.instruments.capabilities import Rendered
@@ -271,7 +271,7 @@ def _is_focused(camera: "Instrument | None", calibration: "Calibration") -> bool
     return calibration.lattice.kinds > 1 if camera is None else isinstance(camera, Rendered)
 
 
-def _corrected(found: "DepthMap", views: Any, how: tuple[Any, Search], shown: Progress) -> "DepthMap":
+def _corrected(found: "DepthMap", views: Any, how: tuple[Any, SearchOptions], shown: Progress) -> "DepthMap":
     """Refocus factors without the bias of diffraction, measured on planes of known depth."""
     from lumigraph import depth as verbs
 
@@ -285,7 +285,7 @@ def _corrected(found: "DepthMap", views: Any, how: tuple[Any, Search], shown: Pr
 
 
 def _in_metres(
-    found: "DepthMap", grounds: Any, lengths: Lengths, camera: "Instrument | None"
+    found: "DepthMap", grounds: Any, lengths: LengthOptions, camera: "Instrument | None"
 ) -> "tuple[DepthMap, float | None]":
     """The map in metres where the lens is known, and the distance of the plane in focus."""
     from lumigraph import depth as verbs
@@ -297,7 +297,7 @@ def _in_metres(
     lens = lengths.known(camera, grounds if isinstance(grounds, LightField) else None)
     if lens is None:
         return found, None
-    if isinstance(camera, WithDepth) and lengths == Lengths():
+    if isinstance(camera, WithDepth) and lengths == LengthOptions():
         return camera.in_metres(found, grounds), camera.object_to_pupil()
     return verbs.metric(found, grounds, focal_length=lens[0], object_distance=lens[1]), lens[1]
 

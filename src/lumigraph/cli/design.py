@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.reporting import REPORTED, Reported, tell
+from lumigraph.cli.reporting import REPORTED, ReportOptions, tell
 from lumigraph.cli.serving import Port, announce, check_port
 from lumigraph.core.result import Figure, Result
 from lumigraph.errors import FormatError
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Web:
+class DesignerOptions:
     """The designer's page.
 
     Parameters
@@ -45,7 +45,12 @@ class Web:
 
 
 def design(
-    camera: str, /, *, plot: Path | None = None, page: Web = Web(), common: Reported = REPORTED
+    camera: str,
+    /,
+    *,
+    plot: Path | None = None,
+    page: DesignerOptions = DesignerOptions(),
+    common: ReportOptions = REPORTED,
 ) -> Result | None:
     """Print everything that follows from a camera's description, with its equations.
 
@@ -76,7 +81,8 @@ def design(
         files.save_figure(plots.layout(described), plot)
     found = Result(
         "Design", f"{table.title[0].upper()}{table.title[1:]}, and all that follows in closed form.",
-        described, (str(table),), figures=lambda: _figures(described, table), extra=table.as_dict(),
+        described, tuple(str(table).splitlines()), figures=lambda: _figures(described, table),
+        extra=table.as_dict(),
         written=() if plot is None else (plot,),
     )  # fmt: skip
     if not page.web:

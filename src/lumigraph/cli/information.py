@@ -7,11 +7,11 @@ from cyclopts import Parameter
 
 from lumigraph.cli.console import progress
 from lumigraph.cli.deconvolve_options import depths as planes_of
-from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Figure, Quantity, Result
 
 if TYPE_CHECKING:
-    from lumigraph.information import Bounds
+    from lumigraph.studies.information import Bounds
 
 Depths = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
@@ -24,7 +24,7 @@ def information(
     photons: Annotated[float, Parameter(allow_leading_hyphen=True)] = 10_000.0,
     background: Annotated[float, Parameter(allow_leading_hyphen=True)] = 0.0,
     places: Annotated[int, Parameter(allow_leading_hyphen=True)] = 4,
-    common: Reported = REPORTED,
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Print how well a point of light can be placed by one raw image: Cramér-Rao bounds over a volume.
 
@@ -48,8 +48,8 @@ def information(
     places
         Places at each depth, over the cell of a lenslet; without lenslets before the focused plane, a pixel.
     """
-    from lumigraph.information import Light, bounds
     from lumigraph.instruments import load_camera
+    from lumigraph.studies.information import Light, bounds
 
     common.check()
     planes = planes_of("--depths", depths)

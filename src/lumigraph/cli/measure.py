@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from cyclopts import Parameter
 
 from lumigraph.cli.options import above_zero, length, region
-from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Looked:
+class RegionOptions:
     """Part of the pictures to measure.
 
     Parameters
@@ -52,7 +52,7 @@ class Looked:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Dark:
+class DarkOptions:
     """Dark pictures and range of a sensor, for its flats.
 
     Parameters
@@ -75,9 +75,9 @@ def measure(
     pictures: list[Path],
     /,
     *,
-    looked: Looked = Looked(),
-    dark: Dark = Dark(),
-    common: Reported = REPORTED,
+    looked: RegionOptions = RegionOptions(),
+    dark: DarkOptions = DarkOptions(),
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Measure how sharp or how noisy pictures are.
 
@@ -97,7 +97,7 @@ def measure(
         Picture files, or stacks: one edge, one point, one or two even pictures, or pairs of flats.
     """
     common.check()
-    if what != "sensor" and dark != Dark():
+    if what != "sensor" and dark != DarkOptions():
         raise FormatError(f"--dark, --exposure-time and --highest are for 'sensor', not for {what!r}.")
     from lumigraph.preparation import read_pages
 
@@ -236,7 +236,7 @@ def _noise(areas: "list[np.ndarray]") -> Result:
     return _result("Noise", about, areas, quantities, lambda: [Figure(areas[0], "What was measured.")])
 
 
-def _sensor(areas: "list[np.ndarray]", bits: int | None, looked: Looked, dark: Dark) -> Result:
+def _sensor(areas: "list[np.ndarray]", bits: int | None, looked: RegionOptions, dark: DarkOptions) -> Result:
     from lumigraph.analysis import photon_transfer
     from lumigraph.preparation import read_raw
     from lumigraph.units import parse

@@ -11,21 +11,21 @@ from lumigraph.cli import files, optimised
 from lumigraph.cli.console import line, progress
 from lumigraph.cli.deconvolve_options import depths as planes_of
 from lumigraph.cli.options import Output, length
-from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from lumigraph.information import Scenes
     from lumigraph.instruments import Instrument
-    from lumigraph.optimisation import Goal
+    from lumigraph.studies.information import Scenes
+    from lumigraph.studies.optimisation import Goal
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Aim:
+class GoalOptions:
     """Goal of the optimisation.
 
     Parameters
@@ -76,8 +76,8 @@ class Aim:
 
     def read(self, given: "Instrument") -> "Goal":
         """The goal, of a camera to begin with; refuses nonsense."""
-        from lumigraph.information import Light
-        from lumigraph.optimisation import Goal
+        from lumigraph.studies.information import Light
+        from lumigraph.studies.optimisation import Goal
 
         planes = () if self.depths is None else planes_of("--depths", self.depths)
         light = Light(self.photons, self.background)
@@ -86,9 +86,13 @@ class Aim:
 
     def _scenes(self, usual: "Scenes | None") -> "Scenes | None":
         """Scenes for pictures and numbers; None if the goal needs none."""
-        from lumigraph.information import Scenes
+        from lumigraph.studies.information import Scenes
 
-        asked = bool(self.scenes) or self.scene_pitch is not None or self.scene_samples != Aim.scene_samples
+        asked = (
+            bool(self.scenes)
+            or self.scene_pitch is not None
+            or self.scene_samples != GoalOptions.scene_samples
+        )
         if usual is None and asked:
             raise FormatError(
                 f"--scenes, --scene-pitch and --scene-samples are for the goals 'picture error' and 'volume "
@@ -104,7 +108,7 @@ class Aim:
 
 def _pictures(paths: Sequence[Path] | None) -> "list[np.ndarray]":
     """Grey pictures of scenes."""
-    from lumigraph.metric.planes import grey
+    from lumigraph.metrology.datasheet.planes import grey
     from lumigraph.preparation import read_raw
 
     return [grey(read_raw(one, "picture of a scene").data) for one in paths or ()]
@@ -112,7 +116,7 @@ def _pictures(paths: Sequence[Path] | None) -> "list[np.ndarray]":
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class How:
+class OptimiserOptions:
     """Search for the optimum.
 
     Parameters
@@ -143,10 +147,10 @@ def optimise(
     /,
     *,
     vary: Annotated[list[str], Parameter(allow_leading_hyphen=True)],
-    aim: Aim = Aim(),
-    how: How = How(),
+    aim: GoalOptions = GoalOptions(),
+    how: OptimiserOptions = OptimiserOptions(),
     output: Output,
-    common: Reported = REPORTED,
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Search for the best camera for a goal, within ranges and a stock, and write its file.
 
@@ -170,7 +174,7 @@ def optimise(
     """  # noqa: E501 - an example is one line
     from lumigraph import store
     from lumigraph.instruments import load_camera
-    from lumigraph.optimisation import optimise as best_of
+    from lumigraph.studies.optimisation import optimise as best_of
 
     common.check()
     files.check_output(output, (".toml",))

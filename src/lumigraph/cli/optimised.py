@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     import numpy as np
 
     from lumigraph.instruments import Instrument
-    from lumigraph.optimisation import Goal, Optimum
-    from lumigraph.optimisation.tried import Tried
+    from lumigraph.studies.optimisation import Goal, Optimum
+    from lumigraph.studies.optimisation.tried import DrawnErrors
 
 NAMES = {"start": "as given", "swept": "the best of the first values"}
 """Names of the cameras beside the best."""
@@ -52,7 +52,7 @@ def _told(goal: "Goal", one: Quantity) -> str:
     return f"{goal.told(one.value)}{within}"
 
 
-def _reached(found: "Optimum", which: str, one: "Tried") -> str:
+def _reached(found: "Optimum", which: str, one: "DrawnErrors") -> str:
     """Error that reconstruction reaches, beside the expected one, in words."""
     words, told = NAMES.get(which, which), found.goal.told
     if one.reason:
@@ -64,9 +64,9 @@ def _reached(found: "Optimum", which: str, one: "Tried") -> str:
     )
 
 
-def _off(found: "Optimum", one: "Tried") -> str:
+def _off(found: "Optimum", one: "DrawnErrors") -> str:
     """A standard error, in two digits where it has no unit."""
-    from lumigraph.optimisation.goals import ERRORS
+    from lumigraph.studies.optimisation.goals import ERRORS
 
     return f"{one.error:.2g}" if found.goal.name in ERRORS else found.goal.told(one.error)
 
@@ -217,7 +217,7 @@ def _pictures(found: "Optimum", what: str, pictures: "Mapping[str, tuple[np.ndar
 def _over_depth(found: "Optimum") -> Iterator[Figure]:
     """The bound over depth, before and after."""
     from lumigraph import plots
-    from lumigraph.optimisation.goals import BOUNDS
+    from lumigraph.studies.optimisation.goals import BOUNDS
 
     if "best" not in found.checked or len(found.goal.depths) < 2:
         return
@@ -253,8 +253,8 @@ def _front(found: "Optimum", given: "Instrument") -> Iterator[Figure]:
 
 def _scaled(goal: "Goal", values: list[float]) -> tuple[list[float], str]:
     """Values in a unit that suits them, and the axis' label."""
-    from lumigraph.optimisation.goals import BOUNDS
     from lumigraph.plots.axes import length_unit
+    from lumigraph.studies.optimisation.goals import BOUNDS
 
     if BOUNDS.get(goal.name) != "m":
         return values, goal.name
@@ -265,8 +265,8 @@ def _scaled(goal: "Goal", values: list[float]) -> tuple[list[float], str]:
 def _search(found: "Optimum") -> Iterator[Figure]:
     """Figure of the best value so far over the cameras in turn."""
     from lumigraph import plots
-    from lumigraph.optimisation.goals import BOUNDS
     from lumigraph.plots.axes import length_unit
+    from lumigraph.studies.optimisation.goals import BOUNDS
 
     costs = [found.goal.cost(row) for row in found.rows]
     so_far = [min(costs[: k + 1]) for k in range(len(costs))]

@@ -20,7 +20,7 @@ Use = Literal["decode", "render"]
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Origin:
+class RawOptions:
     """Corrections and geometry of a raw image, for views, a picture or a volume.
 
     Parameters
@@ -66,9 +66,9 @@ class Origin:
         """
         from lumigraph import io
         from lumigraph.core import checks
-        from lumigraph.core.brief import called
         from lumigraph.core.lightfield import LightField
         from lumigraph.core.raw import RawImage
+        from lumigraph.core.short_repr import called
         from lumigraph.core.stack import Stack
         from lumigraph.core.volume import Volume
 
@@ -144,4 +144,4 @@ def notes_of(ready: "PreparedImage", camera: str | None = None) -> tuple[str, ..
     )
 
 
-NO_ORIGIN = Origin()
+NO_ORIGIN = RawOptions()

@@ -10,8 +10,8 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, length
-from lumigraph.cli.origin import NO_ORIGIN, Origin, notes_of
-from lumigraph.cli.reporting import REPORTED, Reported, enlarged
+from lumigraph.cli.origin import NO_ORIGIN, RawOptions, notes_of
+from lumigraph.cli.reporting import REPORTED, ReportOptions, enlarged
 from lumigraph.core.progress import Progress
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
@@ -31,7 +31,7 @@ MOST_SHOWN = 24
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Focus:
+class FocusOptions:
     """Focus: α' = F/F', below 1 nearer than the focused plane, 1 as recorded, above 1 farther.
 
     Parameters
@@ -82,7 +82,7 @@ def _check_alpha(alpha: float) -> None:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Quality:
+class PictureOptions:
     """Method of making pictures.
 
     Parameters
@@ -140,10 +140,10 @@ def refocus(
     /,
     *,
     output: Output,
-    focus: Focus = Focus(),
-    origin: Origin = NO_ORIGIN,
-    quality: Quality = Quality(),
-    common: Reported = REPORTED,
+    focus: FocusOptions = FocusOptions(),
+    origin: RawOptions = NO_ORIGIN,
+    quality: PictureOptions = PictureOptions(),
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Refocus on one or more depths.
 
@@ -188,7 +188,7 @@ def _figures(images: list[Any], alphas: list[float]) -> "Iterator[Figure]":
         yield Figure(image, f"α' = {alpha:g}", options={"white": white, "zoom": enlarged(image)})
 
 
-def _light_field(path: Path, origin: Origin) -> "tuple[LightField, tuple[str, ...]]":
+def _light_field(path: Path, origin: RawOptions) -> "tuple[LightField, tuple[str, ...]]":
     """The views in a file, or those of the raw image in it, and what was done to it."""
     from lumigraph import preparation
     from lumigraph.core.lightfield import LightField

@@ -9,9 +9,9 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, length
-from lumigraph.cli.origin import NO_ORIGIN, Origin
+from lumigraph.cli.origin import NO_ORIGIN, RawOptions
 from lumigraph.cli.refocus import MOST_SHOWN, range_of
-from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.progress import Progress
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
@@ -31,7 +31,7 @@ _MOST_FRAMES = 1000
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Tiles:
+class TileOptions:
     """Raw images of a camera 2.0: how large the piece of each micro-image is, and how pieces are joined.
 
     Parameters
@@ -69,7 +69,7 @@ class Tiles:
     @property
     def is_given(self) -> bool:
         """True if some option is given that only a raw image needs."""
-        return self != Tiles()
+        return self != TileOptions()
 
     @property
     def is_auto(self) -> bool:
@@ -125,7 +125,7 @@ class Tiles:
         return camera.patch_at(length("--depth", self.depth) or 0.0)
 
     def sharp(
-        self, camera: "Rendered | None", calibration: "Calibration", origin: Origin
+        self, camera: "Rendered | None", calibration: "Calibration", origin: RawOptions
     ) -> list[float] | None:
         """The patch at which each kind of lenslets is sharp, where there are three and it is known."""
         if self.focus is not None:
@@ -137,7 +137,7 @@ class Tiles:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Look:
+class ViewOptions:
     """Views of a camera 1.0: which picture is made of them.
 
     Parameters
@@ -179,10 +179,10 @@ def render(
     *,
     output: Output,
     depth_map: Annotated[Path | None, Parameter(name="--map")] = None,
-    origin: Origin = NO_ORIGIN,
-    tiles: Tiles = Tiles(),
-    look: Look = Look(),
-    common: Reported = REPORTED,
+    origin: RawOptions = NO_ORIGIN,
+    tiles: TileOptions = TileOptions(),
+    look: ViewOptions = ViewOptions(),
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Render pictures of a focused plenoptic camera 2.0 from its raw image, or out of views.
 
@@ -214,7 +214,7 @@ def render(
                 "--map writes a map, but none is computed. Give --depth auto or --all-in-focus."
             )
     if look.all_in_focus and not tiles.is_given:
-        tiles = Tiles(depth="auto")
+        tiles = TileOptions(depth="auto")
     if not look.all_in_focus and look.path is None:
         tiles.check(origin.camera)
     found = origin.views(raw)
@@ -235,7 +235,7 @@ def render(
 
 
 @dataclass(frozen=True)
-class _Made:
+class _RenderedPicture:
     """Rendered pictures, their report, and the depth map that was found or None."""
 
     pictures: list[Any]
@@ -250,7 +250,7 @@ class _Made:
         return rows, columns
 
 
-def _figures(made: _Made, output: Path) -> "Iterator[Figure]":
+def _figures(made: _RenderedPicture, output: Path) -> "Iterator[Figure]":
     if output.suffix.lower() in files.MOVIES:
         yield Figure(made.pictures[0], f"The first picture of the film in {output.name}.", "Picture")
     else:
@@ -263,7 +263,9 @@ def _figures(made: _Made, output: Path) -> "Iterator[Figure]":
         yield Figure(drawn, f"{made.depth.quantity} [{made.depth.unit}] of each place.", "Picture")
 
 
-def _from_raw(found: "RawImage", how: tuple[Origin, Tiles], output: Path, shown: Progress) -> _Made:
+def _from_raw(
+    found: "RawImage", how: tuple[RawOptions, TileOptions], output: Path, shown: Progress
+) -> _RenderedPicture:
     from lumigraph import depth, io, preparation
 
     origin, tiles = how
@@ -296,20 +298,20 @@ def _from_raw(found: "RawImage", how: tuple[Origin, Tiles], output: Path, shown:
     told = f"of {size:.4g} px" if extra is None else f"from {patch[0]:.4g} to {patch[1]:.4g} px"
     rows, columns = image.shape[:2]
     text = f"{rows} x {columns} px with patches {told}"
-    return _Made([image], text, (Quantity("patch_px", patch, "px"),), extra, ready.notes)
+    return _RenderedPicture([image], text, (Quantity("patch_px", patch, "px"),), extra, ready.notes)
 
 
-def _planes(stack: Any, sizes: list[float], output: Path, notes: tuple[str, ...]) -> _Made:
+def _planes(stack: Any, sizes: list[float], output: Path, notes: tuple[str, ...]) -> _RenderedPicture:
     from lumigraph import io
     from lumigraph.core.stack import Stack
 
     io.save(Stack(stack, tuple(sizes), "patch"), output)
     count, rows, columns = stack.shape[:3]
     text = f"{count} pictures of {rows} x {columns} px, patches {sizes[0]:.4g} to {sizes[-1]:.4g} px"
-    return _Made(list(stack), text, (Quantity("patch_px", sizes, "px"),), None, notes)
+    return _RenderedPicture(list(stack), text, (Quantity("patch_px", sizes, "px"),), None, notes)
 
 
-def _from_views(views: "LightField", look: Look, output: Path, shown: Progress) -> _Made:
+def _from_views(views: "LightField", look: ViewOptions, output: Path, shown: Progress) -> _RenderedPicture:
     from lumigraph import depth, io, rendering
     from lumigraph.core.stack import Stack
 
@@ -319,7 +321,7 @@ def _from_views(views: "LightField", look: Look, output: Path, shown: Progress) 
         io.save(Stack(stack), output)
         count, rows, columns = stack.shape[:3]
         text = f"{count} pictures of {rows} x {columns} px"
-        return _Made(list(stack), text, (Quantity("frames", count),))
+        return _RenderedPicture(list(stack), text, (Quantity("frames", count),))
     if look.alphas is not None:
         made = rendering.all_in_focus(views, range_of("--alphas", look.alphas), progress=shown)
         extra = depth.DepthMap(made.alpha, made.confidence, "alpha")
@@ -330,4 +332,4 @@ def _from_views(views: "LightField", look: Look, output: Path, shown: Progress) 
     rows, columns = made.picture.shape[:2]
     ends = list(extra.quantiles(0.01, 0.99))
     text = f"{rows} x {columns} px, refocus factors from {ends[0]:.4g} to {ends[1]:.4g}"
-    return _Made([made.picture], text, (Quantity("alpha", ends),), extra)
+    return _RenderedPicture([made.picture], text, (Quantity("alpha", ends),), extra)

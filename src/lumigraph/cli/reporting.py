@@ -11,6 +11,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import console, files
 from lumigraph.cli.options import COMMAND, WARNED, Common
+from lumigraph.core.printable import printable
 from lumigraph.core.result import Result
 from lumigraph.errors import LumigraphError
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Reported(Common):
+class ReportOptions(Common):
     """Options of every verb that computes.
 
     Parameters
@@ -41,7 +42,7 @@ class Reported(Common):
             files.check_output(self.report, (".html", ".htm"))
 
 
-REPORTED = Reported()
+REPORTED = ReportOptions()
 
 Verb = Callable[..., Result | None]
 
@@ -77,9 +78,9 @@ def telling(verb: Verb) -> Verb:
 def tell(common: Common, result: Result) -> None:
     """Print a result as text or as JSON, and write its report if one is requested."""
     text, values = result.text(WARNED.get([])), result.values()
-    if isinstance(common, Reported) and common.report is not None:
+    if isinstance(common, ReportOptions) and common.report is not None:
         page(result).write(common.report)
-        text, values = f"{text}\nwritten {common.report}", {**values, "report": str(common.report)}
+        text, values = f"{text}\nwritten {printable(common.report)}", {**values, "report": str(common.report)}
     console.report(common, text, values if result.rows is None else result.rows)
 
 

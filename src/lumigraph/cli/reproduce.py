@@ -8,13 +8,14 @@ from cyclopts import Parameter
 
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import COMMON, Common, Output
+from lumigraph.core.printable import printable
 from lumigraph.core.progress import Stage
 from lumigraph.core.result import Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
-    from lumigraph.experiments.registry import Experiment
-    from lumigraph.experiments.run import Result as Computed
+    from lumigraph.studies.thesis.registry import Experiment
+    from lumigraph.studies.thesis.run import StoredResult as Computed
 
 Flag = Annotated[bool, Parameter(negative="")]
 
@@ -47,13 +48,13 @@ def reproduce(
     output
         Folder for the results; made if it does not exist.
     """
-    from lumigraph import experiments
+    from lumigraph.studies import thesis
 
-    chosen = experiments.find(ids)
+    chosen = thesis.find(ids)
     if list_:
         return _listed(chosen)
     _check_folder(output)
-    from lumigraph.experiments import pages, run
+    from lumigraph.studies.thesis import pages, run
 
     output.mkdir(exist_ok=True)
     with progress("reproduce") as shown:
@@ -65,7 +66,12 @@ def reproduce(
         run.write_records(results, output / "results.json")
     text = "\n\n".join([*map(_table, results), f"Open {output / 'report.html'}"])
     return Result(
-        "Reproduce", "", results, (text,), rows=run.records(results), failure=_failure(results, output)
+        "Reproduce",
+        "",
+        results,
+        tuple(text.split("\n")),
+        rows=run.records(results),
+        failure=_failure(results, output),
     )
 
 
@@ -90,12 +96,13 @@ def _tell(result: "Computed") -> None:
     """One line on standard error as soon as an experiment is finished."""
     failed = f"{len(result.failed)} FAIL" if result.failed else "none fails"
     took = "from an earlier run" if result.stored else f"{result.seconds:.1f} s"
-    print(f"{result.id}: {len(result.rows)} rows, {failed}, {took}", file=sys.stderr, flush=True)
+    line = printable(f"{result.id}: {len(result.rows)} rows, {failed}, {took}")
+    print(line, file=sys.stderr, flush=True)
 
 
 def _table(result: "Computed") -> str:
     """Rows of an experiment in columns."""
-    from lumigraph.experiments import pages
+    from lumigraph.studies.thesis import pages
 
     lines = [pages.HEADER[:-1], *(pages.cells(row)[:-1] for row in result.rows)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]

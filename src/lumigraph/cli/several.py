@@ -24,7 +24,7 @@ Shifts = tuple[tuple[float, float], ...]
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Several:
+class SeveralOptions:
     """Differences between raw images of one object.
 
     Parameters
@@ -106,7 +106,7 @@ class Several:
         return found
 
 
-SEVERAL = Several()
+SEVERAL = SeveralOptions()
 
 
 def with_shifts(result: Result, found: "FoundShifts | None") -> Result:

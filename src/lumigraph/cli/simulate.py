@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, length
-from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError, GeometryError, ParaxialWarning
 
@@ -42,7 +42,7 @@ _COUNTS = {"snapshots": 100, "tilted": 64}
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Light:
+class LightOptions:
     """Coherence and spectrum of the scene's light.
 
     Parameters
@@ -154,7 +154,7 @@ class Light:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Stage:
+class SceneOptions:
     """Scene in front of the camera.
 
     Parameters
@@ -258,10 +258,10 @@ class Stage:
         import numpy as np
 
         from lumigraph.preparation import read_raw
-        from lumigraph.scene import Seeing, Slice, targets
+        from lumigraph.scene import SeeingCamera, Slice, targets
 
         (picture,) = (p for p in _scene((self.scene or [""])[0], camera.scene_grid).parts)
-        if not isinstance(picture, Slice) or not isinstance(camera, Seeing):
+        if not isinstance(picture, Slice) or not isinstance(camera, SeeingCamera):
             raise FormatError("--depth-map is of a picture before a camera with a main lens.")
         values = read_raw(path).data
         if values.ndim != 2:
@@ -288,11 +288,11 @@ def simulate(
     /,
     *,
     output: Output,
-    stage: Stage = Stage(),
-    light: Light = Light(),
+    stage: SceneOptions = SceneOptions(),
+    light: LightOptions = LightOptions(),
     seed: int = 0,
     noise: Annotated[bool, Parameter(negative="")] = False,
-    common: Reported = REPORTED,
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Simulate the raw image of a scene by wave optics.
 

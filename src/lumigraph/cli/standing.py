@@ -20,7 +20,7 @@ _SHOWN = 50
 """Failures and warnings that are listed."""
 
 
-class Standing:
+class StatusPage:
     """Progress that also writes the page now and then.
 
     Parameters

@@ -1,6 +1,7 @@
 """`lumigraph sweep`: what follows from a camera's description, for every combination of some values."""
 
 import re
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -10,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.batch import TABLES, Hands, kept, require_table, save_table
+from lumigraph.cli.batch import TABLES, WorkerOptions, kept, require_table, save_table
 from lumigraph.cli.console import line, progress
 from lumigraph.cli.options import Output
-from lumigraph.cli.reporting import REPORTED, Reported
-from lumigraph.cli.standing import Standing
+from lumigraph.cli.reporting import REPORTED, ReportOptions
+from lumigraph.cli.standing import StatusPage
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
 
@@ -37,7 +38,7 @@ def sweep(
     measure: str | None = None,
     output: Output,
     workers: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None,
-    common: Reported = REPORTED,
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Vary a camera's values and write the quantities of each combination into a table.
 
@@ -71,7 +72,7 @@ def sweep(
 
     common.check()
     files.check_output(output, (*TABLES, ".nc"))
-    given, varied = load_camera(camera), dict(map(values, vary))
+    given, varied = load_camera(anywhere(camera)), dict(map(values, vary))
     if len(varied) < len(vary):
         raise FormatError("--vary names a key twice. Give all its values at once.")
     items = combinations(varied)
@@ -80,11 +81,12 @@ def sweep(
     changed(given, items[0])  # an unknown key is refused before any work
     names = _names(measure, [row.name for row in given.quantities()])
     check_measures(given, names)
-    source = str(Path(camera).absolute()) if Path(camera).exists() else camera
     with progress("sweep") as shown, kept(output):
+        text = given.to_toml()
         found = cluster.batch(
-            Designs(source, tuple(names)), items, output, what={"camera": given.to_toml(), "measure": names},
-            workers=Hands(workers).cluster(), progress=Standing(output, shown),
+            Designs(text, tuple(names)), items, output,
+            what={"camera": text, "measure": names}, inputs=cluster.inputs.named_in(text),
+            workers=WorkerOptions(workers).cluster(), progress=StatusPage(output, shown),
             estimated=lambda needed: line(str(needed)),
         )  # fmt: skip
     save_table(output, axes)
@@ -95,6 +97,11 @@ def sweep(
     return _result(rows, list(varied), names, output)
 
 
+def anywhere(camera: str) -> str:
+    """A camera file by a path that does not depend on the folder, in which workers may differ; or a name."""
+    return str(Path(camera).absolute()) if Path(camera).exists() else camera
+
+
 @dataclass(frozen=True)
 class Designs:
     """Quantities of a camera with changed values.
@@ -102,7 +109,7 @@ class Designs:
     Parameters
     ----------
     camera
-        File, or a name of the catalogue.
+        Text of a camera file: what the file holds later does not matter.
     names
         Names of the quantities.
     """
@@ -113,11 +120,11 @@ class Designs:
     def __call__(self, item: Mapping[str, Any]) -> "Values":
         """The values, and the quantities or why no camera has those values."""
         from lumigraph.cluster import Values
-        from lumigraph.instruments import load_camera
+        from lumigraph.instruments.loading import camera_of
         from lumigraph.instruments.varied import changed
 
         try:
-            camera = changed(load_camera(self.camera), item)
+            camera = changed(camera_of(tomllib.loads(self.camera), "the camera file"), item)
             known = {row.name: row for row in (*camera.quantities(), *self._simulated(camera))}
         except LumigraphError as error:
             return Values({**item, _ERROR: " ".join(str(error).split())})
@@ -130,15 +137,15 @@ class Designs:
 
     def _simulated(self, camera: "Instrument") -> "Iterable[Quantity]":
         """Quantities measured on a simulated picture."""
-        from lumigraph import metric
+        from lumigraph import metrology
         from lumigraph.core.cache import SHARED
-        from lumigraph.metric.charts import check_camera
+        from lumigraph.metrology.datasheet.charts import check_camera
 
-        names = [name for name in self.names if metric.is_measure(name)]
+        names = [name for name in self.names if metrology.is_measure(name)]
         if not names:
             return ()
         try:
-            return metric.simulated(check_camera(camera), names).values()
+            return metrology.simulated(check_camera(camera), names).values()
         finally:
             SHARED.empty()  # the next camera is another one
 
@@ -162,7 +169,7 @@ def _names(measure: str | None, known: Sequence[str]) -> list[str]:
     """Requested quantities."""
     if measure is None:
         return list(known)
-    from lumigraph.metric import is_measure
+    from lumigraph.metrology import is_measure
 
     names = [name.strip() for name in measure.split(",")]
     for name in names:
@@ -175,8 +182,8 @@ def _names(measure: str | None, known: Sequence[str]) -> list[str]:
 
 def check_measures(camera: "Instrument", names: Sequence[str]) -> None:
     """Refuse measures on simulated pictures of cameras that have none."""
-    from lumigraph.metric import is_measure
-    from lumigraph.metric.charts import check_camera
+    from lumigraph.metrology import is_measure
+    from lumigraph.metrology.datasheet.charts import check_camera
 
     if any(map(is_measure, names)):
         check_camera(camera)

@@ -7,23 +7,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from lumigraph.cli import files
-from lumigraph.cli.batch import TABLES, Hands, kept, require_table, save_table
+from lumigraph.cli.batch import TABLES, WorkerOptions, kept, require_table, save_table
 from lumigraph.cli.console import line, progress
 from lumigraph.cli.options import Output
-from lumigraph.cli.reporting import REPORTED, Reported
-from lumigraph.cli.standing import Standing
+from lumigraph.cli.reporting import REPORTED, ReportOptions
+from lumigraph.cli.standing import StatusPage
+from lumigraph.cli.sweep import anywhere
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
 
 if TYPE_CHECKING:
-    from lumigraph.tolerance import Outcome, Study
+    from lumigraph.studies.tolerance import Study, ToleranceOutcome
 
 Tolerances = Annotated[
     list[str] | None, Parameter(name=("--tolerance", "-t"), allow_leading_hyphen=True, negative="")
 ]
 """Option of keys and tolerances."""
 
-ALONE = Hands()
+ALONE = WorkerOptions()
 
 _POINTS = 200
 """Most points of a drawn curve."""
@@ -41,8 +42,8 @@ def tolerance(
     measure: str | None = None,
     seed: Annotated[int, Parameter(allow_leading_hyphen=True)] = 0,
     output: Output,
-    hands: Hands = ALONE,
-    common: Reported = REPORTED,
+    hands: WorkerOptions = ALONE,
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Draw cameras with manufacturing errors, and rank the tolerances by their effect.
 
@@ -81,22 +82,25 @@ def tolerance(
     """  # noqa: E501 - an example is one line
     from lumigraph import cluster
     from lumigraph.instruments import load_camera
-    from lumigraph.tolerance import Study, Trials
-    from lumigraph.tolerance.making import check_camera
+    from lumigraph.studies.tolerance import Study, ToleranceTrials
+    from lumigraph.studies.tolerance.making import check_camera
 
     common.check()
     hands.check()
     files.check_output(output, TABLES)
     require_table(output)
     names = None if measure is None else [name.strip() for name in measure.split(",")]
-    trials = Trials.of(check_camera(load_camera(camera)), given_tolerances(tolerance or []), names, seed=seed)
+    trials = ToleranceTrials.of(
+        check_camera(load_camera(anywhere(camera))), given_tolerances(tolerance or []), names, seed=seed
+    )
     items = trials.items(draws)
     if hands.slurm is not None:
         return hands.submitted(output)
     with progress("tolerance") as shown, kept(output):
         found = cluster.batch(
-            trials, items, output, what=trials.what, workers=hands.cluster(), part=hands.share(),
-            progress=Standing(output, shown), estimated=lambda needed: line(str(needed)),
+            trials, items, output, what=trials.what, inputs=cluster.inputs.named_in(trials.camera),
+            workers=hands.cluster(), part=hands.share(),
+            progress=StatusPage(output, shown), estimated=lambda needed: line(str(needed)),
         )  # fmt: skip
     save_table(output)
     if found.failures:
@@ -142,7 +146,7 @@ def _result(study: "Study", output: Path) -> Result:
     )  # fmt: skip
 
 
-def _line(one: "Outcome", names: tuple[str, ...]) -> str:
+def _line(one: "ToleranceOutcome", names: tuple[str, ...]) -> str:
     """One measure: where most cameras are, how far they are from each other, and what that costs most."""
     if not one.changes:
         return f"{one.name}: {_text(one, one.nominal)}, which these errors do not change"
@@ -156,7 +160,7 @@ def _line(one: "Outcome", names: tuple[str, ...]) -> str:
     )
 
 
-def _text(one: "Outcome", value: float) -> str:
+def _text(one: "ToleranceOutcome", value: float) -> str:
     from lumigraph.instruments import Row
 
     if abs(value) < 1e-9 * one.deviation:
@@ -186,13 +190,13 @@ def _figures(study: "Study") -> Iterator[Figure]:
         yield Figure(drawn, f"{one.name} of {len(one.sample)} cameras, and to first order.", one.name)
 
 
-def _scale(one: "Outcome") -> tuple[float, str]:
+def _scale(one: "ToleranceOutcome") -> tuple[float, str]:
     from lumigraph.instruments import Row
 
     return Row(one.name, max(abs(one.nominal), 3 * one.deviation), one.unit).scale
 
 
-def _curves(one: "Outcome", size: float) -> dict[str, tuple[Any, Any]]:
+def _curves(one: "ToleranceOutcome", size: float) -> dict[str, tuple[Any, Any]]:
     import numpy as np
     from scipy.special import ndtr
 

@@ -11,13 +11,13 @@ from lumigraph.cli import console
 from lumigraph.cli.console import progress
 from lumigraph.cli.files import PICTURES, check_output
 from lumigraph.cli.options import Output, above_zero
-from lumigraph.cli.reporting import REPORTED, Reported
+from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Figure, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
     from lumigraph.core.raw import RawImage
-    from lumigraph.metric import Twin
+    from lumigraph.metrology import Twin
 
 _PAUSE = 0.5  # seconds between looks into a folder
 _SETTLED = 1.0  # seconds since a picture was written last
@@ -32,7 +32,7 @@ def twin(
     pitch_error: float | None = None,
     watch: Path | None = None,
     output: Output | None = None,
-    common: Reported = REPORTED,
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Compare a bench with its camera file by white images, and print the adjustments to make.
 
@@ -65,17 +65,17 @@ def twin(
     if (watch is None) == (not whites):
         raise FormatError("give white images, or --watch FOLDER.")
     above_zero("--pitch-error", pitch_error)
-    from lumigraph import metric, store
+    from lumigraph import metrology, store
     from lumigraph.instruments import load_camera
-    from lumigraph.metric.charts import check_camera
+    from lumigraph.metrology.datasheet.charts import check_camera
     from lumigraph.preparation import read_raw
 
-    bench = metric.Bench(check_camera(load_camera(camera)))
+    bench = metrology.BenchModel(check_camera(load_camera(camera)))
     unlit = None if dark is None else read_raw(dark, "dark image")
 
     def compared(images: "list[RawImage]") -> "Twin":
         with progress("twin") as tell:
-            return metric.twin(images, bench, dark=unlit, pitch_error=pitch_error, progress=tell)
+            return metrology.twin(images, bench, dark=unlit, pitch_error=pitch_error, progress=tell)
 
     if watch is None:
         found = compared([read_raw(path, "white image") for path in whites])
@@ -92,7 +92,7 @@ def twin(
     assert found is not None  # the folder is watched until there is one
     notes, written = found.notes, ()
     if output is not None:
-        fixed, left = metric.corrected(bench.camera, found)
+        fixed, left = metrology.corrected(bench.camera, found)
         store.write_bytes(output, fixed.to_toml().encode())
         notes, written = (*notes, *left), (output,)
     about = "What is out of place on a bench, by its white images against those of the camera file."

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import COMMON, Common
-from lumigraph.cli.origin import Origin
+from lumigraph.cli.origin import RawOptions
 from lumigraph.cli.serving import Port, announce, check_port
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError
@@ -17,7 +17,7 @@ from lumigraph.errors import FormatError
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Shown(Origin):
+class ShownOptions(RawOptions):
     """Corrections and geometry of a raw image, for views or pictures.
 
     Parameters
@@ -39,7 +39,7 @@ class Shown(Origin):
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Page:
+class PageOptions:
     """Display of the page.
 
     Parameters
@@ -92,8 +92,8 @@ def view(
     beside: Path | None = None,
     /,
     *,
-    origin: Shown = Shown(),
-    page: Page = Page(),
+    origin: ShownOptions = ShownOptions(),
+    page: PageOptions = PageOptions(),
     common: Common = COMMON,
 ) -> Result | None:
     """Look at a file in the browser: refocus by a click, move the viewpoint, see raw pixels, depth, volumes.
@@ -121,25 +121,22 @@ def view(
     if page.serve_folder:
         if beside is not None:
             raise FormatError("--serve-folder serves one folder. Leave the second file out.")
-        _serve(viewer.serve_folder(file), (file,), page, common)
+        _serve(viewer.serve_folder(file), page, common)
         return None
     exhibits = [_opened(path, origin) for path in (file, beside) if path is not None]
     if page.export is None:
-        _serve(viewer.site(exhibits), (file,) if beside is None else (file, beside), page, common)
+        _serve(viewer.site(exhibits), page, common)
         return None
     return _exported(exhibits, page, page.export)
 
 
-def _serve(site: Any, files: tuple[Path, ...], page: Page, common: Common) -> None:
+def _serve(site: Any, page: PageOptions, common: Common) -> None:
     from lumigraph import viewer
 
-    viewer.serve(
-        site, port=page.port, address=viewer.address_of(files),
-        ready=lambda address: announce(address, common, no_open=page.no_open),
-    )  # fmt: skip
+    viewer.serve(site, port=page.port, ready=lambda address: announce(address, common, no_open=page.no_open))
 
 
-def _exported(exhibits: list[Any], page: Page, path: Path) -> Result:
+def _exported(exhibits: list[Any], page: PageOptions, path: Path) -> Result:
     from lumigraph import viewer
 
     with progress("export") as shown:
@@ -159,7 +156,7 @@ def _exported(exhibits: list[Any], page: Page, path: Path) -> Result:
     )
 
 
-def _opened(path: Path, origin: Shown) -> Any:
+def _opened(path: Path, origin: ShownOptions) -> Any:
     from lumigraph import viewer
 
     wanted = viewer.Origin(

@@ -10,17 +10,17 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.adaptive import Modes, indices
 from lumigraph.cli.console import progress
-from lumigraph.cli.deconvolve_options import SEEN, Seen
+from lumigraph.cli.deconvolve_options import SEEN, RawImageOptions
 from lumigraph.cli.options import Output, length
-from lumigraph.cli.reporting import REPORTED, Reported, enlarged
+from lumigraph.cli.reporting import REPORTED, ReportOptions, enlarged
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
-    from lumigraph.adaptive import Slopes
-    from lumigraph.adaptive import Wavefront as Found
     from lumigraph.core.prepared import PreparedImage
     from lumigraph.instruments import Instrument
+    from lumigraph.studies.adaptive import ViewSlopes
+    from lumigraph.studies.adaptive import Wavefront as Found
 
 
 def wavefront(
@@ -31,9 +31,9 @@ def wavefront(
     object: Literal["star", "scene"] = "star",  # noqa: A002 - what it is called everywhere
     terms: str = "4-21",
     place: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
-    seen: Seen = SEEN,
+    seen: RawImageOptions = SEEN,
     output: Output | None = None,
-    common: Reported = REPORTED,
+    common: ReportOptions = REPORTED,
 ) -> Result:
     """Find the wavefront at a camera's main lens, from one raw image of a star or of a scene.
 
@@ -81,7 +81,7 @@ def wavefront(
     return replace(found, notes=(*found.notes, *ready.notes), written=written)
 
 
-def _check(seen_as: str, place: str | None, seen: Seen) -> None:
+def _check(seen_as: str, place: str | None, seen: RawImageOptions) -> None:
     """Refuse what only the other kind of object has."""
     if seen_as == "scene" and (place, seen.region) != (None, None):
         raise FormatError("--place and --region are of a star. Leave them out, or use --object star.")
@@ -109,7 +109,7 @@ def _place(text: str | None) -> tuple[float, float, float]:
 def _of_star(
     ready: "PreparedImage", camera: "Instrument", terms: tuple[int, ...], place: tuple[float, float, float]
 ) -> Result:
-    from lumigraph.adaptive import sense
+    from lumigraph.studies.adaptive import sense
 
     with progress("wavefront") as shown:
         found = sense(ready, cast("Any", camera), terms, place=place, progress=shown)
@@ -127,7 +127,7 @@ def _of_star(
 def _of_scene(ready: "PreparedImage", camera: "Instrument", terms: tuple[int, ...]) -> Result:
     import numpy as np
 
-    from lumigraph.adaptive import start
+    from lumigraph.studies.adaptive import start
 
     dark = 0.0 if ready.background is None else ready.background
     light = np.asarray(ready.data, np.float32) - np.asarray(dark, np.float32)
@@ -141,7 +141,7 @@ def _of_scene(ready: "PreparedImage", camera: "Instrument", terms: tuple[int, ..
 
 
 def _result(
-    found: "Found | Slopes", modes: Modes, about: tuple[Quantity, ...], ready: "PreparedImage",
+    found: "Found | ViewSlopes", modes: Modes, about: tuple[Quantity, ...], ready: "PreparedImage",
     notes: tuple[str, ...],
 ) -> Result:  # fmt: skip
     expected = float(sum(d**2 for d in modes.deviations.values()) ** 0.5)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
 
-from lumigraph.cluster.ledger import Entry
+from lumigraph.cluster.entry import Entry
 from lumigraph.core import memory
 from lumigraph.errors import SamplingError
 

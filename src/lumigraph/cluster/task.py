@@ -14,7 +14,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from lumigraph.cluster.ledger import Entry, Ledger
+from lumigraph.cluster.entry import Entry
+from lumigraph.cluster.inputs import Known, check_unchanged
+from lumigraph.cluster.ledger import Ledger
 from lumigraph.core.threads import single_products
 from lumigraph.errors import LumigraphError
 from lumigraph.io import series
@@ -40,7 +42,7 @@ class Values:
 
 
 @dataclass(frozen=True, slots=True)
-class Several:
+class FrameGroup:
     """Results of frames in a row, which one item makes: all are done, or none.
 
     Parameters
@@ -59,7 +61,7 @@ class Several:
 
 
 @runtime_checkable
-class SideBySide(Protocol):
+class BatchedWork(Protocol):
     """Work that does some items in less time than one after the other."""
 
     @property
@@ -89,12 +91,15 @@ class Task:
         A store of shards, beside which the ledger lies.
     count
         Items of the job.
+    inputs
+        Files that the work reads besides, as they were when the job began.
     """
 
     work: Work
     items: Mapping[int, Any]
     output: Path
     count: int
+    inputs: tuple[Known, ...] = ()
 
     @cached_property
     def ledger(self) -> Ledger:
@@ -104,7 +109,7 @@ class Task:
     @property
     def side_by_side(self) -> int:
         """Frames that a worker is given at a time, at most."""
-        return self.work.side_by_side if isinstance(self.work, SideBySide) else 1
+        return self.work.side_by_side if isinstance(self.work, BatchedWork) else 1
 
     def do(self, numbers: Sequence[int]) -> Iterator[Outcome]:
         """Compute frames unless they are done or somebody does so: `DONE`, `FAILED`, `BUSY`, `FULL`."""
@@ -134,7 +139,7 @@ class Task:
 
     def _results(self, items: list[Any]) -> Iterator[Sequence[Any]]:
         """Results of some items at a time, or the exceptions that they raise."""
-        if isinstance(self.work, SideBySide):
+        if isinstance(self.work, BatchedWork):
             yield from self.work.several(items)
         else:
             yield from ([_tried(self.work, item)] for item in items)
@@ -153,6 +158,7 @@ class Task:
         raise error
 
     def _record(self, number: int, thing: Any, made: "_Cost") -> None:
+        check_unchanged(self.inputs)  # after the work: what it has read is what was noted
         with _measured() as cost:
             files, values = self._written_of(number, thing)
         notes = list(dict.fromkeys(made.notes + cost.notes))
@@ -170,18 +176,18 @@ class Task:
         """Files that were written, and values."""
         if isinstance(found, Values):
             return {}, dict(found.row)
-        if not isinstance(found, Several):
-            return self._written(number, series.Frame.of(found), self.count), {}
+        if not isinstance(found, FrameGroup):
+            return self._written(number, series.SeriesFrame.of(found), self.count), {}
         files: series.Checksums = {}
         for place, thing in enumerate(found.things, found.first):
-            files |= self._written(place, series.Frame.of(thing), found.count)
+            files |= self._written(place, series.SeriesFrame.of(thing), found.count)
         return files, {}
 
-    def _written(self, number: int, frame: series.Frame, count: int) -> series.Checksums:
+    def _written(self, number: int, frame: series.SeriesFrame, count: int) -> series.Checksums:
         if not (self.output / "zarr.json").exists():
             with self.ledger.alone():
                 if not (self.output / "zarr.json").exists():
-                    series.create(self.output, frame, count)
+                    series.create(self.output, frame, count, self.ledger.keep_store)
         return series.write(self.output, number, frame)
 
 

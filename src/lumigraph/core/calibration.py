@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from lumigraph.core import checks, picture
-from lumigraph.core.aside import Aside
-from lumigraph.core.brief import brief
 from lumigraph.core.drawing import draw
 from lumigraph.core.lattice import Lattice, Vector
+from lumigraph.core.lattice_offsets import LatticeOffsets
+from lumigraph.core.short_repr import brief
 from lumigraph.core.warp import Warp
 from lumigraph.errors import CalibrationError
 
@@ -80,7 +80,7 @@ class Calibration:
     sharpness: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
     by_maker: bool = False
-    aside: Aside | None = None
+    aside: LatticeOffsets | None = None
 
     __repr__ = brief
 
@@ -102,7 +102,7 @@ class Calibration:
         if self.warp is not None:
             checks.instance("warp", self.warp, Warp, CalibrationError)
         if self.aside is not None:
-            checks.instance("aside", self.aside, Aside, CalibrationError)
+            checks.instance("aside", self.aside, LatticeOffsets, CalibrationError)
         for name in ("pixel_pitch", "separation", "lenslet_distance", "fill"):
             if (value := getattr(self, name)) is not None:
                 checks.positive(name, value, error=CalibrationError)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, to_numpy
-from lumigraph.core.brief import brief, table
+from lumigraph.core.short_repr import brief, table
 from lumigraph.errors import GeometryError
 
 

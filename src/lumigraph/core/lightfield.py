@@ -5,10 +5,10 @@ from typing import ClassVar, Self
 
 from lumigraph.core import checks, picture
 from lumigraph.core.arrays import A, Array, to_numpy
-from lumigraph.core.brief import brief
 from lumigraph.core.grid import Grid
 from lumigraph.core.labelled import Labels
 from lumigraph.core.noun import Noun
+from lumigraph.core.short_repr import brief
 from lumigraph.errors import GeometryError
 
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, namespace
-from lumigraph.core.brief import brief, table
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
+from lumigraph.core.short_repr import brief, table
 from lumigraph.errors import GeometryError
 
 

@@ -7,10 +7,10 @@ from typing import Self
 import numpy as np
 
 from lumigraph.core.arrays import Array
-from lumigraph.core.brief import brief
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.labelled import Labels
 from lumigraph.core.raw import RawImage
+from lumigraph.core.short_repr import brief
 from lumigraph.errors import GeometryError
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from lumigraph.core import checks, picture
 from lumigraph.core.arrays import A, to_numpy
-from lumigraph.core.brief import brief
 from lumigraph.core.labelled import Labels
 from lumigraph.core.noun import Noun
+from lumigraph.core.short_repr import brief
 from lumigraph.errors import GeometryError
 
 _SHOWN, _SIDE = 4, 160

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lumigraph.core import checks
-from lumigraph.core.brief import brief
 from lumigraph.core.lattice import Vector
+from lumigraph.core.short_repr import brief
 from lumigraph.errors import CalibrationError
 
 _STEPS = 60

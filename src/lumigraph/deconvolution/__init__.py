@@ -1,6 +1,6 @@
 """Deconvolution: objects from raw images and a model of the camera, a `core.linear.Linear`.
 
-- `deconvolve`: `deconvolve`; for time series `deconvolve_series`, `Deconvolver`; `run`: `Step`, `Interrupted`
+- `deconvolve`: `deconvolve`; for time series `deconvolve_series`, `Deconvolver`; `run`: `RunStep`, `Interrupted`
 - `exposure`, `problem`: what is known of the raw image; model, sensitivity and deviance
 - `methods`, `richardson_lucy`, `least_squares`: `Stop`, `RichardsonLucy`, `LeastSquares`
 - `total_variation`, `wavelets`, `filters`: priors, and `LowPass`, against artefacts of the lenslets
@@ -16,7 +16,7 @@ from lumigraph.deconvolution.filters import LowPass
 from lumigraph.deconvolution.least_squares import LeastSquares
 from lumigraph.deconvolution.methods import Stop
 from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
-from lumigraph.deconvolution.run import Interrupted, Step
+from lumigraph.deconvolution.run import Interrupted, RunStep
 from lumigraph.deconvolution.total_variation import TotalVariation
 from lumigraph.deconvolution.wavelets import Wavelets
 
@@ -28,7 +28,7 @@ __all__ = [
     "LeastSquares",
     "LowPass",
     "RichardsonLucy",
-    "Step",
+    "RunStep",
     "Stop",
     "TotalVariation",
     "Wavelets",

@@ -29,7 +29,7 @@ Inside = tuple[slice, slice]
 
 
 @runtime_checkable
-class Widening(Protocol):
+class WidenedOperator(Protocol):
     """An operator that can look beyond the picture."""
 
     def widened(self, least: float) -> tuple[Linear, Inside]:
@@ -43,14 +43,14 @@ class Widening(Protocol):
 def looks_beyond(operator: Linear) -> bool:
     """True if an operator, or one of several of an object, can look beyond the picture."""
     parts = operator.maps if isinstance(operator, Joint) else (operator,)
-    return any(isinstance(part, Widening) for part in parts)
+    return any(isinstance(part, WidenedOperator) for part in parts)
 
 
 def beyond(operator: Linear) -> tuple[Linear, Inside]:
     """The operator of the object that light on the picture comes from, and the wanted part of it."""
     if isinstance(operator, Joint):
         return _all_beyond(operator)
-    if isinstance(operator, Widening):
+    if isinstance(operator, WidenedOperator):
         return operator.widened(
             BARELY / 2
         )  # at corners and in dark samples, less is seen than beside a border
@@ -71,7 +71,9 @@ def _all_beyond(operator: Joint) -> tuple[Linear, Inside]:
     before, after = ([max(sides) for sides in zip(*some, strict=True)] for some in (befores, afters))
     shape = (before[0] + asked[0] + after[0], before[1] + asked[1] + after[1])
     maps = [
-        one if one.shape[1][-2:] == shape else Inner(one, shape, (before[0] - mine[0], before[1] - mine[1]))
+        one
+        if one.shape[1][-2:] == shape
+        else InnerMap(one, shape, (before[0] - mine[0], before[1] - mine[1]))
         for (one, _), mine in zip(wide, befores, strict=True)
     ]
     rows, columns = (slice(b, b + n) for b, n in zip(before, asked, strict=True))
@@ -79,7 +81,7 @@ def _all_beyond(operator: Joint) -> tuple[Linear, Inside]:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Inner(Linear):
+class InnerMap(Linear):
     """A map of the inner part of a larger object.
 
     Parameters

@@ -7,9 +7,9 @@ import numpy as np
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array, to_numpy
-from lumigraph.core.brief import brief
 from lumigraph.core.prepared import PreparedImage, Reason
 from lumigraph.core.raw import RawImage
+from lumigraph.core.short_repr import brief
 from lumigraph.errors import CalibrationError
 
 

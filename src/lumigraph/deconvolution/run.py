@@ -22,7 +22,7 @@ Result = Array | Volume | RawImage
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class RunStep:
     """Progress of a deconvolution.
 
     Parameters
@@ -49,7 +49,7 @@ class Step:
     stopped: str = ""
 
 
-Report = Callable[[Step], None]
+Report = Callable[[RunStep], None]
 
 
 class Interrupted(KeyboardInterrupt):
@@ -125,7 +125,7 @@ class Run:
         left = 0 if stopped else self.limits.iterations - state.done
         remaining = left * elapsed / (state.done - first)
         self.progress(
-            Step(state.done, self.limits.iterations, state.deviance, change, elapsed, remaining, stopped)
+            RunStep(state.done, self.limits.iterations, state.deviance, change, elapsed, remaining, stopped)
         )
 
 

@@ -36,7 +36,7 @@ class _Table:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Meeting(Linear):
+class SharedOperator(Linear):
     """An operator that waits until all runs need it.
 
     Parameters
@@ -109,7 +109,7 @@ def side_by_side(operator: Linear, runs: Sequence[Callable[[Linear], Found]]) ->
 
     At most ``operator.side_by_side`` of them.
     """
-    meeting = Meeting(operator, _Table(len(runs)))
+    meeting = SharedOperator(operator, _Table(len(runs)))
     with ThreadPoolExecutor(len(runs), thread_name_prefix="lumigraph-run") as pool:
         futures = [pool.submit(meeting.attended, run) for run in runs]
         try:

@@ -13,7 +13,7 @@ Pair = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Beside:
+class LensletNeighbours:
     """Lenslets around n places, k each by their distance, independent of the places' patches.
 
     Parameters
@@ -37,7 +37,9 @@ class Beside:
     sides: np.ndarray
 
     @classmethod
-    def of(cls, away: Pair, center: Pair, kind: np.ndarray, usable: np.ndarray, reach: float) -> "Beside":
+    def of(
+        cls, away: Pair, center: Pair, kind: np.ndarray, usable: np.ndarray, reach: float
+    ) -> "LensletNeighbours":
         """Neighbours from lenslets (steps, n) in any order; places at `reach` and beyond do not see them."""
         distance = np.where(usable, np.hypot(*away), np.float32(_BEYOND * reach))
         count = int((distance < reach).sum(0).max(initial=0))
@@ -50,11 +52,11 @@ class Beside:
             distance, (parts[0], parts[1]), (parts[2], parts[3]), kind, np.stack(sides).astype(np.float32)
         )
 
-    def within(self, reach: float) -> "Beside":
+    def within(self, reach: float) -> "LensletNeighbours":
         """The lenslets that some place has within a reach [pitches], one at least."""
         count = max(1, int(np.searchsorted(self.distance.min(1), reach)))
         (ay, ax), (cy, cx) = self.away, self.center
-        return Beside(
+        return LensletNeighbours(
             self.distance[:count],
             (ay[:count], ax[:count]),
             (cy[:count], cx[:count]),

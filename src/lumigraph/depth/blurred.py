@@ -14,7 +14,7 @@ _STEP = 0.02  # px: between the standard deviations that are kept
 
 
 @dataclass(frozen=True)
-class Blurred:
+class BlurLevels:
     """Raw image (levels, y, x), blurred by 0, 1, 2 ... steps; for `focus` see `Sightings`.
 
     A lenslet spreads a point over a disc as wide as the patch differs from that at which it is sharp. So
@@ -27,7 +27,7 @@ class Blurred:
     @classmethod
     def of(
         cls, image: np.ndarray, focus: np.ndarray | None, trusts: Sequence[tuple[float, np.ndarray]]
-    ) -> "Blurred":
+    ) -> "BlurLevels":
         """Copies blurred as far as kinds of lenslets need it, for patches [px] and weights (kinds,)."""
         if focus is None:
             return cls(image[None], None)

@@ -19,7 +19,7 @@ from lumigraph.depth import repeats
 from lumigraph.depth.chance import by_chance, slowly
 from lumigraph.depth.correlation import WIDEST, correlation
 from lumigraph.depth.expected import MICRO_IMAGES, Evidence, contrast, deviation, expected
-from lumigraph.depth.flat import Flat
+from lumigraph.depth.flat import FlatImage
 from lumigraph.depth.micro_images import MicroImages
 from lumigraph.depth.pictures import LEAST_NOISE, noise_of
 from lumigraph.depth.sightings import Sightings
@@ -28,7 +28,7 @@ from lumigraph.depth.volume import box, cheapest, guided, rivals, semi_global
 from lumigraph.errors import SamplingWarning
 from lumigraph.preparation import of_raw
 from lumigraph.rendering.decode import check_raw
-from lumigraph.rendering.patches import Layout, Patches, checked_focus
+from lumigraph.rendering.patches import Patches, PatchLayout, checked_focus
 
 # Lengths in px are those by which a detail moves that stands at the edge of its micro-image.
 _STEP = 0.4  # px between sizes that are tried
@@ -118,8 +118,8 @@ def dense(
         lenslets = correlation(raw, calibration, progress=within(progress, 0, 0.3))
     lenslets.check("patch")
     sizes = Patches.of(lenslets.values, calibration)
-    layout = Layout.of(calibration, sizes, samples)
-    sights = Sightings(Flat.of(raw, calibration), calibration, layout, kinds)
+    layout = PatchLayout.of(calibration, sizes, samples)
+    sights = Sightings(FlatImage.of(raw, calibration), calibration, layout, kinds)
     trust = to_numpy(lenslets.confidence)
     found, evidence, ends = moves_of(sights, (sizes, trust), within(progress, 0.3, 1))
     sign, reach = math.copysign(1.0, sizes.middle), sights.flat.even

@@ -27,7 +27,7 @@ _BRIGHT = 0.98  # part of the pixels of a ring that are darker than what lights 
 
 
 @dataclass(frozen=True)
-class Flat:
+class FlatImage:
     """Square roots (y, x) of a raw image over its white, as bright at the edge of micro-images as inside.
 
     `radius` is how far lenslets show it [px from a centre], `even` how far all of a lenslet is lit: beyond,
@@ -41,7 +41,7 @@ class Flat:
     fall_off: np.ndarray
 
     @classmethod
-    def of(cls, raw: RawImage, calibration: Calibration) -> "Flat":
+    def of(cls, raw: RawImage, calibration: Calibration) -> "FlatImage":
         """A raw image, divided by how light falls off from the middle of its micro-images to their edge.
 
         That shading stands still while details move from one micro-image to the next, and would pull patches

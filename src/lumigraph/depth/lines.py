@@ -12,7 +12,7 @@ from lumigraph.core.progress import Progress
 from lumigraph.depth.chance import of_views
 from lumigraph.depth.expected import LINES, Evidence, contrast, deviation
 from lumigraph.depth.pictures import Pictures
-from lumigraph.depth.shading import WINDOW, Fit, Shading
+from lumigraph.depth.shading import WINDOW, Shading, ShadingFit
 from lumigraph.depth.smooth import Stiffness, tears, update
 from lumigraph.depth.visible import BEFORE, visible
 from lumigraph.depth.volume import box
@@ -111,7 +111,7 @@ class _Lines:
         asked = _asked(self.pictures, self.splines, moves, shading)
         return self.changed(moves, asked, jump), asked.shading
 
-    def changed(self, moves: np.ndarray, asked: "_Asked", jump: float) -> np.ndarray:
+    def changed(self, moves: np.ndarray, asked: "_LineDemand", jump: float) -> np.ndarray:
         """Map (y, x) moved by the changes that views imply."""
         stiffness = _STIFFNESS * self.pictures.noise**2 * _lever(self.pictures)
         how = Stiffness(stiffness, _KINK, jump)
@@ -119,7 +119,7 @@ class _Lines:
         return moves + np.clip(change, -BEFORE, BEFORE)
 
 
-def _evidence(lines: _Lines, asked: "_Asked", moves: np.ndarray, rivals: np.ndarray) -> Evidence:
+def _evidence(lines: _Lines, asked: "_LineDemand", moves: np.ndarray, rivals: np.ndarray) -> Evidence:
     """Evidence for a map (y, x), by the pull of views on it.
 
     Noise has gradients, too, which carry no information.
@@ -145,7 +145,7 @@ def _lever(pictures: Pictures) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
+class _LineDemand:
     """Pull of the views at each place (y, x), their information about it, and the shading that is left.
 
     `residual` is how much the views that see a place differ from the middle one, `disputed` the part of them
@@ -160,11 +160,11 @@ class _Asked:
     shown: np.ndarray
 
 
-def _asked(pictures: Pictures, lines: np.ndarray, moves: np.ndarray, shading: Shading) -> _Asked:
+def _asked(pictures: Pictures, lines: np.ndarray, moves: np.ndarray, shading: Shading) -> _LineDemand:
     center = pictures.center.mean(0)
     slope = np.gradient(center)
     pull, information, down, right, alike, off, count, shown = (np.zeros_like(moves) for _ in range(8))
-    fit, usual = Fit(moves.shape, pictures.noise), 2.5 * pictures.noise
+    fit, usual = ShadingFit(moves.shape, pictures.noise), 2.5 * pictures.noise
     for (y, x), seen, view in _warped(pictures, lines, moves):
         residual, along = view - center, np.gradient(view)
         gradient = 0.5 * y * (along[0] + slope[0]) + 0.5 * x * (along[1] + slope[1])
@@ -185,7 +185,7 @@ def _asked(pictures: Pictures, lines: np.ndarray, moves: np.ndarray, shading: Sh
     clear = maximum_filter(moves, 2 * _BESIDE + 1) - moves < BEFORE
     shown = np.where(count > 0, shown / np.maximum(count, 1), center)
     count = np.maximum(count, 1)
-    return _Asked(pull * clear, information * clear, shading, off / count, 1 - alike / count, shown)
+    return _LineDemand(pull * clear, information * clear, shading, off / count, 1 - alike / count, shown)
 
 
 def _warped(

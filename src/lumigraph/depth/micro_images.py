@@ -112,9 +112,9 @@ class MicroImages:
             out[:, part] = _better_half(found)
         return out.reshape(-1, *self.indices.shape[:2])
 
-    def _readings(self, way: tuple[int, int], sizes: np.ndarray) -> "dict[int, Reading]":
+    def _readings(self, way: tuple[int, int], sizes: np.ndarray) -> "dict[int, MicroImageReader]":
         """Readings of a neighbour, by number, for each size at which enough of it is shared."""
-        read = {k: Reading.of(self.inside, self._vector(way) * size) for k, size in enumerate(sizes)}
+        read = {k: MicroImageReader.of(self.inside, self._vector(way) * size) for k, size in enumerate(sizes)}
         return {k: reading for k, reading in read.items() if reading is not None}
 
     def _ways(self) -> list[tuple[int, int]]:
@@ -141,7 +141,7 @@ class MicroImages:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class MicroImageReader:
     """Micro-images read linearly at positions moved by a fraction of a pixel, where both are inside.
 
     Parameters
@@ -159,7 +159,7 @@ class Reading:
     matrix: csr_array
 
     @classmethod
-    def of(cls, inside: np.ndarray, move: np.ndarray) -> "Reading | None":
+    def of(cls, inside: np.ndarray, move: np.ndarray) -> "MicroImageReader | None":
         """Reading for a move (dy, dx) [px]; None where too little of the pixels inside (h, w) is shared."""
         lines = [_line(count, float(part)) for count, part in zip(inside.shape, move, strict=True)]
         weight = (inside * (lines[0] @ inside @ lines[1].T)).ravel()

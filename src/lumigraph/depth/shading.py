@@ -37,7 +37,7 @@ class Shading:
         return cls(np.zeros(shape, np.float32), np.zeros(shape, np.float32))
 
 
-class Fit:
+class ShadingFit:
     """Weighted least squares of residuals (y, x) on the places of their views, one view after the other."""
 
     def __init__(self, shape: tuple[int, ...], noise: float) -> None:

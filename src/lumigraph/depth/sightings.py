@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from lumigraph.core.calibration import Calibration
-from lumigraph.depth.beside import Beside
-from lumigraph.depth.blurred import Blurred
-from lumigraph.depth.flat import Flat
-from lumigraph.rendering.patches import Layout
+from lumigraph.depth.beside import LensletNeighbours
+from lumigraph.depth.blurred import BlurLevels
+from lumigraph.depth.flat import FlatImage
+from lumigraph.rendering.patches import PatchLayout
 
 Pair = tuple[np.ndarray, np.ndarray]
 
@@ -23,7 +23,7 @@ _BAND, _BLOCK = 1 << 15, 32  # samples at a time, and across: so that they stay 
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
+class NeighbourView:
     """View of each place (y, x) by one neighbour of the nearest lenslet.
 
     `away` is from the lenslet to the place, along y and x [px of the lattice]. `weight` is 0 where it is not
@@ -54,9 +54,9 @@ class Sightings:
         Patch [px] at which each kind of lenslets is sharp; None where that is not known.
     """
 
-    flat: Flat
+    flat: FlatImage
     calibration: Calibration
-    layout: Layout
+    layout: PatchLayout
     focus: np.ndarray | None
 
     @cached_property
@@ -79,10 +79,10 @@ class Sightings:
             for right in columns
         ]
 
-    def blurred(self, sizes: np.ndarray) -> Blurred:
+    def blurred(self, sizes: np.ndarray) -> BlurLevels:
         """The raw image for `disagreements`."""
         trusts = [(float(size), self._trust(float(size))) for size in sizes]
-        return Blurred.of(
+        return BlurLevels.of(
             self.flat.image, self.focus, [(size, trust) for size, trust in trusts if trust is not None]
         )
 
@@ -129,8 +129,8 @@ class Sightings:
             y, x = warp.applied(np.stack([y, x], -1)).T
         return y.astype(np.float32), x.astype(np.float32)
 
-    def disagreements(self, sizes: np.ndarray, most: float, blurred: Blurred) -> np.ndarray:
-        """Disagreement (n, y, x) of lenslets if all patches have one of `sizes` (n,); see `Beside`."""
+    def disagreements(self, sizes: np.ndarray, most: float, blurred: BlurLevels) -> np.ndarray:
+        """Disagreement (n, y, x) of lenslets if all patches have one of `sizes` (n,); see `LensletNeighbours`."""
         pitch, even = self.calibration.lattice.pitch, self.flat.even
         beside = self._beside(float(np.abs(sizes).min()))
         steps = np.arange(math.ceil(_FINE * (even + 1))).astype(np.float32) / np.float32(_FINE)
@@ -149,7 +149,7 @@ class Sightings:
             out[k] = near.disagreement(weight, value, most).reshape(self.shape)
         return out
 
-    def _beside(self, size: float) -> Beside:
+    def _beside(self, size: float) -> LensletNeighbours:
         """The lenslets that show the places if their patches have a size [px] or more."""
         lattice, (ny, nx) = self.calibration.lattice, self.calibration.shape
         pitch, half = np.float32(lattice.pitch), lattice.pitch / 2
@@ -164,9 +164,9 @@ class Sightings:
         kind = np.mod(self._kinds + kinds[:, None], np.int8(lattice.kinds))
         cy, cx = center
         whole = (cy >= half - 1) & (cy + half <= ny) & (cx >= half - 1) & (cx + half <= nx)
-        return Beside.of((away[0], away[1]), (cy, cx), kind, whole, self.flat.even / size)
+        return LensletNeighbours.of((away[0], away[1]), (cy, cx), kind, whole, self.flat.even / size)
 
-    def around(self, size: np.ndarray | float, *, finer: bool = False) -> Iterator[Sight]:
+    def around(self, size: np.ndarray | float, *, finer: bool = False) -> Iterator[NeighbourView]:
         """Sights of each place by the lenslets near it, for a patch size, one or (y, x) [px].
 
         Of the raw image, or of the finer one.
@@ -194,7 +194,7 @@ class Sightings:
                 slant = self._some(ratio, here)
                 at = [fineness * (c - slant * a.ravel()[here]) for c, a in zip((cy, cx), away, strict=True)]
                 value = self._spread(_linear(image, at), here)
-                yield Sight(self._spread(weight, here), value, away, here, at)
+                yield NeighbourView(self._spread(weight, here), value, away, here, at)
 
     def _some(self, values: np.ndarray, here: np.ndarray) -> np.ndarray:
         """Values, one or (y, x), at numbered places (n,)."""
@@ -251,7 +251,7 @@ class Sightings:
         pull, information = -(pulled * off).sum(0), (pulled * slopes).sum(0)
         return np.stack([pull, information, variance, disputed, *_shared(seen, values - slow)])
 
-    def _slope(self, sight: Sight) -> np.ndarray:
+    def _slope(self, sight: NeighbourView) -> np.ndarray:
         """Derivative (y, x) of a lenslet's value by the logarithm of the patch, over patch/pitch."""
         image, slope = self.flat.finer, np.zeros(len(sight.here), np.float32)
         for axis, away in enumerate(sight.away):

@@ -17,7 +17,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates, median_filter
 from lumigraph.core import memory
 from lumigraph.core.progress import Progress, silent, within
 from lumigraph.depth.pictures import Pictures
-from lumigraph.depth.shading import WINDOW, Fit, Shading
+from lumigraph.depth.shading import WINDOW, Shading, ShadingFit
 from lumigraph.depth.volume import box, cheapest, guided, rivals, semi_global
 from lumigraph.errors import GeometryError
 
@@ -274,7 +274,7 @@ def _textures(pictures: Pictures) -> Pictures:
 
 def _shading(pictures: Pictures, moves: np.ndarray, radius: int, most: float) -> Shading:
     """Shading of the cross of views against the middle one, with places moved by `moves`."""
-    fit = Fit(moves.shape, pictures.noise)
+    fit = ShadingFit(moves.shape, pictures.noise)
     grey, (v, u) = pictures.data.mean(2), pictures.middle
     slope = np.gradient(grey[v, u])
     places = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in moves.shape), indexing="ij")

@@ -6,8 +6,8 @@
 - `lens`: `ThinLens`
 - `lenslets`: `LensletArray`, square or hexagonal, of one or three focal lengths
 - `scatter`: `Scatter`, how lenslets of an array differ from each other; `form`, terms of their form
-- `surface`: `Surface`, the curved side of lenslets of glass
-- `lean`: `Lean`, tilt and bow of arrays and sensors
+- `surface`: `GlassSurface`, the curved side of lenslets of glass
+- `lean`: `TiltAndBow`, tilt and bow of arrays and sensors
 - `zernike`: Zernike polynomials in Noll's order and `ZernikePlate`
 - `field_plate`: Zernike terms that change over the field, and their plate
 - `objective`: `Objective`, a microscope's, for points before it; `disc`, nodes of its pupil
@@ -15,14 +15,14 @@
 """
 
 from lumigraph.elements.apertures import CircularAperture, RectangularAperture
-from lumigraph.elements.field_plate import OF_ONE_LENS, FieldPlate, Openings, ZernikeMap
-from lumigraph.elements.lean import Lean
+from lumigraph.elements.field_plate import OF_ONE_LENS, FieldPlate, VignettedPupil, ZernikeMap
 from lumigraph.elements.lens import ThinLens
 from lumigraph.elements.lenslets import LensletArray
 from lumigraph.elements.masks import random_phase_mask, white_phase
 from lumigraph.elements.object_space import ObjectSpace
-from lumigraph.elements.scatter import Own, Scatter
-from lumigraph.elements.surface import Surface
+from lumigraph.elements.scatter import Scatter, SingleLenslet
+from lumigraph.elements.surface import GlassSurface
+from lumigraph.elements.tilt import TiltAndBow
 from lumigraph.elements.train import Element, Train
 from lumigraph.elements.zernike import ZernikePlate, noll_to_nm, zernike
 
@@ -31,16 +31,16 @@ __all__ = [
     "CircularAperture",
     "Element",
     "FieldPlate",
-    "Lean",
+    "GlassSurface",
     "LensletArray",
     "ObjectSpace",
-    "Openings",
-    "Own",
     "RectangularAperture",
     "Scatter",
-    "Surface",
+    "SingleLenslet",
     "ThinLens",
+    "TiltAndBow",
     "Train",
+    "VignettedPupil",
     "ZernikeMap",
     "ZernikePlate",
     "noll_to_nm",

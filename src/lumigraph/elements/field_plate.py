@@ -204,7 +204,7 @@ def _through(nodes: Nodes, values: np.ndarray, at: float, parity: np.ndarray | N
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Openings:
+class VignettedPupil:
     """Vignetted pupil of a round lens, seen from the image: an ellipse for each field.
 
     Parameters
@@ -258,7 +258,7 @@ class FieldPlate:
     aberrations: ZernikeMap
     diameter: float
     more: tuple[tuple[int, float], ...] = ()
-    openings: Openings | None = None
+    openings: VignettedPupil | None = None
 
     def at(self, y: float, x: float, wavelength: float) -> ZernikePlate:
         """The plate for light from a field, tangents, of a wavelength [m].

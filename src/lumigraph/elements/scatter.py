@@ -23,7 +23,7 @@ MOST = {"focal_length": 0.2, "decentre": 1.0, "missing": MOST_MISSING, "turn": 0
 UNITS = {"decentre": " m", "turn": " rad (of light, n - 1 times the tilt)", "form": " m"}
 
 
-class Warp(NamedTuple):
+class LensletWarp(NamedTuple):
     """Deviations of paths through lenslets besides focus and vertex: angles [rad] and terms [m].
 
     `down` and `across` (...) turn light towards later columns and rows; `terms` (..., k) are those of
@@ -36,7 +36,7 @@ class Warp(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Own:
+class SingleLenslet:
     """Deviations of the lenslet of an index (i, j); lengths along columns and rows of the array.
 
     `focal_change` is the part by which its focal length is longer; `aside` (down, across) the way from its
@@ -92,7 +92,7 @@ class Scatter:
     seed: int = 0
     turn: float = 0.0
     form: float = 0.0
-    own: tuple[Own, ...] = ()
+    own: tuple[SingleLenslet, ...] = ()
 
     def __post_init__(self) -> None:
         checks.whole("seed", self.seed, 0)
@@ -129,7 +129,7 @@ class Scatter:
             found[0][mine], found[1][mine] = one.aside or (0.0, 0.0)
         return found[0], found[1]
 
-    def _among(self, i: np.ndarray, j: np.ndarray) -> Iterator[tuple[np.ndarray, Own]]:
+    def _among(self, i: np.ndarray, j: np.ndarray) -> Iterator[tuple[np.ndarray, SingleLenslet]]:
         for one in self.own:
             if (mine := (i == one.index[0]) & (j == one.index[1])).any():
                 yield mine, one
@@ -146,7 +146,7 @@ class Scatter:
     def naming(self, lenslets: Mapping[tuple[int, int], bool]) -> "Scatter":
         """Scatter that also lists these lenslets, with the apertures of those that are marked."""
         own = {one.index: one for one in self.own}
-        named = {index: own.get(index, Own(index)) for index in lenslets}
+        named = {index: own.get(index, SingleLenslet(index)) for index in lenslets}
         return replace(self, own=tuple(
             replace(one, aside=one.aside or (0.0, 0.0)) if lenslets[index] else one
             for index, one in sorted(named.items())
@@ -157,12 +157,12 @@ class Scatter:
         """True if lenslets are tilted or have a form error."""
         return bool(self.turn or self.form)
 
-    def warp(self, i: np.ndarray, j: np.ndarray) -> Warp:
+    def warp(self, i: np.ndarray, j: np.ndarray) -> LensletWarp:
         """Tilt and form of the paths through lenslets (i, j)."""
         down, across, *terms = (
             np.clip(ndtri(_uniform(i, j, self.seed, channel)), -4, 4) for channel in range(4, 6 + len(TERMS))
         )
-        return Warp(
+        return LensletWarp(
             self.turn * down, self.turn * across, self.form / math.sqrt(len(TERMS)) * np.stack(terms, -1)
         )
 

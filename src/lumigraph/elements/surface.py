@@ -38,7 +38,7 @@ def index_at(wavelength: float, index: float, abbe: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Surface:
+class GlassSurface:
     """A conic of glass, flat on the other side.
 
     Parameters
@@ -111,7 +111,7 @@ class Surface:
 
 
 @lru_cache(maxsize=64)
-def _light(surface: Surface, half: float, focal_length: float) -> tuple[Chebyshev, Chebyshev]:
+def _light(surface: GlassSurface, half: float, focal_length: float) -> tuple[Chebyshev, Chebyshev]:
     """Path taken away and amplitude, by the squared distance from the vertex."""
     widest = MARGIN * math.sqrt(2) * half
     squared = widest**2 * (1 - np.cos(np.pi * (np.arange(4 * DEGREE) + 0.5) / (4 * DEGREE))) / 2

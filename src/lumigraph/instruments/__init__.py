@@ -25,7 +25,6 @@ from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.files import catalogue
 from lumigraph.instruments.instrument import Instrument
-from lumigraph.instruments.joint import joint_operator, scan
 from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.lenslets import Lenslets
 from lumigraph.instruments.loading import load_camera
@@ -36,9 +35,10 @@ from lumigraph.instruments.parts import MainLens, Pixels
 from lumigraph.instruments.plenoptic1 import PlenopticCamera
 from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
 from lumigraph.instruments.row import Row
-from lumigraph.instruments.shifts import FoundShifts, find_shifts
 from lumigraph.instruments.single_lens import SingleLensCamera
 from lumigraph.instruments.tolerances import Tolerance
+from lumigraph.metrology.scanning.joint import joint_operator, scan
+from lumigraph.metrology.scanning.shifts import FoundShifts, find_shifts
 
 __all__ = [
     "Built",

@@ -3,12 +3,12 @@
 from pydantic import model_validator
 
 from lumigraph.errors import GeometryError
-from lumigraph.instruments.part import Part
+from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.quantities import Angle, Fraction, NotNegative
 from lumigraph.sensor import AngularResponse
 
 
-class Angles(Part):
+class Angles(CameraTable):
     """Table ``[sensor.angular_response]``; see `lumigraph.sensor.AngularResponse`.
 
     Angles count from the chief ray: on-chip microlenses are taken to be offset for the main lens of the

@@ -4,13 +4,13 @@ import math
 
 from pydantic import model_validator
 
-from lumigraph.elements import Lean, Scatter
+from lumigraph.elements import Scatter, TiltAndBow
 from lumigraph.errors import GeometryError
-from lumigraph.instruments.part import Part
+from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.quantities import Angle, Displacement, Length, NotNegative, Seed, Tilt
 
 
-class Built(Part):
+class Built(CameraTable):
     """A camera as built: distances other than described, lenslets that differ, tilted planes.
 
     The object stays at `object_distance`, in focus or not.
@@ -78,7 +78,7 @@ class Built(Part):
         )
         return None if found == Scatter(seed=self.seed) else found
 
-    def lean(self, corner: float) -> Lean | None:
+    def lean(self, corner: float) -> TiltAndBow | None:
         """Tilt and bow of array and sensor, whose corners are `corner` from the axis [m]; None without any.
 
         Raises
@@ -89,8 +89,8 @@ class Built(Part):
         array, sensor = (
             (math.tan(y), math.tan(x)) for y, x in (self.array_tilt, self.sensor_tilt)
         )  # fmt: skip
-        found = Lean(array, self.array_bow / corner**2, sensor)
-        return None if found == Lean() else found
+        found = TiltAndBow(array, self.array_bow / corner**2, sensor)
+        return None if found == TiltAndBow() else found
 
     @model_validator(mode="after")
     def _is_possible(self) -> "Built":

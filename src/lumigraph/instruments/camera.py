@@ -16,12 +16,14 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.linear import Linear, Sum
 from lumigraph.core.progress import Progress, part
+from lumigraph.describe import lens_glass
+from lumigraph.describe.trade_offs import MagnificationRange
 from lumigraph.design import plenoptic1, resolution, thin_lens
 from lumigraph.design.layout import Layout, LensletLayout
 from lumigraph.elements import FieldPlate, LensletArray, ThinLens, Train, ZernikePlate
 from lumigraph.errors import GeometryError, ParaxialWarning
-from lumigraph.instruments import describe_glass, parameters, point_view
-from lumigraph.instruments.glass import Glass, Wanted, first_order, glass
+from lumigraph.instruments import parameters, point_view
+from lumigraph.instruments.glass import GlassRequest, LensGlass, first_order, glass
 from lumigraph.instruments.glass_layout import glass_layout
 from lumigraph.instruments.glass_optics import ExitPupil, Traced, behind_glass, traced
 from lumigraph.instruments.grids import Sampling
@@ -31,7 +33,6 @@ from lumigraph.instruments.parameters import Parameter
 from lumigraph.instruments.parts import MainLens, Pixels
 from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.quantities import Length, Wavelength
-from lumigraph.instruments.trade_offs import Range
 from lumigraph.operators import CameraOptics
 from lumigraph.propagation import Propagate
 from lumigraph.sensor import Sensor
@@ -180,7 +181,7 @@ class Camera(Instrument):
         return Train((plate, ThinLens(focal_length)))
 
     @cached_property
-    def glass(self) -> Glass | None:
+    def glass(self) -> LensGlass | None:
         """Ray-traced properties of the main lens' prescription at this camera's distances; None without one.
 
         Raises
@@ -212,9 +213,9 @@ class Camera(Instrument):
         return None if self.glass is None else traced(self.glass, self.exit_pupil, self.object_distance)
 
     @property
-    def _wanted(self) -> Wanted:
+    def _wanted(self) -> GlassRequest:
         """Requirements on the glass."""
-        return Wanted(
+        return GlassRequest(
             self.wavelength, self.object_distance, self.main_lens.focal_length, self.pupil_diameter,
             math.hypot(*self.sampling.object_half) / self.object_distance,
         )  # fmt: skip
@@ -268,17 +269,17 @@ class Camera(Instrument):
         """Operator of the described pixels, whatever the calibration of a raw image."""
         return self.operator(depths, samples_per_lenslet, progress=progress)
 
-    def magnifications(self) -> Range:
+    def magnifications(self) -> MagnificationRange:
         """Magnifications of the main lens, varied by the object's distance."""
         focal_length, own = self.main_lens.focal_length, self.magnification
-        return Range(
+        return MagnificationRange(
             "z2/z1, of the main lens", own, (own / 5, own * 5),
             lambda m: self.replace(object_distance=focal_length * (1 + 1 / m)),
         )  # fmt: skip
 
     def optics(self) -> CameraOptics:
         """Plain values of the camera, which operators read."""
-        for text in describe_glass.warnings(self):
+        for text in lens_glass.warnings(self):
             warnings.warn(text, ParaxialWarning, stacklevel=2)
         thin = CameraOptics(
             self.wavelength, self.object_distance, self.separation, self.pupil_diameter, self.lens_train(),

@@ -17,11 +17,11 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError
 from lumigraph.instruments.lenslet_camera import LensletCamera
-from lumigraph.operators.microscope_building import require_accuracy
-from lumigraph.operators.microscope_cell import Lenslet
-from lumigraph.operators.microscope_layout import Behind, cell_sampling, laid_out
-from lumigraph.operators.microscope_pupil import PupilImages
-from lumigraph.operators.paraxial import resolved
+from lumigraph.operators.lenslets.paraxial_error import resolved
+from lumigraph.operators.microscope.building import require_accuracy
+from lumigraph.operators.microscope.cell import Lenslet
+from lumigraph.operators.microscope.layout import SensorLayout, cell_sampling, laid_out
+from lumigraph.operators.microscope.pupil import PupilImages
 
 POINTS = 1
 """Along a lenslet, of the samples of which a point of 1 is one."""
@@ -48,7 +48,7 @@ def pupil_images(
         parts.pitch, parts.focal_length[0], b * L / (L + b), L / z, parts.pitch * parts.fill_factor,
     )  # fmt: skip
     calibration = camera.calibration if pixels is None else pixels
-    behind = Behind(calibration, camera.pixels.fill_factor)
+    behind = SensorLayout(calibration, camera.pixels.fill_factor)
     sampling = cell_sampling(objective, lenslet, behind, POINTS, (0.0,), accuracy)
     sampling = replace(sampling, light=sampling.light * (L / (L + b)) ** 2)
     layout = laid_out(sampling, calibration, parts.pitch * z / L)

@@ -8,7 +8,7 @@ from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.elements.objective import Objective
 from lumigraph.instruments.parts import MainLens
-from lumigraph.operators.microscope_pupil import PupilImages
+from lumigraph.operators.microscope.pupil import PupilImages
 
 
 @runtime_checkable

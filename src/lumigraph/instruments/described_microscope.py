@@ -22,8 +22,8 @@ from lumigraph.instruments.lenslets import Lenslets
 from lumigraph.instruments.microscope_objective import MicroscopeObjective
 from lumigraph.instruments.parts import Pixels
 from lumigraph.instruments.quantities import Displacement, Length, Positive, Wavelength
-from lumigraph.operators.fourier_microscope import Mosaic
-from lumigraph.operators.microscope_cell import Lenslet
+from lumigraph.operators.microscope.cell import Lenslet
+from lumigraph.operators.microscope.fourier_microscope import Mosaic
 from lumigraph.sensor import Sensor
 
 

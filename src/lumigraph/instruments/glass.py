@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from lumigraph.design import thin_lens
-from lumigraph.elements import Openings, ZernikeMap, noll_to_nm, zernike
+from lumigraph.elements import VignettedPupil, ZernikeMap, noll_to_nm, zernike
 from lumigraph.errors import GeometryError
 from lumigraph.io.prescription import FirstOrder, Prescription, Rays, content
-from lumigraph.store import cabinet
+from lumigraph.store import array_cache
 
 VERSION = 1
 """Version of the cached arrays: another one discards them."""
@@ -51,7 +51,7 @@ TERMS = tuple(j for j in range(2, (ORDER + 1) * (ORDER + 2) // 2 + 1) if noll_to
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Wanted:
+class GlassRequest:
     """Requirements of a camera on its glass.
 
     Parameters
@@ -79,7 +79,7 @@ class Wanted:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Glass:
+class LensGlass:
     """Ray-traced properties of a prescription.
 
     Parameters
@@ -109,7 +109,7 @@ class Glass:
 
     first_order: FirstOrder
     aberrations: ZernikeMap
-    openings: Openings
+    openings: VignettedPupil
     entrance_pupil: float
     defocus: float
     moved: np.ndarray
@@ -141,7 +141,7 @@ def _first_order(path: Path, digest: str, wavelength: float) -> FirstOrder:
         return {"first_order": np.array([getattr(found, field.name) for field in fields(found)])}
 
     key = hashlib.sha256(repr((VERSION, _version(), digest, wavelength)).encode()).hexdigest()
-    return FirstOrder(*cabinet.kept(f"glass-first-{key}", traced)["first_order"].tolist())
+    return FirstOrder(*array_cache.kept(f"glass-first-{key}", traced)["first_order"].tolist())
 
 
 def _version() -> str:
@@ -152,7 +152,7 @@ def _version() -> str:
         return ""  # it is refused when it is needed
 
 
-def glass(path: Path, wanted: Wanted) -> Glass:
+def glass(path: Path, wanted: GlassRequest) -> LensGlass:
     """Ray-traced properties of a prescription for a camera; cached.
 
     Raises
@@ -167,19 +167,19 @@ def glass(path: Path, wanted: Wanted) -> Glass:
     return _glass(path, hashlib.sha256(content(path)).hexdigest(), tuple(_numbers(wanted)))
 
 
-def _numbers(wanted: Wanted) -> list[float]:
+def _numbers(wanted: GlassRequest) -> list[float]:
     return [getattr(wanted, field.name) for field in fields(wanted)]
 
 
 @lru_cache(16)
-def _glass(path: Path, digest: str, numbers: tuple[float, ...]) -> Glass:
-    wanted = Wanted(*numbers)
+def _glass(path: Path, digest: str, numbers: tuple[float, ...]) -> LensGlass:
+    wanted = GlassRequest(*numbers)
     key = hashlib.sha256(repr((VERSION, _version(), digest, numbers)).encode()).hexdigest()
-    kept = cabinet.kept(f"glass-{key}", lambda: _traced(path, wanted))
+    kept = array_cache.kept(f"glass-{key}", lambda: _traced(path, wanted))
     return _of(kept)
 
 
-def _of(kept: dict[str, np.ndarray]) -> Glass:
+def _of(kept: dict[str, np.ndarray]) -> LensGlass:
     numbers = dict(zip(_SCALARS, kept["numbers"].tolist(), strict=True))
     first = FirstOrder(*kept["first_order"].tolist())
     x = tuple(kept["fields"].tolist())
@@ -187,8 +187,8 @@ def _of(kept: dict[str, np.ndarray]) -> Glass:
         TERMS, np.array(kept["terms"])[:, None], x, None, tuple(kept["wavelengths"].tolist()), metres=True
     )
     notes = tuple(str(note) for note in kept["notes"].tolist() if note)
-    openings = Openings(x, tuple(kept["wavelengths"].tolist()), np.array(kept["axes"]))
-    return Glass(
+    openings = VignettedPupil(x, tuple(kept["wavelengths"].tolist()), np.array(kept["axes"]))
+    return LensGlass(
         first, aberrations, openings, moved=np.array(kept["moved"]), turned=np.array(kept["turned"]),
         notes=notes, **numbers,
     )  # fmt: skip
@@ -197,7 +197,7 @@ def _of(kept: dict[str, np.ndarray]) -> Glass:
 _SCALARS = ("entrance_pupil", "defocus", "left", "between", "rim")
 
 
-def _traced(path: Path, wanted: Wanted) -> dict[str, np.ndarray]:
+def _traced(path: Path, wanted: GlassRequest) -> dict[str, np.ndarray]:
     """Everything about a prescription, as arrays."""
     lens = Prescription(path)
     wavelengths = _wavelengths(lens, wanted.wavelength)
@@ -216,7 +216,7 @@ def _traced(path: Path, wanted: Wanted) -> dict[str, np.ndarray]:
     }
 
 
-def _enough(lens: Prescription, wanted: Wanted, wavelengths: np.ndarray) -> tuple[np.ndarray, dict]:
+def _enough(lens: Prescription, wanted: GlassRequest, wavelengths: np.ndarray) -> tuple[np.ndarray, dict]:
     """Fields that are close enough to each other, and what their rays say."""
     between = math.inf
     for count in FIELDS:
@@ -248,11 +248,11 @@ def _wavelengths(lens: Prescription, own: float) -> np.ndarray:
     return np.unique([*np.linspace(ends[0], own, 4), *np.linspace(own, ends[1], 4)])
 
 
-def _image_distance(first: FirstOrder, wanted: Wanted) -> float:
+def _image_distance(first: FirstOrder, wanted: GlassRequest) -> float:
     return thin_lens.image_distance(first.focal_length, wanted.object_distance)
 
 
-def _entrance_pupil(lens: Prescription, first: FirstOrder, wanted: Wanted) -> float:
+def _entrance_pupil(lens: Prescription, first: FirstOrder, wanted: GlassRequest) -> float:
     """Diameter that has the thin lens' aperture at the image [m]."""
     if abs(first.focal_length - wanted.focal_length) > SAME_FOCUS * wanted.focal_length:
         raise GeometryError(
@@ -277,7 +277,7 @@ def _pupil() -> np.ndarray:
     return np.stack([np.outer(rho, np.cos(angle)).ravel(), np.outer(rho, np.sin(angle)).ravel()], axis=-1)
 
 
-def _fitted(lens: Prescription, wanted: Wanted, at: np.ndarray, wavelengths: np.ndarray) -> dict:
+def _fitted(lens: Prescription, wanted: GlassRequest, at: np.ndarray, wavelengths: np.ndarray) -> dict:
     """Terms (wavelengths, fields, terms) and what else the rays at some fields say."""
     points, own = np.concatenate(([[0.0, 0.0]], _pupil())), wanted.wavelength
     bundles = {w: _arrived(lens, w, wanted, at, points) for w in wavelengths.tolist()}
@@ -314,7 +314,7 @@ def _fitted(lens: Prescription, wanted: Wanted, at: np.ndarray, wavelengths: np.
 
 
 def _arrived(
-    lens: Prescription, wavelength: float, wanted: Wanted, at: np.ndarray, points: np.ndarray
+    lens: Prescription, wavelength: float, wanted: GlassRequest, at: np.ndarray, points: np.ndarray
 ) -> Rays:
     rays = lens.trace(wavelength, at * wanted.object_distance, points)
     through = np.isfinite(rays.path).all(axis=1) & np.isfinite(rays.along).all(axis=1)
@@ -349,13 +349,13 @@ def _path(rays: Rays, heights: np.ndarray, defocus: float) -> np.ndarray:
     return rays.path + moved + defocus * _cosine(rays)
 
 
-def _places(rays: Rays, chief: np.ndarray, wanted: Wanted) -> tuple[np.ndarray, np.ndarray]:
+def _places(rays: Rays, chief: np.ndarray, wanted: GlassRequest) -> tuple[np.ndarray, np.ndarray]:
     """Positions of rays in the thin lens' stop, along and across the field, over its radius."""
     scale = -2 * wanted.image_distance / wanted.diameter
     return scale * (rays.along - chief[:, None]), scale * rays.across
 
 
-def _best_focus(rays: Rays, wanted: Wanted) -> float:
+def _best_focus(rays: Rays, wanted: GlassRequest) -> float:
     """Plane behind the image's in which the wavefront on the axis has no defocus [m]."""
     u, v = (each[0, 1:] for each in _places(rays, rays.along[:, 0], wanted))
     radius, at = float(np.hypot(u, v).max()), TERMS.index(4)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lumigraph.design.layout import GlassLayout
-from lumigraph.instruments.glass import Wanted, glass
+from lumigraph.instruments.glass import GlassRequest, glass
 from lumigraph.io.prescription import Prescription, content
 
 FIELD = 0.75
@@ -16,7 +16,7 @@ FIELD = 0.75
 _PUPIL = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 
 
-def glass_layout(path: Path, wanted: Wanted) -> GlassLayout:
+def glass_layout(path: Path, wanted: GlassRequest) -> GlassLayout:
     """Layout of a prescription as a camera uses it.
 
     Raises
@@ -28,7 +28,7 @@ def glass_layout(path: Path, wanted: Wanted) -> GlassLayout:
 
 
 @lru_cache(16)
-def _layout(path: Path, _: str, wanted: Wanted) -> GlassLayout:
+def _layout(path: Path, _: str, wanted: GlassRequest) -> GlassLayout:
     known, lens = glass(path, wanted), Prescription(path)
     first = lens.first_order(wanted.wavelength)
     lens.focus(wanted.object_distance, wanted.image_distance + known.defocus, known.entrance_pupil)

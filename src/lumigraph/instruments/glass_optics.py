@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lumigraph.elements import FieldPlate, ObjectSpace, Openings, ThinLens, Train, ZernikeMap
+from lumigraph.elements import FieldPlate, ObjectSpace, ThinLens, Train, VignettedPupil, ZernikeMap
 from lumigraph.errors import GeometryError
-from lumigraph.instruments.glass import Glass
+from lumigraph.instruments.glass import LensGlass
 from lumigraph.operators import CameraOptics
 
 
@@ -91,7 +91,7 @@ class Traced:
         return np.interp(field, self.fields, self.lean)
 
 
-def traced(glass: Glass, pupil: ExitPupil, object_distance: float) -> Traced:
+def traced(glass: LensGlass, pupil: ExitPupil, object_distance: float) -> Traced:
     """Chief rays of a lens at a distance from the focused plane [m]."""
     at = np.array(glass.aberrations.x)
     height = pupil.image_distance * at
@@ -111,7 +111,7 @@ def traced(glass: Glass, pupil: ExitPupil, object_distance: float) -> Traced:
     )
 
 
-def behind_glass(thin: CameraOptics, glass: Glass, found: Traced, pupil: ExitPupil) -> CameraOptics:
+def behind_glass(thin: CameraOptics, glass: LensGlass, found: Traced, pupil: ExitPupil) -> CameraOptics:
     """A camera whose thin main lens, with its plate, becomes the one in the exit pupil."""
     plate = next(part for part in thin.lens.elements if isinstance(part, FieldPlate))
     diameter = thin.pupil_diameter * pupil.wider
@@ -122,7 +122,7 @@ def behind_glass(thin: CameraOptics, glass: Glass, found: Traced, pupil: ExitPup
             aberrations.metres,
         ),
         diameter, plate.more,
-        Openings(
+        VignettedPupil(
             found.fields, openings.wavelengths, openings.axes, found.lean * pupil.to_image / (diameter / 2)
         ),
     )  # fmt: skip

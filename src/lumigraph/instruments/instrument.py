@@ -12,22 +12,22 @@ from lumigraph.core.drawing import draw
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress
+from lumigraph.describe.trade_offs import MagnificationRange
 from lumigraph.design.layout import Layout, MicroscopeLayout
 from lumigraph.errors import FormatError
 from lumigraph.instruments import files
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.parameters import Parameter, changes
-from lumigraph.instruments.part import Part
+from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.problems import readable
 from lumigraph.instruments.quantities import FROM_FILE
 from lumigraph.instruments.row import Row
-from lumigraph.instruments.trade_offs import Range
-from lumigraph.operators.fineness import Fineness
+from lumigraph.operators.sampling.sampling_rules import SamplingRules
 from lumigraph.sensor import Sensor
 
 
-class Instrument(Part):
+class Instrument(CameraTable):
     """Base of everything that a camera file describes; see its children.
 
     The protocols of `instruments.capabilities` say what only some kinds can do. What raises
@@ -137,7 +137,7 @@ class Instrument(Part):
         GeometryError
             Of a microscope, out of 1e-5 to 0.1.
         """
-        Fineness(accuracy)
+        SamplingRules(accuracy)
 
     def operator_for(
         self,
@@ -217,7 +217,7 @@ class Instrument(Part):
         """Rows of the `quantities` that change with the magnification, to first order."""
         raise NotImplementedError
 
-    def magnifications(self) -> Range:
+    def magnifications(self) -> MagnificationRange:
         """Range of magnifications for the trade-offs."""
         raise NotImplementedError
 

@@ -19,7 +19,7 @@ from lumigraph.core.linear import Linear
 from lumigraph.depth import metric
 from lumigraph.design import plenoptic1, plenoptic2, resolution
 from lumigraph.design.layout import LensletLayout
-from lumigraph.elements import Lean, LensletArray, Scatter, Train
+from lumigraph.elements import LensletArray, Scatter, TiltAndBow, Train
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import grids, point_view
 from lumigraph.instruments.built import Built
@@ -28,12 +28,12 @@ from lumigraph.instruments.making import Making
 from lumigraph.instruments.parameters import Parameter, optional
 from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.tolerances import Tolerances
-from lumigraph.instruments.with_parts import WithParts
+from lumigraph.instruments.with_parts import CameraGradients
 from lumigraph.operators import CameraOptics, Model, is_possible, periodic_operator
 from lumigraph.propagation import Propagate
 
 
-class LensletCamera(WithParts):
+class LensletCamera(CameraGradients):
     """A main lens, lenslets and a sensor."""
 
     lenslets: Lenslets
@@ -86,7 +86,7 @@ class LensletCamera(WithParts):
         return max(super().path_difference, self.lenslets.pitch**2 / self.lenslet_distance)
 
     @cached_property
-    def lean(self) -> Lean | None:
+    def lean(self) -> TiltAndBow | None:
         """Tilt and bow of array and sensor as built; None if they are square to the axis."""
         return self.built.lean(math.hypot(*self.lenslets.reach))
 

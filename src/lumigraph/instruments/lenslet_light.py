@@ -14,8 +14,8 @@ from lumigraph.deconvolution import Exposure
 from lumigraph.errors import CalibrationError
 from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.microscope import LightFieldMicroscope
-from lumigraph.instruments.texture import SAMPLES, Part, Textures
-from lumigraph.operators.microscope_operator import MicroscopeOperator
+from lumigraph.metrology.scanning.texture import SAMPLES, PicturePart, Textures
+from lumigraph.operators.microscope.volume_operator import MicroscopeOperator
 
 FAINT = 0.5
 """Light of a lenslet, over the median's, below which it does not count."""
@@ -37,7 +37,7 @@ Lensed = LensletCamera | LightFieldMicroscope
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LensletLight:
+class LensletPixels:
     """Assignment of pixels to lenslets, and their images of the object.
 
     Parameters
@@ -57,7 +57,7 @@ class LensletLight:
     textures: Textures
 
     @classmethod
-    def of(cls, camera: Lensed) -> "LensletLight":
+    def of(cls, camera: Lensed) -> "LensletPixels":
         """Light of the lenslets on the camera's own pixels.
 
         Raises
@@ -87,7 +87,7 @@ class LensletLight:
         even = np.asarray(operator.forward(np.ones(grid.shape, np.float32)), np.float64)
         return cls(labels, inner, even, places, Textures.of(footprint))
 
-    def seen(self, raws: Sequence[RawImage], exposures: Sequence[Exposure | None]) -> Part:
+    def seen(self, raws: Sequence[RawImage], exposures: Sequence[Exposure | None]) -> PicturePart:
         """Light of each lenslet that counts in all raw images, over its mean.
 
         Raises
@@ -110,7 +110,7 @@ class LensletLight:
         if not mean > 0:
             raise CalibrationError("the raw images are dark: shifts are unknown. Give more light.")
         noise = np.maximum(noise, 0.1 * noise.mean())
-        return Part(values / mean, noise / mean**2, self.places[counts], self.textures)
+        return PicturePart(values / mean, noise / mean**2, self.places[counts], self.textures)
 
     def _of(self, raw: RawImage, known: Exposure) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Electrons of each lenslet, their variance, and what it shows of an even object."""

@@ -7,12 +7,12 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from lumigraph.core.aside import Aside
 from lumigraph.core.lattice import Lattice
-from lumigraph.elements import Own, Surface
+from lumigraph.core.lattice_offsets import LatticeOffsets
+from lumigraph.elements import GlassSurface, SingleLenslet
 from lumigraph.elements.surface import index_at
 from lumigraph.errors import FormatError, GeometryError
-from lumigraph.instruments.part import Part
+from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.quantities import (
     Angle,
     Counts,
@@ -35,7 +35,7 @@ MOST_CONIC = 100.0
 """Largest conic constant of their surfaces, of either sign."""
 
 
-class OneLenslet(Part):
+class OneLenslet(CameraTable):
     """Deviations of one lenslet, table ``[lenslets.single.N]``.
 
     Parameters
@@ -91,7 +91,7 @@ Singles = Annotated[dict[int, OneLenslet], BeforeValidator(_singles)]
 """Deviations of single lenslets, by number."""
 
 
-class Lenslets(Part):
+class Lenslets(CameraTable):
     """The lenslet array.
 
     Parameters
@@ -233,7 +233,7 @@ class Lenslets(Part):
             )
         return found
 
-    def surface(self, wavelength: float) -> Surface | None:
+    def surface(self, wavelength: float) -> GlassSurface | None:
         """Curved surface at a wavelength [m]; None for ideal lenslets.
 
         Raises
@@ -243,7 +243,7 @@ class Lenslets(Part):
         """
         if self.conic is None:
             return None
-        surface = Surface(self.index_at(wavelength), self.conic, self.thickness)
+        surface = GlassSurface(self.index_at(wavelength), self.conic, self.thickness)
         for focal_length in self.focal_length:
             surface.check(self.fill_factor * self.pitch / 2, focal_length)
         return surface
@@ -313,16 +313,16 @@ class Lenslets(Part):
             focal_lengths[number - 1] *= 1 + own.focal_change
         return centers, focal_lengths
 
-    def own(self) -> tuple[Own, ...]:
+    def own(self) -> tuple[SingleLenslet, ...]:
         """Deviations of single lenslets, in the frame that turns with the array."""
         indices, found = self.indices(), []
         for number, one in self.single.items():
             i, j = indices[number - 1].tolist()
             aside, decentre = self.turned(*one.offset), self.turned(*one.decentre)
-            found.append(Own((i, j), one.focal_change, aside if any(aside) else None, decentre))
+            found.append(SingleLenslet((i, j), one.focal_change, aside if any(aside) else None, decentre))
         return tuple(found)
 
-    def aside(self, scale: float) -> Aside | None:
+    def aside(self, scale: float) -> LatticeOffsets | None:
         """Offsets of micro-images from the lattice, of lenslets whose vertex is off it, times a scale [px/m].
 
         Where the raw image is turned the scale is negative, and indices are the other way round.
@@ -331,7 +331,7 @@ class Lenslets(Part):
         if not ways:
             return None
         indices = self.indices()[np.array(list(ways)) - 1]
-        return Aside(int(math.copysign(1, scale)) * indices, scale * np.array(list(ways.values())))
+        return LatticeOffsets(int(math.copysign(1, scale)) * indices, scale * np.array(list(ways.values())))
 
     def amid(self, count: Sequence[int]) -> dict[str, Any]:
         """Changes for `Instrument.replace` that keep the middle of the array, `count` lenslets.

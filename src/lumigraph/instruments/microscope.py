@@ -11,20 +11,21 @@ from lumigraph.core import checks
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress
+from lumigraph.describe import microscope, trade_offs
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import describe_microscope, microscope_design, trade_offs
+from lumigraph.instruments import microscope_design
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.parameters import Parameter
 from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.row import Row
-from lumigraph.instruments.scope_with_parts import ScopeWithParts
-from lumigraph.operators.fourier_microscope import fourier_operator
-from lumigraph.operators.microscope_building import Layout, microscope_operator, require_accuracy
-from lumigraph.operators.microscope_cell import CellSampling
-from lumigraph.operators.microscope_layout import Behind, cell_sampling, laid_out
-from lumigraph.operators.microscope_pixels import narrowed
-from lumigraph.operators.microscope_pupil import PupilImages
-from lumigraph.operators.points import OUTSIDE
+from lumigraph.instruments.scope_with_parts import MicroscopeGradients
+from lumigraph.operators.lenslets.points import OUTSIDE
+from lumigraph.operators.microscope.building import SampledLenslets, microscope_operator, require_accuracy
+from lumigraph.operators.microscope.cell import CellSampling
+from lumigraph.operators.microscope.fourier_microscope import fourier_operator
+from lumigraph.operators.microscope.layout import SensorLayout, cell_sampling, laid_out
+from lumigraph.operators.microscope.pixels import narrowed
+from lumigraph.operators.microscope.pupil import PupilImages
 from lumigraph.simulation.microscope_scene import SAMPLES, point_image
 
 MODELLED = 1e-2
@@ -34,7 +35,7 @@ FINER = 1.5
 """Samples of light that is traced by rays, over whole pixels: those between are interpolated."""
 
 
-class LightFieldMicroscope(ScopeWithParts):
+class LightFieldMicroscope(MicroscopeGradients):
     """A microscope with lenslets in front of its sensor.
 
     Parameters
@@ -236,12 +237,12 @@ class LightFieldMicroscope(ScopeWithParts):
 
     def _layout(
         self, samples: int, pixels: int | Calibration | None, depths: Sequence[float], accuracy: float
-    ) -> Layout:
+    ) -> SampledLenslets:
         require_accuracy(accuracy)
         if isinstance(pixels, int) and not isinstance(pixels, bool):
             if pixels < 2:
                 raise GeometryError(f"pixels is {pixels} but a lenslet needs at least 2 along each side.")
-            return Layout(self.lenslets.count, self._sampled(samples, pixels, 1 / pixels, 0))
+            return SampledLenslets(self.lenslets.count, self._sampled(samples, pixels, 1 / pixels, 0))
         calibration = self.calibration if pixels is None else pixels
         if not isinstance(calibration, Calibration):
             raise GeometryError(f"pixels is {pixels!r} but must be a whole number, a Calibration or None.")
@@ -256,7 +257,7 @@ class LightFieldMicroscope(ScopeWithParts):
             N = math.ceil(max(FINER, math.sqrt(2) / fill) * pitch)
             return self._sampled(samples, N, 1 / pitch, 1)
         shortest = min(self.objectives, key=lambda one: one.wavelength)
-        behind = Behind(calibration, fill)
+        behind = SensorLayout(calibration, fill)
         return cell_sampling(shortest, self.lenslet, behind, samples, depths, accuracy)
 
     def _sampled(self, samples: int, N: int, apart: float, degree: int) -> CellSampling:
@@ -269,10 +270,10 @@ class LightFieldMicroscope(ScopeWithParts):
         """Refuse an accuracy that `operator` cannot reach, before any work."""
         require_accuracy(accuracy)
 
-    def magnifications(self) -> trade_offs.Range:
+    def magnifications(self) -> trade_offs.MagnificationRange:
         """Magnifications of the objective."""
         own = self.objective.magnification
-        return trade_offs.Range(
+        return trade_offs.MagnificationRange(
             "M, of the objective", own, (own / 4, own * 4),
             lambda m: self.replace(objective={"magnification": m}),
         )  # fmt: skip
@@ -284,7 +285,7 @@ class LightFieldMicroscope(ScopeWithParts):
 
     def describe(self) -> Description:
         """Magnification, resolution, depth of field, directions and band limits, each with its equation."""
-        return describe_microscope.microscope(self)
+        return microscope.microscope(self)
 
 
 def _numbers(depths: Sequence[float]) -> tuple[float, ...]:

@@ -6,11 +6,11 @@ from pydantic import Field, model_validator
 
 from lumigraph.design import microscope as closed_forms
 from lumigraph.errors import GeometryError
-from lumigraph.instruments.part import Part
+from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.quantities import Aberrations, Fraction, Length, Positive
 
 
-class MicroscopeObjective(Part):
+class MicroscopeObjective(CameraTable):
     """Table ``[objective]``.
 
     Parameters

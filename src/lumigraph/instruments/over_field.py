@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, PlainSerializer, model_validator
 
 from lumigraph.elements import ZernikeMap
 from lumigraph.errors import FormatError, GeometryError
-from lumigraph.instruments.part import Part
+from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.quantities import angles, noll_index, numbers, wavelengths
 from lumigraph.io import tables
 
@@ -42,7 +42,7 @@ def _items(table: Any) -> Iterable[tuple[Any, Any]]:
     return table.items()
 
 
-class OverField(Part):
+class OverField(CameraTable):
     """Aberrations of a main lens that change over the field: Zernike terms, rms, at some fields.
 
     A round lens has one row of fields, angles from the axis, as seen from the middle of the lens; others have

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from lumigraph.instruments.problems import readable
 
 
-class Part(BaseModel):
+class CameraTable(BaseModel):
     """A table of a camera file. Whatever is wrong with it is one line that names the field."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, populate_by_name=True)

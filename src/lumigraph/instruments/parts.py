@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments.angular import Angles
 from lumigraph.instruments.over_field import OverField, given
-from lumigraph.instruments.part import Part
+from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.quantities import (
     Aberrations,
     Bits,
@@ -30,7 +30,7 @@ MOST_PIXELS = 2**28
 """Largest sensor: 268 million pixels, 1 GiB in single precision."""
 
 
-class MainLens(Part):
+class MainLens(CameraTable):
     """The lens that forms the image: a thin lens with a round stop.
 
     Parameters
@@ -80,7 +80,7 @@ class MainLens(Part):
         return self.over_field is not None or self.prescription is not None
 
 
-class Pixels(Part):
+class Pixels(CameraTable):
     """The sensor's pixels, table ``[sensor]``.
 
     Parameters

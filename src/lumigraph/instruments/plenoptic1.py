@@ -7,14 +7,15 @@ from pydantic import model_validator
 
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
+from lumigraph.describe import cameras, trade_offs
 from lumigraph.design import plenoptic1, thin_lens
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import camera_pupil, describe, trade_offs
+from lumigraph.instruments import camera_pupil
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.parameters import Parameter, lenslets
 from lumigraph.instruments.row import Row
-from lumigraph.operators.microscope_pupil import PupilImages
+from lumigraph.operators.microscope.pupil import PupilImages
 from lumigraph.simulation import plane_views
 
 _MOST_KNOWN = 33
@@ -45,7 +46,7 @@ class PlenopticCamera(LensletCamera):
     built
         `Built`: distances as built, where they are not the description's.
     tolerances
-        Tolerances of values, as `lumigraph.tolerance` takes them, such as "±0.05 mm" of "separation".
+        Tolerances of values, as `lumigraph.studies.tolerance` takes them, such as "±0.05 mm" of "separation".
 
     Raises
     ------
@@ -153,4 +154,4 @@ class PlenopticCamera(LensletCamera):
 
     def describe(self) -> Description:
         """Distances, f-numbers, cut-offs, directions and sampling, each with its equation."""
-        return describe.plenoptic1(self)
+        return cameras.plenoptic1(self)

@@ -4,10 +4,10 @@ from typing import ClassVar
 
 from pydantic import model_validator
 
+from lumigraph.describe import cameras, trade_offs
 from lumigraph.design import plenoptic2 as closed_forms
 from lumigraph.design import thin_lens
 from lumigraph.errors import FormatError, GeometryError
-from lumigraph.instruments import describe, trade_offs
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.parameters import Parameter, choice, lenslets, number
@@ -39,7 +39,7 @@ class FocusedPlenopticCamera(LensletCamera):
     built
         `Built`: distances as built, where they are not the description's.
     tolerances
-        Tolerances of values, as `lumigraph.tolerance` takes them, such as "±0.05 mm" of "separation".
+        Tolerances of values, as `lumigraph.studies.tolerance` takes them, such as "±0.05 mm" of "separation".
 
     Raises
     ------
@@ -178,11 +178,11 @@ class FocusedPlenopticCamera(LensletCamera):
             *lenslets(self.lenslets, layouts=len(self.lenslets.focal_length) == 1),
         )
 
-    def magnifications(self) -> trade_offs.Range:
+    def magnifications(self) -> trade_offs.MagnificationRange:
         """Magnifications of the lenslets."""
         m = self.lenslet_magnification
         ends = (min(0.05, m), max(1.5, m)) if m > 0 else (min(0.05, -m), max(0.95, -m))
-        return trade_offs.Range(
+        return trade_offs.MagnificationRange(
             "|m| = b/|a|, of the lenslets", m, ends, lambda m: self.replace(lenslets={"magnification": m})
         )
 
@@ -192,4 +192,4 @@ class FocusedPlenopticCamera(LensletCamera):
 
     def describe(self) -> Description:
         """Distances, f-numbers, cut-offs, views and sampling, each with its equation."""
-        return describe.plenoptic2(self)
+        return cameras.plenoptic2(self)

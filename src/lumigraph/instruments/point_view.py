@@ -14,7 +14,7 @@ from lumigraph.errors import SamplingError, SamplingWarning
 from lumigraph.instruments.grids import Sampling
 from lumigraph.scene import targets
 from lumigraph.simulation import simulate
-from lumigraph.simulation.camera import Camera
+from lumigraph.simulation.camera import ImagedCamera
 
 MOST_ALONG = 15
 """Lenslets along each side that are simulated."""
@@ -47,7 +47,7 @@ class PointImage:
     notes: tuple[str, ...] = ()
 
 
-class Simulated(Camera, Protocol):
+class Simulated(ImagedCamera, Protocol):
     """A camera with few lenslets, or none."""
 
     @cached_property

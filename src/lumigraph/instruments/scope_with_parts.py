@@ -11,14 +11,14 @@ from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 from lumigraph.instruments.described_microscope import DescribedMicroscope
-from lumigraph.instruments.sees_volumes import SeesVolumes
-from lumigraph.operators.fourier_plane import FourierPlane
-from lumigraph.operators.fourier_points import FourierPoints
-from lumigraph.operators.microscope_building import require_accuracy
-from lumigraph.operators.microscope_layout import Behind, interpolated, laid_out
-from lumigraph.operators.microscope_pupil import PupilImages, require_phase
-from lumigraph.operators.pupil_plane import PupilPlane
-from lumigraph.operators.whole_planes import WholePlane
+from lumigraph.instruments.sees_volumes import VolumeGradients
+from lumigraph.operators.lenslets.whole_planes import WholePlane
+from lumigraph.operators.microscope.building import require_accuracy
+from lumigraph.operators.microscope.fourier_plane import FourierPlane
+from lumigraph.operators.microscope.fourier_points import FourierPoints
+from lumigraph.operators.microscope.layout import SensorLayout, interpolated, laid_out
+from lumigraph.operators.microscope.pupil import PupilImages, require_phase
+from lumigraph.operators.microscope.pupil_plane import PupilPlane
 from lumigraph.simulation.microscope_scene import SAMPLES
 
 RESOLVED = 0.21
@@ -27,7 +27,7 @@ that the kernel which spreads samples leaves its band alone.
 """
 
 
-class ScopeWithParts(SeesVolumes, DescribedMicroscope):
+class MicroscopeGradients(VolumeGradients, DescribedMicroscope):
     """A microscope: those whose images are not traced by rays have derivatives."""
 
     def images_alike(
@@ -87,7 +87,7 @@ class ScopeWithParts(SeesVolumes, DescribedMicroscope):
         require_phase(self.objectives)
         (far, points), N = told, None if like is None else like[1].layout.sampling.pixels
         shortest = min(self.objectives, key=lambda one: one.wavelength)
-        pixels = Behind(self.calibration, self.pixels.fill_factor)
+        pixels = SensorLayout(self.calibration, self.pixels.fill_factor)
         sampling = interpolated(shortest, self.lenslet, pixels, points, (far, -far), accuracy, N)
         layout = laid_out(sampling, self.calibration, self.lenslet_size, np.float64)
         if like is not None and self.calibration.lattice == like[0].calibration.lattice:

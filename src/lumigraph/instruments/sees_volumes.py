@@ -6,11 +6,11 @@ from typing import Any, Self
 
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
-from lumigraph.operators.part_volume import PartVolume
-from lumigraph.operators.whole_planes import Part
+from lumigraph.operators.lenslets.part_volume import PartVolume
+from lumigraph.operators.lenslets.whole_planes import PlaneImages
 
 
-class SeesVolumes:
+class VolumeGradients:
     """Instrument whose raw images of planes have derivatives."""
 
     @abstractmethod
@@ -21,7 +21,7 @@ class SeesVolumes:
         dz: float = 0.0,
         *,
         accuracy: float = 1e-2,
-    ) -> Part:
+    ) -> PlaneImages:
         """Raw images of a plane, with derivatives by any difference between pairs of nearby instruments."""
 
     def part_volume(

@@ -11,21 +11,22 @@ from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear, stack
 from lumigraph.core.progress import part
+from lumigraph.describe import cameras, trade_offs
 from lumigraph.design import resolution
 from lumigraph.elements import Train
 from lumigraph.errors import FormatError, GeometryError, SamplingError, SamplingWarning
-from lumigraph.instruments import describe, grids, trade_offs
+from lumigraph.instruments import grids
 from lumigraph.instruments.angular import refuse_angles
 from lumigraph.instruments.description import Description
 from lumigraph.instruments.making import Making
 from lumigraph.instruments.row import Row
-from lumigraph.instruments.with_parts import WithParts
+from lumigraph.instruments.with_parts import CameraGradients
 from lumigraph.operators import CameraOptics, single_lens_operator
 from lumigraph.operators.single_lens import FINEST
 from lumigraph.propagation import Propagate
 
 
-class SingleLensCamera(WithParts):
+class SingleLensCamera(CameraGradients):
     """A main lens and a sensor at its image.
 
     Parameters
@@ -135,7 +136,7 @@ class SingleLensCamera(WithParts):
 
     def describe(self) -> Description:
         """Distances, f-numbers, cut-offs and sampling, each with its equation."""
-        return describe.single_lens(self)
+        return cameras.single_lens(self)
 
 
 def _warned(operator: Linear, dz: float, accuracy: float) -> Linear:

@@ -5,19 +5,19 @@ from typing import Self
 
 from lumigraph.core.grid import Grid
 from lumigraph.instruments.camera import Camera
-from lumigraph.instruments.sees_volumes import SeesVolumes
-from lumigraph.operators.part_images import PartImages
-from lumigraph.operators.part_leaning import LeaningParts, by_parts
-from lumigraph.operators.plane_of_points import plane_before
-from lumigraph.operators.whole_planes import WholePlane
+from lumigraph.instruments.sees_volumes import VolumeGradients
+from lumigraph.operators.lenslets.part_images import PartImages
+from lumigraph.operators.lenslets.part_leaning import TiltedImages, by_parts
+from lumigraph.operators.lenslets.plane_of_points import plane_before
+from lumigraph.operators.lenslets.whole_planes import WholePlane
 
 
-class WithParts(SeesVolumes, Camera):
+class CameraGradients(VolumeGradients, Camera):
     """A camera with a main lens: images of points, and raw images of planes and volumes, have derivatives."""
 
     def part_images(
         self, pairs: Sequence[tuple[Self, Self]], *, accuracy: float = 1e-2
-    ) -> PartImages | LeaningParts[PartImages]:
+    ) -> PartImages | TiltedImages[PartImages]:
         """Images of points, with derivatives by any difference between pairs of nearby cameras.
 
         Parameters
@@ -61,7 +61,7 @@ class WithParts(SeesVolumes, Camera):
         dz: float = 0.0,
         *,
         accuracy: float = 1e-2,
-    ) -> WholePlane | LeaningParts[WholePlane]:
+    ) -> WholePlane | TiltedImages[WholePlane]:
         """Raw images of a plane, with derivatives by any difference between pairs of nearby cameras.
 
         The object stays where it is before all cameras, and as bright for each area: how it falls onto their
@@ -109,4 +109,4 @@ class WithParts(SeesVolumes, Camera):
         def plane(one: PartImages) -> WholePlane:
             return plane_before(one, wanted, float(dz))
 
-        return images.each(plane) if isinstance(images, LeaningParts) else plane(images)
+        return images.each(plane) if isinstance(images, TiltedImages) else plane(images)

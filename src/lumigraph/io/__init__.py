@@ -19,8 +19,8 @@
 from lumigraph.io.calibration import load_calibration, save_calibration
 from lumigraph.io.formats import (  # lumigraph.open is meant to read like the builtin
     FORMATS,
+    FilePart,
     Format,
-    Part,
     contents,
     open,  # noqa: A004
     opens_pages,
@@ -31,8 +31,8 @@ from lumigraph.io.target import check_target
 
 __all__ = [
     "FORMATS",
+    "FilePart",
     "Format",
-    "Part",
     "check_target",
     "contents",
     "load_calibration",

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from lumigraph.core.arrays import to_numpy
-from lumigraph.core.aside import Aside
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
+from lumigraph.core.lattice_offsets import LatticeOffsets
 from lumigraph.core.warp import Warp
 from lumigraph.errors import FormatError, LumigraphError
 from lumigraph.io import source, target
@@ -215,7 +215,7 @@ def _extras(found: dict[str, Any], lenslets: dict[str, Any]) -> dict[str, Any]:
         extras["missing"] = _numbers(lenslets, "lenslets.missing", (-1, 2)).astype(np.int64)
     if "aside" in lenslets:
         indices = _numbers(lenslets, "lenslets.aside", (-1, 2)).astype(np.int64)
-        extras["aside"] = Aside(indices, _numbers(lenslets, "lenslets.aside_by", (-1, 2)))
+        extras["aside"] = LatticeOffsets(indices, _numbers(lenslets, "lenslets.aside_by", (-1, 2)))
     if "light" in lenslets:
         extras["light"] = _numbers(lenslets, "lenslets.light", (-1,))
     if "fill" in found:

@@ -9,12 +9,12 @@ from typing import Any, TypeVar, overload
 import numpy as np
 
 from lumigraph.core.arrays import to_numpy
-from lumigraph.core.brief import called
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.cloud import PointCloud
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
+from lumigraph.core.short_repr import called
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
@@ -32,7 +32,7 @@ FOLDER = "/"
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class FilePart:
     """One thing in a file: `name` is what ``open(path, what=name)`` takes; its noun, and a few words."""
 
     name: str
@@ -234,7 +234,7 @@ def _opened(path: Path, max_pixels: int, given: dict[str, Any]) -> Noun:
         return row.imported().load(path, max_pixels=max_pixels, **options)
 
 
-def contents(path: str | os.PathLike[str]) -> tuple[Part, ...]:
+def contents(path: str | os.PathLike[str]) -> tuple[FilePart, ...]:
     """The parts of a file, in the order in which they stand; most formats hold one.
 
     Raises
@@ -256,12 +256,12 @@ def contents(path: str | os.PathLike[str]) -> tuple[Part, ...]:
     listed = getattr(row.imported(), "contents", None)
     if listed is not None:
         with source.ours(path, row.name):
-            return tuple(Part(*part) for part in listed(path))
+            return tuple(FilePart(*part) for part in listed(path))
     thing = open(path)
     data = getattr(thing, "data", None)
     if data is None:
-        return (Part("", type(thing).__name__, row.name),)
-    return (Part("", type(thing).__name__, f"{' x '.join(map(str, data.shape))}, {data.dtype}"),)
+        return (FilePart("", type(thing).__name__, row.name),)
+    return (FilePart("", type(thing).__name__, f"{' x '.join(map(str, data.shape))}, {data.dtype}"),)
 
 
 def pages(path: str | os.PathLike[str]) -> int:

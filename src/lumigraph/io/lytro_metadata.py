@@ -22,7 +22,7 @@ _FARTHEST = 10.0  # m: an exit pupil farther away than this is a placeholder for
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class RawFrame:
     """Storage and metadata of a raw frame.
 
     Parameters
@@ -78,7 +78,7 @@ def parse(content: bytes) -> dict[str, Any]:
     return found
 
 
-def frame(found: dict[str, Any]) -> Frame:
+def frame(found: dict[str, Any]) -> RawFrame:
     """Storage and metadata of the raw frame that a JSON object describes.
 
     Raises
@@ -94,7 +94,7 @@ def frame(found: dict[str, Any]) -> Frame:
     mosaic = field(found, "image.rawDetails.mosaic") or field(found, "image.mosaic")
     first = mosaic.get("upperLeftPixel") if isinstance(mosaic, dict) else None
     pitch = _number(found, "devices.sensor.pixelPitch")
-    return Frame(
+    return RawFrame(
         shape,
         whole(packing, "bitsPerPixel"),
         order if isinstance(order, str) else "",

@@ -25,7 +25,7 @@ _LONGEST = 16 << 20  # characters
 
 
 @dataclass(frozen=True, slots=True)
-class Planes:
+class OmePlanes:
     """Planes of the first image of an OME-XML text.
 
     Parameters
@@ -95,7 +95,7 @@ def text(
     return found.encode("ascii", "xmlcharrefreplace").decode("ascii")
 
 
-def parse(description: str) -> Planes | None:
+def parse(description: str) -> OmePlanes | None:
     """Planes that an OME-XML text describes; None for any other text.
 
     Raises
@@ -123,7 +123,7 @@ def parse(description: str) -> Planes | None:
             places[_size(node.get("TheZ", "0"), 0)] = _length(node, "PositionZ", signed=True)
     complete = sorted(places) == list(range(sizes[0])) and None not in places.values()
     depths = tuple(float(places[k] or 0) for k in range(sizes[0])) if complete else ()
-    return Planes((sizes[0], sizes[1], sizes[2]), (pitch[0], pitch[1], pitch[2]), depths, note)
+    return OmePlanes((sizes[0], sizes[1], sizes[2]), (pitch[0], pitch[1], pitch[2]), depths, note)
 
 
 def _tag(node: Any) -> str:

@@ -6,7 +6,7 @@ numbers. Volumes become OME-Zarr with an axis of time.
 
 import json
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ Checksums = dict[str, tuple[int, int]]
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class SeriesFrame:
     """One result as arrays.
 
     Parameters
@@ -57,7 +57,7 @@ class Frame:
     attributes: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, thing: Any) -> "Frame":
+    def of(cls, thing: Any) -> "SeriesFrame":
         """A picture, several, views, a volume, a depth map, or arrays by name.
 
         Raises
@@ -72,7 +72,7 @@ class Frame:
         return found
 
     @classmethod
-    def _of(cls, thing: Any) -> "Frame":
+    def _of(cls, thing: Any) -> "SeriesFrame":
         match thing:
             case Volume():
                 about = {**header.describe_volume(thing), "ome": ngff.describe(thing, times=True)}
@@ -118,8 +118,17 @@ class Frame:
         return {name: [list(array.shape), str(array.dtype)] for name, array in self.arrays.items()}
 
 
-def create(path: Path, first: Frame, count: int) -> None:
+def create(
+    path: Path, first: SeriesFrame, count: int, describing: Callable[[dict[str, str]], None] | None = None
+) -> None:
     """An empty store for `count` frames like the first one; complete, or not there at all.
+
+    Parameters
+    ----------
+    path, first, count
+        Of the store.
+    describing
+        Called with the files that describe it, by their names inside, before it takes its place.
 
     Raises
     ------
@@ -140,9 +149,12 @@ def create(path: Path, first: Frame, count: int) -> None:
                 compressors=[ZstdCodec(level=3, checksum=True)],
                 fill_value=np.nan if array.dtype.kind == "f" else 0, config={"write_empty_chunks": True},
             )  # fmt: skip
+        if describing is not None:
+            paths = sorted(one for one in temporary.rglob("*") if one.is_file())
+            describing({one.relative_to(temporary).as_posix(): one.read_text() for one in paths})
 
 
-def write(path: Path, number: int, frame: Frame) -> Checksums:
+def write(path: Path, number: int, frame: SeriesFrame) -> Checksums:
     """Write one frame into its shards, each in one step.
 
     Raises
@@ -153,7 +165,7 @@ def write(path: Path, number: int, frame: Frame) -> Checksums:
     known = described(path)["layout"]
     if frame.layout != known:
         raise FormatError(f"it gives {_told(frame.layout)} where the first frame gave {_told(known)}.")
-    writer = _Writer(LocalStore(path))
+    writer = _SeriesWriter(LocalStore(path))
     group = zarr.open_group(writer, mode="r+", zarr_format=3, use_consolidated=False)
     for name, values in frame.arrays.items():
         array = group[name]
@@ -246,12 +258,12 @@ def described(path: Path) -> dict[str, Any]:
         found = json.loads((path / "zarr.json").read_text())["attributes"]
         if found["kind"] == KIND:
             return found
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         pass
     raise FormatError(f"{path} is not a series of frames. Check the path.")
 
 
-def _leading(frame: Frame) -> str:
+def _leading(frame: SeriesFrame) -> str:
     return "t" if "ome" in frame.attributes else "frame"
 
 
@@ -265,7 +277,7 @@ def _told(layout: Mapping[str, Any]) -> str:
     )
 
 
-class _Writer(WrapperStore[LocalStore]):
+class _SeriesWriter(WrapperStore[LocalStore]):
     """A store that writes each file in one step and notes its checksum."""
 
     def __init__(self, inner: LocalStore) -> None:

@@ -135,7 +135,7 @@ def _single(path: Path, image: tifffile.TiffPage, max_pixels: int) -> RawImage:
 
 
 def _pages(
-    path: Path, file: tifffile.TiffFile, count: int, planes: ome.Planes | None, max_pixels: int
+    path: Path, file: tifffile.TiffFile, count: int, planes: ome.OmePlanes | None, max_pixels: int
 ) -> RawImage | Stack | Volume:
     first = _page(path, file, 0)
     _check_page(path, first, max_pixels)
@@ -158,7 +158,7 @@ def _pages(
     return _noun(data, planes, first)
 
 
-def _of_stack(page: RawImage, planes: ome.Planes, count: int) -> RawImage:
+def _of_stack(page: RawImage, planes: ome.OmePlanes, count: int) -> RawImage:
     """A page with what the first one says of the whole stack."""
     found = header.loads(planes.note)
     if found is not None and found.get("kind") == "Stack":
@@ -170,7 +170,7 @@ def _of_stack(page: RawImage, planes: ome.Planes, count: int) -> RawImage:
     return RawImage(page.data, planes.pitch[2], page.bit_depth, metadata=page.metadata)
 
 
-def _noun(data: np.ndarray, planes: ome.Planes | None, first: tifffile.TiffPage) -> Stack | Volume:
+def _noun(data: np.ndarray, planes: ome.OmePlanes | None, first: tifffile.TiffPage) -> Stack | Volume:
     found = header.loads(planes.note) if planes is not None else None
     if found is not None:
         return header.restore_planes(data, found)
@@ -182,7 +182,7 @@ def _noun(data: np.ndarray, planes: ome.Planes | None, first: tifffile.TiffPage)
     return Stack(data, pixel_pitch=pitch, bit_depth=first.bitspersample if data.dtype.kind in "iu" else None)
 
 
-def _is_volume(planes: ome.Planes | None, count: int) -> bool:
+def _is_volume(planes: ome.OmePlanes | None, count: int) -> bool:
     if planes is None:
         return False
     if (found := header.loads(planes.note)) is not None:

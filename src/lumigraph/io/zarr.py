@@ -108,7 +108,7 @@ def _save_light_field(views: LightField, path: Path) -> None:
 
 
 def _save_depth(found: DepthMap, path: Path) -> None:
-    frame, units = series.Frame.of(found), {"confidence": "1"}
+    frame, units = series.SeriesFrame.of(found), {"confidence": "1"}
     chunks = tuple(min(n, _SIDE) for n in found.shape)
     arrays = [
         (name, array, chunks, frame.axes[name], {"units": units.get(name, found.unit)})
@@ -143,7 +143,7 @@ def _write(path: Path, arrays: list[tuple[Any, ...]], attributes: dict[str, Any]
             _consolidate(store)
 
 
-def _consolidate(store: "_Writer") -> None:
+def _consolidate(store: "_ZarrWriter") -> None:
     """Describe all arrays in the group's own file, so that programs open the store by one request."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Consolidated metadata", ZarrUserWarning)
@@ -215,7 +215,7 @@ def _reading(path: Path) -> Iterator[zarr.Group]:
         store.close()
 
 
-class _Writer(WrapperStore[LocalStore | ZipStore]):
+class _ZarrWriter(WrapperStore[LocalStore | ZipStore]):
     """Store that hides its failures from zarr, whose other chunks' tasks would complain later."""
 
     failure: OSError | None = None
@@ -238,8 +238,8 @@ class _Writer(WrapperStore[LocalStore | ZipStore]):
 
 
 @contextmanager
-def _writing(path: Path, zipped: bool) -> Iterator[_Writer]:
-    store = _Writer(ZipStore(path, mode="w") if zipped else LocalStore(path))
+def _writing(path: Path, zipped: bool) -> Iterator[_ZarrWriter]:
+    store = _ZarrWriter(ZipStore(path, mode="w") if zipped else LocalStore(path))
     try:
         with closing(store):
             yield store

@@ -10,7 +10,7 @@ from magicgui.widgets import CheckBox, FileEdit, FloatSpinBox, LineEdit, SpinBox
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.progress import Progress, Stage, within
 from lumigraph.core.raw import RawImage
-from lumigraph.deconvolution import Interrupted, RichardsonLucy, Step, deconvolve
+from lumigraph.deconvolution import Interrupted, RichardsonLucy, RunStep, deconvolve
 from lumigraph.errors import LumigraphError
 from lumigraph.instruments import load_camera
 from lumigraph.instruments.smoothing import low_pass_of
@@ -61,7 +61,7 @@ class Deconvolve(Panel):
             method = RichardsonLucy(None, low_pass_of(camera, operator), accelerated=faster)
             reached = 0
 
-            def follow(step: Step) -> None:
+            def follow(step: RunStep) -> None:
                 nonlocal reached
                 reached, part = step.iteration, step.iteration / step.iterations
                 what = f"iteration {reached}, the last changed {100 * step.change:.2g} %"

@@ -36,9 +36,9 @@
 - `camera`: `CameraOptics`, what an operator reads of an instrument, as plain values
 """
 
-from lumigraph.operators.camera import CameraOptics, HasOptics, Model
-from lumigraph.operators.paraxial import is_possible
-from lumigraph.operators.periodic import PeriodicOperator, periodic_operator
+from lumigraph.operators.lenslets.paraxial_error import is_possible
+from lumigraph.operators.periodic.incoherent import PeriodicOperator, periodic_operator
+from lumigraph.operators.sampling.camera import CameraOptics, HasOptics, Model
 from lumigraph.operators.single_lens import SingleLensOperator, single_lens_operator
 
 __all__ = [

@@ -34,14 +34,14 @@ from lumigraph.core.cache import ByteCache
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Chain, Linear, Shape
 from lumigraph.errors import SamplingError, SamplingWarning
-from lumigraph.operators import band, varying
-from lumigraph.operators import cells as _cells
-from lumigraph.operators.band import Span
-from lumigraph.operators.camera import CameraOptics, HasOptics
-from lumigraph.operators.regrid import Regridded
-from lumigraph.operators.resampling import Resampling, averaged, represented
-from lumigraph.operators.seen import Fields, seen_plane, seen_points
-from lumigraph.operators.varying import FieldOperator
+from lumigraph.operators.sampling import band, field_lenses
+from lumigraph.operators.sampling import cells as _cells
+from lumigraph.operators.sampling.band import Span
+from lumigraph.operators.sampling.camera import CameraOptics, HasOptics
+from lumigraph.operators.sampling.field_lenses import FieldOperator
+from lumigraph.operators.sampling.glass_distortion import Fields, seen_plane, seen_points
+from lumigraph.operators.sampling.regrid import Regridded
+from lumigraph.operators.sampling.resampling import Resampling, averaged, represented
 from lumigraph.propagation import propagate
 from lumigraph.propagation.window import smooth_size
 from lumigraph.scene import Points, sources
@@ -165,7 +165,7 @@ def single_lens_operator(
         return seen_plane(
             plain, grid, dz, lambda one, seen, depth, fields: _varying(one, seen, depth, fields, accuracy)
         )
-    if varying.plate_of(plain) is not None:
+    if field_lenses.plate_of(plain) is not None:
         distance = plain.object_distance + dz
         return _varying(plain, grid, dz, (grid.y / distance, grid.x / distance), accuracy)
     scale, pitch = -plain.separation / (plain.object_distance + dz), image_pitch(plain)
@@ -185,20 +185,20 @@ def object_samples(image: tuple[Span, Span], scale: float) -> Grid:
 def _varying(camera: CameraOptics, grid: Grid, dz: float, fields: Fields, accuracy: float) -> FieldOperator:
     """Of a plane before a lens that changes over the field."""
     distance = camera.object_distance + dz
-    found = varying.lenses(camera, fields, _seen(camera, distance), accuracy)
+    found = field_lenses.lenses(camera, fields, _seen(camera, distance), accuracy)
 
     def of(one: CameraOptics) -> SingleLensOperator:
         result = single_lens_operator(one, grid, dz)
         assert isinstance(result, SingleLensOperator)  # of one lens
         return result
 
-    return varying.operator(camera, grid, distance, found, of)
+    return field_lenses.operator(camera, grid, distance, found, of)
 
 
-def _seen(camera: CameraOptics, distance: float) -> varying.Image:
+def _seen(camera: CameraOptics, distance: float) -> field_lenses.Image:
     """Images of a point by lenses of a camera; see `varying`."""
     pitch, spot = image_pitch(camera), _cells.airy(camera)
-    reach = max(1.2 * _cells.blur(one, distance) for one in varying.some(camera)) + TOLD * spot
+    reach = max(1.2 * _cells.blur(one, distance) for one in field_lenses.some(camera)) + TOLD * spot
     span = Span.around(-reach, reach, pitch)
     # Coarse pupils do to set lenses beside each other.
     return lambda one: _point_image(one, distance, [span, span], 1.0, 0.0).ravel()
@@ -210,12 +210,12 @@ def points_image(instrument: HasOptics, points: Points) -> tuple[np.ndarray, flo
     One convolution for each depth or, where the lens changes over the field, for each point.
     """
     camera, points = seen_points(instrument.optics(), points)
-    if varying.plate_of(camera) is None:
+    if field_lenses.plate_of(camera) is None:
         return _points_image(camera, points.positions, points.intensities)
     total, off = np.zeros(camera.sensor.shape, np.float32), 0.0
     for position, intensity in zip(points.positions, points.intensities, strict=True):
         distance = camera.object_distance + float(position[2])
-        one = varying.at(camera, position[0] / distance, position[1] / distance)
+        one = field_lenses.at(camera, position[0] / distance, position[1] / distance)
         image, error = _points_image(one, position[None], np.array([intensity]))
         total, off = total + image, max(off, error)
     return total, off
@@ -274,7 +274,7 @@ def image_pitch(camera: CameraOptics) -> float:
     return _cells.airy(camera) / 2 / band.OVERSAMPLING
 
 
-class _Followed(NamedTuple):
+class _FollowedLight(NamedTuple):
     """How far from the axis light is wanted and followed [m], samples across the pupil, what these leave."""
 
     wanted: float
@@ -283,13 +283,13 @@ class _Followed(NamedTuple):
     left: float
 
 
-def _followed(camera: CameraOptics, distance: float, offsets: list[Span], finely: float) -> _Followed:
+def _followed(camera: CameraOptics, distance: float, offsets: list[Span], finely: float) -> _FollowedLight:
     spot, blur = _cells.airy(camera), _cells.blur(camera, distance)
     wanted = max(max(abs(span.first), abs(span.last)) * span.pitch for span in offsets)
     reach = min(wanted, max(FINEST_PUPIL * spot / PERIOD, 1.5 * blur + 50 * spot))
     blurred = min(finely * blur / spot, FINEST_BLURRED)
     across = math.ceil(max(COARSEST_PUPIL, PERIOD * reach / spot, blurred))
-    return _Followed(wanted, reach, across, EDGE * (blur / spot / across) ** 2)
+    return _FollowedLight(wanted, reach, across, EDGE * (blur / spot / across) ** 2)
 
 
 def _point_image(

@@ -21,7 +21,7 @@ BUNDLES = ("#c1272d", "#0071bc")
 FAN = ("#7a4fa3", "#c1272d", "#e08a00", "#2e8b57", "#0071bc")
 
 
-class Camera(Protocol):
+class DrawnCamera(Protocol):
     """Instruments that `layout` can draw."""
 
     def layout(self) -> Layout | MicroscopeLayout:
@@ -29,7 +29,7 @@ class Camera(Protocol):
         ...
 
 
-def layout(camera: Camera) -> Figure:
+def layout(camera: DrawnCamera) -> Figure:
     """Ray diagram of a camera: object, main lens with its stop, lenslets and sensor, distances labelled.
 
     The upper panel shows the whole camera, the lower one the lenslets and the sensor. Distances along the

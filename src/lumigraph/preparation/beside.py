@@ -1,4 +1,4 @@
-"""The pictures that come with a raw image: `Beside`."""
+"""The pictures that come with a raw image: `ReferenceImages`."""
 
 import math
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ _LOOKED_AT = 4e6  # values; of larger pictures some rows are
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Beside:
+class ReferenceImages:
     """White and dark image of one exposure and one zoom."""
 
     white: RawImage | None = None

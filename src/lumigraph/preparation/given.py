@@ -8,11 +8,11 @@ from typing import Any, TypeVar
 from lumigraph import io
 from lumigraph.calibration import calibrate
 from lumigraph.core import checks
-from lumigraph.core.brief import called
 from lumigraph.core.cache import remembered
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.raw import RawImage
+from lumigraph.core.short_repr import called
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError

@@ -17,7 +17,7 @@ from lumigraph.core.prepared import PreparedImage, Reason, Verdicts
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError, SamplingWarning
 from lumigraph.preparation.agreement import Described, implied
-from lumigraph.preparation.beside import Beside, above, black_plane, coloured
+from lumigraph.preparation.beside import ReferenceImages, above, black_plane, coloured
 from lumigraph.preparation.drift import check_drift
 from lumigraph.preparation.validity import pixel_reasons, verdicts
 from lumigraph.preparation.vignetting import vignetting
@@ -87,7 +87,7 @@ def prepare(
     >>> ready.valid.shape == camera.sensor.shape, ready.notes[0]
     (True, 'the lattice is that of the camera file')
     """
-    beside = Beside(*(None if one is None else as_raw(one) for one in (white, dark)))
+    beside = ReferenceImages(*(None if one is None else as_raw(one) for one in (white, dark)))
     raw = as_raw(raw)
     beside.check(raw)
     found, notes = _placed(raw, calibration, beside.white, camera)
@@ -169,7 +169,7 @@ def _mask(mask: Array | None, raw: RawImage) -> np.ndarray | None:
     return used
 
 
-def _pictured(raw: RawImage, beside: Beside) -> tuple[RawImage, np.ndarray | None]:
+def _pictured(raw: RawImage, beside: ReferenceImages) -> tuple[RawImage, np.ndarray | None]:
     """Values that pictures are made of, above the dark, evenly lit, in colour; and what divided them."""
     dark, light = beside.dark or black_plane(raw), None
     if beside.white is not None:
@@ -180,7 +180,7 @@ def _pictured(raw: RawImage, beside: Beside) -> tuple[RawImage, np.ndarray | Non
     return even if raw.bayer is None else coloured(even, raw), light
 
 
-def _modelled(raw: RawImage, beside: Beside, found: Calibration | None) -> dict[str, Any]:
+def _modelled(raw: RawImage, beside: ReferenceImages, found: Calibration | None) -> dict[str, Any]:
     """Background and response that the model of a deconvolution takes from dark and white image."""
     dark = None if beside.dark is None else np.asarray(to_numpy(beside.dark.data), np.float64)
     if beside.white is None or found is None:
@@ -203,7 +203,7 @@ def _counted(reasons: np.ndarray, lenslets: Verdicts | None) -> tuple[str, ...]:
     return tuple(told)
 
 
-class OfRaw(Protocol[Options, Seen]):
+class RawFunction(Protocol[Options, Seen]):
     """A function of a raw image, prepared or not, whose calibration may be left out."""
 
     def __call__(
@@ -214,7 +214,9 @@ class OfRaw(Protocol[Options, Seen]):
         ...
 
 
-def of_raw(function: Callable[Concatenate[RawImage, Calibration, Options], Made]) -> OfRaw[Options, Made]:
+def of_raw(
+    function: Callable[Concatenate[RawImage, Calibration, Options], Made],
+) -> RawFunction[Options, Made]:
     """The same function of any raw image: one that was not prepared is prepared before.
 
     The calibration may be left out where `prepare` has found one.

@@ -8,7 +8,7 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.prepared import Reason, Verdicts
 from lumigraph.core.raw import RawImage
-from lumigraph.preparation.beside import Beside
+from lumigraph.preparation.beside import ReferenceImages
 from lumigraph.rendering import hot_pixels
 
 DARK = 0.1
@@ -20,7 +20,7 @@ _CORE = 0.35  # of the pitch around a lenslet's centre: what is looked at
 
 
 def pixel_reasons(
-    raw: RawImage, beside: Beside, calibration: Calibration | None, mask: np.ndarray | None = None
+    raw: RawImage, beside: ReferenceImages, calibration: Calibration | None, mask: np.ndarray | None = None
 ) -> np.ndarray:
     """A `Reason` for each pixel (y, x), uint8.
 

@@ -15,7 +15,7 @@ from lumigraph.errors import GeometryError
 from lumigraph.rendering.decode import check_raw
 from lumigraph.rendering.geometry import Frame
 from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, sample, weighted
-from lumigraph.rendering.patches import Layout, Patches, checked_focus
+from lumigraph.rendering.patches import Patches, PatchLayout, checked_focus
 
 _BAND = 1 << 20  # picture samples handled at a time
 _FARTHEST = 1.6  # pitches to the farthest lenslet that shows a place; one of each kind stands within 1
@@ -94,7 +94,7 @@ def render(
     """
     raw = _checked(raw, calibration, interpolation)
     sizes = Patches.of(patch, calibration)
-    layout = Layout.of(calibration, sizes, samples)
+    layout = PatchLayout.of(calibration, sizes, samples)
     source = _Source(calibration, sizes, blend or focus is not None, checked_focus(focus, calibration))
     return _picture(as_float(raw.data), layout, source, interpolation)
 
@@ -137,7 +137,7 @@ def render_stack(
         )
     sizes = [Patches.of(patch, calibration) for patch in values]
     largest = max(sizes, key=lambda size: size.largest)
-    layout, kinds = Layout.of(calibration, largest, samples), checked_focus(focus, calibration)
+    layout, kinds = PatchLayout.of(calibration, largest, samples), checked_focus(focus, calibration)
     data = as_float(raw.data)
     pictures = [
         _picture(data, layout, _Source(calibration, size, True, kinds), interpolation) for size in sizes
@@ -166,7 +166,7 @@ def rendered_grid(calibration: Calibration, patch: float | Array, samples: int |
     (0.2, 0.2)
     """
     sizes = Patches.of(patch, calibration)
-    layout = Layout.of(calibration, sizes, samples)
+    layout = PatchLayout.of(calibration, sizes, samples)
     frame, scale = Frame.of(calibration), 1 / calibration.lattice.pitch
     pixel, distance, separation = (
         calibration.pixel_pitch,
@@ -190,12 +190,12 @@ def sight_grid(calibration: Calibration, patch: float | Array, samples: int | No
     calibration, patch, samples
         As given to `render`.
     """
-    layout = Layout.of(calibration, Patches.of(patch, calibration), samples)
+    layout = PatchLayout.of(calibration, Patches.of(patch, calibration), samples)
     frame = Frame.of(calibration)
     return _grid(layout, frame, frame.lenslet_per_px)
 
 
-def _grid(layout: Layout, frame: Frame, scale: float) -> Grid:
+def _grid(layout: PatchLayout, frame: Frame, scale: float) -> Grid:
     """Places of a layout [px], `scale` metres each, from the optical axis."""
     middle = layout.y[len(layout.y) // 2], layout.x[len(layout.x) // 2]
     center = [(place - axis) * scale for place, axis in zip(middle, frame.axis, strict=True)]
@@ -210,7 +210,7 @@ def _checked(raw: RawImage | Array, calibration: Calibration, interpolation: str
     return raw
 
 
-def _picture(data: Array, layout: Layout, source: "_Source", interpolation: Interpolation) -> Array:
+def _picture(data: Array, layout: PatchLayout, source: "_Source", interpolation: Interpolation) -> Array:
     """Picture (y, x[, c]) of an image (y, x[, c]), a band of rows at a time."""
     memory.require(
         16.0 * len(layout.y) * len(layout.x) * math.prod(data.shape[2:]),

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lumigraph.core.arrays import Array, namespace, to_numpy
-from lumigraph.core.aside import Aside
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
+from lumigraph.core.lattice_offsets import LatticeOffsets
 from lumigraph.core.lightfield import LightField
 from lumigraph.errors import CalibrationError
 
@@ -83,7 +83,7 @@ def transposed(calibration: Calibration) -> Calibration | None:
         light=None,
         missing=here(calibration.missing),
         warp=None if calibration.warp is None else calibration.warp.transposed(),
-        aside=None if aside is None else Aside(here(aside.indices), aside.ways[:, ::-1]),
+        aside=None if aside is None else LatticeOffsets(here(aside.indices), aside.ways[:, ::-1]),
     )
 
 

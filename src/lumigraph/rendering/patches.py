@@ -173,7 +173,7 @@ def sharp_patches(
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class PatchLayout:
     """Places of the picture's rows and columns in the lattice of micro-image centres [px]."""
 
     y: np.ndarray
@@ -181,7 +181,7 @@ class Layout:
     step: float
 
     @classmethod
-    def of(cls, calibration: Calibration, sizes: Patches, samples: int | None) -> "Layout":
+    def of(cls, calibration: Calibration, sizes: Patches, samples: int | None) -> "PatchLayout":
         """Samples of lenslets whose patch lies on the sensor; one of them would be on the optical axis."""
         lattice = calibration.lattice
         if samples is None:
@@ -211,6 +211,6 @@ class Layout:
             )
         return cls(axes[0][top:bottom], axes[1][left:right], step)
 
-    def part(self, rows: slice, columns: slice = slice(None)) -> "Layout":
+    def part(self, rows: slice, columns: slice = slice(None)) -> "PatchLayout":
         """Some of its rows and columns."""
         return replace(self, y=self.y[rows], x=self.x[columns])

@@ -17,7 +17,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.errors import GeometryError, SamplingWarning
 from lumigraph.rendering.decode import check_raw
 from lumigraph.rendering.interpolate import as_float
-from lumigraph.rendering.patches import Layout, Patches
+from lumigraph.rendering.patches import Patches, PatchLayout
 
 _MOST = 8  # times finer
 _ENOUGH = 1.6  # the widest gap between samples, over the finer picture's pitch, that still resolves it
@@ -83,7 +83,7 @@ def super_resolve(
         raise GeometryError(f"smoothness is {smoothness:g} but must be at least 0.")
     sizes = Patches.of(patch, calibration)
     _warn_if_alike(calibration, sizes, factor)
-    layout = Layout.of(calibration, sizes, max(1, round(abs(sizes.middle) * factor)))
+    layout = PatchLayout.of(calibration, sizes, max(1, round(abs(sizes.middle) * factor)))
     projection, used = _projection(calibration, sizes, layout)
     data = to_numpy(as_float(raw.data))
     flat = data.reshape(data.shape[0] * data.shape[1], -1)[used].astype(float)
@@ -131,7 +131,7 @@ def _warn_if_alike(calibration: Calibration, sizes: Patches, factor: int) -> Non
         )
 
 
-def _projection(calibration: Calibration, sizes: Patches, layout: Layout) -> tuple[Matrix, np.ndarray]:
+def _projection(calibration: Calibration, sizes: Patches, layout: PatchLayout) -> tuple[Matrix, np.ndarray]:
     """Matrix from a picture to means over the pixels' widths (pixels,), and those pixels' flat indices."""
     lattice, (ny, nx) = calibration.lattice, calibration.shape
     y, x = np.meshgrid(np.arange(ny, dtype=float), np.arange(nx, dtype=float), indexing="ij")

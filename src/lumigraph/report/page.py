@@ -34,7 +34,7 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class PageFrame:
     """Another page inside this one, from a file in the same folder."""
 
     file: str
@@ -50,7 +50,7 @@ class Section:
 
     title: str
     folded: bool = False
-    parts: list[Text | Table | Picture | Frame] = field(default_factory=list)
+    parts: list[Text | Table | Picture | PageFrame] = field(default_factory=list)
 
     def text(self, text: str) -> "Section":
         """Add paragraphs, parted by empty lines."""
@@ -90,7 +90,7 @@ class Section:
 
     def frame(self, file: str, title: str) -> "Section":
         """Show another page, a file that lies beside this one."""
-        self.parts.append(Frame(file, title))
+        self.parts.append(PageFrame(file, title))
         return self
 
     @property
@@ -121,7 +121,7 @@ class Page:
     @property
     def framed(self) -> bool:
         """True if the page shows another."""
-        return any(isinstance(part, Frame) for section in self.sections for part in section.parts)
+        return any(isinstance(part, PageFrame) for section in self.sections for part in section.parts)
 
     def section(self, title: str, *, folded: bool = False) -> Section:
         """Add a section and return it."""

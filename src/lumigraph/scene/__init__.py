@@ -14,7 +14,7 @@ from lumigraph.scene import sources, targets
 from lumigraph.scene.extended import ExtendedSource
 from lumigraph.scene.line import SpectralLine
 from lumigraph.scene.medium import Medium
-from lumigraph.scene.rgbd import Seeing
+from lumigraph.scene.rgbd import SeeingCamera
 from lumigraph.scene.schell import GaussianSchell
 from lumigraph.scene.volumes import Diffuser, Part, Points, Scene, Slice
 
@@ -26,7 +26,7 @@ __all__ = [
     "Part",
     "Points",
     "Scene",
-    "Seeing",
+    "SeeingCamera",
     "Slice",
     "SpectralLine",
     "sources",

@@ -132,7 +132,7 @@ class ExtendedSource:
         checks.finite_array("intensity", data)
         if np.iscomplexobj(data) or data.min() < 0 or not data.any():
             raise LumigraphError("a source's intensity must be real, at least 0, and above 0 somewhere.")
-        return cls(lamps.Picture(data.astype(np.float64), sines), distance)
+        return cls(lamps.PictureLamp(data.astype(np.float64), sines), distance)
 
     def degree(self, dy: Any, dx: Any, wavelength: float) -> np.ndarray:
         """Degree of coherence of two points at r1 - r2 = (dy, dx) [m], in closed form, without curvature."""

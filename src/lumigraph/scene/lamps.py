@@ -9,8 +9,8 @@ from numpy.polynomial import legendre
 from scipy.special import j1
 
 from lumigraph.core import checks
-from lumigraph.core.brief import brief
 from lumigraph.core.grid import Grid
+from lumigraph.core.short_repr import brief
 from lumigraph.errors import GeometryError
 
 Pair = tuple[float, float]
@@ -94,7 +94,7 @@ class Rectangle:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Picture:
+class PictureLamp:
     """Pixels (y, x), each evenly bright, on a grid of sines."""
 
     intensity: np.ndarray
@@ -142,7 +142,7 @@ class Picture:
         light = self.intensity[lit] / self.intensity.sum()
         return (middles[:, None] + inside).reshape(-1, 2), np.outer(light, weights).ravel()
 
-    def scaled(self, factor: float) -> "Picture":
+    def scaled(self, factor: float) -> "PictureLamp":
         """The same, seen under other angles; turned by 180° where the factor is below 0."""
         flipped = self.intensity if factor > 0 else self.intensity[::-1, ::-1]
         (py, px), (ny, nx) = self.sines.pitch, self.sines.shape
@@ -150,7 +150,7 @@ class Picture:
         step = (0.0, 0.0) if factor > 0 else ((ny - 1 - 2 * (ny // 2)) * py, (nx - 1 - 2 * (nx // 2)) * px)
         y, x = (factor * c - abs(factor) * s for c, s in zip(self.sines.center, step, strict=True))
         size = abs(factor)
-        return Picture(flipped, Grid(self.sines.shape, (size * py, size * px), (y, x)))
+        return PictureLamp(flipped, Grid(self.sines.shape, (size * py, size * px), (y, x)))
 
 
 def fewest(rows: np.ndarray, columns: np.ndarray, accuracy: float, dtype: Any) -> tuple[np.ndarray, float]:

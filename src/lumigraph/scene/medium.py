@@ -11,8 +11,8 @@ from scipy.ndimage import shift, zoom
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import to_numpy
-from lumigraph.core.brief import brief
 from lumigraph.core.grid import Grid
+from lumigraph.core.short_repr import brief
 from lumigraph.core.volume import Volume
 from lumigraph.errors import GeometryError
 

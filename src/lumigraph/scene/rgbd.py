@@ -20,7 +20,7 @@ BESIDE = 2.0
 
 
 @runtime_checkable
-class Seeing(Protocol):
+class SeeingCamera(Protocol):
     """Protocol of the camera that a scene with hidden parts is made for."""
 
     @property
@@ -35,7 +35,7 @@ class Seeing(Protocol):
 
 
 def rgbd(
-    picture: Any, depth: Any, grid: Grid, camera: Seeing, planes: int = 8, *, behind: Any = None
+    picture: Any, depth: Any, grid: Grid, camera: SeeingCamera, planes: int = 8, *, behind: Any = None
 ) -> Scene:
     r"""Opaque slices that look like a picture with depths, from the middle of a camera's main lens.
 
@@ -99,7 +99,7 @@ def rgbd(
 
 
 def _distances(
-    colours: np.ndarray, depths: np.ndarray, under: np.ndarray, grid: Grid, camera: Seeing
+    colours: np.ndarray, depths: np.ndarray, under: np.ndarray, grid: Grid, camera: SeeingCamera
 ) -> np.ndarray:
     """Distances of the picture's samples to the main lens (y, x) [m]."""
     for name, shape in (("picture", colours.shape[:2]), ("depth", depths.shape), ("behind", under.shape[:2])):
@@ -118,7 +118,7 @@ def _distances(
 
 
 def _going_on(
-    number: np.ndarray, k: int, places: Sequence[float], grid: Grid, camera: Seeing
+    number: np.ndarray, k: int, places: Sequence[float], grid: Grid, camera: SeeingCamera
 ) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
     """Mask of slice k (y, x), continued behind nearer slices, and indices of the colours to use there."""
     found: Any = distance_transform_edt(number != k, sampling=grid.pitch, return_indices=True)

@@ -199,7 +199,7 @@ def chessboard(
     angle: float = 0.0,
     position: Pair = (0.0, 0.0),
 ) -> Scene:
-    """A board of squares on white paper, such as `lumigraph.metric.find_corners` looks for.
+    """A board of squares on white paper, such as `lumigraph.metrology.find_corners` looks for.
 
     Parameters
     ----------

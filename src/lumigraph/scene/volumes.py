@@ -11,8 +11,8 @@ import numpy as np
 
 from lumigraph.core import checks, picture
 from lumigraph.core.arrays import Array, is_complex, namespace, to_numpy
-from lumigraph.core.brief import brief, table
 from lumigraph.core.grid import Grid
+from lumigraph.core.short_repr import brief, table
 from lumigraph.errors import GeometryError, LumigraphError
 
 

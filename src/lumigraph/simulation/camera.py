@@ -18,7 +18,7 @@ class Imaging(Protocol):
         ...
 
 
-class Camera(Imaging, Protocol):
+class ImagedCamera(Imaging, Protocol):
     """Protocol of a camera that `simulate` accepts; members of lenslets are None without them."""
 
     def optics(self) -> CameraOptics:

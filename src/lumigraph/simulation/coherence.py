@@ -16,7 +16,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.modes import CoherentModes
 from lumigraph.elements import masks
 from lumigraph.errors import GeometryError, LumigraphError, SamplingError
-from lumigraph.operators.fineness import COARSEST, FINEST
+from lumigraph.operators.sampling.sampling_rules import COARSEST, FINEST
 from lumigraph.propagation import propagate
 from lumigraph.simulation import directions
 
@@ -27,7 +27,7 @@ BLOCKS = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plane:
+class ScenePlane:
     """A plane of the scene on its way to the main lens.
 
     Parameters
@@ -71,7 +71,7 @@ class Coherence(Protocol):
         """Blocks of shots, alike in kind and one after the other, whose spread shows the error; or 1."""
         ...
 
-    def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
+    def illuminations(self, planes: list[ScenePlane], wavelength: float) -> Iterator[list]:
         """Each shot's complex amplitude on each plane of the scene."""
         ...
 
@@ -109,7 +109,7 @@ class Coherent:
         """One: nothing is drawn."""
         return 1
 
-    def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
+    def illuminations(self, planes: list[ScenePlane], wavelength: float) -> Iterator[list]:
         """Amplitude 1 everywhere."""
         yield [np.ones((1, 1), np.complex64)] * len(planes)
 
@@ -172,7 +172,7 @@ class Snapshots:
         """A few."""
         return min(self.count, BLOCKS)
 
-    def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
+    def illuminations(self, planes: list[ScenePlane], wavelength: float) -> Iterator[list]:
         """Random phases, independent from plane to plane and from snapshot to snapshot."""
         grids = [plane.grid for plane in planes]
         for rng in np.random.default_rng(self.rng).spawn(self.count):
@@ -264,7 +264,7 @@ class TiltedWaves:
         """No: one wave lights all planes."""
         return False
 
-    def directions(self, plane: Plane, wavelength: float) -> tuple[np.ndarray, np.ndarray]:
+    def directions(self, plane: ScenePlane, wavelength: float) -> tuple[np.ndarray, np.ndarray]:
         """Direction sines (count, 2) as (y, x), and the weight of each wave's intensity (count,)."""
         radius = plane.pupil_diameter / (2 * wavelength * plane.distance)
         share, frequencies = directions.share_of_light(plane.amplitude, plane.grid, radius)
@@ -290,7 +290,7 @@ class TiltedWaves:
         """A few: what comes one after the other covers all directions evenly."""
         return min(self.count, BLOCKS)
 
-    def illuminations(self, planes: list[Plane], wavelength: float) -> Iterator[list]:
+    def illuminations(self, planes: list[ScenePlane], wavelength: float) -> Iterator[list]:
         """Converging waves exp(-ikr²/2z) with a tilt, each as bright as the directions it stands for."""
         k = 2 * math.pi / wavelength
         tilts = [self.directions(plane, wavelength) for plane in planes]

@@ -9,8 +9,8 @@ import numpy as np
 
 from lumigraph.errors import ParaxialWarning, SamplingWarning
 from lumigraph.operators import CameraOptics
-from lumigraph.operators.paraxial import paraxial_error
-from lumigraph.simulation.camera import Camera
+from lumigraph.operators.lenslets.paraxial_error import paraxial_error
+from lumigraph.simulation.camera import ImagedCamera
 
 _MEASURED = {  # by benchmarks.accuracy and estimates, over the accuracy asked: at 1e-2, 1e-3 and 1e-4
     "operator": (0.45, 0.3, 0.25),
@@ -19,7 +19,7 @@ _MEASURED = {  # by benchmarks.accuracy and estimates, over the accuracy asked: 
 
 
 @dataclass(frozen=True, slots=True)
-class Reached:
+class ReachedError:
     """Estimated error of an image, or of a part of it.
 
     Parameters
@@ -36,26 +36,26 @@ class Reached:
     source: str
     paraxial: float = 0.0
 
-    def and_also(self, rms: float, source: str = "") -> "Reached":
+    def and_also(self, rms: float, source: str = "") -> "ReachedError":
         """Error together with an independent one, which may have a source of its own."""
         return replace(self, rms=math.hypot(self.rms, rms), source=self.source + source)
 
-    def through(self, camera: CameraOptics) -> "Reached":
+    def through(self, camera: CameraOptics) -> "ReachedError":
         """Error of an image formed by a camera's parabolic lenses and lenslets."""
         return self if camera.array is None else replace(self, paraxial=paraxial_error(camera))
 
 
-def of_quadrature(path: str, accuracy: float) -> Reached:
+def of_quadrature(path: str, accuracy: float) -> ReachedError:
     """Error of a path that takes an accuracy: measured at three accuracies, power laws in between."""
     share = np.interp(-math.log10(accuracy), (2, 3, 4), np.log(_MEASURED[path]))
-    return Reached(accuracy * math.exp(share), f"{path} at accuracy {accuracy:g}")
+    return ReachedError(accuracy * math.exp(share), f"{path} at accuracy {accuracy:g}")
 
 
 SINGLE = 1.3
 """Ratio of the error of one sample's image to that of many samples'."""
 
 
-def of_operator(intensity: np.ndarray, accuracy: float) -> Reached:
+def of_operator(intensity: np.ndarray, accuracy: float) -> ReachedError:
     """Error of a slice's image: smaller for many samples than for few, whose errors differ."""
     light, squared = float(np.abs(intensity).sum()), float(np.square(intensity, dtype=float).sum())
     few = SINGLE * math.sqrt(squared) / (light or 1.0)
@@ -67,26 +67,26 @@ ROUNDING = 1.5e-6
 """Rounding error of points' images in single precision, relative rms."""
 
 
-def of_points(difference: float, accuracy: float) -> Reached:
+def of_points(difference: float, accuracy: float) -> ReachedError:
     """Error of points, from the difference that `points.image_and_error` finds for the brightest."""
-    return Reached(difference, f"points at accuracy {accuracy:g}, beside another image of one").and_also(
+    return ReachedError(difference, f"points at accuracy {accuracy:g}, beside another image of one").and_also(
         ROUNDING
     )
 
 
-def of_white(difference: float, accuracy: float) -> Reached:
+def of_white(difference: float, accuracy: float) -> ReachedError:
     """Error of a white image, from the difference that `white.image_and_error` finds."""
-    return Reached(
+    return ReachedError(
         difference, f"white image at accuracy {accuracy:g}, beside light that is followed less far"
     )
 
 
-def of_convolution(operator_error: float, source: str = "") -> Reached:
+def of_convolution(operator_error: float, source: str = "") -> ReachedError:
     """Error of a camera without lenslets, from the one that its operator states."""
-    return Reached(max(operator_error, ROUNDING), f"convolution with a point's image{source}")
+    return ReachedError(max(operator_error, ROUNDING), f"convolution with a point's image{source}")
 
 
-def of_grids(camera: Camera) -> Reached:
+def of_grids(camera: ImagedCamera) -> ReachedError:
     """Error of fields propagated on grids, whatever their number: measured against exact images of slices.
 
     Before lenslets 1.7e-2 to 3e-2. Without them paraxial lenses and exact free space differ by a spherical
@@ -94,22 +94,22 @@ def of_grids(camera: Camera) -> Reached:
     """
     source = "propagation on grids"
     if camera.lattice is not None:
-        return Reached(0.025, source)
+        return ReachedError(0.025, source)
     aberration = camera.pupil_diameter**4 / (128 * camera.wavelength * camera.separation**3)
-    return Reached(math.hypot(7e-4, 0.5 * aberration), source)
+    return ReachedError(math.hypot(7e-4, 0.5 * aberration), source)
 
 
-def together(parts: Sequence[tuple[float, Reached]]) -> Reached | None:
+def together(parts: Sequence[tuple[float, ReachedError]]) -> ReachedError | None:
     """Error of a sum of images of the given norms, whose errors are independent."""
     if not parts:
         return None
     whole = math.hypot(*(norm for norm, _ in parts)) or 1.0
     rms = math.hypot(*(norm * part.rms for norm, part in parts)) / whole
     paraxial = math.hypot(*(norm * part.paraxial for norm, part in parts)) / whole
-    return Reached(rms, "; ".join(dict.fromkeys(part.source for _, part in parts)), paraxial)
+    return ReachedError(rms, "; ".join(dict.fromkeys(part.source for _, part in parts)), paraxial)
 
 
-def warn_if_missed(asked: float, reached: Reached | None) -> None:
+def warn_if_missed(asked: float, reached: ReachedError | None) -> None:
     """Warn where the error is larger than what was asked for."""
     if reached is not None and reached.rms > asked:
         warnings.warn(

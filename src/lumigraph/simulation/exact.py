@@ -8,24 +8,19 @@ import numpy as np
 from lumigraph.core import arrays
 from lumigraph.core.progress import Progress
 from lumigraph.core.progress import part as share
-from lumigraph.operators import (
-    CameraOptics,
-    SingleLensOperator,
-    points,
-    single_lens,
-    single_lens_operator,
-    white,
-)
-from lumigraph.operators.coherent import coherent_image
-from lumigraph.operators.leaning import flat
-from lumigraph.operators.paraxial import left_by_field, resolved
-from lumigraph.operators.periodic import periodic_operator
-from lumigraph.operators.regrid import Regridded
-from lumigraph.operators.screens import Screen
-from lumigraph.operators.varying import FieldOperator
+from lumigraph.operators import CameraOptics, SingleLensOperator, single_lens, single_lens_operator
+from lumigraph.operators.lenslets import points
+from lumigraph.operators.lenslets.paraxial_error import left_by_field, resolved
+from lumigraph.operators.lenslets.tilted_planes import flat
+from lumigraph.operators.periodic import white
+from lumigraph.operators.periodic.coherent import coherent_image
+from lumigraph.operators.periodic.incoherent import periodic_operator
+from lumigraph.operators.periodic.screens import Screen
+from lumigraph.operators.sampling.field_lenses import FieldOperator
+from lumigraph.operators.sampling.regrid import Regridded
 from lumigraph.scene import Diffuser, Points, Slice
 from lumigraph.simulation import error
-from lumigraph.simulation.camera import Camera
+from lumigraph.simulation.camera import ImagedCamera
 from lumigraph.simulation.coherence import Coherent, PartiallyCoherent
 from lumigraph.simulation.hiding import hidden_image
 
@@ -33,14 +28,14 @@ Part = Slice | Points | Diffuser
 
 
 def image_of(
-    camera: Camera,
+    camera: ImagedCamera,
     part: Part,
     accuracy: float,
     progress: Progress,
     light: Coherent | PartiallyCoherent | None = None,
     *,
     screens: Sequence[Screen] = (),
-) -> tuple[np.ndarray, error.Reached]:
+) -> tuple[np.ndarray, error.ReachedError]:
     """Image of a part in incoherent light, or of a slice in light that interferes; and how far off it is.
 
     In incoherent light screens hide what stands behind them.
@@ -58,7 +53,7 @@ def _leaning(
     progress: Progress,
     light: Coherent | PartiallyCoherent | None,
     screens: Sequence[Screen],
-) -> tuple[np.ndarray, error.Reached]:
+) -> tuple[np.ndarray, error.ReachedError]:
     """Image of a part by a tilted camera, as the sum of upright cameras' images, and its error."""
     found, reached = flat(camera, accuracy), []
 
@@ -74,13 +69,13 @@ def _leaning(
 
 
 def _image_of(
-    camera: Camera | CameraOptics,
+    camera: ImagedCamera | CameraOptics,
     part: Part,
     accuracy: float,
     progress: Progress,
     light: Coherent | PartiallyCoherent | None,
     screens: Sequence[Screen],
-) -> tuple[np.ndarray, error.Reached]:
+) -> tuple[np.ndarray, error.ReachedError]:
     """Image of a part formed by an upright camera (ny, nx), and its error."""
     plain = camera.optics()
     if screens and not isinstance(part, Diffuser):
@@ -111,7 +106,7 @@ def _image_of(
 
 def _lit(
     camera: CameraOptics, part: Slice, accuracy: float, light: Coherent | PartiallyCoherent
-) -> tuple[np.ndarray, error.Reached]:
+) -> tuple[np.ndarray, error.ReachedError]:
     """Image of a slice in coherent or partially coherent light (ny, nx), and its error."""
     reached = error.of_quadrature("coherent", accuracy).through(camera)
     amplitude = np.sqrt(arrays.to_numpy(part.intensity))
@@ -123,7 +118,9 @@ def _lit(
     return coherent_image(camera, amplitude, part.grid, part.dz, accuracy), reached
 
 
-def _without_lenslets(camera: Camera, part: Part, accuracy: float) -> tuple[np.ndarray, error.Reached]:
+def _without_lenslets(
+    camera: ImagedCamera, part: Part, accuracy: float
+) -> tuple[np.ndarray, error.ReachedError]:
     if isinstance(part, Points):
         image, off = single_lens.points_image(camera, part)
         return image, error.of_convolution(off)

@@ -9,12 +9,15 @@ from lumigraph.core import arrays
 from lumigraph.core.progress import Progress
 from lumigraph.core.progress import part as share_of
 from lumigraph.errors import GeometryError
-from lumigraph.operators import CameraOptics, partly, points, varying
-from lumigraph.operators.periodic import PeriodicOperator, periodic_operator
-from lumigraph.operators.screens import Screen
+from lumigraph.operators import CameraOptics
+from lumigraph.operators.lenslets import points
+from lumigraph.operators.periodic import partial_occlusion
+from lumigraph.operators.periodic.incoherent import PeriodicOperator, periodic_operator
+from lumigraph.operators.periodic.screens import Screen
+from lumigraph.operators.sampling import field_lenses
 from lumigraph.scene import Points, Scene, Slice
 from lumigraph.simulation import error
-from lumigraph.simulation.camera import Camera
+from lumigraph.simulation.camera import ImagedCamera
 from lumigraph.simulation.coherence import Incoherent
 
 OFF = 0.01
@@ -23,7 +26,7 @@ OFF = 0.01
 SOURCE = "points hidden in part"
 
 
-def screens_of(scene: Scene, camera: Camera, coherence: object) -> list[Screen]:
+def screens_of(scene: Scene, camera: ImagedCamera, coherence: object) -> list[Screen]:
     """The slices that hide something.
 
     Raises
@@ -44,7 +47,7 @@ def screens_of(scene: Scene, camera: Camera, coherence: object) -> list[Screen]:
             f"a slice at {opaque[0].dz * 1e3:.4g} mm is opaque but the camera has no lenslets: what hides "
             "what is known of cameras with lenslets. Leave the opacity out, or use a plenoptic camera."
         )
-    varying.check_one(camera.optics())
+    field_lenses.check_one(camera.optics())
     return [
         Screen(part.opacity, part.grid, camera.object_distance + part.dz)
         for part in opaque
@@ -54,7 +57,7 @@ def screens_of(scene: Scene, camera: Camera, coherence: object) -> list[Screen]:
 
 def hidden_image(
     camera: CameraOptics, part: Slice | Points, accuracy: float, progress: Progress, screens: Sequence[Screen]
-) -> tuple[np.ndarray, error.Reached]:
+) -> tuple[np.ndarray, error.ReachedError]:
     """Raw image (ny, nx) of a part behind the screens that are nearer, and how far off it is."""
     camera = replace(camera, model="paraxial")
     if isinstance(part, Points):
@@ -70,13 +73,13 @@ def hidden_image(
     if not nearer:
         return operator.forward(intensity), reached
     told = share_of(progress, 1, 2)
-    whole, parts = partly.plane_image(operator, camera, part.dz, intensity, nearer, told)
+    whole, parts = partial_occlusion.plane_image(operator, camera, part.dz, intensity, nearer, told)
     return _both(whole, reached, parts, camera)
 
 
 def _points_image(
     camera: CameraOptics, part: Points, accuracy: float, progress: Progress, screens: Sequence[Screen]
-) -> tuple[np.ndarray, error.Reached]:
+) -> tuple[np.ndarray, error.ReachedError]:
     """Depth by depth; points that nothing nearer could hide are as exact as asked."""
     depths = part.positions[:, 2]
     free = min(screen.distance for screen in screens) - camera.object_distance >= depths
@@ -88,17 +91,17 @@ def _points_image(
         mine = depths == dz
         some = Points(part.positions[mine], part.intensities[mine])
         nearer = _nearer(screens, camera.object_distance + float(dz))
-        parts += partly.points_image(camera, some, nearer, share_of(progress, k, len(behind)))
+        parts += partial_occlusion.points_image(camera, some, nearer, share_of(progress, k, len(behind)))
     return _both(whole, reached, parts, camera)
 
 
 def _both(
-    whole: np.ndarray, reached: error.Reached, parts: np.ndarray, camera: CameraOptics
-) -> tuple[np.ndarray, error.Reached]:
+    whole: np.ndarray, reached: error.ReachedError, parts: np.ndarray, camera: CameraOptics
+) -> tuple[np.ndarray, error.ReachedError]:
     """The image of points seen in full and of those hidden in part, and how far off it is."""
     if not parts.any():
         return whole, reached
-    of_parts = error.Reached(OFF, SOURCE).through(camera)
+    of_parts = error.ReachedError(OFF, SOURCE).through(camera)
     both = error.together([(error.norm(whole), reached), (error.norm(parts), of_parts)])
     assert both is not None  # of two
     return whole + parts, both

@@ -13,10 +13,10 @@ from lumigraph.core.progress import part as share
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators.coherent import is_followed
+from lumigraph.operators.periodic.coherent import is_followed
 from lumigraph.scene import Medium, Points, Scene, Slice
 from lumigraph.simulation import error
-from lumigraph.simulation.camera import Camera, Imaging
+from lumigraph.simulation.camera import ImagedCamera, Imaging
 from lumigraph.simulation.coherence import (
     Coherence,
     Coherent,
@@ -27,7 +27,7 @@ from lumigraph.simulation.coherence import (
 )
 from lumigraph.simulation.exact import image_of
 from lumigraph.simulation.hiding import screens_of
-from lumigraph.simulation.light import Light, Shots, read_out
+from lumigraph.simulation.light import AccumulatedLight, Shots, read_out
 from lumigraph.simulation.microscope_scene import Microscope, microscope_image
 from lumigraph.simulation.shots import Shot, number_of_shots, shots
 from lumigraph.simulation.spectrum import Spectrum, by_wavelength
@@ -48,7 +48,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 def simulate(
-    camera: Camera | Microscope,
+    camera: ImagedCamera | Microscope,
     scene: Scene | Volume,
     coherence: Coherence | Incoherent | PartiallyCoherent | None = None,
     *,
@@ -119,14 +119,14 @@ def simulate(
 
 
 def _imaged(
-    camera: Camera,
+    camera: ImagedCamera,
     scene: Scene,
     coherence: Coherence | Incoherent | PartiallyCoherent,
     progress: Progress | None,
     map: Callable[..., Iterable[Any]],  # noqa: A002 - as `simulate` names it
 ) -> RawImage:
     dark = np.zeros(camera.sensor.shape)
-    light = Light(dark, Shots(camera, dark))
+    light = AccumulatedLight(dark, Shots(camera, dark))
     slices, count, accuracy, screens = [], 0, 1e-3, screens_of(scene, camera, coherence)
     fields: Iterable[Shot] = ()
     followed = None
@@ -163,7 +163,7 @@ def _imaged(
 
 
 def _coloured(
-    camera: Camera | Microscope,
+    camera: ImagedCamera | Microscope,
     scene: Scene,
     coherence: Coherence | Incoherent | PartiallyCoherent,
     spectrum: Spectrum,
@@ -172,13 +172,13 @@ def _coloured(
 ) -> RawImage:
     count = len(spectrum.wavelengths)
 
-    def at_wavelength(camera: Camera | Microscope, scene: Scene, number: int) -> RawImage:
+    def at_wavelength(camera: ImagedCamera | Microscope, scene: Scene, number: int) -> RawImage:
         return simulate(camera, scene, coherence, progress=share(progress, number, count), map=map)
 
     return by_wavelength(camera, scene, spectrum, at_wavelength)
 
 
-def _check(camera: Camera, scene: Scene, coherence: Coherence | Incoherent | PartiallyCoherent) -> None:
+def _check(camera: ImagedCamera, scene: Scene, coherence: Coherence | Incoherent | PartiallyCoherent) -> None:
     """Refuse scenes that are empty or behind the lens, and propagations that do not fit in memory."""
     checks.instance("scene", scene, Scene)
     if not isinstance(coherence, Incoherent | Coherent | PartiallyCoherent | Snapshots | TiltedWaves):

@@ -6,13 +6,13 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
 from lumigraph.rendering import decode
 from lumigraph.scene import Scene, Slice
-from lumigraph.simulation.camera import Camera
+from lumigraph.simulation.camera import ImagedCamera
 from lumigraph.simulation.imaging import simulate
 
 _WAVES, _FINEST, _CONTRAST = 40, 0.6, 0.15  # of the texture: how many, lenslets^-1 times 2 pi, and of each
 
 
-def plane_views(camera: Camera, calibration: Calibration, dz: float) -> LightField:
+def plane_views(camera: ImagedCamera, calibration: Calibration, dz: float) -> LightField:
     """Views of a textured plane before the middle of a plenoptic camera 1.0, by wave optics.
 
     Parameters

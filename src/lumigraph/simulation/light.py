@@ -9,7 +9,7 @@ from lumigraph.core.progress import Progress
 from lumigraph.core.raw import RawImage
 from lumigraph.sensor import integrate
 from lumigraph.simulation import error
-from lumigraph.simulation.camera import Camera
+from lumigraph.simulation.camera import ImagedCamera
 from lumigraph.simulation.coherence import Coherence, Incoherent, PartiallyCoherent
 
 
@@ -29,7 +29,7 @@ class Shots:
         Squared norms of their images, each over its shots, summed.
     """
 
-    camera: Camera
+    camera: ImagedCamera
     total: np.ndarray
     drawn: list[int] = field(default_factory=list)
     squares: float = 0.0
@@ -72,13 +72,13 @@ class Shots:
 
 
 @dataclass(slots=True)
-class Light:
+class AccumulatedLight:
     """Light that has arrived so far: intensity on the pixels, after `done` shots or parts."""
 
     pixels: np.ndarray
     shots: Shots
     done: int = 0
-    reached: list[tuple[float, error.Reached]] = field(default_factory=list)
+    reached: list[tuple[float, error.ReachedError]] = field(default_factory=list)
     """Norm of each part that is imaged at once, and how far off it is."""
 
     def count(self, progress: Progress | None, total: int) -> None:
@@ -88,7 +88,9 @@ class Light:
             progress(self.done / total)
 
 
-def read_out(camera: Camera, light: Light, coherence: Coherence | Incoherent | PartiallyCoherent) -> RawImage:
+def read_out(
+    camera: ImagedCamera, light: AccumulatedLight, coherence: Coherence | Incoherent | PartiallyCoherent
+) -> RawImage:
     """Raw image of what has arrived, with what is known of its error."""
     shots, reached = light.shots, list(light.reached)
     shots.complete()
@@ -102,7 +104,7 @@ def read_out(camera: Camera, light: Light, coherence: Coherence | Incoherent | P
             drawn = shots.error(coherence.convergence)
             known["estimated_error"] = drawn * error.norm(shots.total) / (error.norm(pixels) or 1.0)
             source = f"{len(shots.drawn)} blocks of {sum(shots.drawn)} shots on grids"
-            there = error.Reached(drawn, source, there.paraxial).and_also(there.rms)
+            there = error.ReachedError(drawn, source, there.paraxial).and_also(there.rms)
         reached.append((error.norm(shots.total), there))
     if (whole := error.together(reached)) is not None:
         known["error"] = {"rms": whole.rms, "source": whole.source}

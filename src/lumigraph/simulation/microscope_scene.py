@@ -17,11 +17,11 @@ from lumigraph.core.progress import Progress
 from lumigraph.core.raw import RawImage
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError, SamplingWarning
-from lumigraph.operators.microscope_building import Layout
-from lumigraph.operators.microscope_cell import Lenslet
-from lumigraph.operators.microscope_kernels import Demand, point_cells, require_window
-from lumigraph.operators.microscope_operator import MicroscopeOperator
-from lumigraph.operators.microscope_pupil import PupilImages
+from lumigraph.operators.microscope.building import SampledLenslets
+from lumigraph.operators.microscope.cell import Lenslet
+from lumigraph.operators.microscope.kernels import KernelAccuracy, point_cells, require_window
+from lumigraph.operators.microscope.pupil import PupilImages
+from lumigraph.operators.microscope.volume_operator import MicroscopeOperator
 from lumigraph.scene import Diffuser, Medium, Points, Scene, Slice
 from lumigraph.sensor import Sensor
 from lumigraph.simulation import error
@@ -118,7 +118,7 @@ def microscope_image(
         else:
             image, rms = _image(scope, part, coherence.accuracy)
         pixels += image
-        reached.append((error.norm(image), error.Reached(rms, _SOURCE)))
+        reached.append((error.norm(image), error.ReachedError(rms, _SOURCE)))
         if progress is not None:
             progress((done + 1) / len(scene.parts))
     known = {
@@ -159,7 +159,10 @@ def _slice_image(scope: Microscope, part: Slice, accuracy: float) -> tuple[np.nd
             "Give spectrum=Spectrum.rgb() for a coloured scene."
         )
     finest = min(one.wavelength / (4 * one.numerical_aperture) for one in scope.objectives)
-    steps, found = (max(finest, *part.grid.pitch), finest), _Found(np.zeros(scope.sensor.shape), 0.0, 0.0)
+    steps, found = (
+        (max(finest, *part.grid.pitch), finest),
+        _FoundSlice(np.zeros(scope.sensor.shape), 0.0, 0.0),
+    )
     counts = [max(SAMPLES, math.ceil(scope.lenslet_size / p - 1e-6)) for p in steps]
     for samples in dict.fromkeys(counts):
         found = _by_operator(scope, part, samples, accuracy)
@@ -172,7 +175,7 @@ def _slice_image(scope: Microscope, part: Slice, accuracy: float) -> tuple[np.nd
 
 
 @dataclass(frozen=True, slots=True)
-class _Found:
+class _FoundSlice:
     """Image of a slice, its relative rms error, and what of it is that of the operator's samples."""
 
     image: np.ndarray
@@ -180,11 +183,11 @@ class _Found:
     sampled: float
 
 
-def _by_operator(scope: Microscope, part: Slice, samples: int, accuracy: float) -> _Found:
+def _by_operator(scope: Microscope, part: Slice, samples: int, accuracy: float) -> _FoundSlice:
     operator = _operator(scope, part.dz, samples, accuracy)
     image = operator.forward(_plane(part, operator.object_grid))
     sampled = _sampling_error(operator, part, image)
-    return _Found(image, math.hypot(operator.error, sampled), sampled)
+    return _FoundSlice(image, math.hypot(operator.error, sampled), sampled)
 
 
 def _operator(scope: Microscope, dz: float, samples: int, accuracy: float) -> Any:
@@ -242,7 +245,7 @@ def _white(operator: Any) -> np.ndarray:
 def point_image(
     objectives: Sequence[Objective],
     lenslet: Lenslet,
-    layout: Layout,
+    layout: SampledLenslets,
     position: tuple[float, float, float],
     accuracy: float = 1e-3,
 ) -> tuple[np.ndarray, float]:
@@ -267,7 +270,7 @@ def point_image(
     own = [math.floor(cell + 0.5) for cell in place]
     within = ((place[0] - own[0]) * s + (s - 1) / 2, (place[1] - own[1]) * s + (s - 1) / 2)
     farthest = max(max(k, n - 1 - k) for k, n in zip(own, layout.cells, strict=True))
-    demand = Demand(accuracy, farthest + 1)  # what falls beside the sensor needs no window
+    demand = KernelAccuracy(accuracy, farthest + 1)  # what falls beside the sensor needs no window
     for one in objectives:
         require_window(one, lenslet, layout.sampling, position[2], demand)
     cells, error = point_cells(objectives, lenslet, layout.sampling, within, (position[2], demand))

@@ -13,8 +13,8 @@ from lumigraph.elements import Train
 from lumigraph.errors import SamplingWarning
 from lumigraph.propagation import Propagate, propagate
 from lumigraph.scene import Slice
-from lumigraph.simulation.camera import Camera
-from lumigraph.simulation.coherence import Coherence, Plane
+from lumigraph.simulation.camera import ImagedCamera
+from lumigraph.simulation.coherence import Coherence, ScenePlane
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ def number_of_shots(slices: list[Slice], coherence: Coherence) -> int:
     return planes * coherence.shots
 
 
-def shots(camera: Camera, slices: list[Slice], coherence: Coherence) -> Iterator[Shot]:
+def shots(camera: ImagedCamera, slices: list[Slice], coherence: Coherence) -> Iterator[Shot]:
     """Shots of slices; independent planes share one propagation, as their interference averages out."""
     train, grid = camera.image_train(), camera.pupil_grid
     planes = [_plane(camera, part) for part in slices]
@@ -63,12 +63,12 @@ def shots(camera: Camera, slices: list[Slice], coherence: Coherence) -> Iterator
             yield from (Shot(wave, train, 1.0, block) for wave in arriving)
 
 
-def _plane(camera: Camera, part: Slice) -> Plane:
+def _plane(camera: ImagedCamera, part: Slice) -> ScenePlane:
     amplitude = np.sqrt(arrays.to_numpy(part.intensity)).astype(np.float32)
-    return Plane(amplitude, part.grid, camera.object_distance + part.dz, camera.pupil_diameter)
+    return ScenePlane(amplitude, part.grid, camera.object_distance + part.dz, camera.pupil_diameter)
 
 
-def _factor(camera: Camera, plane: Plane, coherence: Coherence) -> float:
+def _factor(camera: ImagedCamera, plane: ScenePlane, coherence: Coherence) -> float:
     """Factor of a plane's amplitude that makes an even scene of intensity 1 a raw image of mean 1."""
     area = math.prod(plane.grid.pitch)
     scale = coherence.scale(area, camera.wavelength, math.pi * camera.pupil_diameter**2 / 4, plane.distance)

@@ -11,8 +11,8 @@ from lumigraph.core import arrays, checks
 from lumigraph.core.grid import Grid
 from lumigraph.core.progress import Progress
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
-from lumigraph.operators.microscope_medium import Seen
-from lumigraph.operators.microscope_pupil import PupilImages
+from lumigraph.operators.microscope.medium import MediumImages
+from lumigraph.operators.microscope.pupil import PupilImages
 from lumigraph.scene import Diffuser, Medium, Points, Scene, Slice
 from lumigraph.sensor import Sensor
 from lumigraph.simulation import error
@@ -27,7 +27,7 @@ PUPIL, FINEST = 0.7, 1e-5
 """Part of the accuracy that images without steps are made for: the distance of slices may take the rest."""
 
 
-class Seeing(Protocol):
+class MediumMicroscope(Protocol):
     """Protocol of a light-field microscope that images through a medium."""
 
     @property
@@ -45,7 +45,7 @@ class Seeing(Protocol):
         ...
 
 
-def lit_points(scope: Seeing, scene: Scene) -> Points:
+def lit_points(scope: MediumMicroscope, scene: Scene) -> Points:
     """All points and lit samples of a scene.
 
     Raises
@@ -86,7 +86,7 @@ def _samples(part: Slice, grid: Grid) -> Points:
 
 
 def medium_image(
-    scope: Seeing, points: Points, medium: Medium, accuracy: float, progress: Progress | None
+    scope: MediumMicroscope, points: Points, medium: Medium, accuracy: float, progress: Progress | None
 ) -> tuple[np.ndarray, float]:
     """Raw image of points through a medium, and its estimated relative rms error.
 
@@ -98,7 +98,7 @@ def medium_image(
     checks.instance("medium", medium, Medium)
     farthest = max(abs(float(dz)) for dz in (*points.positions[:, 2], *medium.depths))
     own = max(PUPIL * accuracy, FINEST)
-    seen = Seen(scope.pupil_images((), farthest=farthest, accuracy=own), medium)
+    seen = MediumImages(scope.pupil_images((), farthest=farthest, accuracy=own), medium)
     _say_how_long(seen, points)
     between = _between_planes(seen, points, accuracy)
     whole, off, lost = np.zeros(scope.sensor.shape), 0.0, 0.0
@@ -119,7 +119,7 @@ def medium_image(
     return whole, math.sqrt(off) / (error.norm(whole) or 1.0)
 
 
-def _say_how_long(seen: Seen, points: Points) -> None:
+def _say_how_long(seen: MediumImages, points: Points) -> None:
     """Warn, before anything starts, of points that take minutes."""
     count, seconds = len(points.intensities), seen.seconds(points.positions[:, 2])
     if seconds > SAID:
@@ -133,7 +133,7 @@ def _say_how_long(seen: Seen, points: Points) -> None:
         )
 
 
-def _between_planes(seen: Seen, points: Points, accuracy: float) -> float:
+def _between_planes(seen: MediumImages, points: Points, accuracy: float) -> float:
     """Relative rms error from a volume's spacing of planes, for the brightest of the deepest points."""
     deepest = points.positions[:, 2] >= points.positions[:, 2].max()
     place = points.positions[int(np.argmax(np.where(deepest, points.intensities, -np.inf)))]

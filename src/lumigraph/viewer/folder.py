@@ -15,7 +15,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Progress, part, silent
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
-from lumigraph.io.target import check_target
+from lumigraph.io.target import check_target, is_clutter
 from lumigraph.viewer import safety
 from lumigraph.viewer.encoding import Coded, white_level
 from lumigraph.viewer.exhibit import Exhibit, comfortable, depth_of, grey_or_colour
@@ -59,7 +59,7 @@ def check_folder(path: Path) -> Path:
         return check_target(path)
     check_target(path / "index.html")
     for entry in path.iterdir():
-        if entry.name not in _ENTRIES and not entry.name.startswith("."):
+        if entry.name not in _ENTRIES and not is_clutter(entry):
             raise FormatError(
                 f"writing {path} would remove {entry.name}, which it holds too. Choose another folder."
             )
@@ -106,7 +106,7 @@ def export_folder(
     check_quality(quality)
     target, progress = check_folder(Path(path)), progress or silent
     with store.replacing(target) as place:
-        writer, parts = _Writer(place, quality), []
+        writer, parts = _FolderWriter(place, quality), []
         for k, exhibit in enumerate(exhibits):
             parts.append(
                 _streamed(exhibit, _Tiles(writer, k, coarse, tile, part(progress, k, len(exhibits))))
@@ -148,7 +148,7 @@ def _with_policy(page: bytes) -> bytes:
     )
 
 
-class _Writer:
+class _FolderWriter:
     """Files in a folder, and how large they are."""
 
     def __init__(self, place: Path, quality: int) -> None:
@@ -171,7 +171,7 @@ class _Writer:
 class _Tiles:
     """Writer of the tiles of one exhibit."""
 
-    writer: _Writer
+    writer: _FolderWriter
     number: int
     coarse: int
     tile: int

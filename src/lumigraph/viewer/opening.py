@@ -12,7 +12,6 @@ import numpy as np
 from lumigraph import io
 from lumigraph.core import checks
 from lumigraph.core.arrays import to_numpy
-from lumigraph.core.brief import called
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.grid import Grid
@@ -20,6 +19,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.progress import Progress, Stage, silent, within
 from lumigraph.core.raw import RawImage
+from lumigraph.core.short_repr import called
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError, SamplingWarning

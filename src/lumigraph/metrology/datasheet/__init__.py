@@ -1,0 +1,5 @@
+"""Data sheets of plenoptic cameras.
+
+- `measure`: `datasheet`; `sheet`, its entries; `planes`, `steady`, one chart's quantities
+- `charts`, `exposures`, `lights`: the pictures; `simulated`, what a camera file promises
+"""

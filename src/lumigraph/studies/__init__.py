@@ -1,0 +1,8 @@
+"""Studies of a camera that has been described: what it can resolve, and what could be better.
+
+- `information`: Cramér-Rao bounds of points, errors of the best linear reconstruction
+- `optimisation`: the best camera within ranges and stock
+- `tolerance`: manufacturing tolerances, one by one and by chance
+- `adaptive`: aberrations estimated from the light field itself
+- `thesis`: the tables and figures of the thesis, reproduced
+"""

@@ -1,0 +1,34 @@
+"""Fisher information of a raw image about points of light, and the least errors of any estimate.
+
+- `bounds`: `bounds`, errors of place, depth and light over a volume; `noise`, information of a pixel
+- `slopes`: `slopes`, derivatives of a bound by an instrument's parts; `followed`, its way back
+- `points`: images of points and their derivatives by place, of any instrument
+- `reconstruction`: `reconstruction_error`, what the best linear reconstruction of `Scenes` leaves
+- `reconstruction_slopes`, `reconstruction_trials`: its derivatives; errors of drawn scenes
+- `trials`: `trials`, errors of the most likely places in drawn noise, to compare with the bounds
+"""
+
+from lumigraph.studies.information.bounds import Bounds, Light, bounds
+from lumigraph.studies.information.noise import pixel_information
+from lumigraph.studies.information.reconstruction import ReconstructionError, reconstruction_error
+from lumigraph.studies.information.reconstruction_slopes import reconstruction_slopes
+from lumigraph.studies.information.reconstruction_trials import ReconstructionTrials, reconstruction_trials
+from lumigraph.studies.information.scenes import Scenes
+from lumigraph.studies.information.slopes import slopes
+from lumigraph.studies.information.trials import Trials, trials
+
+__all__ = [
+    "Bounds",
+    "Light",
+    "ReconstructionError",
+    "ReconstructionTrials",
+    "Scenes",
+    "Trials",
+    "bounds",
+    "pixel_information",
+    "reconstruction_error",
+    "reconstruction_slopes",
+    "reconstruction_trials",
+    "slopes",
+    "trials",
+]

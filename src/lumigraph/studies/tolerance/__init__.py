@@ -1,0 +1,17 @@
+"""Manufacturing tolerances: cameras as built, the effect of each tolerance, and Monte Carlo trials.
+
+- `lumigraph.instruments.Tolerance`: the error of a value; camera files have them in ``[tolerances]``.
+- `making`: `built`, the camera with given errors; `drawn`, `cameras`: random errors, and such cameras.
+- `measures`: results of a camera as built beside those of its description; `single`: effects of single
+  lenslets that differ.
+- `study`: many random cameras (`trials`) beside first-order sensitivities, a `Study` with an `ToleranceOutcome` for
+  each measure.
+"""
+
+from lumigraph.studies.tolerance.making import built, cameras, drawn
+from lumigraph.studies.tolerance.measures import measures
+from lumigraph.studies.tolerance.outcome import ToleranceOutcome
+from lumigraph.studies.tolerance.study import Study, study
+from lumigraph.studies.tolerance.trials import ToleranceTrials
+
+__all__ = ["Study", "ToleranceOutcome", "ToleranceTrials", "built", "cameras", "drawn", "measures", "study"]
