@@ -133,6 +133,8 @@ def _optional(text: str) -> str:
 
     def option(found: re.Match[str]) -> str:
         name, value = found.groups()
+        if name == "views":  # of a mosaic: to the command line they are the input
+            return f"--mosaic {value}".rstrip()
         return f"--{name}{' ' * bool(value)}{value}" if name in names else found[0]
 
     if verb is simulate:
@@ -174,8 +176,8 @@ def _unknown(word: str) -> str:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    WARNED.get([]).append(str(message))
-    _say(f"warning: {message}")
+    WARNED.get([]).append(text := _optional(str(message)))
+    _say(f"warning: {text}")
 
 
 def _say(text: str) -> None:

@@ -30,6 +30,12 @@ class ShownOptions(RawOptions):
         Image with the lens covered: subtracted; shows which pixels are hot.
     camera
         Camera file, or a name of the catalogue, of the raw image.
+    page
+        Page of a stack of raw images, counted from 0.
+    bit_depth
+        Bits of the sensor, such as 12, where the file does not say and full pixels are to be known.
+    mosaic
+        Views, rows x columns, such as 5x5, of a picture made of blocks, one for each lenslet (ESLF).
     patch
         For a camera 2.0: size of the patches [px]; found in the raw image if left out.
     """
@@ -160,7 +166,14 @@ def _opened(path: Path, origin: ShownOptions) -> Any:
     from lumigraph import viewer
 
     wanted = viewer.Origin(
-        origin.calibration, origin.white, origin.dark, origin.described(), origin.patch, origin.page
+        origin.calibration,
+        origin.white,
+        origin.dark,
+        origin.described(),
+        origin.patch,
+        origin.page,
+        origin.bit_depth,
+        origin.views_of_mosaic,
     )
     with progress(f"open {path.name}") as shown:
         return viewer.open_exhibit(path, wanted, shown)
