@@ -184,12 +184,11 @@ def test_what_looks_alike_is_judged_above_the_noise():
     moves, noise, variance = np.arange(0.1, 4, 0.1), 0.3, np.array([1.0, 0.31, 0.29, 20.0])
     texture = np.sin(np.pi * moves / 2)[:, None] ** 2 * variance
     found = first_alike(noise + texture, moves, variance, noise)
-    assert found == pytest.approx(
-        [2.0, 2.0, 0.0, 2.0], abs=0.01
-    )  # a texture below the noise looks alike anyway
+    # A texture below the noise looks alike anyway.
+    assert found == pytest.approx([2.0, 2.0, 0.0, 2.0], abs=0.01)
     off = noise + texture + 0.06 * variance  # by more than places alike may differ
     assert not first_alike(off, moves, variance, noise).any()
     near = noise + texture + 0.04 * variance
     assert first_alike(near, moves, variance, noise)[[0, 3]] == pytest.approx([2.0, 2.0], abs=0.01)
-    flat = noise + 0.29 / 0.3 * 0.3 * np.minimum(texture / variance, 1) * variance  # never quite different
+    flat = noise + 0.29 * texture  # never quite different
     assert not first_alike(flat, moves, variance, noise).any()

@@ -74,7 +74,7 @@ def test_a_plain_picture_stands_beside_a_light_field():
     light = blob_on(there, 20 * um, 35 * um)
     for found, camera, dz in ((seen, small, 1 * mm), (picture, plain, 0.0)):
         truth = lg.simulate(camera, lg.Scene([lg.Slice(light, there, dz)]), lg.Incoherent(1e-2)).data
-        assert relative(found, truth) < 2e-2  # at the other one's depth: 0.4
+        assert relative(found, truth) < 2e-2
     with pytest.raises(lg.GeometryError, match=r"focused at 0\.2 to 0\.201 m. Give depths"):
         lg.joint_operator([small, plain])
 
