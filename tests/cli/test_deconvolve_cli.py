@@ -327,7 +327,7 @@ pixel_pitch = "10 um"
 @pytest.fixture
 def rough(monkeypatch):
     """Joint operators to 1e-2, which take less time; what is tested is which raw images go where."""
-    module = importlib.import_module("lumigraph.instruments.joint")
+    module = importlib.import_module("lumigraph.metrology.scanning.joint")
     monkeypatch.setattr(module, "joint_operator", functools.partial(module.joint_operator, accuracy=1e-2))
 
 
