@@ -241,7 +241,7 @@ def test_the_residual_of_several_white_images_holds_no_noise(light, drawn, of_fe
 
 
 def test_the_sheet_says_whether_noise_is_in_the_residual(drawn, of_few_and_many):
-    alone = lg.metric.datasheet(replace(drawn, whites=drawn.whites[:1]))
+    alone = lg.metrology.datasheet(replace(drawn, whites=drawn.whites[:1]))
     how = [
         next(one.how for one in sheet.entries if one.quantity.name == "residual_px")
         for sheet in (alone, *of_few_and_many)

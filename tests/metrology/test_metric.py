@@ -202,7 +202,7 @@ def test_boards_that_tell_nothing_are_refused(seen: Corners) -> None:
 
 
 def test_six_corners_are_enough_for_a_picture_and_five_are_not(
-    seen: Corners, measured: lg.metric.Measured
+    seen: Corners, measured: lg.metrology.Measured
 ) -> None:
     """The least that a pose is found by, of a picture by itself and of one among others."""
     first = seen[seen.frame == 0]

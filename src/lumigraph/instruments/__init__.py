@@ -12,7 +12,7 @@
 - `instrument`, `camera`, `lenslet_camera`: what the kinds share; `capabilities`: what some of them can do
 - `parameters`: what a designer can change; `point_view`: a point's image at once
 - `grids`: how finely and widely planes are sampled
-- `description`: `Description`, rows of quantities (`Row`); the rows themselves are made by `lumigraph.describe`
+- `description`: `Description`, rows of quantities (`Row`), which `lumigraph.describe` makes
 - `quantities`, `problems`, `files`: numbers with units, errors in one line, TOML and the `catalogue`
 """
 

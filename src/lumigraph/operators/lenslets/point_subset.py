@@ -1,7 +1,7 @@
 """Images of the points of a cell behind lenslets of any shape, from few of the points.
 
 A field is band-limited in the point's place too, so that those of some points give those of all. What is
-faint besides, as where lenslets are missing, follows from the intensities of fewer points still (`ChosenPoints`).
+faint besides, as where lenslets are missing, follows from the intensities of still fewer (`ChosenPoints`).
 """
 
 import math

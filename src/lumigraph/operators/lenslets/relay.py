@@ -174,7 +174,7 @@ class SeparableRelay:
         return [(which, cell, rows, columns) for cell in cells[which]]
 
     def piece(self, key: Key) -> np.ndarray:
-        """A matrix (terms, samples, window), by axis, cell and those around it; or some of its `CellNumbers`."""
+        """Matrix (terms, samples, window), by axis, cell and those around it; or some `CellNumbers` of it."""
         if key[0] in CellNumbers._fields:
             name, *seat = key
             return getattr(self._numbers_of(tuple(seat)), str(name))
