@@ -9,7 +9,8 @@ import lumigraph as lg
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.point_changes import place_changes
-from lumigraph.operators.points import points_image, share
+from lumigraph.operators.lenslets.illuminated import share
+from lumigraph.operators.points import points_image
 from lumigraph.operators.relay import Relays
 from lumigraph.scene import Points
 from lumigraph.units import mm, nm, um

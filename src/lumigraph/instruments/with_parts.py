@@ -6,7 +6,7 @@ from typing import Self
 from lumigraph.core.grid import Grid
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.sees_volumes import SeesVolumes
-from lumigraph.operators.part_images import PartImages
+from lumigraph.operators.lenslets.point_images import PointImages
 from lumigraph.operators.part_leaning import LeaningParts, by_parts
 from lumigraph.operators.plane_of_points import plane_before
 from lumigraph.operators.whole_planes import WholePlane
@@ -17,7 +17,7 @@ class WithParts(SeesVolumes, Camera):
 
     def part_images(
         self, pairs: Sequence[tuple[Self, Self]], *, accuracy: float = 1e-2
-    ) -> PartImages | LeaningParts[PartImages]:
+    ) -> PointImages | LeaningParts[PointImages]:
         """Images of points, with derivatives by whatever differs between pairs of cameras a little apart.
 
         Parameters
@@ -106,7 +106,7 @@ class WithParts(SeesVolumes, Camera):
         images = self.part_images(pairs, accuracy=accuracy)
         wanted = grid or self.operator_grid()
 
-        def plane(one: PartImages) -> WholePlane:
+        def plane(one: PointImages) -> WholePlane:
             return plane_before(one, wanted, float(dz))
 
         return images.each(plane) if isinstance(images, LeaningParts) else plane(images)

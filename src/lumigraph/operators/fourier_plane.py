@@ -21,7 +21,7 @@ from lumigraph.errors import GeometryError
 from lumigraph.operators.fourier_changes import Behind, Pupil, Slopes, pupils
 from lumigraph.operators.fourier_microscope import FourierMicroscopeOperator, lit_ones
 from lumigraph.operators.fourier_points import FourierPoints
-from lumigraph.operators.part_waves import times
+from lumigraph.operators.lenslets.gradient import times
 from lumigraph.operators.resampling import represented
 from lumigraph.operators.whole_planes import WholePlane
 

@@ -13,11 +13,10 @@ import numpy as np
 
 from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.leaning import near
+from lumigraph.operators.lenslets.gradient import Moved
+from lumigraph.operators.lenslets.point_images import PointImages, one_lens, require_paraxial
 from lumigraph.operators.paraxial import resolved
-from lumigraph.operators.part_exact import ExactImages
-from lumigraph.operators.part_images import PartImages, one_lens, require_paraxial
 from lumigraph.operators.part_points import Back, PartPoints, SteppedPoints
-from lumigraph.operators.part_waves import Where
 from lumigraph.operators.whole_planes import Part
 from lumigraph.scene import Points
 
@@ -122,27 +121,25 @@ def weighed(moved: np.ndarray, seen: Sequence[np.ndarray]) -> np.ndarray:
 
 def by_parts(
     camera: HasOptics, pairs: Sequence[tuple[HasOptics, HasOptics]], accuracy: float
-) -> PartImages | LeaningParts[PartImages]:
+) -> PointImages | LeaningParts[PointImages]:
     """Of instruments, a little to either side of one, whose model they have where theirs is "auto".
 
     Raises
     ------
     GeometryError
-        As of `PartImages`.
+        As of `PointImages`.
     SamplingError
         As of `leaning.flat`.
     """
     own, ends = resolved(camera.optics(), accuracy), [end.optics() for both in pairs for end in both]
     ends = [replace(end, model=own.model) if end.model == "auto" else end for end in ends]
     both = tuple(zip(ends[::2], ends[1::2], strict=True))
-    if own.model == "exact":
-        return ExactImages(own, both, accuracy)
-    plain = all(one.lean is None for one in (own, *ends))
-    return PartImages(own, both, accuracy) if plain else _leaning(own, both, accuracy)
+    plain = own.model == "exact" or all(one.lean is None for one in (own, *ends))
+    return PointImages(own, both, accuracy) if plain else _leaning(own, both, accuracy)
 
 
 def points_before(
-    images: PartImages | LeaningParts[PartImages], points: Points, moved: Sequence[Where]
+    images: PointImages | LeaningParts[PointImages], points: Points, moved: Sequence[Moved]
 ) -> PartPoints | LeaningPoints:
     """Points one by one, before any camera; elsewhere before those of each pair."""
     if isinstance(images, LeaningParts):
@@ -151,21 +148,21 @@ def points_before(
     return _flat(images, points, moved)
 
 
-def _flat(images: PartImages, points: Points, moved: Sequence[Where]) -> PartPoints:
+def _flat(images: PointImages, points: Points, moved: Sequence[Moved]) -> PartPoints:
     turned = images.camera.model == "paraxial" and one_lens(images.camera)
     return (PartPoints if turned else SteppedPoints)(images, points, moved)
 
 
 def _leaning(
     camera: CameraOptics, pairs: Sequence[tuple[CameraOptics, CameraOptics]], accuracy: float
-) -> LeaningParts[PartImages]:
+) -> LeaningParts[PointImages]:
     """Of cameras of which one leans at least."""
     for one in (camera, *(end for pair in pairs for end in pair)):
         require_paraxial(one)
     found = near(camera, [end for pair in pairs for end in pair], accuracy)
     own, ends = found.of(camera), [(found.of(low), found.of(high)) for low, high in pairs]
     parts = tuple(
-        PartImages(one, tuple((low.cameras[n], high.cameras[n]) for low, high in ends), accuracy)
+        PointImages(one, tuple((low.cameras[n], high.cameras[n]) for low, high in ends), accuracy)
         for n, one in enumerate(own.cameras)
     )
     moved = np.array([high.weights - low.weights for low, high in ends])

@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -16,25 +15,20 @@ from lumigraph.core import arrays
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
 from lumigraph.operators.camera import CameraOptics
+from lumigraph.operators.lenslets.gradient import Both, Gradient, Moved, Tangent
+from lumigraph.operators.lenslets.point_images import PointImages, squared
+from lumigraph.operators.lenslets.sampled_camera import SPARE, SampledCamera, SourcePoint
 from lumigraph.operators.optics import Optics
-from lumigraph.operators.part_images import PartImages
-from lumigraph.operators.part_images import Told as ByWaves
-from lumigraph.operators.part_sight import Sight, Spot
-from lumigraph.operators.part_waves import Both, Where
-from lumigraph.operators.points import SPARE
 from lumigraph.operators.tiles import as_plane, by_cell, spread
 from lumigraph.operators.whole_planes import Block, CellPlane
 from lumigraph.scene import Points
-
-NODES = 64
-"""Across the main lens, at least: more where the accuracy asks for them."""
 
 TOGETHER = 8
 """Points whose images are known at a time."""
 
 
 @dataclass(frozen=True, eq=False)
-class PartPlane(CellPlane[Sight, "Lit"]):
+class PartPlane(CellPlane[SampledCamera, "CellImages"]):
     """How a camera sees a plane, with derivatives by what differs between pairs of cameras.
 
     The object's samples stay where they are, and as bright, before all cameras. Light from beyond the array
@@ -51,7 +45,7 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         Depth from the focused plane [m].
     """
 
-    images: PartImages
+    images: PointImages
     grid: Grid
     dz: float = 0.0
 
@@ -60,28 +54,28 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         """Of a raw image and of an object."""
         return self.images.shape, self.grid.shape
 
-    def _whole(self) -> Sight:
+    def _whole(self) -> SampledCamera:
         return self._here
 
     def _pairs(self) -> Sequence[Both]:
         return self._seen
 
-    def _read(self, end: Sight) -> Linear:
+    def _read(self, end: SampledCamera) -> Linear:
         return end.read
 
-    def _changed(self, change: list[float]) -> Callable[["Lit"], Block]:
+    def _changed(self, change: list[float]) -> Callable[["CellImages"], Block]:
         weighed = list(zip(change, self._ends, self._moved, strict=True))
-        changed = self._amid.changing(self._own, self._spots, weighed)
+        changed = Tangent.of(self._own, weighed, self._spots)
         return lambda block: block.changed(changed)
 
-    def _slopes(self) -> "_Told":
-        return _Told(self._amid.by_pairs(self._own, self._ends, self._moved))
+    def _slopes(self) -> "_BlockGradient":
+        return _BlockGradient(self._amid.by_pairs(self._own, self._ends, self._moved))
 
-    def _points(self, end: Sight, x: np.ndarray) -> np.ndarray:
+    def _points(self, end: SampledCamera, x: np.ndarray) -> np.ndarray:
         optics, cells = self._optics(end), end.optics.cells
         return by_cell(spread(optics, self.grid, cells.points, self._margin).forward(x), cells, cells.points)
 
-    def _optics(self, seen: Sight) -> Optics:
+    def _optics(self, seen: SampledCamera) -> Optics:
         return replace(seen.optics, distance=seen.optics.camera.object_distance + self.dz)
 
     def _dark(self) -> np.ndarray:
@@ -98,14 +92,13 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         (ry, rx), (ny, nx) = cells.ring, cells.count
         return by_cell(plane, cells, cells.samples)[ry : ry + ny, rx : rx + nx]
 
-    def _blocks(self) -> Iterator["Lit"]:
+    def _blocks(self) -> Iterator["CellImages"]:
         spots = self._spots
         for k in range(0, len(spots), TOGETHER):
-            waves = [self._amid.waves(self._own, spot) for spot in spots[k : k + TOGETHER]]
-            yield Lit.of(self._own, waves, self._margin)
+            yield CellImages.of(self._own, spots[k : k + TOGETHER], self._margin)
 
     @cached_property
-    def _amid(self) -> PartImages:
+    def _amid(self) -> PointImages:
         """Of arrays around the points of one cell, as wide as their light is followed."""
         camera, finer = self.images.camera, SPARE * self.images.accuracy
         optics = Optics.of(camera, camera.object_distance + self.dz, finer)
@@ -118,17 +111,20 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         return replace(self.images, camera=own, pairs=tuple(zip(ends[::2], ends[1::2], strict=True)))
 
     @cached_property
-    def _own(self) -> Sight:
+    def _own(self) -> SampledCamera:
         """Before points of a cell amid."""
         middle = Points(np.array([[0.0, 0.0, self.dz]]), np.ones(1))
-        return self._amid.before(middle, fewest=NODES)[0]
+        beside = math.hypot(
+            *Optics.of(self.images.camera, self.images.camera.object_distance, SPARE).cells.size
+        )
+        return self._amid.before(middle, beside=beside)[0]
 
     @cached_property
     def _ends(self) -> list[Both]:
         return self._amid.ends(self._own)
 
     @cached_property
-    def _here(self) -> Sight:
+    def _here(self) -> SampledCamera:
         """Of the whole array, sampled alike."""
         own = Optics.of(self.images.camera, self._own.optics.distance, self._own.optics.fineness.accuracy)
         amid = self._own.optics.cells
@@ -140,14 +136,14 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         return self.images.ends(self._here)
 
     @cached_property
-    def _spots(self) -> list[Spot]:
-        return self._own.spots(self._lit(self._own))
+    def _spots(self) -> list[SourcePoint]:
+        return self._own.sources(self._lit(self._own))
 
     @cached_property
-    def _moved(self) -> list[Where | None]:
+    def _moved(self) -> list[Moved | None]:
         return [(self._lit(first), self._lit(last)) for first, last in self._ends]
 
-    def _lit(self, own: Sight) -> Points:
+    def _lit(self, own: SampledCamera) -> Points:
         """The points of the cell amid the array, each as bright as its part."""
         optics = self._optics(own)
         cells, camera = optics.cells, optics.camera
@@ -166,92 +162,92 @@ class PartPlane(CellPlane[Sight, "Lit"]):
         """Cells to which light comes from one."""
         far = []
         for k, middle in enumerate(middle_of(self._own)):
-            ends = [(middle - spot.cells[k].start, spot.cells[k].stop - 1 - middle) for spot in self._spots]
+            ends = [
+                (middle - spot.lit.cells[k].start, spot.lit.cells[k].stop - 1 - middle)
+                for spot in self._spots
+            ]
             far.append(max(map(max, ends)))
         return far[0], far[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lit(Block):
+class CellImages(Block):
     """Images of some points of the cell amid the array.
 
     Parameters
     ----------
-    waves
-        The points'.
-    samples
-        (y, x) of a cell.
+    own
+        The camera.
+    sources
+        The points.
     """
 
-    waves: list[Any]
-    samples: tuple[int, int]
+    own: SampledCamera
+    sources: list[SourcePoint]
 
     @classmethod
-    def of(cls, own: Sight, waves: list[Any], margin: tuple[int, int]) -> "Lit":
-        """Of points with others around the array, so many cells on all sides."""
-        spots = [one.spot for one in waves]
-        numbers = slice(spots[0].number, spots[-1].number + 1)
-        places = zip(margin, middle_of(own), _lit(spots), strict=True)
+    def of(cls, own: SampledCamera, sources: list[SourcePoint], margin: tuple[int, int]) -> "CellImages":
+        """Images of points with others around the array, so many cells on all sides."""
+        numbers = slice(sources[0].number, sources[-1].number + 1)
+        places = zip(margin, middle_of(own), _lit(sources), strict=True)
         y, x = (more + middle - lit.start for more, middle, lit in places)
-        found = cls(np.zeros(()), numbers, (y, x), waves, own.optics.cells.samples)
-        return found._with([one.spot.intensity * np.abs(one.field) ** 2 for one in waves])
+        found = cls(np.zeros(()), numbers, (y, x), own, sources)
+        return found._with([one.intensity * squared(own.own_field(one)[0]) for one in sources])
 
-    def changed(self, by: Callable[[Any], np.ndarray]) -> "Lit":
-        """Change of the images, by that of each field."""
-        return self._with([
-            2 * one.spot.intensity * np.real(one.field.conj() * by(one)) for one in self.waves
-        ])  # fmt: skip
+    def changed(self, by: Tangent) -> "CellImages":
+        """Change of the images."""
+        return self._with([one.intensity * by.intensity(one)[1] for one in self.sources])
 
     def of_each(self, kernel: np.ndarray) -> Iterator[np.ndarray]:
-        """What a kernel has of each point's image (y, x)."""
-        for k, waves in enumerate(self.waves):
-            tiles = kernel[(*self._inside(waves.spot), k)]
-            yield arrays.untiled(tiles.reshape(*tiles.shape[:2], *self.samples))
+        """Part of a kernel that is each point's image (y, x)."""
+        for k, source in enumerate(self.sources):
+            tiles = kernel[(*self._inside(source), k)]
+            yield arrays.untiled(tiles.reshape(*tiles.shape[:2], *self.own.optics.cells.samples))
 
-    def _with(self, images: Sequence[np.ndarray]) -> "Lit":
-        """With other images (y, x) of the points."""
-        size = [len(cells) for cells in self._cells]
-        kernel = np.zeros((*size, len(images), math.prod(self.samples)))
-        for k, (waves, image) in enumerate(zip(self.waves, images, strict=True)):
-            tiles = arrays.tiled(image, self.samples)
-            kernel[(*self._inside(waves.spot), k)] = tiles.reshape(*tiles.shape[:2], -1)
+    def _with(self, images: Sequence[np.ndarray]) -> "CellImages":
+        """The same with other images (y, x) of the points."""
+        size, samples = [len(cells) for cells in self._cells], self.own.optics.cells.samples
+        kernel = np.zeros((*size, len(images), math.prod(samples)))
+        for k, (source, image) in enumerate(zip(self.sources, images, strict=True)):
+            tiles = arrays.tiled(image, samples)
+            kernel[(*self._inside(source), k)] = tiles.reshape(*tiles.shape[:2], -1)
         return replace(self, kernel=kernel)
 
     @property
     def _cells(self) -> tuple[range, range]:
-        return _lit([waves.spot for waves in self.waves])
+        return _lit(self.sources)
 
-    def _inside(self, spot: Spot) -> tuple[slice, slice]:
+    def _inside(self, source: SourcePoint) -> tuple[slice, slice]:
         """The point's cells in the kernel."""
         y, x = (
             slice(mine.start - lit.start, mine.stop - lit.start)
-            for mine, lit in zip(spot.cells, self._cells, strict=True)
+            for mine, lit in zip(source.lit.cells, self._cells, strict=True)
         )
         return y, x
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Told:
-    """`whole_planes.Told` before a camera: slopes by points' waves."""
+class _BlockGradient:
+    """Slopes of a number by images of a cell's points; see `whole_planes`."""
 
-    by: ByWaves
+    by: Gradient
 
-    def add(self, block: Lit, asked: np.ndarray) -> None:
-        for waves, part in zip(block.waves, block.of_each(asked), strict=True):
-            self.by.add(waves, waves.spot.intensity * part * waves.field.conj())
+    def add(self, block: CellImages, asked: np.ndarray) -> None:
+        for source, part in zip(block.sources, block.of_each(asked), strict=True):
+            self.by.add(source, source.intensity * part)
 
     def along(self) -> np.ndarray:
         return self.by.along()
 
 
-def _lit(spots: Sequence[Spot]) -> tuple[range, range]:
+def _lit(spots: Sequence[SourcePoint]) -> tuple[range, range]:
     """Rows and columns that any of the points lights."""
-    some = [spot.cells for spot in spots]
+    some = [spot.lit.cells for spot in spots]
     y, x = (range(min(one[k].start for one in some), max(one[k].stop for one in some)) for k in (0, 1))
     return y, x
 
 
-def middle_of(own: Sight) -> tuple[int, int]:
+def middle_of(own: SampledCamera) -> tuple[int, int]:
     """Row and column of the image's cell that is amid the array."""
     y, x = (ring + n // 2 for ring, n in zip(own.optics.cells.ring, own.optics.cells.count, strict=True))
     return y, x

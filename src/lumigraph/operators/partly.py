@@ -16,12 +16,12 @@ from lumigraph.core.progress import Progress
 from lumigraph.core.threads import each
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import CameraOptics
-from lumigraph.operators.cell_response import MIDDLE
+from lumigraph.operators.lenslets.illuminated import on_lenslets
+from lumigraph.operators.lenslets.square import SquareLenslets
 from lumigraph.operators.let import Let
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.periodic import PeriodicOperator
-from lumigraph.operators.points import on_lenslets
-from lumigraph.operators.relay import Straight, relay
+from lumigraph.operators.relay import relay
 from lumigraph.operators.screens import OPEN, PARTLY, Screen, Shadow
 from lumigraph.operators.tiles import readout
 from lumigraph.scene import Points
@@ -232,9 +232,9 @@ class PartlyHidden:
             np.exp(self._turn * np.outer(at - m, self.pupil)).astype(np.complex64)
             for at, m in zip((y, x), middle, strict=True)
         )
-        if isinstance(self.relay, Straight):
-            down = self.relay.along(0, down[None], rows, MIDDLE)[0]
-            across = self.relay.along(1, across[None], columns, MIDDLE)[0]
+        if type(self.relay) is SquareLenslets:
+            down = self.relay.along(0, down, rows)
+            across = self.relay.along(1, across, columns)
             yield from down @ (waves @ across.T)
             return
         for wave in waves:

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from lumigraph.operators.lenslets.gradient import times
 from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.microscope_pupil_waves import Told as Sampled
 from lumigraph.operators.microscope_pupil_waves import Waves, of_each
-from lumigraph.operators.part_waves import times
 from lumigraph.operators.pupil_points import Both, Parts
 from lumigraph.operators.whole_planes import Block
 

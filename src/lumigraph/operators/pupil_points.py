@@ -19,6 +19,7 @@ import numpy as np
 from lumigraph.core.threads import single_products
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError
+from lumigraph.operators.lenslets.gradient import times
 from lumigraph.operators.microscope_cell import Lenslet
 from lumigraph.operators.microscope_pupil import PupilImages
 from lumigraph.operators.microscope_pupil_waves import (
@@ -29,7 +30,6 @@ from lumigraph.operators.microscope_pupil_waves import (
     sampling_matrix,
     window_of,
 )
-from lumigraph.operators.part_waves import times
 from lumigraph.scene import Points
 
 Place = tuple[Objective, Lenslet]

@@ -1,20 +1,18 @@
-r"""Images of points before a camera with lenslets, and how they change with whatever changes of it.
+r"""Images of points before a camera, and how they change with whatever changes of it.
 
 A point's light is a product of matrices, and a raw image what pixels take of its square,
 
-.. math:: I = R\,|U|^2, \quad U = A(E_y P E_x^T), \quad
-          \delta I = R\,2\,\mathrm{Re}(U^* \delta U) + \delta R\,|U|^2
+.. math:: I = R\,|U|^2, \quad U = A(E_y P E_x^T),
 
-with P the wave in the main lens, E phases of nodes there times those of places before the lenslets, and A
-the way past these, whose steps are each linear in a matrix (`passed`). How all matrices change with a length,
-the wavelength or a term of the phase is the difference of two cameras a little apart, sampled alike; all else
-is differentiated. What is made of the image is followed back to them once, so that each camera more
-costs no product of large matrices.
+with P the wave in the main lens, E phases of nodes there times those of places before the lenslets, and A the
+propagation through these. All of it is computed from a camera's numbers, by lines that an array library
+differentiates: derivatives are the numbers' slopes times their differences between two cameras a little
+apart. Images of points add up, so that each is followed back alone, once for all cameras.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -22,35 +20,19 @@ from lumigraph.core.threads import single_products
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics
-from lumigraph.operators.each import one_by_one
 from lumigraph.operators.fineness import COARSEST
-from lumigraph.operators.part_lens import LensSight
-from lumigraph.operators.part_sight import Sight, Spot
-from lumigraph.operators.part_waves import Both, ByPairs, Change, Waves, Where, read_anew
-from lumigraph.operators.point_changes import PUPIL
+from lumigraph.operators.lenslets.gradient import Both, Gradient, Moved, Tangent, read_anew
+from lumigraph.operators.lenslets.individual import one_by_one
+from lumigraph.operators.lenslets.sampled_camera import SPARE, SampledCamera, SourcePoint, sampled
+from lumigraph.operators.paraxial import is_possible
 from lumigraph.operators.seen import seen_points
 from lumigraph.scene import Points
 
 FINEST = 1e-3
-"""Accuracy that can be asked for: finer ones would need many samples across the main lens."""
+"""Finest accuracy of derivatives."""
 
 TOGETHER = 256
 """Points whose slopes, and all matrices that they see, are kept at a time."""
-
-Weighed = tuple[float, Both, Where | None]
-"""How many times from the first to the last of a pair, both, and where points are before them."""
-
-
-class Told(Protocol):
-    """Slopes of a number by what points' fields follow from."""
-
-    def add(self, waves: Any, by: np.ndarray) -> None:
-        """Those that come from slopes by the field of a point, without conjugates."""
-        ...
-
-    def along(self) -> np.ndarray:
-        """(n,), what they come to from the first to the last camera of each pair."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,29 +43,25 @@ class _Some:
     ----------
     own, ends
         The camera, which knows no others, and those of each pair.
-    spots, where
-        The points.
+    sources, moved
+        The points, and where they are before the cameras of each pair.
     x
         (k, points), how bright each is in each object.
     """
 
-    own: Sight
+    own: SampledCamera
     ends: list[Both]
-    spots: list[Spot]
-    where: list[Where | None]
+    sources: list[SourcePoint]
+    moved: list[Moved | None]
     x: np.ndarray
 
-    def weighed(self, change: Sequence[float]) -> list[Weighed]:
-        """So many times from the first to the last of each pair."""
-        return list(zip(change, self.ends, self.where, strict=True))
-
-    def bright(self, spot: Spot) -> np.ndarray:
+    def bright(self, source: SourcePoint) -> np.ndarray:
         """(k,), a point's light in each object."""
-        return spot.intensity * self.x[:, spot.number]
+        return source.intensity * self.x[:, source.number]
 
 
 @dataclass(frozen=True, eq=False)
-class PartImages:
+class PointImages:
     """How a camera sees points, with derivatives by what differs between pairs of cameras.
 
     Points shine as samples of the camera's own object grid, as `simulate` has them. Objects that are made
@@ -92,7 +70,7 @@ class PartImages:
     Parameters
     ----------
     camera
-        Paraxial, without lenslets or with some of any shape and focal lengths; squares of one may differ.
+        Without lenslets or with some of any shape and focal lengths; squares of one may differ.
     pairs
         (n,), cameras a little to either side of it: by a length, a term of the phase, the wavelength.
     accuracy
@@ -111,14 +89,14 @@ class PartImages:
     accuracy: float = 1e-2
 
     def __post_init__(self) -> None:
-        check_parts(self.camera, self.pairs, self.accuracy, require_paraxial)
+        check_cameras(self.camera, self.pairs, self.accuracy)
         camera, *ends = one_by_one((self.camera, *(end for pair in self.pairs for end in pair)))
         object.__setattr__(self, "camera", camera)
         object.__setattr__(self, "pairs", tuple(zip(ends[::2], ends[1::2], strict=True)))
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Of a raw image."""
+        """Shape of a raw image."""
         return self.camera.sensor.shape
 
     def forward(self, points: Points) -> np.ndarray:
@@ -141,8 +119,8 @@ class PartImages:
         own, *given = self.before(points)
         light = np.zeros((len(x), *own.shape))
         for some in self._some(own, given, x):
-            for spot in some.spots:
-                _add(light, some, spot, np.abs(self.waves(some.own, spot).field) ** 2)
+            for source in some.sources:
+                _add(light, some, source, squared(some.own.own_field(source)[0]))
         return np.stack([own.read.forward(one) for one in light])
 
     @single_products()
@@ -151,11 +129,10 @@ class PartImages:
         own, *given = self.before(points)
         light, moved = np.zeros((2, len(x), *own.shape))
         for some in self._some(own, given, x):
-            changed = self.changing(some.own, some.spots, some.weighed(change))
-            for spot in some.spots:
-                waves = self.waves(some.own, spot)
-                _add(light, some, spot, np.abs(waves.field) ** 2)
-                _add(moved, some, spot, 2 * np.real(waves.field.conj() * changed(waves)))
+            by = Tangent.of(some.own, list(zip(change, some.ends, some.moved, strict=True)), some.sources)
+            for source in some.sources:
+                for plane, one in zip((light, moved), by.intensity(source), strict=True):
+                    _add(plane, some, source, one)
         found = np.stack([own.read.forward(one) for one in moved])
         for weight, (low, high) in zip(change, self.ends(own), strict=True):
             if low.read is not high.read:
@@ -169,41 +146,39 @@ class PartImages:
         seen, light = np.stack([own.read.adjoint(one) for one in weights]), np.zeros((len(x), *own.shape))
         found = np.zeros(len(self.pairs))
         for some in self._some(own, given, x):
-            told = self.by_pairs(some.own, some.ends, some.where)
-            for spot in some.spots:
-                waves = self.waves(some.own, spot)
-                _add(light, some, spot, np.abs(waves.field) ** 2)
-                asked = np.tensordot(some.bright(spot), seen[(slice(None), *spot.window)], 1)
-                told.add(waves, asked * waves.field.conj())
-            found += told.along()
+            gradient = self.by_pairs(some.own, some.ends, some.moved)
+            for source in some.sources:
+                asked = np.tensordot(some.bright(source), seen[(slice(None), *source.window)], 1)
+                _add(light, some, source, gradient.add(source, asked))
+            found += gradient.along()
         for k, both in enumerate(self.ends(own)):
             found[k] += sum(read_anew(both, light[n], one) for n, one in enumerate(weights))
         return found
 
-    def _some(self, own: Sight, given: Sequence[Any], x: np.ndarray) -> Iterator[_Some]:
+    def _some(self, own: SampledCamera, given: Sequence[Any], x: np.ndarray) -> Iterator[_Some]:
         """Those that shine, a few at a time, by depth."""
         points, where = given
         order = np.argsort(points.positions[:, 2], kind="stable")
         order = order[x[:, order].any(0)]
         for k in range(0, len(order), TOGETHER):
-            kept, sight = order[k : k + TOGETHER], own.anew
+            kept, few = order[k : k + TOGETHER], own.anew if k else own
             moved = [one and (_only(one[0], kept), _only(one[1], kept)) for one in where]
-            yield _Some(sight, self.ends(sight), own.spots(_only(points, kept)), moved, x[:, kept])
+            yield _Some(few, self.ends(few), own.sources(_only(points, kept)), moved, x[:, kept])
 
-    def ends(self, own: Sight) -> list[Both]:
-        """Cameras of each pair."""
+    def ends(self, own: SampledCamera) -> list[Both]:
+        """Cameras of each pair, sampled as another."""
         return [(own.alike(_thin(first)), own.alike(_thin(last))) for first, last in self.pairs]
 
     def before(
-        self, points: Points, moved: Sequence[Where] | None = None, fewest: int = PUPIL
-    ) -> tuple[Sight, Points, list[Where | None]]:
+        self, points: Points, moved: Sequence[Moved] | None = None, beside: float = 0.0
+    ) -> tuple[SampledCamera, Points, list[Moved | None]]:
         """The camera before points, where its main lens sees these, and where those of each pair do.
 
-        Points that are `moved` are elsewhere before the cameras of each pair. Light is sampled by so many
-        nodes across the lens at least.
+        Points that are `moved` are elsewhere before the cameras of each pair. Others may be `beside` the
+        points [m in the lenslet plane].
         """
         camera, mine = seen_points(self.camera, points)
-        own = (Sight if camera.array else LensSight).of(camera, mine, self.accuracy, fewest)
+        own = sampled(camera).of(camera, mine, SPARE * self.accuracy, beside=beside)
         if moved is None and self.camera.objects is None:
             return own, mine, [None] * len(self.pairs)
         known = [(points, points)] * len(self.pairs) if moved is None else moved
@@ -216,20 +191,14 @@ class PartImages:
             ],
         )
 
-    def waves(self, own: Sight, spot: Spot) -> Any:
-        """A point's light on its way, whose `field` is on the samples (y, x)."""
-        return Waves.of(own, spot)
+    def by_pairs(self, own: SampledCamera, ends: Sequence[Both], moved: Sequence[Moved | None]) -> Gradient:
+        """Slopes of a number by all that points' light follows from, to changes between cameras of pairs."""
+        return Gradient(own, ends, moved)
 
-    def changing(
-        self, own: Sight, spots: Sequence[Spot], pairs: Sequence[Weighed]
-    ) -> Callable[[Any], np.ndarray]:
-        """Gives how the field of some points changes between cameras, by their light on its way."""
-        by = Change.of(own, pairs, spots)
-        return lambda waves: waves.changed(own, by)
 
-    def by_pairs(self, own: Sight, ends: Sequence[Both], moved: Sequence[Where | None]) -> Told:
-        """What takes slopes by such light, to changes between the cameras of pairs."""
-        return ByPairs(own, ends, moved)
+def squared(field: np.ndarray) -> np.ndarray:
+    """Intensity of a field."""
+    return field.real**2 + field.imag**2
 
 
 def _once(points: Points) -> np.ndarray:
@@ -240,9 +209,9 @@ def _only(points: Points, kept: np.ndarray) -> Points:
     return Points(points.positions[kept], points.intensities[kept])
 
 
-def _add(light: np.ndarray, some: _Some, spot: Spot, image: np.ndarray) -> None:
-    """What a point brings to the light (k, y, x) of each object."""
-    light[(slice(None), *spot.window)] += np.multiply.outer(some.bright(spot), image)
+def _add(light: np.ndarray, some: _Some, source: SourcePoint, image: np.ndarray) -> None:
+    """Adds what a point brings to the light (k, y, x) of each object."""
+    light[(slice(None), *source.window)] += np.multiply.outer(some.bright(source), image)
 
 
 def _thin(camera: CameraOptics) -> CameraOptics:
@@ -250,15 +219,13 @@ def _thin(camera: CameraOptics) -> CameraOptics:
     return replace(camera, objects=None)
 
 
-def check_parts(
-    camera: CameraOptics,
-    pairs: Sequence[tuple[CameraOptics, CameraOptics]],
-    accuracy: float,
-    require: Callable[[CameraOptics], None],
+def check_cameras(
+    camera: CameraOptics, pairs: Sequence[tuple[CameraOptics, CameraOptics]], accuracy: float
 ) -> None:
     """Refuse accuracies out of range, and cameras that are refused or have other numbers of parts."""
     if not FINEST <= accuracy <= COARSEST:
         raise SamplingError(f"accuracy is {accuracy:g} but must lie between {FINEST:g} and {COARSEST:g}.")
+    require: Callable[[CameraOptics], None] = require_exact if camera.model == "exact" else require_paraxial
     for one in (camera, *(end for pair in pairs for end in pair)):
         require(one)
         _require_as_many(one, camera)
@@ -283,6 +250,18 @@ def require_paraxial(camera: CameraOptics) -> None:
         raise GeometryError(
             "derivatives by a camera's parts are between cameras of one model, but one of a pair is exact "
             "and the camera itself is not. Use model = 'paraxial' for all, or 'exact'."
+        )
+
+
+def require_exact(camera: CameraOptics) -> None:
+    """Refuse cameras that are not exact as images of points are."""
+    array = camera.array
+    plain = array is not None and array.scatter is None and camera.objects is None
+    if not (plain and camera.model == "exact" and is_possible(camera)):
+        raise GeometryError(
+            "derivatives by a camera's parts with model = 'exact' are of square lenslets of one focal length "
+            "that are alike, behind a thin lens, and all cameras have that model. Leave over_field, "
+            "prescription and scatter out, or use model = 'paraxial' for all."
         )
 
 
