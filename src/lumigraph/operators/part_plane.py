@@ -114,9 +114,8 @@ class PartPlane(CellPlane[SampledCamera, "CellImages"]):
     def _own(self) -> SampledCamera:
         """Before points of a cell amid."""
         middle = Points(np.array([[0.0, 0.0, self.dz]]), np.ones(1))
-        beside = math.hypot(
-            *Optics.of(self.images.camera, self.images.camera.object_distance, SPARE).cells.size
-        )
+        camera, finer = self.images.camera, SPARE * self.images.accuracy
+        beside = math.hypot(*Optics.of(camera, camera.object_distance + self.dz, finer).cells.size)
         return self._amid.before(middle, beside=beside)[0]
 
     @cached_property

@@ -12,9 +12,10 @@ from lumigraph.operators import cells as _cells
 from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics, HasOptics
 from lumigraph.operators.fineness import COARSEST, FINEST
+from lumigraph.operators.lenslets.cameras import sampled
 from lumigraph.operators.lenslets.illuminated import amplitude, farthest, illuminated, on_lenslets
 from lumigraph.operators.lenslets.point_images import squared
-from lumigraph.operators.lenslets.sampled_camera import SPARE, sampled
+from lumigraph.operators.lenslets.sampled_camera import SPARE
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.relay import Relay, Relays, relay
 from lumigraph.operators.seen import seen_points

@@ -11,7 +11,7 @@ from typing import Any, Protocol, cast
 import numpy as np
 
 from lumigraph.operators.camera import CameraOptics
-from lumigraph.operators.lenslets.sampled_camera import lenslets_of
+from lumigraph.operators.lenslets.models import lenslets_of
 from lumigraph.operators.optics import Optics
 
 _KEPT = 8

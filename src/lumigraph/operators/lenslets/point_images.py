@@ -21,9 +21,10 @@ from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators import varying
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.fineness import COARSEST
+from lumigraph.operators.lenslets.cameras import sampled
 from lumigraph.operators.lenslets.gradient import Both, Gradient, Moved, Tangent, read_anew
 from lumigraph.operators.lenslets.individual import one_by_one
-from lumigraph.operators.lenslets.sampled_camera import SPARE, SampledCamera, SourcePoint, sampled
+from lumigraph.operators.lenslets.sampled_camera import SPARE, SampledCamera, SourcePoint
 from lumigraph.operators.paraxial import is_possible
 from lumigraph.operators.seen import seen_points
 from lumigraph.scene import Points

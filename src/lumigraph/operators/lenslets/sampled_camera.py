@@ -24,6 +24,7 @@ from lumigraph.operators.lenslets.illuminated import (
     on_lenslets,
     share,
 )
+from lumigraph.operators.lenslets.models import lenslets_of
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.tiles import readout
 from lumigraph.scene import Points
@@ -316,27 +317,3 @@ def reach_of(camera: CameraOptics) -> float:
 def lens_before(camera: CameraOptics, *field: float) -> Train:
     """Main lens as it is at a field (y, x), turned with the lenslets."""
     return _cells.lens(varying.at(camera, *field) if field else camera)
-
-
-def sampled(camera: CameraOptics) -> type[SampledCamera]:
-    """Kind of sampling that a camera's images of points need."""
-    from lumigraph.operators.lenslets.exact_camera import ExactSampledCamera
-    from lumigraph.operators.lenslets.no_lenslets import FilmCamera
-
-    if camera.array is None:
-        return FilmCamera
-    return ExactSampledCamera if camera.model == "exact" else SampledCamera
-
-
-def lenslets_of(optics: Optics, precision: type[np.complexfloating] = np.complex64, like: Any = None) -> Any:
-    """Light in the lenslet plane to light on the image, in the frame that turns with the lenslets."""
-    from lumigraph.operators.lenslets.any_shape import AnyShape
-    from lumigraph.operators.lenslets.exact_square import ExactSquareLenslets
-    from lumigraph.operators.lenslets.individual import IndividualLenslets
-    from lumigraph.operators.lenslets.square import SquareLenslets
-
-    if optics.array.scatter is not None:
-        return IndividualLenslets(optics, precision, like)
-    if optics.camera.model == "exact":
-        return ExactSquareLenslets(optics, precision, like)
-    return (SquareLenslets if optics.straight else AnyShape)(optics, precision, like)
