@@ -10,7 +10,7 @@ import cameras
 from lumigraph.core.cache import Budget, ByteCache
 from lumigraph.errors import SamplingError
 from lumigraph.instruments import PlenopticCamera
-from lumigraph.operators.lenslets import lenslet_light, point_images, point_subset
+from lumigraph.operators.lenslets import cell_images, lenslet_light, point_subset
 from lumigraph.operators.periodic import blocks, factors, kernels
 from lumigraph.operators.periodic.border_correction import BorderCorrection
 from lumigraph.operators.periodic.kernels import matrix
@@ -67,7 +67,7 @@ def test_mirrored_blocks_are_those_computed_one_by_one(layout, monkeypatch):
     monkeypatch.setattr(Optics, "reach", (2, 2))
     monkeypatch.setattr(Optics, "near", (1, 1))
     folded = whole(kernels._unpacked(kernels._build(optics), optics))
-    monkeypatch.setattr(point_images.LensletPlaneWave, "even", (False, False))
+    monkeypatch.setattr(cell_images.LensletPlaneWave, "even", (False, False))
     assert difference(folded, whole(kernels._unpacked(kernels._build(optics), optics))) < 1e-4
 
 
@@ -225,10 +225,10 @@ def test_a_faint_block_has_no_factors(rng):
 def test_a_mirrored_factor_is_the_plane_turned_over(rng):
     factor = rng.random((12, 2))
     plane = factor.reshape(3, 4, 2)
-    turned = point_images.mirrored(factor, (3, 4), True, False).reshape(3, 4, 2)
+    turned = cell_images.mirrored(factor, (3, 4), True, False).reshape(3, 4, 2)
     np.testing.assert_array_equal(turned, plane[::-1])
     np.testing.assert_array_equal(
-        point_images.mirrored(factor, (3, 4), False, True).reshape(3, 4, 2), plane[:, ::-1]
+        cell_images.mirrored(factor, (3, 4), False, True).reshape(3, 4, 2), plane[:, ::-1]
     )
 
 

@@ -7,8 +7,9 @@ import pytest
 
 import lumigraph as lg
 from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.operators.lenslets.illuminated import share
 from lumigraph.operators.lenslets.point_changes import place_changes
-from lumigraph.operators.lenslets.points import points_image, share
+from lumigraph.operators.lenslets.points import points_image
 from lumigraph.operators.lenslets.relay import RelaySet
 from lumigraph.operators.sampling.optics import Optics
 from lumigraph.scene import Points

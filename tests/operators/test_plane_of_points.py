@@ -13,8 +13,8 @@ from tests.operators.test_part_images import camera, off, pair, peak
 import lumigraph as lg
 from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError, SamplingWarning
-from lumigraph.operators import single_lens
-from lumigraph.operators.lenslets import part_images, plane_of_points
+from lumigraph.operators import part_images, single_lens
+from lumigraph.operators.lenslets import plane_of_points
 from lumigraph.operators.lenslets.film_plane import FilmPlane
 from lumigraph.operators.lenslets.part_leaning import TiltedImages
 from lumigraph.operators.lenslets.part_plane import PartPlane
