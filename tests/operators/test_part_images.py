@@ -7,9 +7,9 @@ import pytest
 
 import lumigraph as lg
 from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.operators.lenslets.illuminated import share
 from lumigraph.operators.optics import Optics
 from lumigraph.operators.point_changes import place_changes
-from lumigraph.operators.lenslets.illuminated import share
 from lumigraph.operators.points import points_image
 from lumigraph.operators.relay import Relays
 from lumigraph.scene import Points

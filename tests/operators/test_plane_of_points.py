@@ -15,8 +15,9 @@ from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError, SamplingWarning
 from lumigraph.information import Light
 from lumigraph.information.points import collected
-from lumigraph.operators import part_images, plane_of_points, single_lens
+from lumigraph.operators import plane_of_points, single_lens
 from lumigraph.operators.film_plane import FilmPlane
+from lumigraph.operators.lenslets import point_images as part_images
 from lumigraph.operators.part_leaning import LeaningParts
 from lumigraph.operators.part_plane import PartPlane
 from lumigraph.operators.plane_of_points import PlaneOfPoints

@@ -92,10 +92,11 @@ class PartPoints:
 
     def _see_anew(self, number: int, brighter: float, light: np.ndarray, given: np.ndarray) -> None:
         """Adds what a point's brightness and what pixels take of the light bring."""
-        for k, (both, where) in enumerate(zip(self._ends, self.moved, strict=True)):
+        for k, where in enumerate(self.moved):
             low, high = (points.intensities[number] for points in where)
             self._found[k] += brighter * (high - low)
-            self._found[k] += sum(read_anew(both, *pair) for pair in zip(light, given, strict=True))
+        for plane, slopes in zip(light, given, strict=True):
+            self._found += read_anew(self._own, self._ends, plane, slopes)
 
     def _source(self, number: int) -> SourcePoint:
         return self._sources[number]

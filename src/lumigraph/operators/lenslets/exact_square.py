@@ -252,7 +252,8 @@ class ExactSquareLenslets:
         """Amplitudes (..., terms, samples, n) along one axis of light (..., 1 or terms, places, n)."""
         side = self._sides[which]
         parts = [
-            matrix(which, number) @ light[..., side.window(number), :] for number in range(len(cells[which]))
+            matrix(which, number) @ xp.part(light, (window := side.window(number)).start, window.stop, -2)
+            for number in range(len(cells[which]))
         ]
         return xp.concatenate(parts, -2)
 

@@ -9,6 +9,7 @@ from lumigraph.elements import Train
 from lumigraph.operators import cells as _cells
 from lumigraph.operators.camera import CameraOptics
 from lumigraph.operators.lenslets import main_lens
+from lumigraph.operators.lenslets.array_libraries import NUMPY
 from lumigraph.operators.optics import Optics
 
 LEFT_OUT = 0.3
@@ -66,7 +67,7 @@ def amplitude(
     grid = main_lens.pupil_grid(
         camera, main_lens.samples_across(camera, spread, slack), _cells.stop_reach(lens)
     )
-    wave = main_lens.wave(camera, lens, distance, grid)
+    wave = main_lens.wave(NUMPY, main_lens.wave_numbers(camera, lens, distance, grid))
     turn = -2j * np.pi / (camera.wavelength * camera.separation)
     near = [np.flatnonzero(np.abs(at) <= widest) for at in places]
     down, across = (np.exp(turn * np.outer(at[mine], grid.y)) for at, mine in zip(places, near, strict=True))
