@@ -26,7 +26,7 @@ class ExactSampledCamera(SampledCamera):
     """An exact camera with lenslets before points."""
 
     def numbers(self, source: SourcePoint) -> dict[str, Any]:
-        """Numbers that a point's light follows from: phases of places, directions, the stop's and its edge's."""
+        """Numbers that a point's light follows from: of places, directions, the stop and its edge."""
         light = self._oblique(source)
         nodes, _ = interpolated(SMOOTH)
         y, x = ((d[-1] + d[0]) / 2 + (d[-1] - d[0]) / 2 * nodes for d in light.directions)

@@ -83,7 +83,7 @@ def followed_to(camera: CameraOptics, lens: Train, distance: float, accuracy: fl
 
 
 def illuminated(optics: Optics, lens: Train, place: np.ndarray) -> IlluminatedCells:
-    """Cells that all but `LEFT_OUT` of the accuracy of a point's light lies in, imaged at a place (2,) [m]."""
+    """Cells that all but `LEFT_OUT` of the accuracy of a point's light lies in, imaged at (2,) [m]."""
     widest = min(
         farthest(optics, place[None]),
         followed_to(optics.camera, lens, optics.distance, optics.fineness.accuracy),

@@ -79,10 +79,17 @@ def one_by_one(cameras: Sequence[CameraOptics]) -> list[CameraOptics]:
         found.append((camera, array, scatter))
     moved = [one.index for *_, scatter in found for one in scatter.own if one.aside is not None]
     named = {one.index: one.index in moved for *_, scatter in found for one in scatter.own}
+    kept = [array.scatter is scatter and _names(scatter, named) for _, array, scatter in found]
     return [
-        replace(camera, array=replace(array, scatter=scatter.naming(named)))
-        for camera, array, scatter in found
+        camera if same else replace(camera, array=replace(array, scatter=scatter.naming(named)))
+        for same, (camera, array, scatter) in zip(kept, found, strict=True)
     ]
+
+
+def _names(scatter: Scatter, lenslets: dict[tuple[int, int], bool]) -> bool:
+    """Whether a scatter names these lenslets in order, and says where those stand that are marked."""
+    own = [(one.index, one.aside is not None) for one in scatter.own]
+    return own == sorted(lenslets.items())
 
 
 def bright_ones(bright: np.ndarray, accuracy: float) -> list[int]:

@@ -2,8 +2,8 @@ r"""Wave of a point of light in the main lens, on few samples across it, however
 
 Light near the image follows from samples of the wave if these stand close enough, but a stop's sharp edge has
 all frequencies: samples that are grey in proportion to their open area are right to first order in their
-pitch h alone. Here the stop's edge is smoothed by a kernel whose spectrum is 1 wherever light is followed, and
-0 where the samples' spectrum repeats, so that no sampling error is left (`band` has it along one axis). What a
+pitch alone. Here the stop's edge is smoothed by a kernel whose spectrum is 1 wherever light is followed, and 0
+where the samples' spectrum repeats, so that no sampling error is left (`band` has it along one axis). What a
 stop of radius R lets through at a distance r from its middle is
 
 .. math:: g(r) = 2\pi R \int \hat K(u) \, J_1(2\pi R u) \, J_0(2\pi r u) \, du.
@@ -186,8 +186,8 @@ def pupil_grid(camera: CameraOptics, samples: int, reach: float = 1.0) -> Grid:
 def wave_numbers(camera: CameraOptics, lens: Train, distance: float, grid: Grid) -> dict[str, Any]:
     """Numbers that the wave of a point in the main lens follows from; see `wave`.
 
-    Its strength, the stop (y, x), aberrations (y, x) [rad], and the defocus at a distance of a sample [rad]. The
-    wave is of light of 1 behind a round stop of the camera's diameter.
+    Its strength, the stop (y, x), aberrations (y, x) [rad], and the defocus at a distance of a sample [rad].
+    The wave is of light of 1 behind a round stop of the camera's diameter.
     """
     squared, half = camera.wavelength * camera.separation, camera.pupil_diameter / 2
     light = math.prod(grid.pitch) / (squared * math.sqrt(math.pi) * half)

@@ -228,7 +228,7 @@ class SampledCamera:
         return (turn * (y - place[0]), grid.y), (turn * (x - place[1]), grid.x)
 
     def moves(self, source: SourcePoint) -> list[Phase]:
-        """Phases in the main lens as a point moves by y, x and dz, sums of one along y and one along x [rad/m].
+        """Phases in the main lens as a point moves by y, x and dz, one along y plus one along x [rad/m].
 
         How much light a sample of the object stands for, by its depth, stays as it is.
         """
