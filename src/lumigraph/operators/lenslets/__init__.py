@@ -4,7 +4,7 @@ One chain of pure steps. Sampling is decided once from plain numbers; all else a
 camera's numbers, with nothing written in place, by the functions of an array library.
 
 - `array_libraries`: the functions that the chain calls, NumPy's or autograd's, and derivatives by these
-- `illuminated`: cells that a point lights; `sampled_camera`, how finely all is sampled, and its numbers before
+- `illuminated`: cells that a point lights; `sampled_camera`, how finely all is sampled before
   a point; `exact_camera`, beyond the paraxial; `no_lenslets`; `cameras`, which of them a camera is
 - `main_lens`: the wave in the main lens, whose stop is sampled with smooth edges
 - lenslets: `square`, alike; `individual`, each its own; `any_shape`, by `line_matrices`; `exact_square`, beyond
